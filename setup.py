@@ -3,7 +3,6 @@
 Name, commands and dependencies for pip are in pyproject.toml, all else of the package in package.xml.
 """
 
-import os
 import shutil
 from pathlib import Path
 from xml.etree import ElementTree
@@ -21,11 +20,11 @@ DATA = {
 
 
 class BuildWithData(build_py):
-    """Puts the data beside the modules, for a wheel: catkin installs it where ROS looks for it."""
+    """Puts the data beside the installed modules; catkin installs it also where ROS looks for it."""
 
     def run(self) -> None:
         super().run()
-        if self.editable_mode or "CATKIN_BINARY_DIR" in os.environ:
+        if self.editable_mode:
             return
         for pattern, place in DATA.items():
             folder = Path(self.build_lib, place)

@@ -20,7 +20,7 @@ from stable_baselines3 import DQN
 
 from rl_workbench.starting import Interrupt
 from rl_workbench.training.algorithms import algorithm
-from rl_workbench.training.command_line import choose
+from rl_workbench.training.train import choose
 from rl_workbench.training.training import Training
 
 ENV_ID = "CartPole-v1"

@@ -21,7 +21,7 @@ import reporting
 import cartpole  # noqa: F401 - registers the environments
 from rl_workbench.starting import Interrupt
 from rl_workbench.training.algorithms import algorithm
-from rl_workbench.training.command_line import choose
+from rl_workbench.training.train import choose
 from rl_workbench.training.training import Training
 
 FLAGS = ["--env-id=cartpole/Balance-v0", "--train-env-kwargs=backend=ros-own", "--stop-at-length=0",

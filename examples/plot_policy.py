@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import torch
 
 from rl_workbench.plotting import as_png, new_figure
 from rl_workbench.tools.policies import TEST_SEED, episode_steps, load_learned
@@ -52,6 +53,16 @@ PLANES = {
 }
 
 
+@torch.no_grad()
+def preference(network: torch.nn.Module, observations: np.ndarray) -> np.ndarray:
+    """Returns the action, or how much the score of the last one is above that of the first: (N,)."""
+    seen = torch.from_numpy(observations)
+    if not hasattr(network, "scores"):
+        return network(seen)[:, 0].numpy()
+    scores = network.scores(seen)
+    return (scores[:, -1] - scores[:, 0]).numpy()
+
+
 def main(folder: Path, out: Path) -> None:
     run = open_run(folder)
     plane = PLANES[run.env_id.rpartition(":")[2]]
@@ -60,7 +71,8 @@ def main(folder: Path, out: Path) -> None:
     angles = np.linspace(-plane.angle, plane.angle, POINTS)
     velocities = np.linspace(-plane.velocity, plane.velocity, POINTS)
     across, up = np.meshgrid(angles, velocities)
-    values = policy.preference(plane.observe(across.ravel(), up.ravel())).reshape(across.shape)
+    values = preference(policy.network, plane.observe(across.ravel(), up.ravel()))
+    values = values.reshape(across.shape)
     steps = episode_steps(policy.env, policy.act, TEST_SEED, MAX_STEPS)
     visited = np.array([plane.locate(step.observation) for step in steps]) * (180 / math.pi, 1.0)
     policy.env.close()
@@ -71,7 +83,7 @@ def main(folder: Path, out: Path) -> None:
     strongest = max(float(np.percentile(np.abs(values), 95)), 1e-9)
     mesh = axes.pcolormesh(np.degrees(angles), velocities, values, cmap="RdBu_r", vmin=-strongest,
                            vmax=strongest, shading="auto", rasterized=True)  # fmt: skip
-    figure.colorbar(mesh, ax=axes, label=f"{policy.meaning}: red pushes right, blue left")
+    figure.colorbar(mesh, ax=axes, label="red pushes right, blue left")
     if values.min() < 0.0 < values.max():
         axes.contour(np.degrees(angles), velocities, values, levels=[0.0], colors="black")
     # When the pole swings through the bottom, its angle jumps between the edges; NaN breaks the line.

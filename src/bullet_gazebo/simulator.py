@@ -63,7 +63,7 @@ class Simulator:
         self._robots_of: dict[Model, list[ControlledRobot]] = {}
         self._robots_version = 0
         self.applied = AppliedForces()
-        # Called with `now` before each physics step.
+        # Called with `now` before each physics step, under the lock: topics, plugins and, later, sensors.
         self.listeners: list[Callable[[int], None]] = []
         # What sends messages after the ticks, and whether those who step the world call them.
         self.outboxes: list[Outbox] = []

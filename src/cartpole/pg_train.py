@@ -12,11 +12,10 @@ from cartpole import NAMESPACE
 from cartpole.workbench import PROGRAM, ros_options
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import Options, check_options, option
-from rl_workbench.starting import Interrupt, reader_may_go
-from rl_workbench.training.command_line import USAGE, choose_training, flag
+from rl_workbench.starting import Interrupt, run_command
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.progress import tell
-from rl_workbench.training.train import run_training, shown
+from rl_workbench.training.train import USAGE, choose_training, flag, page_of, run_training
 from robot_envs.backends import has_ros, need_ros
 from robot_envs.errors import RobotEnvError
 
@@ -66,43 +65,26 @@ ROBOT_OPTIONS = Options(RobotOptions)
 _ANYWHERE = (False, 0.0, "bullet")  # values that suit every environment
 
 
-@reader_may_go()
 def main(argv: list[str] | None = None) -> int:
     """Runs the command line; returns the process's exit code."""
-    argv = sys.argv[1:] if argv is None else argv
-    interrupt = Interrupt().install()
-    try:
-        flags, parameters, name = ros_options(argv, NODE)
+    words = sys.argv[1:] if argv is None else argv
+
+    def command(interrupt: Interrupt) -> None:
+        flags, parameters, name = ros_options(words, NODE)
         options, robot = choose(flags, parameters)
+        over_ros = needs_session(options)
+        # A single robot over ROS is shown in its simulator's window.
+        in_window = over_ros and options.run.num_envs == 1
+        callbacks = [] if in_window else page_of(options, PROGRAM)
         with contextlib.ExitStack() as beside:
 
             def begin(folder: Path) -> None:
-                over_ros = needs_session(options)
                 if over_ros:
-                    beside.enter_context(session(options, name, argv, robot, folder))
-                # A single robot over ROS is shown in its simulator's window.
-                if not over_ros or options.run.num_envs > 1:
-                    beside.enter_context(shown(options, folder, PROGRAM))
+                    beside.enter_context(session(options, name, words, robot, folder))
 
-            try:
-                run_training(options, interrupt, begin)
-            except (
-                WorkbenchError
-            ) as error:  # printed before the session closes, which may take long
-                return _failed(error, interrupt)
-        return interrupt.exit_code
-    except (WorkbenchError, RobotEnvError) as error:
-        return _failed(error, interrupt)
-    except KeyboardInterrupt:
-        print(f"{PROG}: interrupted before the training began", file=sys.stderr)
-        return interrupt.exit_code or 130
-    finally:
-        interrupt.defer()
+            run_training(options, interrupt, begin, callbacks)
 
-
-def _failed(error: Exception, interrupt: Interrupt) -> int:
-    print(f"{PROG}: {error}", file=sys.stderr, flush=True)
-    return interrupt.exit_code or 1
+    return run_command(PROG, command, RobotEnvError)
 
 
 def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOptions, RobotOptions]:

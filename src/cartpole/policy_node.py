@@ -13,7 +13,7 @@ from gymnasium import spaces
 
 from cartpole.workbench import ros_options
 from rl_workbench.errors import WorkbenchError, error_line
-from rl_workbench.starting import Interrupt, reader_may_go
+from rl_workbench.starting import Interrupt, run_command
 from rl_workbench.tools.flags import WHICH, env_options, number
 from rl_workbench.tools.policies import load_learned
 from rl_workbench.tools.runs import open_run
@@ -49,13 +49,12 @@ class Deployed(NamedTuple):
     period: float  # [s], control period
 
 
-@reader_may_go()
 def main(argv: list[str] | None = None) -> int:
     """Runs the command line; returns the process's exit code."""
-    argv = sys.argv[1:] if argv is None else argv
-    interrupt = Interrupt().install()
-    try:
-        flags, parameters, name = ros_options(argv, NODE)
+    words = sys.argv[1:] if argv is None else argv
+
+    def command(interrupt: Interrupt) -> None:
+        flags, parameters, name = ros_options(words, NODE)
         arguments = parse(flags, parameters)
         need_ros("it")
         with interrupt.reading():
@@ -72,14 +71,9 @@ def main(argv: list[str] | None = None) -> int:
             return PolicyNode(robot, task, act, period, late, seed, goal, way)
 
         with _errors_in_one_line():
-            run_node(name, argv, make, interrupt.requested)
-        return interrupt.exit_code
-    except (WorkbenchError, RobotEnvError) as error:
-        print(f"{NODE}.py: {error}", file=sys.stderr, flush=True)
-        return interrupt.exit_code or 1
-    except KeyboardInterrupt:
-        print(f"{NODE}.py: interrupted", file=sys.stderr)
-        return interrupt.exit_code or 130
+            run_node(name, words, make, interrupt.requested)
+
+    return run_command(f"{NODE}.py", command, RobotEnvError)
 
 
 @contextlib.contextmanager

@@ -1,25 +1,69 @@
 """The command workbench.py: rl_workbench's command line, with all environments of this project."""
 
+import contextlib
 import os
+import random
+import shlex
+import socket
 import sys
 from pathlib import Path
 from typing import Any
 
 import robot_envs.robots  # noqa: F401 - registers its environments, as importing cartpole does its own
-from rl_workbench import cli
-from rl_workbench.starting import program
+from rl_workbench import cli, errors
+from rl_workbench.starting import JOB, program
 from robot_envs.backends import need_ros
 from robot_envs.errors import RobotEnvError
 
 PROGRAM = program("cartpole.workbench")  # this module, since it registers the same environments
+# Below the kernel's ephemeral range, so that no other process gets the port before it is used.
+MASTER_PORTS = range(30000, 32768)
 REMAPPING = ":="  # in every argument of ROS's: __name:=pg_train, _gamma:=0.9, old:=new
+
+
+class WorkspaceHints(errors.Hints):
+    """The commands that texts recommend, by way of `ws`.
+
+    Args:
+        workspace: the path of `ws`.
+    """
+
+    def __init__(self, workspace: str) -> None:
+        self._workspace = workspace
+        self.extras = shlex.join([workspace, "extras"])
+
+    def finding_modules(self) -> str:
+        return f"{shlex.quote(self._workspace)} --with FOLDER ... finds those in FOLDER"
+
+    def watching(self, folder: Path) -> str:
+        return shlex.join([self._workspace, "tensorboard", "--logdir", str(folder)])
+
+    def replaying(self, folder: Path) -> str:
+        folders = filter(None, os.environ.get("CARTPOLE_WITH", "").split(":"))
+        # Each where it really is: ws may name a link.
+        found = [word for each in folders for word in ("--with", os.path.realpath(each))]
+        command = [self._workspace, *found, "rosrun", "cartpole", "workbench.py"]
+        return shlex.join([*command, "view", str(folder)])
+
+
+if "CARTPOLE_WS" in os.environ:  # ws sets it to its own path
+    errors.hints = WorkspaceHints(os.environ["CARTPOLE_WS"])
 
 
 def main(argv: list[str] | None = None) -> int:
     """Runs the command line; returns the process's exit code."""
+    if os.environ.get(JOB):  # environments over ROS may start a master
+        os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{_free_port()}"
     argv = sys.argv[1:] if argv is None else argv
     plain = [each for each in argv if not (each.startswith("__") and ":=" in each)]  # roslaunch's
     return cli.main(plain, Path(sys.argv[0]).name, PROGRAM)
+
+
+def _free_port() -> int:
+    for port in random.SystemRandom().sample(MASTER_PORTS, len(MASTER_PORTS)):
+        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            return port
+    raise RobotEnvError("no port is free for the training's own simulation")
 
 
 def ros_options(argv: list[str], default_name: str) -> tuple[list[str], dict[str, Any], str]:

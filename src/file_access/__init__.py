@@ -5,7 +5,7 @@ A leaf: it imports nothing of this repository, no ROS and no engine, and may be 
 - `content`: reads a regular file within a bound of bytes.
 - `xml_text`, `yaml_text`: parse text of any encoding, however large or nested it would become.
 - `text`: one line for an error, and the name that was meant.
-- `locks`: one process at a time in a folder or file.
+- `locks`: one process at a time in a folder.
 """
 
 __all__ = ["content", "locks", "text", "xml_text", "yaml_text"]

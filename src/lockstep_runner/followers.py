@@ -18,6 +18,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from lockstep_runner import originals
 from lockstep_runner.clock import Others
 from lockstep_runner.line import ADDRESS, Line, LineEnded
@@ -77,24 +79,14 @@ class StartedProcesses:
 
 def _below() -> dict[int, tuple[str, int]]:
     """Returns state and processor time [ticks] of each living descendant, by process id."""
-    parents: dict[int, tuple[int, str, int]] = {}
-    for entry in os.listdir("/proc"):
-        look = look_at(Path("/proc", entry)) if entry.isdigit() else None
-        if look is not None:
-            parents[int(entry)] = look
-    below = {os.getpid()}
-    grown = True
-    while grown:
-        more = {pid for pid, (parent, _, _) in parents.items() if parent in below} - below
-        below |= more
-        grown = bool(more)
-    below.discard(os.getpid())
-    return {pid: parents[pid][1:] for pid in below if parents[pid][1] != "Z"}
+    children = psutil.Process().children(recursive=True)
+    looks = {child.pid: look_at(Path("/proc", str(child.pid))) for child in children}
+    return {pid: look for pid, look in looks.items() if look is not None and look[0] != "Z"}
 
 
 def _name(pid: int) -> str:
-    with contextlib.suppress(OSError):
-        return Path(f"/proc/{pid}/comm").read_text().strip()
+    with contextlib.suppress(psutil.Error):
+        return str(psutil.Process(pid).name())
     return "ended"
 
 

@@ -27,16 +27,16 @@ class Seen:
         if originals.monotonic() >= self._next:
             self._next = originals.monotonic() + LOOK
             look = look_at(self._place)
-            works = look is not None and (look[1] in WORKING or look[2] != self._used)
+            works = look is not None and (look[0] in WORKING or look[1] != self._used)
             self._quiet = 0 if works else self._quiet + 1
-            self._used = look[2] if look else -1
+            self._used = look[1] if look else -1
         return self._quiet >= self._looks
 
 
-def look_at(place: Path) -> tuple[int, str, int] | None:
-    """Returns parent id, state and processor time [ticks] of a process or thread, None if it has ended."""
+def look_at(place: Path) -> tuple[str, int] | None:
+    """Returns state and processor time [ticks] of a process or thread, None if it has ended."""
     try:
         fields = Path(place, "stat").read_text().rpartition(") ")[2].split()
     except OSError:
         return None
-    return int(fields[1]), fields[0], int(fields[11]) + int(fields[12])
+    return fields[0], int(fields[11]) + int(fields[12])

@@ -9,7 +9,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Collection, Sequence
-from typing import Concatenate, NoReturn, ParamSpec, TypeVar
+from typing import Any, NoReturn, TypeVar, cast
 
 import rospy
 
@@ -34,20 +34,15 @@ class BadPeriod(Exception):
     """The period at a trigger is no whole number of physics steps; the text gives both."""
 
 
-Answer = TypeVar("Answer")
-Options = ParamSpec("Options")
+Method = TypeVar("Method", bound=Callable[..., Any])
 
 
-def _ends_with_the_world(
-    instead: Answer,
-) -> Callable[[Callable[Concatenate[ScriptRunner, Options], Answer]], Callable[..., Answer]]:
+def _ends_with_the_world(instead: bool | None) -> Callable[[Method], Method]:
     """Makes a method return `instead` once the simulator has ended, and end the script if it failed."""
 
-    def decorate(
-        method: Callable[Concatenate[ScriptRunner, Options], Answer],
-    ) -> Callable[..., Answer]:
+    def decorate(method: Method) -> Method:
         @functools.wraps(method)
-        def guarded(self: ScriptRunner, *args: Options.args, **kwds: Options.kwargs) -> Answer:
+        def guarded(self: ScriptRunner, *args: Any, **kwds: Any) -> Any:
             try:
                 return method(self, *args, **kwds)
             except WorldGone as gone:
@@ -59,7 +54,7 @@ def _ends_with_the_world(
             except (RunsByItself, WorldFailed) as fault:
                 self.fail(fault)
 
-        return guarded
+        return cast(Method, guarded)
 
     return decorate
 

@@ -129,6 +129,7 @@ LIBRARIES = frozenset(
         "multiprocess",
         "numpy",
         "optuna",
+        "psutil",
         "pybullet",
         "ray",
         "rl_workbench",

@@ -5,9 +5,8 @@ import sys
 from importlib import import_module
 from typing import Any
 
-from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import unknown
-from rl_workbench.starting import Interrupt, reader_may_go
+from rl_workbench.starting import Interrupt, run_command
 from rl_workbench.training import train as training
 
 PROG = "rl-workbench"
@@ -35,35 +34,28 @@ COMMANDS = {
 }
 
 
-@reader_may_go()
 def main(
     argv: list[str] | None = None, prog: str = PROG, program: tuple[str, ...] = training.PROGRAM
 ) -> int:
     """Runs the command line; returns the process's exit code.
 
     Args:
-        prog: the command's name, for --help and errors.
-        program: how it is started, for trainings in processes of their own.
+        argv: The arguments.
+        prog: The command's name, for --help and errors.
+        program: Starts this command line, for trainings in processes of their own.
     """
-    argv = sys.argv[1:] if argv is None else argv
-    if argv[:1] == [TRAIN]:  # its flags depend on the algorithm
-        return training.main(argv[1:], prog=f"{prog} {TRAIN}", program=program)
-    interrupt = Interrupt().install()
-    try:
+    words = sys.argv[1:] if argv is None else argv
+    if words[:1] == [TRAIN]:  # its flags depend on the algorithm
+        return training.main(words[1:], prog=f"{prog} {TRAIN}", program=program)
+
+    def command(interrupt: Interrupt) -> None:
         with interrupt.reading():
-            arguments = parse(argv, prog)
-            command = _module(arguments.command)
+            arguments = parse(words, prog)
+            module = _module(arguments.command)
         arguments.program = program
-        command.run(arguments, interrupt)
-        return interrupt.exit_code
-    except WorkbenchError as error:
-        print(f"{prog}: {error}", file=sys.stderr, flush=True)
-        return interrupt.exit_code or 1
-    except KeyboardInterrupt:
-        print(f"{prog}: interrupted", file=sys.stderr)
-        return interrupt.exit_code or 130
-    finally:
-        interrupt.defer()  # Python is ending
+        module.run(arguments, interrupt)
+
+    return run_command(prog, command)
 
 
 def parse(argv: list[str], prog: str = PROG) -> argparse.Namespace:

@@ -1,11 +1,11 @@
 """Errors whose text is meant for the user, and the commands that such a text recommends.
 
-An error is shown as one line, never as a traceback. A command in it can be pasted as it is. It depends on
-what started this process: `ws`, which sets CARTPOLE_WS, a plain Python, or a catkin workspace.
+An error is shown as one line, never as a traceback. Any function of this library that reads files, makes
+environments or runs them raises WorkbenchError where the user can mend something; its docstring says so only
+if there is more to know.
 """
 
 import importlib.util
-import os
 import shlex
 import shutil
 import sys
@@ -17,7 +17,7 @@ from pathlib import Path
 _LIBRARIES = (
     *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
     str(Path(__file__).parents[1]),  # all of this project, ...
-    str(Path(__file__).resolve().parents[1]),  # ... also where a catkin workspace links to it
+    str(Path(__file__).resolve().parents[1]),  # ... also by way of a link
     "<frozen",
 )
 
@@ -51,50 +51,38 @@ def need(module: str, package: str, what: str) -> None:
         WorkbenchError: If it isn't installed.
     """
     if not importlib.util.find_spec(module):
-        raise WorkbenchError(f"{what} needs {package}, an extra: {installing(package)} installs it")
+        command = hints.installing(package)
+        raise WorkbenchError(f"{what} needs {package}, an extra: {command} installs it")
 
 
-def installing(package: str) -> str:
-    """Returns the command that installs an optional package."""
-    workspace = os.environ.get("CARTPOLE_WS")
-    command = (
-        [workspace, "extras"] if workspace else [sys.executable, "-m", "pip", "install", package]
-    )
-    return shlex.join(command)
+class Hints:
+    """The commands that texts recommend, each ready to be pasted. A launcher sets `hints` to its own."""
+
+    extras = ""
+    """Installs all optional packages; empty if each has to be named."""
+
+    def installing(self, package: str) -> str:
+        """Returns the command that installs an optional package."""
+        return self.extras or shlex.join([sys.executable, "-m", "pip", "install", package])
+
+    def finding_modules(self) -> str:
+        """Returns how Python finds a module of the user's own."""
+        return "its folder has to be on PYTHONPATH"
+
+    def watching(self, folder: Path) -> str:
+        """Returns the command that shows a run in TensorBoard."""
+        command = _command("tensorboard", "tensorboard.main")
+        return shlex.join([*command, "--logdir", str(folder)])
+
+    def replaying(self, folder: Path) -> str:
+        """Returns the command that shows a run's episodes and curves on a page."""
+        return shlex.join([*_command("rl-workbench", "rl_workbench"), "view", str(folder)])
 
 
-def finding_modules() -> str:
-    """Returns how Python finds a module of the user's own."""
-    workspace = os.environ.get("CARTPOLE_WS")
-    if workspace:
-        return f"{shlex.quote(workspace)} --with FOLDER ... finds those in FOLDER"
-    return "its folder has to be on PYTHONPATH"
+def _command(name: str, module: str) -> list[str]:
+    """Returns how a command of this Python's environment is started: by its name if PATH finds it."""
+    beside = Path(sys.executable).with_name(name)
+    return [name] if shutil.which(name) == str(beside) else [sys.executable, "-m", module]
 
 
-def watching(folder: Path) -> str:
-    """Returns the command that shows a run in TensorBoard."""
-    workspace = os.environ.get("CARTPOLE_WS")
-    beside = Path(sys.executable).with_name("tensorboard")
-    if workspace:
-        command = [workspace, "tensorboard"]
-    elif shutil.which("tensorboard") == str(beside):
-        command = ["tensorboard"]
-    else:
-        command = [sys.executable, "-m", "tensorboard.main"]
-    return shlex.join([*command, "--logdir", str(folder)])
-
-
-def replaying(folder: Path) -> str:
-    """Returns the command that shows a run's episodes and curves on a page."""
-    workspace = os.environ.get("CARTPOLE_WS")
-    beside = Path(sys.executable).with_name("rl-workbench")
-    if workspace:
-        folders = filter(None, os.environ.get("CARTPOLE_WITH", "").split(":"))
-        # Each where it really is: ws may name a link.
-        found = [word for each in folders for word in ("--with", os.path.realpath(each))]
-        command = [workspace, *found, "rosrun", "cartpole", "workbench.py"]
-    elif shutil.which(beside.name) == str(beside):
-        command = [beside.name]
-    else:
-        command = [sys.executable, "-m", "rl_workbench"]
-    return shlex.join([*command, "view", str(folder)])
+hints = Hints()

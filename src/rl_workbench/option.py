@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, field, fields
 from difflib import get_close_matches
+from functools import partial
 from types import NoneType
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -89,15 +90,7 @@ class Options:
         return list(self._fields)
 
     def read(self, values: Mapping[str, Any], origin: str) -> dict[str, Any]:
-        """Converts values to the types of their options. It leaves out '' and None.
-
-        Args:
-            values: By name.
-            origin: Where they were given, for errors.
-
-        Raises:
-            WorkbenchError: If there is no such option, or a value has the wrong type.
-        """
+        """Converts values to the types of their options. It leaves out '' and None."""
         result = {}
         for name, value in values.items():
             if name not in self._fields:
@@ -111,11 +104,7 @@ class Options:
         return result
 
     def make(self, owner: type, values: Mapping[str, Any]) -> Any:
-        """Makes one of the dataclasses from those values that it has options for.
-
-        Raises:
-            WorkbenchError: If a value is outside its limits.
-        """
+        """Makes one of the dataclasses from those values that it has options for."""
         own = {each.name for each in fields(owner)}
         return owner(**{name: value for name, value in values.items() if name in own})
 
@@ -141,7 +130,7 @@ class Options:
             metavar = each.metadata["metavar"] or name.rsplit("_", 1)[-1].upper()
             parser.add_argument(
                 flag,
-                type=_FlagType(self._types[name]),
+                type=partial(_flag_value, self._types[name]),
                 choices=choices,
                 default=argparse.SUPPRESS,
                 metavar=None if choices else metavar,
@@ -149,17 +138,12 @@ class Options:
             )
 
 
-class _FlagType:
+def _flag_value(kind: Any, text: str) -> Any:
     """Converts the text of a flag, with an error that argparse shows as it is."""
-
-    def __init__(self, kind: Any) -> None:
-        self._kind = kind
-
-    def __call__(self, text: str) -> Any:
-        try:
-            return _converted(self._kind, text)
-        except ValueError as error:
-            raise argparse.ArgumentTypeError(f"must be {error}, not {text!r}") from error
+    try:
+        return _converted(kind, text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"must be {error}, not {text!r}") from error
 
 
 def unknown(kind: str, name: str, known: list[str]) -> str:
@@ -170,11 +154,7 @@ def unknown(kind: str, name: str, known: list[str]) -> str:
 
 
 def key_values(texts: list[str], origin: str) -> dict[str, str]:
-    """Splits KEY=VALUE texts into a dict.
-
-    Raises:
-        WorkbenchError: If one has no equals sign.
-    """
+    """Splits KEY=VALUE texts into a dict."""
     pairs = {}
     for text in texts:
         name, sign, value = text.partition("=")

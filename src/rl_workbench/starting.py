@@ -5,7 +5,7 @@ import os
 import select
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import NoReturn
 
@@ -32,6 +32,9 @@ def _end(number: int, frame: FrameType | None) -> NoReturn:
     with contextlib.suppress(OSError):
         os.write(2, f"{name}: interrupted\n".encode())
     os._exit(128 + number)
+
+
+JOB = "RL_WORKBENCH_JOB"  # set in the environment of a training that is one of several at the same time
 
 
 def program(module: str) -> tuple[str, ...]:
@@ -133,3 +136,29 @@ class Interrupt:
             signal.signal(number, signal.SIG_IGN)
         if not self._deferred:
             raise KeyboardInterrupt
+
+
+def run_command(prog: str, command: Callable[[Interrupt], object], *errors: type[Exception]) -> int:
+    """Runs a command; returns the process's exit code.
+
+    Args:
+        prog: The command's name, for errors.
+        command: Gets what handles signals. An error for the user becomes one line and exit code 1.
+        errors: Further ones for the user than WorkbenchError.
+    """
+    from rl_workbench.errors import WorkbenchError  # only after Ctrl-C is handled
+
+    expected: tuple[type[Exception], ...] = (WorkbenchError, *errors)
+    interrupt = Interrupt().install()
+    with reader_may_go():
+        try:
+            command(interrupt)
+            return interrupt.exit_code
+        except expected as error:
+            print(f"{prog}: {error}", file=sys.stderr, flush=True)
+            return interrupt.exit_code or 1
+        except KeyboardInterrupt:
+            print(f"{prog}: interrupted", file=sys.stderr)
+            return interrupt.exit_code or 130
+        finally:
+            interrupt.defer()  # Python is ending

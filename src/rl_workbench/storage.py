@@ -3,7 +3,6 @@
 import io
 import json
 import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -20,16 +19,15 @@ def write_atomically(path: Path, write: Writer) -> None:
     Raises:
         OSError: If it can't be written. An older file of that name is untouched.
     """
-    descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        with os.fdopen(descriptor, "wb") as stream:
+        with temporary.open("wb") as stream:
             write(stream)
             stream.flush()
             os.fsync(stream.fileno())
-        os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, path)
     except BaseException:
-        os.unlink(temporary)
+        temporary.unlink(missing_ok=True)
         raise
     _sync_folder(path.parent)
 
@@ -97,12 +95,6 @@ def save_tensors(path: Path, content: dict[str, Any]) -> None:
     write_atomically(path, lambda stream: stream.write(memory.getbuffer()))
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
 def _sync_folder(folder: Path) -> None:
     """Makes a rename survive a power cut."""
     descriptor = os.open(folder, os.O_RDONLY)
@@ -115,17 +107,23 @@ def _sync_folder(folder: Path) -> None:
 CONFIG_RECORD = "config.json"
 
 
-def read_record(folder: Path) -> Any:
-    """Reads a run folder's config.json.
-
-    Raises:
-        WorkbenchError: If there is none, or it isn't JSON.
-    """
-    path = folder / CONFIG_RECORD
+def read_json(path: Path) -> Any:
+    """Returns the content of a JSON file; None if there is no such file."""
     try:
         with open_text(path) as file:
             return json.load(file)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
     except OSError as error:
-        raise WorkbenchError(f"{folder} is no run folder: {path}: {error.strerror}") from error
+        raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:  # the latter for deeply nested brackets
         raise WorkbenchError(f"{path} isn't JSON: {error}") from error
+
+
+def read_record(folder: Path) -> Any:
+    """Reads a run folder's config.json."""
+    record = read_json(folder / CONFIG_RECORD)
+    if record is None:
+        why = f"it has no {CONFIG_RECORD}" if folder.is_dir() else "there is no such folder"
+        raise WorkbenchError(f"{folder} is no run folder: {why}")
+    return record

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import time
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import rosgraph
@@ -78,16 +78,8 @@ class Ready:
             NotReady: something is still missing after that.
             rospy.ROSInterruptException: the caller's node was shut down meanwhile.
         """
-        deadline = time.monotonic() + timeout
-        missing = ""
-
-        def look() -> bool:
-            nonlocal missing
-            left = min(max(deadline - time.monotonic(), 1.0), _CALL_TIMEOUT)
-            missing = self.missing(left)
-            return not missing
-
-        if not wait_until(look, timeout, "a world that is ready"):
+        missing = still_missing(self, timeout)
+        if missing:
             raise NotReady(f"not ready after {timeout:g} s: {missing}")
 
     def _faults(self, timeout: float) -> Iterator[str]:
@@ -114,6 +106,21 @@ class Ready:
             namespace, _, name = full.rpartition("/")
             found.setdefault(namespace, []).append(name)
         return found
+
+
+def still_missing(ready: Ready, timeout: float, is_over: Callable[[], bool] = lambda: False) -> str:
+    """Waits until nothing is missing, or `is_over`, at most `timeout` [s]; returns what still is."""
+    deadline = time.monotonic() + timeout
+    missing = ""
+
+    def look() -> bool:
+        nonlocal missing
+        over = is_over()
+        missing = ready.missing(min(max(deadline - time.monotonic(), 1.0), _CALL_TIMEOUT))
+        return over or not missing
+
+    wait_until(look, timeout, "a world that is ready")
+    return missing
 
 
 def _faults_of_manager(namespace: str, names: Sequence[str], timeout: float) -> Iterator[str]:

@@ -15,14 +15,7 @@ from ros_utils._internal import log as _log
 from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import packages as _packages
 from ros_utils._internal import programs as _programs
-from ros_utils._internal.programs import (
-    CannotStart,
-    Handle,
-    Readiness,
-    Started,
-    await_start,
-    wait_until_ready,
-)
+from ros_utils._internal.programs import CannotStart, Handle, Started, await_start
 from ros_utils.readiness import Ready
 
 
@@ -74,8 +67,8 @@ def ros_node_from_pkg(
     with _master.using(master_uri):
         try:
             command = [_executable(pkg_name, node_name), *_arguments(args), *_remappings(name, ns)]
-            if launch_master and not _master.is_up():
-                _start_master(launch_master_term, timeout)
+            if launch_master and not _start_master(launch_master_term, timeout):
+                return False
             _master.require()
             before = set(_nodes.node_uris().values())
             handle = _programs.start(
@@ -93,12 +86,9 @@ def ros_node_from_pkg(
         if not wait:
             return Started(handle)
         full_name = rosgraph.names.ns_join(_global(ns), name) if name else None
+        absent = f"not registered at {_master.uri()} (for a program that is no node: wait=False)"
         return await_start(
-            handle,
-            lambda: _is_registered(handle, full_name, before),
-            f"not registered at {_master.uri()} (for a program that is no node: wait=False)",
-            timeout,
-            ready,
+            handle, lambda: _is_registered(handle, full_name, before), absent, timeout, ready
         )
 
 
@@ -209,18 +199,17 @@ def _remappings(name: str | None, ns: str | None) -> list[str]:
     return [*([f"__name:={name}"] if name else []), f"__ns:={_global(ns)}"]
 
 
-def _start_master(window: bool, timeout: float) -> None:
-    """Starts a master at ROS_MASTER_URI; raises CannotStart if it doesn't come up."""
-    _master.is_up_or_startable()
+def _start_master(window: bool, timeout: float) -> Started | bool:
+    """Starts a master at ROS_MASTER_URI, unless there is one; returns whether there is one now."""
+    if _master.is_up_or_startable():
+        return True
     port = str(_master.host_and_port()[1])
     handle = _programs.start(["roscore", "-p", port], "master", "roscore", window=window)
 
     def is_up() -> bool:
         return _master.is_up() and "/rosout" in _nodes.node_names()
 
-    if wait_until_ready(is_up, handle, timeout) is not Readiness.READY:
-        handle.end()
-        raise CannotStart(f"roscore: not up after {timeout:g} s: {handle.reason()}{handle.where()}")
+    return await_start(handle, is_up, "not up", timeout, None, may_end=False)
 
 
 def _is_registered(handle: Handle, name: str | None, before: set[str]) -> bool:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache
+from typing import Any
 
 import numpy as np
 import viser
@@ -10,7 +11,7 @@ from trimesh import creation
 
 from bullet_gazebo.physics.description import Color, DescriptionError, Joint, Shape
 from bullet_gazebo.physics.files.elements import shown
-from bullet_gazebo.physics.files.meshes import MeshLook, read_look
+from bullet_gazebo.physics.files.meshes import read_look
 from bullet_gazebo.physics.pose import Pose, Vector, rotate
 from bullet_gazebo.pictures.page_batches import (
     Appearance,
@@ -56,8 +57,11 @@ class ShapeMaker:
         self._warn = warn
         self._complained: set[str] = set()
         self._names = 0
-        self._geometry_of = lru_cache(MOST_FILES)(_geometry_of)
-        self._glb_of = lru_cache(MOST_FILES)(_glb_of)
+        # One object for each file, so that its shapes are in the same batch.
+        self._geometry_of = lru_cache(MOST_FILES)(
+            lambda look: _geometry(look.mesh.vertices, look.mesh.faces, side="double")
+        )
+        self._glb_of = lru_cache(MOST_FILES)(lambda look: GlbFile(look.glb))
 
     def add(self, where: Where, shape: Shape, what: str, collision: bool) -> None:
         """Adds a shape of a link; `what` it is, for the log."""
@@ -159,23 +163,18 @@ class ShapeMaker:
         self._batches.add(Appearance(_cylinder(), shadow=False), part)
 
 
-def _glb_of(look: MeshLook) -> GlbFile:
-    assert look.glb is not None
-    return GlbFile(look.glb)
-
-
 @cache
 def _box() -> Geometry:
     """Returns a cube with sides of 1 m."""
     cube = creation.box((1.0, 1.0, 1.0))
-    return Geometry(_singles(cube.vertices), _indices(cube.faces))
+    return _geometry(cube.vertices, cube.faces)
 
 
 @cache
 def _ball() -> Geometry:
     """Returns a ball with a radius of 1 m."""
     found = creation.icosphere(subdivisions=ROUNDS)
-    return Geometry(_singles(found.vertices), _indices(found.faces), flat=False)
+    return _geometry(found.vertices, found.faces, flat=False)
 
 
 @cache
@@ -195,20 +194,12 @@ def _cylinder() -> Geometry:
         (middles + 1, 3 * SIDES + here, 3 * SIDES + following),
     ]
     faces = np.concatenate([np.column_stack(corners) for corners in triangles])
-    return Geometry(_singles(vertices), _indices(faces), flat=False)
+    return _geometry(vertices, faces, flat=False)
 
 
-def _geometry_of(look: MeshLook) -> Geometry:
-    """Returns the triangles of a file, visible from both sides."""
-    return Geometry(_singles(look.mesh.vertices), _indices(look.mesh.faces), side="double")
-
-
-def _singles(vertices: np.ndarray) -> np.ndarray:
-    return np.asarray(vertices, dtype=np.float32)
-
-
-def _indices(faces: np.ndarray) -> np.ndarray:
-    return np.asarray(faces, dtype=np.uint32)
+def _geometry(vertices: np.ndarray, faces: np.ndarray, **look: Any) -> Geometry:
+    """Returns a geometry of the numbers' types that the page takes."""
+    return Geometry(np.asarray(vertices, np.float32), np.asarray(faces, np.uint32), **look)
 
 
 def _turned(way: Vector) -> tuple[float, float, float, float]:

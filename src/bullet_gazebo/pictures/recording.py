@@ -167,14 +167,9 @@ class SimulationRecorder:
 
 
 def _recorded(model: Model) -> RecordedModel:
-    description = model.description
-    return RecordedModel(
-        model.name,
-        description.root,
-        description.static,
-        list(model.link_names),
-        visible_shapes(description),
-    )
+    made = model.description
+    shapes = visible_shapes(made)
+    return RecordedModel(model.name, made.root, made.static, model.link_names, shapes)
 
 
 def _start(options: RecordingOptions) -> subprocess.Popen[bytes]:
@@ -211,7 +206,10 @@ class FrameDrawer:
         rows = iter(np.reshape(np.asarray(poses), (-1, NUMBERS)).tolist())
         places: dict[str, Vector] = {}
         for model in self._models:
-            found = {link: _pose(*next(rows)) for link in model.links}
+            found = {}
+            for link in model.links:
+                x, y, z, *turn = next(rows)
+                found[link] = Pose((x, y, z), (turn[0], turn[1], turn[2], turn[3]))
             self._renderer.place(model.name, found)
             places[model.name] = found[model.root].position if model.root in found else ZERO
         width, height = self._options.width, self._options.height
@@ -233,18 +231,28 @@ class FrameDrawer:
         return Camera(camera.target, ROOM * camera.distance, camera.yaw, camera.pitch, camera.view)
 
 
-def _pose(x: float, y: float, z: float, qx: float, qy: float, qz: float, qw: float) -> Pose:
-    return Pose((x, y, z), (qx, qy, qz, qw))
-
-
 def main(arguments: Sequence[str]) -> int:
     """Draws until standard input ends; SIGTERM drops the frames that aren't drawn yet."""
-    from bullet_gazebo.pictures.renderer import Renderer
-    from web_viewer.video import EncoderFailed, Mp4Writer
+    from web_viewer.video import EncoderFailed
 
     logging.basicConfig(format="recording: %(message)s")
     path, rate, width, height, model = arguments
     options = RecordingOptions(Path(path), float(rate), int(width), int(height), model)
+    try:
+        count = _draw(options)
+    except EncoderFailed as error:
+        print(f"recording: {path}: {error}", file=sys.stderr, flush=True)
+        return 1
+    length = f"{count} frames, {count / options.rate:.1f} s" if count else "no time has passed"
+    print(f"recording: {path}: {length}", flush=True)
+    return 0
+
+
+def _draw(options: RecordingOptions) -> int:
+    """Draws what comes by standard input; returns the number of frames."""
+    from bullet_gazebo.pictures.renderer import Renderer
+    from web_viewer.video import Mp4Writer
+
     inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
     stopping = False
 
@@ -256,25 +264,16 @@ def main(arguments: Sequence[str]) -> int:
     signal.signal(signal.SIGTERM, stop)
     # In a thread, so that the simulator never waits for a frame.
     threading.Thread(target=_read, args=(sys.stdin.buffer, inbox), daemon=True).start()
-    drawer, writer, count = (
-        FrameDrawer(options, Renderer()),
-        Mp4Writer(options.path, options.rate),
-        0,
-    )
-    try:
-        while (message := inbox.get()) is not None and not stopping:
-            models, poses = message
-            if models is not None:
-                drawer.change(models)
-            writer.add(drawer.frame(poses))
-            count += 1
-        writer.close()
-    except EncoderFailed as error:
-        print(f"recording: {path}: {error}", file=sys.stderr, flush=True)
-        return 1
-    length = f"{count} frames, {count / options.rate:.1f} s" if count else "no time has passed"
-    print(f"recording: {path}: {length}", flush=True)
-    return 0
+    drawer, writer = FrameDrawer(options, Renderer()), Mp4Writer(options.path, options.rate)
+    count = 0
+    while (message := inbox.get()) is not None and not stopping:
+        models, poses = message
+        if models is not None:
+            drawer.change(models)
+        writer.add(drawer.frame(poses))
+        count += 1
+    writer.close()
+    return count
 
 
 def _read(stream: BinaryIO, inbox: "queue.SimpleQueue[Any]") -> None:

@@ -108,19 +108,6 @@ class DrawnPart:
         pybullet.removeBody(self.body, physicsClientId=self._client)
 
 
-def drawn_parts(client: int, link: str, shape: Shape, textures: Textures) -> list[DrawnPart]:
-    """Adds a shape to PyBullet's renderer.
-
-    Raises:
-        DescriptionError: a mesh file can't be read.
-    """
-    return [
-        DrawnPart(client, link, shape, small, textures)
-        for piece in pieces_of(shape)
-        for small in _small(piece)
-    ]
-
-
 def _small(piece: Piece) -> Iterator[Piece]:
     """Splits a piece into sizes that PyBullet takes."""
     for start in range(0, len(piece.solid.corners), MOST_CORNERS):
@@ -156,7 +143,8 @@ class Renderer:
         self._models[name] = parts = []
         for link, shape in shapes:
             try:
-                parts += drawn_parts(self._client, link, shape, self._textures)
+                for piece in (small for whole in pieces_of(shape) for small in _small(whole)):
+                    parts.append(DrawnPart(self._client, link, shape, piece, self._textures))
             except DescriptionError as error:
                 logger.warning("model '%s', link '%s' isn't drawn whole: %s", name, link, error)
 

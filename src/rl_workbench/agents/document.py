@@ -101,9 +101,6 @@ class Episode:
             state: the return value of `state_dict`.
             size: D of the observations.
             kind: the number of discrete actions, or the shape of continuous ones.
-
-        Raises:
-            TypeError, ValueError, LookupError: if `state` is malformed.
         """
         *observations, final = array(state["observations"], torch.float32, (None, size))
         length = len(observations)
@@ -233,11 +230,6 @@ class PolicyGradientAgent(TwoNetworks):
         """
         left, right = (self._weight @ observation + self._bias).tolist()
         return 1.0 / (1.0 + math.exp(min(right - left, 700.0)))
-
-    def probabilities(self, observation: np.ndarray) -> np.ndarray:
-        """Returns the probabilities of both actions (2,) for an observation (4,)."""
-        left = self.probability_of_zero(observation)
-        return np.array([left, 1.0 - left])
 
     def draw(self, observation: np.ndarray, generator: np.random.Generator) -> int:
         """Draws an action from the policy with the given generator."""

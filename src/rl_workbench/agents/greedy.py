@@ -3,8 +3,6 @@
 TorchScript can compile all of them. For single observations the agents use faster NumPy code.
 """
 
-from abc import ABC, abstractmethod
-
 import numpy as np
 import torch
 from torch import nn
@@ -81,7 +79,7 @@ class ClippedAction(Continuous):
         return torch.clamp(self.outputs(observations).reshape(self.shape), self.low, self.high)
 
 
-class Choice(nn.Module, ABC):
+class Choice(nn.Module):
     """Maps observations (N, D), float32, to the actions that their scores choose.
 
     Args:
@@ -92,28 +90,9 @@ class Choice(nn.Module, ABC):
         super().__init__()
         self.scores = scores
 
-    @abstractmethod
-    def margins(self, observations: torch.Tensor) -> torch.Tensor:
-        """Returns how far the winning score is above the next one, (N,).
-
-        The margin is relative to the larger absolute score, or to 1 if that is smaller. Within rounding
-        error, the same sums in another order may choose another action.
-        """
-
 
 class SingleChoice(Choice):
     """Chooses the action with the highest score, (N,)."""
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         return self.scores(observations).argmax(dim=1)
-
-    def margins(self, observations: torch.Tensor) -> torch.Tensor:
-        return lead(self.scores(observations))
-
-
-def lead(scores: torch.Tensor) -> torch.Tensor:
-    """Returns the margin of the highest of scores (N, A), see `Choice.margins`: (N,)."""
-    if scores.shape[1] == 1:
-        return torch.full((len(scores),), float("inf"))
-    first, second = scores.topk(2, dim=1).values.unbind(dim=1)
-    return (first - second) / torch.maximum(first.abs(), second.abs()).clamp_min(1.0)

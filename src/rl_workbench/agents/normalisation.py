@@ -13,11 +13,7 @@ SMALLEST = 1e-8  # added to the variance, so that a constant quantity gives 0
 
 
 class Normaliser:
-    """Running mean and variance of each quantity (Welford's way).
-
-    Args:
-        size: number of quantities D.
-    """
+    """Running mean and variance of each quantity (Welford's way)."""
 
     def __init__(self, size: int) -> None:
         self._count = 0

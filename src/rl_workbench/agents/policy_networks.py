@@ -5,7 +5,7 @@ For a single observation NumPy is several times as fast as torch.
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -14,35 +14,53 @@ from torch import nn
 SMALLEST_CHANCE = float(np.finfo(np.float32).tiny)  # lower bound of probabilities in the entropy
 
 
-class SoftmaxNetwork(nn.Module):
-    """Maps prepared observations (N, D) to the probabilities of the actions (N, A).
+class PolicyNetworkBase(nn.Module):
+    """A linear layer, after a hidden tanh layer if there is one.
 
     Args:
         observations: D.
-        actions: A.
-        hidden: units of the hidden tanh layer; 0 for no such layer.
+        outputs: A.
+        hidden: units of the hidden layer; 0 for no such layer.
     """
 
-    def __init__(self, observations: int, actions: int, hidden: int) -> None:
+    def __init__(self, observations: int, outputs: int, hidden: int) -> None:
         super().__init__()
         if hidden:
             self.hidden = nn.Linear(observations, hidden)
-        self.fc = nn.Linear(hidden or observations, actions)
-        self._has_hidden = bool(hidden)
+        self.fc = nn.Linear(hidden or observations, outputs)
+        self.has_hidden = bool(hidden)
 
-    def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        if self._has_hidden:
+    def outputs(self, observations: torch.Tensor) -> torch.Tensor:
+        """Returns the outputs (N, A) for prepared observations (N, D)."""
+        if self.has_hidden:
             observations = torch.tanh(self.hidden(observations))
-        return torch.softmax(self.fc(observations), dim=1)
+        return self.fc(observations)
 
     def layers(self) -> list[nn.Module]:
-        """Returns the layers from prepared observations to the logits, before the softmax."""
-        return [self.hidden, nn.Tanh(), self.fc] if self._has_hidden else [self.fc]
+        """Returns the layers from prepared observations to the outputs."""
+        return [self.hidden, nn.Tanh(), self.fc] if self.has_hidden else [self.fc]
 
-    @property
-    def has_hidden(self) -> bool:
-        """Whether there is a hidden layer."""
-        return self._has_hidden
+    def in_numpy(self) -> Callable[[np.ndarray], np.ndarray]:
+        """Returns a copy that maps a prepared observation (D,) to the outputs (A,)."""
+        layers = [self.hidden, self.fc] if self.has_hidden else [self.fc]
+        *hidden, (weight, bias) = [
+            (layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy())
+            for layer in layers
+        ]
+
+        def outputs(seen: np.ndarray) -> np.ndarray:
+            for matrix, offset in hidden:
+                seen = np.tanh(matrix @ seen + offset)
+            return np.asarray(weight @ seen + bias)
+
+        return outputs
+
+
+class SoftmaxNetwork(PolicyNetworkBase):
+    """Maps prepared observations (N, D) to the probabilities of the actions (N, A)."""
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        return torch.softmax(self.outputs(observations), dim=1)
 
     def log_chances(self, probabilities: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
         """Returns the log-probabilities (N,) of actions (N,)."""
@@ -52,18 +70,6 @@ class SoftmaxNetwork(nn.Module):
         """Returns the policy's entropy, averaged over the observations."""
         # At a probability of 0 the entropy's slope is infinite.
         return torch.special.entr(probabilities.clamp_min(SMALLEST_CHANCE)).sum(1).mean()
-
-
-class Actor(Protocol):
-    """Acts with a copy of a network's weights, for observations (D,) as the environment returns them."""
-
-    def draw(self, observation: np.ndarray, generator: np.random.Generator) -> Any:
-        """Draws an action, in the form that the agent learns from."""
-        ...
-
-    def greedy(self, observation: np.ndarray) -> Any:
-        """Returns the most probable action, in the form that the environment takes."""
-        ...
 
 
 class PairActor:
@@ -97,29 +103,15 @@ class PairActor:
 
 
 class SoftmaxActor:
-    """Acts for any number of actions, with or without a hidden layer.
-
-    Args:
-        network: its weights are copied.
-        prepare: scales an observation for the network.
-    """
+    """Acts for any number of actions, with or without a hidden layer."""
 
     def __init__(
         self, network: SoftmaxNetwork, prepare: Callable[[np.ndarray], np.ndarray]
     ) -> None:
-        self._prepare = prepare
-        layers = [network.hidden, network.fc] if network.has_hidden else [network.fc]
-        self._layers = [
-            (layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy())
-            for layer in layers
-        ]
+        self._prepare, self._outputs = prepare, network.in_numpy()
 
     def _preferences(self, observation: np.ndarray) -> np.ndarray:
-        seen = self._prepare(observation)
-        for weight, bias in self._layers[:-1]:
-            seen = np.tanh(weight @ seen + bias)
-        weight, bias = self._layers[-1]
-        return np.asarray(weight @ seen + bias, np.float64)
+        return self._outputs(self._prepare(observation)).astype(np.float64)
 
     def probabilities(self, observation: np.ndarray) -> np.ndarray:
         """Of the actions: (A,), float64."""
@@ -169,34 +161,23 @@ class Bounds(NamedTuple):
         return np.asarray(np.clip(shaped, self.low, self.high))
 
 
-class GaussianNetwork(nn.Module):
+class GaussianNetwork(PolicyNetworkBase):
     """Maps prepared observations (N, D) to the actions' means (N, n), in half-ranges from the middle.
 
     Args:
         observations: D.
         bounds: of the actions.
-        hidden: units of the hidden tanh layer; 0 for no such layer.
+        hidden: units of the hidden layer; 0 for no such layer.
         log_std: logarithm of the initial standard deviation.
     """
 
     def __init__(self, observations: int, bounds: Bounds, hidden: int, log_std: float) -> None:
-        super().__init__()
-        actions = bounds.low.size
-        if hidden:
-            self.hidden = nn.Linear(observations, hidden)
-        self.fc = nn.Linear(hidden or observations, actions)
-        self.log_std = nn.Parameter(torch.full((actions,), log_std))
-        self.has_hidden = bool(hidden)
+        super().__init__(observations, bounds.low.size, hidden)
+        self.log_std = nn.Parameter(torch.full((bounds.low.size,), log_std))
         self._middle, self._half = torch.from_numpy(bounds.middle), torch.from_numpy(bounds.half)
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        if self.has_hidden:
-            observations = torch.tanh(self.hidden(observations))
-        return self.fc(observations)
-
-    def layers(self) -> list[nn.Module]:
-        """Returns the layers from prepared observations to the means."""
-        return [self.hidden, nn.Tanh(), self.fc] if self.has_hidden else [self.fc]
+        return self.outputs(observations)
 
     def deviations(self) -> torch.Tensor:
         """Returns the logarithms of the standard deviations, (n,)."""
@@ -214,13 +195,7 @@ class GaussianNetwork(nn.Module):
 
 
 class GaussianActor:
-    """Acts with a copy of a network's weights; see `Actor`.
-
-    Args:
-        network: its weights are copied.
-        bounds: of the actions.
-        prepare: scales an observation for the network.
-    """
+    """Acts with a copy of a network's weights; see `Actor`."""
 
     def __init__(
         self,
@@ -228,21 +203,12 @@ class GaussianActor:
         bounds: Bounds,
         prepare: Callable[[np.ndarray], np.ndarray],
     ) -> None:
-        self._prepare, self._bounds = prepare, bounds
-        layers = [network.hidden, network.fc] if network.has_hidden else [network.fc]
-        self._layers = [
-            (layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy())
-            for layer in layers
-        ]
+        self._prepare, self._outputs, self._bounds = prepare, network.in_numpy(), bounds
         self._middle, self._half = bounds.middle, bounds.half
         self._std = np.exp(network.deviations().detach().numpy())
 
     def _mean(self, observation: np.ndarray) -> np.ndarray:
-        seen = self._prepare(observation)
-        for weight, bias in self._layers[:-1]:
-            seen = np.tanh(weight @ seen + bias)
-        weight, bias = self._layers[-1]
-        return np.asarray(weight @ seen + bias)
+        return self._outputs(self._prepare(observation))
 
     def draw(self, observation: np.ndarray, generator: np.random.Generator) -> np.ndarray:
         """Draws an action (n,), float32, which may lie outside its range."""
@@ -252,3 +218,10 @@ class GaussianActor:
     def greedy(self, observation: np.ndarray) -> np.ndarray:
         """Returns the mean action, clipped to its range."""
         return self._bounds.limited(self._middle + self._half * self._mean(observation))
+
+
+Actor = PairActor | SoftmaxActor | GaussianActor
+"""Acts with a copy of a network's weights, for observations (D,) as the environment returns them.
+
+`draw` returns an action in the form that the agent learns from, `greedy` in that which the environment takes.
+"""

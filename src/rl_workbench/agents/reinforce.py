@@ -1,6 +1,6 @@
 """REINFORCE with a learned baseline: generalised advantages, one policy step per batch of episodes.
 
-It differs from the algorithm of the ROS policy-gradient document (document.py) in four ways, each of which
+It differs from the policy-gradient document's algorithm (document.py) in four ways, each of which
 reduces the gradient's variance. Advantages are weighted sums of temporal differences (Schulman et al. 2016,
 λ = 0.95) instead of whole returns; they are normalised over the batch; the baseline takes many steps per
 batch, not one; and observations are scaled, so that one learning rate suits all weights. A truncated episode

@@ -37,9 +37,6 @@ class ReplayBuffer:
     """Keeps the newest `capacity` transitions.
 
     Memory is reserved but not touched, so a large buffer takes no RAM until it fills.
-
-    Raises:
-        WorkbenchError: if there isn't enough memory.
     """
 
     def __init__(self, capacity: int, observation_size: int) -> None:
@@ -182,13 +179,7 @@ class NStepReturns:
         }
 
     def load_state_dict(self, state: dict[str, Any], size: int, actions: int) -> None:
-        """Loads what `state_dict` returned.
-
-        Args:
-            state: the return value of `state_dict`.
-            size: D of the observations.
-            actions: A.
-        """
+        """Loads what `state_dict` returned."""
         observations = [
             array(each, torch.float32, (size,)) for each in sequence(state["observations"])
         ]

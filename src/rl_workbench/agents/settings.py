@@ -1,6 +1,5 @@
 """The options of this project's own algorithms, with defaults and limits."""
 
-import dataclasses
 from dataclasses import dataclass
 
 from rl_workbench.errors import WorkbenchError
@@ -61,10 +60,6 @@ class DQNSettings:
         if not self.hidden_sizes or min(self.hidden_sizes) < 1:
             raise WorkbenchError(f"hidden_sizes are positive, one or more: {self.hidden_sizes}")
 
-    def changed(self, **values: object) -> "DQNSettings":
-        """Returns a copy with some values changed."""
-        return dataclasses.replace(self, **values)  # type: ignore[arg-type]
-
 
 @dataclass(frozen=True)
 class ReinforceSettings:
@@ -112,7 +107,7 @@ class ReinforceSettings:
 
 @dataclass(frozen=True)
 class DocumentSettings:
-    """The options of the ROS policy-gradient document's algorithm, which are constants in its script.
+    """The options of the policy-gradient document's algorithm, which are constants in its script.
 
     Raises:
         WorkbenchError: if a value is outside its limits; the text names the option and the limits.

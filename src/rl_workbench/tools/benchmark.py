@@ -21,9 +21,9 @@ from rl_workbench.tools.jobs import claim, job_pool
 from rl_workbench.tools.runs import Run, open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm
-from rl_workbench.training.command_line import choose
 from rl_workbench.training.options import default_file, known_options, read_section
 from rl_workbench.training.progress import tell, warn
+from rl_workbench.training.train import choose
 
 if TYPE_CHECKING:
     from rl_workbench.tools.results import RunResult
@@ -64,13 +64,6 @@ class _Planned(NamedTuple):
     job: Job
 
 
-class _Hint(argparse.Action):
-    """Explains a flag of `train` and `sweep` that users may expect here."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        parser.error(f"{self.option_strings[0]} is an option of the training: {self.metavar}")
-
-
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of the command."""
     add = parser.add_argument
@@ -89,8 +82,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     add("--out", type=Path, metavar="FOLDER",
         help="for runs, tables and curves; a benchmark that was interrupted is continued there "
         "(runs/benchmark/SUITE)")  # fmt: skip
-    add("--total-timesteps", nargs="?", action=_Hint, help=argparse.SUPPRESS,
-        metavar="--params total_timesteps=N, or the suite's own")  # fmt: skip
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
@@ -147,11 +138,7 @@ def _suite(arguments: argparse.Namespace) -> Suite:
 
 
 def read_suite(name: str, path: Path | None = None) -> Suite:
-    """Reads a suite from a file, by default config/benchmark.yaml.
-
-    Raises:
-        WorkbenchError: if the file has no such suite, or it makes no sense.
-    """
+    """Reads a suite from a file, by default config/benchmark.yaml."""
     path = path or default_file(CONFIG)
     section = read_section(path, (), name)
     unknown = [key for key in section if key not in KEYS]
@@ -184,9 +171,6 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
         origin: the file and suite, for errors.
         name: of the variant.
         options: of the training, with the algorithm as `algo`.
-
-    Raises:
-        WorkbenchError: if there is no such algorithm or option, or the name can't be a folder's.
     """
     if not NAME.fullmatch(name):
         raise WorkbenchError(
@@ -256,10 +240,6 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
     costs = figures.summary_table(groups, figures.COSTS_SUMMARY)
     costs += f"\n\n{figures.table(results, figures.COSTS)}"
     about = f"{suite.about}\n\n{_measured(episodes, {threshold(run.env_id) for run in runs})}"
-    machine = (
-        f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}, {where}"
-    )
-    today = datetime.date.today().isoformat()
     content = {
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "versions": run_folder.versions(),
@@ -269,7 +249,7 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
     }
     for name, write in (
         ("results.md", as_text(f"# {suite.name}\n\n{about}\n\n{summary}\n\n{every}\n")),
-        ("costs.md", as_text(f"# {suite.name}: costs\n\n{today}, {machine}.\n\n{costs}\n")),
+        ("costs.md", as_text(f"# {suite.name}: costs\n\n{_machine()}, {where}.\n\n{costs}\n")),
         ("results.json", as_json(content)),
     ):
         write_file(folder / name, write)
@@ -280,6 +260,14 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
         raise WorkbenchError(
             f"{len(failed)} of {len(results)} trainings failed; the first one: {failed[0].fault}"
         )
+
+
+def _machine() -> str:
+    load = os.getloadavg()[0]
+    return (
+        f"{datetime.date.today().isoformat()}, {platform.machine()}, {os.cpu_count()} cores, "
+        f"load {load:.1f}"
+    )
 
 
 def _draw(folder: Path, runs: list[Run]) -> None:

@@ -42,18 +42,8 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     tell(results.summary_table(groups, results.COMPARE_SUMMARY))
     if arguments.json:
         kind = f"mean of {episodes} greedy episodes, {which} checkpoint"
-        content = {
-            "score": kind if episodes else "mean of the last 100 training episodes",
-            "groups": {
-                name: {
-                    "statistics": found._asdict()
-                    if (found := results.statistics_of(own))
-                    else None,
-                    "runs": results.rows(own, results.COMPARE),
-                }
-                for name, own in groups.items()
-            },
-        }
-        write_file(arguments.json, as_json(content))
+        score = kind if episodes else "mean of the last 100 training episodes"
+        figures = {name: results.figures(own) for name, own in groups.items()}
+        write_file(arguments.json, as_json({"score": score, "groups": figures}))
     if arguments.out:
         write_figure(arguments.out, seed_curves(seed_panels(runs)))

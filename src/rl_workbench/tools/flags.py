@@ -48,11 +48,7 @@ def add_job_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def env_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Returns the options of the environment, with values as `train` reads them.
-
-    Raises:
-        WorkbenchError: if one isn't KEY=VALUE.
-    """
+    """Returns the options of the environment, with values as `train` reads them."""
     from rl_workbench.option import Options
     from rl_workbench.training.options import RunOptions
 
@@ -76,11 +72,7 @@ def number(lowest: int) -> Any:
 
 
 def write_figure(path: Path, figure: "Figure") -> None:
-    """Writes a picture as PNG.
-
-    Raises:
-        WorkbenchError: if the file can't be written, or its name ends in something else.
-    """
+    """Writes a picture as PNG."""
     from rl_workbench.plotting import as_png
     from rl_workbench.storage import write_file
 

@@ -7,7 +7,6 @@ FOLDER/NAME.cost.json   when and where each attempt ran, and what it took
 
 import contextlib
 import os
-import random
 import select
 import shutil
 import signal
@@ -20,18 +19,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import JOB
 from rl_workbench.storage import CONFIG_RECORD, as_json, write_file
 from rl_workbench.tools.runs import SUMMARY, cost_file, cost_of, read_leniently
 from rl_workbench.training import folder as run_folder
-from rl_workbench.training.scalar_log import NAME as SCALARS
+from web_viewer.table import NAME as SCALARS
 
 POLL = 0.2  # [s]
 TIME_TO_SAVE = 60.0  # [s] for a training that is stopped early because it is no longer needed
+PAUSE = 1.0  # [s] between two attempts
 MAX_ATTEMPTS = 8  # lost in a row without a new checkpoint
-MAX_PAUSE = 30.0  # [s] between two attempts
 TAIL = 4096  # [bytes] at the end of a file, enough for its last line
-# Below the kernel's ephemeral range, so that no other process gets the port before it is used.
-MASTER_PORTS = range(30000, 32768)
 # The networks are too small to gain from more cores.
 ONE_CORE = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 # The process was killed from outside, as by the kernel when memory is short: the training is retried.
@@ -88,17 +86,8 @@ def run_attempt(
         stop_within: called several times a second. A KeyboardInterrupt stops the training, too.
         since: when the command began [s since 1970]; earlier attempts don't count as lost.
         death_signal: sent to the training if this process is killed.
-
-    Raises:
-        WorkbenchError: if its folder can't be written to.
     """
     spans = cost_of(job.folder).get("spans", [])
-    lost = _attempts_without_checkpoint(job, spans, since)
-    until = time.monotonic() + (min(2.0 ** (lost - 1), MAX_PAUSE) if lost else 0.0)
-    while time.monotonic() < until:
-        if stop_within() is not None:
-            return Ending()
-        time.sleep(POLL)
     try:
         job.folder.parent.mkdir(parents=True, exist_ok=True)
         words = command(job, program.words)
@@ -121,23 +110,20 @@ def run_here(
     """Runs a training on this machine; one that is killed is resumed."""
     while True:
         ending = run_attempt(job, program, stop_within, since)
-        if not ending.lost or is_hopeless(job, since):
+        if not ending.lost or is_hopeless(job, since) or stop_within() is not None:
             return ending
         say(ending.lost)
+        time.sleep(PAUSE)  # memory or the folder may be free again
 
 
 def is_hopeless(job: Job, since: float) -> bool:
     """Returns whether MAX_ATTEMPTS attempts in a row were lost, so that another one is useless."""
-    spans = cost_of(job.folder).get("spans", [])
-    return _attempts_without_checkpoint(job, spans, since) >= MAX_ATTEMPTS
-
-
-def _attempts_without_checkpoint(job: Job, spans: list[list[float]], since: float) -> int:
     from rl_workbench.training.checkpoints import LAST
 
     with contextlib.suppress(OSError):
         since = max(since, (job.folder / LAST).stat().st_mtime)
-    return sum(began > since for began, _ in spans)
+    spans = cost_of(job.folder).get("spans", [])
+    return sum(began > since for began, _ in spans) >= MAX_ATTEMPTS
 
 
 def _note(
@@ -154,15 +140,7 @@ def _note(
 
 
 def command(job: Job, program: Sequence[str]) -> list[str]:
-    """Returns the command that starts or resumes a training.
-
-    Args:
-        job: the training.
-        program: the command line, without `train`.
-
-    Raises:
-        WorkbenchError: if a training of an earlier command still runs in the folder.
-    """
+    """Returns the command that starts or resumes a training."""
     from rl_workbench.training.checkpoints import LAST
 
     if job.folder.exists():
@@ -175,15 +153,13 @@ def command(job: Job, program: Sequence[str]) -> list[str]:
 
 def _start(words: list[str], log: Path, modules: str, death_signal: str) -> subprocess.Popen[bytes]:
     prefix = ["setpriv", "--pdeathsig", death_signal, "--"] if shutil.which("setpriv") else []
-    # Environments over ROS may start a master, so each training gets a port of its own.
-    address = {"ROS_MASTER_URI": f"http://127.0.0.1:{_free_port()}"}
     # Ray's workers block SIGINT, and child processes would inherit that.
     before = signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     try:
         with log.open("ab") as output:
             return subprocess.Popen(
                 [*prefix, *words],
-                env={**os.environ, **ONE_CORE, **address, "PYTHONPATH": modules},
+                env={**os.environ, **ONE_CORE, JOB: "1", "PYTHONPATH": modules},
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
@@ -191,13 +167,6 @@ def _start(words: list[str], log: Path, modules: str, death_signal: str) -> subp
             )
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _free_port() -> int:
-    for port in random.SystemRandom().sample(MASTER_PORTS, len(MASTER_PORTS)):
-        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
-            return port
-    raise WorkbenchError("no port is free for the training's own simulation")
 
 
 def _finish(process: subprocess.Popen[bytes], stop_within: StopWithin) -> tuple[int, float, bool]:

@@ -19,10 +19,9 @@ from typing import Any
 
 from tqdm import tqdm
 
-from file_access.content import open_text
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt, search_path
-from rl_workbench.storage import as_json, write_file
+from rl_workbench.storage import as_json, read_json, write_file
 from rl_workbench.tools.job import (
     MAX_ATTEMPTS,
     TIME_TO_SAVE,
@@ -56,9 +55,6 @@ def job_pool(
         folder: contains all run folders.
         interrupt: ends all jobs.
         jobs: those known from the beginning.
-
-    Raises:
-        WorkbenchError: if there is no such cluster.
     """
     program = Program(arguments.program, search_path())
     with contextlib.ExitStack() as stack:
@@ -92,16 +88,10 @@ def claim(folder: Path, name: str, wanted: Any, refusal: str) -> None:
         Raises:
             WorkbenchError: if it has, or it can't be read or written.
     """
-    path = folder / name
-    try:
-        with open_text(path) as file:
-            found = json.load(file)
-    except FileNotFoundError:
-        write_file(path, as_json(wanted))
-        return
-    except (OSError, ValueError) as error:
-        raise WorkbenchError(f"can't read {path}: {error}") from error
-    if found != json.loads(json.dumps(wanted)):
+    found = read_json(folder / name)
+    if found is None:
+        write_file(folder / name, as_json(wanted))
+    elif found != json.loads(json.dumps(wanted)):
         raise WorkbenchError(f"{folder} holds {refusal}; name another folder with --out")
 
 
@@ -160,11 +150,7 @@ class JobPool:
             self._bar.close()
 
     def run_all(self, jobs: Sequence[Job]) -> None:
-        """Runs independent jobs.
-
-        Raises:
-            WorkbenchError: if a folder can't be written to.
-        """
+        """Runs independent jobs."""
         with ThreadPoolExecutor(self.at_once) as threads:
             list(threads.map(self.run, jobs))
 
@@ -176,9 +162,6 @@ class JobPool:
         Args:
             job: the job; skipped if it is complete.
             is_needed: called several times a second; the training is stopped once it returns False.
-
-        Raises:
-            WorkbenchError: if a folder can't be written to.
         """
         if job.is_done():
             self._set(job, DONE)
@@ -193,8 +176,7 @@ class JobPool:
 
         self._set(job, RUNNING)
         try:
-            with self._progress(job, stop_within) as watched:
-                ending = self._run(job, watched, lambda reason: self._lost(job, reason))
+            ending = self._run(job, stop_within, lambda reason: self._lost(job, reason))
         except BaseException as error:
             self.failure = error
             raise
@@ -245,25 +227,6 @@ class JobPool:
                 self._bar.n = counts[DONE] + counts[FAILED]
                 states = (f"{counts[state]} {state}" for state in (DONE, RUNNING, FAILED))
                 self._bar.set_postfix_str(", ".join(states))
-
-    @contextlib.contextmanager
-    def _progress(self, job: Job, stop_within: StopWithin) -> Iterator[StopWithin]:
-        """Shows a job's bar on a terminal; the yielded function updates it at each call."""
-        if self._bar is None:
-            yield stop_within
-            return
-        bar: Any = tqdm(
-            desc=job.name, unit="step", file=self._bar.fp, leave=False, dynamic_ncols=True
-        )
-
-        def watched() -> float | None:
-            bar.n, length = steps_of(job.folder)
-            bar.total = length or None
-            bar.refresh()
-            return stop_within()
-
-        with contextlib.closing(bar):
-            yield watched
 
     def _say(self, text: str) -> None:
         if self._bar is not None:
@@ -329,22 +292,16 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
 
 
 def read_jobs(folder: Path) -> list[JobStatus]:
-    """Returns the progress of a folder's jobs.
-
-    Raises:
-        WorkbenchError: if the folder has no jobs.
-    """
-    path = folder / NAME
-    try:
-        with open_text(path) as file:
-            entries = [JobEntry(**each) for each in json.load(file)["jobs"]]
-    except OSError as error:
+    """Returns the progress of a folder's jobs."""
+    content = read_json(folder / NAME)
+    if content is None:
         raise WorkbenchError(
-            f"{folder} has no jobs: {NAME} is in the folder of a benchmark or a sweep "
-            f"({error.strerror})"
-        ) from error
-    except (ValueError, TypeError, KeyError) as error:
-        raise WorkbenchError(f"{path} isn't a list of jobs: {error}") from error
+            f"{folder} has no jobs: {NAME} is in the folder of a benchmark or a sweep"
+        )
+    try:
+        entries = [JobEntry(**each) for each in content["jobs"]]
+    except (TypeError, KeyError) as error:
+        raise WorkbenchError(f"{folder / NAME} isn't a list of jobs: {error}") from error
     is_alive = is_held(folder)
     return [_status(folder, entry, is_alive) for entry in entries]
 

@@ -45,15 +45,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
 
 
 def run_panels(runs: Sequence[Run], over: str) -> "list[Panel]":
-    """Makes panels of single runs, one for each environment.
-
-    Args:
-        runs: the runs.
-        over: "episodes" or "steps".
-
-    Raises:
-        WorkbenchError: if a run has no episode yet.
-    """
+    """Makes panels of single runs, one for each environment."""
     import numpy as np
 
     from rl_workbench.plotting import SeedCurve
@@ -80,11 +72,7 @@ def run_panels(runs: Sequence[Run], over: str) -> "list[Panel]":
 
 
 def seed_panels(runs: Sequence[Run]) -> "list[Panel]":
-    """Makes panels of the training returns of experiments over their seeds, one for each environment.
-
-    Raises:
-        WorkbenchError: if no run has an episode.
-    """
+    """Makes panels of the training returns of experiments over their seeds, one for each environment."""
 
     def of(curve: Callable[[Run], Curve]) -> CurveOf:
         def seed_curve(run: Run) -> "SeedCurve | None":
@@ -102,11 +90,7 @@ def seed_panels(runs: Sequence[Run]) -> "list[Panel]":
 
 
 def variant_panels(runs: Sequence[Run]) -> "list[Panel]":
-    """Makes panels of the evaluations of experiments over their seeds, one for each experiment.
-
-    Raises:
-        WorkbenchError: if no run was evaluated.
-    """
+    """Makes panels of the evaluations of experiments over their seeds, one for each experiment."""
     panels = _panels(
         runs,
         lambda run: run.experiment,

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium
-import numpy as np
 from torch import nn
 
 from rl_workbench.errors import WorkbenchError
@@ -38,9 +37,7 @@ class LearnedPolicy(NamedTuple):
     """A learned policy and an environment of the kind it learned in, which the caller closes."""
 
     act: Act  # greedily, for one observation: (D,), or a dict as in the training
-    preference: Callable[[np.ndarray], np.ndarray]  # (N, D) to (N,), see `meaning`
-    meaning: str  # of the preference; positive is the last action, or a push to the right
-    network: nn.Module  # acts for many observations at once
+    network: nn.Module  # observations (N, D) to actions; a choice among N actions has `scores`, too
     env: gymnasium.Env[Any, Any]
     checkpoint: Path
     steps: int  # of the training up to this checkpoint
@@ -52,9 +49,6 @@ def environment_of(run: Run, options: Mapping[str, Any]) -> gymnasium.Env[Any, A
     Args:
         run: the run.
         options: of the environment, on top of the training's own.
-
-    Raises:
-        WorkbenchError: if it can't be made.
     """
     keeps_dict = algorithm(run.algorithm).keeps_dict
     return make_environment(run.env_id, {**run.env_kwargs, **options}, keep_dict=keeps_dict)
@@ -125,11 +119,7 @@ def _learned(
 
 
 def play(policy: LearnedPolicy | RandomPolicy, episodes: int, seed: int) -> Evaluation:
-    """Plays episodes of a policy in its environment, seeded once.
-
-    Raises:
-        WorkbenchError: if the environment fails.
-    """
+    """Plays episodes of a policy in its environment, seeded once."""
     try:
         result = run_greedily(policy.env, policy.act, TEST_SEED + seed, episodes)
     except (ValueError, AssertionError) as error:

@@ -105,13 +105,7 @@ def library_versions() -> dict[str, str]:
 
 
 class RayJobs:
-    """Runs jobs on a joined cluster.
-
-    Args:
-        ray: the initialised module.
-        folder: contains all run folders.
-        program: the command that starts trainings.
-    """
+    """Runs jobs on a joined cluster."""
 
     def __init__(self, ray: Any, folder: Path, program: Program) -> None:
         self._ray, self._folder, self._program = ray, folder, program
@@ -131,11 +125,7 @@ class RayJobs:
         return f"{nodes} node{'s' * (nodes > 1)} of a Ray cluster with {self.cpus} cores"
 
     def run(self, job: Job, stop_within: StopWithin, say: Callable[[str], None]) -> Ending:
-        """Runs a job to its end.
-
-        Raises:
-            WorkbenchError: if a node can't be used.
-        """
+        """Runs a job to its end."""
         options = self._task.options(name=f"train {job.name}")
         task = options.remote(
             job, self._program, self._folder, self._token, self._wanted, self._since
@@ -184,9 +174,6 @@ def joined(address: str) -> Iterator[Any]:
     Args:
         address: HOST:PORT of the cluster's head, "auto" for the cluster that this machine belongs to, or
             "local" for a cluster that ends with the block.
-
-    Raises:
-        WorkbenchError: if Ray isn't installed, or there is no such cluster.
     """
     need("ray", "Ray", "--ray")
     for name, value in QUIET.items():

@@ -224,9 +224,6 @@ def write_video(path: Path, frames: "Sequence[np.ndarray]", rate: float) -> None
         path: the file.
         frames: at least one, all of one size, (H, W, 3) uint8.
         rate: frame rate [Hz].
-
-    Raises:
-        WorkbenchError: if the file can't be written.
     """
     from rl_workbench.storage import write_file
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -49,8 +49,6 @@ QUALITY = 85  # of JPEG on a page
 PATIENCE = 10.0  # [s] to wait for the recording thread to end
 MAX_STEPS = 20_000  # of an episode on a page; some never end
 MAX_BYTES = 2**28  # of an episode's pictures
-BACKEND = "backend"  # the option that may let an environment move a robot outside of its process
-IN_PROCESS = ("bullet", "mujoco")
 
 
 class EpisodeFrame(NamedTuple):
@@ -69,29 +67,8 @@ class EpisodeFrame(NamedTuple):
         return "   ".join([*parts, f"step {self.step}", f"return {self.total_reward:.1f}", *action])
 
 
-class View(Protocol):
-    """Captures an environment, and shows it on a page later, maybe in another thread."""
-
-    def take(self) -> Any:
-        """Returns the present view, small enough to keep thousands of them."""
-        ...
-
-    def show(self, seen: Any, caption: str = "") -> None:
-        """Shows what `take` returned on the page."""
-        ...
-
-
 class PictureView:
-    """Shows the pictures of `render` in the middle of a page.
-
-    Args:
-        env: the environment.
-        server: of the page; None if nothing will be shown.
-        size: of the pictures; by default the environment's own.
-
-    Raises:
-        WorkbenchError: if the environment draws no pictures.
-    """
+    """Shows the pictures of `render`, of that size, in the middle of a page, if there is one."""
 
     def __init__(
         self,
@@ -105,11 +82,7 @@ class PictureView:
         self._shown: viser.ImageHandle | None = None
 
     def take(self) -> bytes:
-        """Returns a PNG, because thousands are kept.
-
-        Raises:
-            WorkbenchError: if the environment can't be drawn.
-        """
+        """Returns a PNG, because thousands are kept."""
         try:
             drawn: Any = self._env.render()
         except (gymnasium.error.Error, WorkbenchError) as error:
@@ -139,16 +112,7 @@ class PictureView:
 
 
 class SceneView:
-    """Shows an environment that draws itself in 3-D on a page.
-
-    Args:
-        env: the environment.
-        server: of the page.
-        index: of the environment among those on the page.
-
-    Raises:
-        WorkbenchError: if the environment can't be drawn.
-    """
+    """Shows an environment that draws itself in 3-D on a page, as one of several with `index`."""
 
     def __init__(
         self, env: gymnasium.Env[Any, Any], server: "viser.ViserServer", index: int = 0
@@ -165,17 +129,17 @@ class SceneView:
         self._drawn.show(seen, *([caption] if caption else []))
 
 
+View = PictureView | SceneView
+"""Captures an environment by `take`, and shows what that returned on a page, maybe in another thread."""
+
+
 def draws_itself(env: gymnasium.Env[Any, Any]) -> bool:
     """Returns whether an environment can be seen in 3-D."""
     return hasattr(env.unwrapped, DRAW)
 
 
 def make_view(server: "viser.ViserServer", env: gymnasium.Env[Any, Any]) -> View:
-    """Makes the best view that the environment has, and points the open pages' cameras at its front.
-
-    Raises:
-        WorkbenchError: if the environment can't be drawn.
-    """
+    """Makes the best view that the environment has, and points the open pages' cameras at its front."""
     if not draws_itself(env):
         return PictureView(env, server)
     view = SceneView(env, server)
@@ -205,9 +169,6 @@ def record_episode(
         seed: of the episode.
         stride: average number of steps between frames; the last step always has a frame.
         max_steps: steps after which the episode is cut off; 0 for never.
-
-    Raises:
-        WorkbenchError: if the environment can't be drawn.
     """
     total, due = 0.0, 0.0
     for length, step in enumerate(episode_steps(env, act, seed, max_steps)):
@@ -398,34 +359,30 @@ class EpisodeRecorder:
 def check_robot_is_free(run: Run, options: dict[str, Any]) -> None:
     """Checks that an episode won't move the robot of a running training.
 
-    `shares_robot` would tell, but an environment that has it is already in the training's world. So this
-    goes by the name of the backend.
-
     Args:
-        run: the run.
+        run: the run, whose record has the options that name a shared robot.
         options: of the episode's environment.
 
     Raises:
         WorkbenchError: if it would.
     """
-    given = run.config["run"]
-    training = {**given["env_kwargs"], **given.get("train_env_kwargs", {})}
-    own = (None, *IN_PROCESS)
-    if options.get(BACKEND) in own or training.get(BACKEND) in own or not is_held(run.folder):
+    shared = run.config.get("shared_robot")
+    if (
+        shared is None
+        or not is_held(run.folder)
+        or shared != {each: options.get(each) for each in shared}
+    ):
         return
+    names = ", ".join(f"{name}={value}" for name, value in shared.items())
     raise WorkbenchError(
-        f"no episodes while it trains: {BACKEND}={options[BACKEND]} is the training's own robot. "
-        f"`view --env-kwargs {BACKEND}={IN_PROCESS[0]}` plays another one, and so does --gui of a "
-        f"training with --train-env-kwargs {BACKEND}={training[BACKEND]} instead of --env-kwargs"
+        f"no episodes while it trains: {names} is the training's own robot. `view --env-kwargs` with "
+        "another one plays that, and so does --gui of a training with --train-env-kwargs instead of "
+        "--env-kwargs"
     )
 
 
 def drawn_environment(run: Run, options: dict[str, Any]) -> gymnasium.Env[Any, Any]:
-    """Makes an environment that draws pictures.
-
-    Raises:
-        WorkbenchError: if it can't be made, or draws none.
-    """
+    """Makes an environment that draws pictures."""
     try:
         return environment_of(run, {**options, "render_mode": "rgb_array"})
     except WorkbenchError as error:

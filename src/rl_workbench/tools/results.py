@@ -166,6 +166,13 @@ def rows(results: Sequence[RunResult], columns: Mapping[str, str]) -> list[dict[
     return [{name: getattr(each, field) for name, field in columns.items()} for each in results]
 
 
+def figures(results: Sequence[RunResult]) -> dict[str, Any]:
+    """Returns a group's statistics and runs as plain values, for JSON."""
+    found = statistics_of(results)
+    statistics = found._asdict() if found else None
+    return {"statistics": statistics, "runs": rows(results, COMPARE)}
+
+
 def table(results: Sequence[RunResult], columns: Mapping[str, str]) -> str:
     """Returns a Markdown table with a row for each run."""
     shown = {name: field for name, field in columns.items() if _is_shown(results, name)}

@@ -1,7 +1,6 @@
 """The page of a run: recorded episodes of its policies, and the curves of its training."""
 
 import contextlib
-import os
 import sys
 import threading
 import time
@@ -24,7 +23,7 @@ from rl_workbench.tools.recording import (
 )
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training.progress import tell, warn
-from web_viewer.address import PortInUse, find_address
+from web_viewer.address import Address, PortInUse, find_address
 from web_viewer.curves import Curves
 from web_viewer.server import open_browser, serve, stop
 
@@ -61,11 +60,7 @@ def show_run(
         port: the port to serve on; None for the first free one.
         browser: whether to open a browser.
         interrupt: ends the serving.
-        beside_training: whether a training started this process and reads its output. The run folder may
-            still be empty, and this process ends when its standard input closes.
-
-    Raises:
-        WorkbenchError: if there is no such run, or the page can't be served.
+        beside_training: whether a training started this process, which ends when its standard input closes.
     """
     import torch
 
@@ -81,19 +76,13 @@ def show_run(
     def is_over() -> bool:
         return training_ended.is_set() or interrupt.requested()
 
-    try:
-        address = find_address(host, port)
-        server = serve(address, folder.name, CAMERA, LOOK_AT)
-    except PortInUse as error:
-        raise WorkbenchError(str(error)) from error
+    address, server = _served(host, port, folder.name)
     with contextlib.ExitStack() as stack:
         stack.callback(stop, server)
         recorder = EpisodeRecorder(folder, server, env_options)
         stack.callback(recorder.close)
-        for line in address.advice("the run", "plays its episodes"):
+        for line in address.advice("the run", "plays its episodes") if not is_over() else ():
             tell(line)
-        if beside_training:
-            _close_output()
         if browser:  # some browsers block until the user closes them
             threading.Thread(target=open_browser, args=(address, warn), daemon=True).start()
         while not server.get_clients() and not is_over():  # nothing is played without a viewer
@@ -106,17 +95,18 @@ def show_run(
             _play(server, playback, curves, is_over)
 
 
+def _served(host: str, port: int | None, title: str) -> tuple[Address, viser.ViserServer]:
+    try:
+        address = find_address(host, port)
+        return address, serve(address, title, CAMERA, LOOK_AT)
+    except PortInUse as error:
+        raise WorkbenchError(str(error)) from error
+
+
 def _await_end(ended: threading.Event) -> None:
     """Waits for the end of standard input, which closes with the training even if that is killed."""
     sys.stdin.buffer.read()
     ended.set()
-
-
-def _close_output() -> None:
-    """Closes standard output, since the training reads it to its end."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)
 
 
 def _play(

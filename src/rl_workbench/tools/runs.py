@@ -2,7 +2,6 @@
 
 import csv
 import glob
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,9 +11,9 @@ import numpy as np
 
 from file_access.content import open_text
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.storage import CONFIG_RECORD
+from rl_workbench.storage import CONFIG_RECORD, read_json, read_record
 from rl_workbench.training.scalar_log import EVALUATION, RETURN, SUCCESS
-from rl_workbench.training.scalar_log import NAME as SCALARS
+from web_viewer.table import NAME as SCALARS
 
 SUMMARY = "summary.json"
 RECORDED = {"env_id": str, "env_kwargs": dict, "exp_name": str, "seed": int}
@@ -52,12 +51,8 @@ def open_run(folder: Path) -> Run:
     Raises:
         WorkbenchError: if the folder isn't a run folder.
     """
-    if not folder.is_dir():
-        raise WorkbenchError(f"{folder} is no run folder: there is no such folder")
+    config = read_record(folder)
     folder = folder.resolve()
-    config = _read_json(folder / CONFIG_RECORD)
-    if config is None:
-        raise WorkbenchError(f"{folder} is no run folder: it has no {CONFIG_RECORD}")
     try:
         run = config["run"]
         for name, kind in RECORDED.items():
@@ -73,36 +68,19 @@ def open_run(folder: Path) -> Run:
         raise WorkbenchError(f"{folder} is no run folder: {text}") from error
 
 
-def _read_json(path: Path) -> Any:
-    """Returns None if there is no such file."""
-    try:
-        with open_text(path) as file:
-            return json.load(file)
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    except OSError as error:
-        raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
-    except ValueError as error:
-        raise WorkbenchError(f"{path} isn't JSON: {error}") from error
-
-
 def read_leniently(path: Path) -> dict[str, Any]:
     """Returns the content of a JSON file; an empty dict if it can't be read."""
     try:
-        content = _read_json(path)
+        content = read_json(path)
     except WorkbenchError:
         return {}
     return content if isinstance(content, dict) else {}
 
 
 def summary_of(run: Run) -> dict[str, Any]:
-    """Returns a training's summary; empty until its end.
-
-    Raises:
-        WorkbenchError: if it can't be read, or isn't a summary.
-    """
+    """Returns a training's summary; empty until its end."""
     path = run.folder / SUMMARY
-    content = _read_json(path)
+    content = read_json(path)
     if content is None:
         return {}
     returns = content.get("returns", []) if isinstance(content, dict) else None
@@ -132,9 +110,6 @@ def find_runs(patterns: Sequence[str], warn: Callable[[str], None]) -> list[Run]
     Args:
         patterns: as the user typed them; matches that aren't runs are skipped.
         warn: receives a line for each run that is skipped for its damaged record.
-
-    Raises:
-        WorkbenchError: if a pattern matches no run, or names a run with a damaged record.
     """
     found: dict[Path, Run] = {}
     for pattern in patterns:
@@ -161,11 +136,7 @@ def _matching(pattern: str, warn: Callable[[str], None]) -> list[Run]:
 
 
 def training_curve(run: Run) -> Curve:
-    """Returns the return of each finished training episode.
-
-    Raises:
-        WorkbenchError: if no episode has ended yet, or the table can't be read.
-    """
+    """Returns the return of each finished training episode."""
     curve = _scalars(run, RETURN)
     if not len(curve.values):
         raise WorkbenchError(f"{run.folder}: no episode has ended yet")

@@ -11,7 +11,7 @@ import argparse
 import contextlib
 import os
 import zlib
-from collections.abc import Iterator
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +28,6 @@ from rl_workbench.tools.jobs import JobPool, claim, job_pool
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.command_line import choose
 from rl_workbench.training.options import (
     RunOptions,
     default_file,
@@ -38,12 +37,12 @@ from rl_workbench.training.options import (
 )
 from rl_workbench.training.progress import tell
 from rl_workbench.training.scalar_log import EVALUATION
+from rl_workbench.training.train import choose
 from web_viewer.table import GrowingTable
 
 RECORD, JOURNAL, STUDY = "sweep.json", "study.journal", "sweep"
 PRUNERS = ("median", "hyperband", "none")
 RANGES = "sweep.yaml"  # in the package's config
-RANGE_KEYS = ("low", "high", "log", "choices")
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -94,60 +93,43 @@ class Sweep:
 
     def run_options(self, values: dict[str, Any]) -> RunOptions:
         """Returns the run options of a trial."""
-        _, _, *rest = self.flags(values)
-        return choose(ALGORITHMS[self.algorithm], rest).run
+        return choose(ALGORITHMS[self.algorithm], self.flags(values)[2:]).run
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """Searches until there are --trials trials, or until interrupted."""
     need("optuna", "Optuna", "sweep")
     algorithm, env_id = arguments.algo, arguments.env_id
-    kind = ALGORITHMS[algorithm]
-    known = known_options(kind)
+    kind, known = ALGORITHMS[algorithm], known_options(ALGORITHMS[algorithm])
     fixed: dict[str, Any] = {**key_values(arguments.params, "--params"), "env_id": env_id}
     if arguments.total_timesteps:
         fixed["total_timesteps"] = arguments.total_timesteps
     known.read(fixed, "--params")  # checked here, else every trial would fail
     ranges = read_ranges(arguments.ranges, algorithm, env_id, known.names)
     ranges = {name: each for name, each in ranges.items() if name not in fixed}
-    folder = arguments.out or Path(f"runs/sweep__{as_file_name(env_id)}__{algorithm}")
-    folder = folder.resolve()
+    folder = (arguments.out or Path(f"runs/sweep__{as_file_name(env_id)}__{algorithm}")).resolve()
     sweep = Sweep(
         folder, algorithm, fixed, ranges, arguments.trials, arguments.seeds,
         arguments.seed, arguments.pruner, kind.section.format(env_id=env_id),
     )  # fmt: skip
     sweep.run_options({})
     check_writable(folder / RECORD)
-    with run_folder.held(folder, "another search"), _disk_errors(folder):
+    with run_folder.held(folder, "another search"):
         claim(folder, RECORD, sweep.record(), "a search with other options, ranges or seeds")
-        study = open_study(sweep)
-        with job_pool(arguments, folder, interrupt) as pool:
-            interrupt.defer()
-            Search(sweep, study, pool, interrupt).run()
-        write_results(sweep, study)
-        if interrupt.requested():
-            tell("interrupted; the same command goes on")
-
-
-@contextlib.contextmanager
-def _disk_errors(folder: Path) -> Iterator[None]:
-    """Turns disk errors into one line; Optuna writes to the folder, too.
-
-    Raises:
-        WorkbenchError: if the block raises OSError.
-    """
-    try:
-        yield
-    except OSError as error:
-        raise WorkbenchError(f"can't write to {folder}: {error.strerror}") from error
+        try:
+            study = open_study(sweep)
+            with job_pool(arguments, folder, interrupt) as pool:
+                interrupt.defer()
+                Search(sweep, study, pool, interrupt).run()
+            write_results(sweep, study)
+        except OSError as error:  # of Optuna's journal
+            raise WorkbenchError(f"can't write to {folder}: {error.strerror}") from error
+    if interrupt.requested():
+        tell("interrupted; the same command goes on")
 
 
 def open_study(sweep: Sweep) -> Any:
-    """Opens or creates the `optuna.Study` of a sweep.
-
-    Raises:
-        WorkbenchError: if the existing one can't be read.
-    """
+    """Opens or creates the `optuna.Study` of a sweep."""
     import optuna
     from optuna.storages.journal import JournalFileBackend
 
@@ -204,14 +186,11 @@ def _seeded_sampler(seed: int) -> Any:
 def _pruner(sweep: Sweep) -> Any:
     from optuna import pruners
 
-    if sweep.pruner == "median":
-        return pruners.MedianPruner()
     if sweep.pruner == "hyperband":
         options = sweep.run_options({})
-        least = max(options.eval_frequency, 1)
-        length = options.total_timesteps
+        least, length = max(options.eval_frequency, 1), options.total_timesteps
         return pruners.HyperbandPruner(least, max(length, least) if length else "auto")
-    return pruners.NopPruner()
+    return pruners.MedianPruner() if sweep.pruner == "median" else pruners.NopPruner()
 
 
 class SearchInterrupted(BaseException):
@@ -219,38 +198,25 @@ class SearchInterrupted(BaseException):
 
 
 class Search:
-    """Runs the trials of a study.
-
-    Args:
-        sweep: the search's settings.
-        study: from `open_study`.
-        pool: runs the trainings.
-        interrupt: ends the search; the next command continues the running trials.
-    """
+    """Runs the trials of a study. An interrupt ends it; the next command continues the running trials."""
 
     def __init__(self, sweep: Sweep, study: Any, pool: JobPool, interrupt: Interrupt) -> None:
         self._sweep, self._study, self._pool, self._interrupt = sweep, study, pool, interrupt
 
     def run(self) -> None:
-        """Finishes the trials that an earlier command left, then makes new ones.
-
-        Raises:
-            OSError: if the folder can't be written to.
-            WorkbenchError: if a training can't be started.
-        """
+        """Finishes the trials that an earlier command left, then makes new ones."""
         from optuna.trial import TrialState
 
         trials = self._study.get_trials(deepcopy=False)
         left = [each for each in trials if each.state == TrialState.RUNNING]
-        tell(
-            f"{len(trials) - len(left)} of {self._sweep.trials} trials are done: {self._sweep.folder}"
-        )
+        done, sweep = len(trials) - len(left), self._sweep
+        tell(f"{done} of {sweep.trials} trials are done: {sweep.folder}")
         with contextlib.suppress(SearchInterrupted):
             with ThreadPoolExecutor(self._pool.at_once) as threads:
                 list(threads.map(self._finish, left))
             self._study.optimize(
                 self._objective,
-                n_trials=max(self._sweep.trials - len(trials), 0),
+                n_trials=max(sweep.trials - len(trials), 0),
                 n_jobs=self._pool.at_once,
                 catch=(WorkbenchError,),
             )
@@ -261,13 +227,12 @@ class Search:
         import optuna
 
         trial = optuna.trial.Trial(self._study, left._trial_id)
-        with contextlib.suppress(WorkbenchError):
-            try:
-                self._study.tell(trial, self._objective(trial))
-            except optuna.TrialPruned:
-                self._study.tell(trial, state=optuna.trial.TrialState.PRUNED)
-            except WorkbenchError:
-                self._study.tell(trial, state=optuna.trial.TrialState.FAIL)
+        try:
+            self._study.tell(trial, self._objective(trial))
+        except optuna.TrialPruned:
+            self._study.tell(trial, state=optuna.trial.TrialState.PRUNED)
+        except WorkbenchError:
+            self._study.tell(trial, state=optuna.trial.TrialState.FAIL)
 
     def _objective(self, trial: Any) -> float:
         """Trains all seeds of a trial in turn; the first one decides whether it is pruned."""
@@ -302,13 +267,9 @@ class Search:
 
 
 class Judge:
-    """Reports a running training's evaluations to Optuna.
+    """Reports the evaluations of a trial's running training to Optuna.
 
-    Args:
-        study: the trial's study.
-        trial: an `optuna.Trial`.
-        folder: the run folder, which may not exist yet.
-        frequency: steps between two evaluations; 0 if only the end is evaluated.
+    Its folder may not exist yet. `frequency` is 0 if only the end is evaluated.
     """
 
     def __init__(self, study: Any, trial: Any, folder: Path, frequency: int) -> None:
@@ -344,11 +305,7 @@ class Judge:
 
 
 def score_of(job: Job) -> float:
-    """Returns the mean return of the best evaluation.
-
-    Raises:
-        WorkbenchError: if the training failed, or was never evaluated.
-    """
+    """Returns the mean return of the best evaluation."""
     summary = job.summary()
     if summary.get("best"):
         return float(summary["best"][1])
@@ -381,8 +338,8 @@ def write_results(sweep: Sweep, study: Any) -> None:
         return
     best, path = study.best_trial, sweep.folder / "best.yaml"
     write_file(path, as_text(yaml.safe_dump({sweep.section: dict(best.params)})))
-    names = [row["state"] for row in rows]
-    counts = ", ".join(f"{names.count(name)} {name}" for name in dict.fromkeys(names))
+    states = Counter(row["state"] for row in rows)
+    counts = ", ".join(f"{count} {state}" for state, count in states.items())
     tell(f"{counts}; best: trial {best.number}, {best.value:.2f}; its options are in {path}")
 
 
@@ -406,15 +363,7 @@ class OptionRange(NamedTuple):
 def read_ranges(
     path: Path | None, algorithm: str, env_id: str, known: list[str]
 ) -> dict[str, OptionRange]:
-    """Reads the ranges for an algorithm in an environment, else those for the algorithm.
-
-    learning_rate: {low: 1.0e-4, high: 1.0e-2, log: true}
-    n_step: {low: 1, high: 5}                  # whole numbers, since both ends are
-    hidden_sizes: {choices: ["64,64", "128,128"]}
-
-    Raises:
-        WorkbenchError: if there are none, an option is unknown, or a range makes no sense.
-    """
+    """Reads the ranges for an algorithm in an environment, else those for the algorithm."""
     origin = path or default_file(RANGES)
     names = section_names(f"{algorithm} {{env_id}}", env_id)
     section = read_section(origin, (*names, algorithm), None)
@@ -430,25 +379,22 @@ def _range(value: Any, origin: str) -> OptionRange:
     if not isinstance(value, dict) or not value:
         raise WorkbenchError(f"{origin} needs low and high, or choices, not {value!r}")
     for key in value:
-        if key not in RANGE_KEYS:
-            raise WorkbenchError(f"{origin}: {unknown('key', str(key), list(RANGE_KEYS))}")
+        if key not in OptionRange._fields:
+            raise WorkbenchError(f"{origin}: {unknown('key', str(key), list(OptionRange._fields))}")
     choices = value.get("choices")
     if choices is not None:
         if not isinstance(choices, list) or not choices:
             raise WorkbenchError(f"{origin}: choices are a list, not {choices!r}")
         if any(isinstance(each, list | dict) for each in choices):
-            text = 'choices are single values; sizes are a text, as in "64,64"'
-            raise WorkbenchError(f"{origin}: {text}")
+            raise WorkbenchError(
+                f'{origin}: choices are single values; sizes are a text, as in "64,64"'
+            )
         return OptionRange(0, 0, False, tuple(choices))
     low: Any = value.get("low")
     high: Any = value.get("high")
-    if not _is_number(low) or not _is_number(high) or low > high:
+    log = bool(value.get("log"))
+    if not {type(low), type(high)} <= {int, float} or low > high:
         raise WorkbenchError(f"{origin} needs numbers low <= high, not {low!r} and {high!r}")
-    log = bool(value.get("log", False))
     if log and low <= 0:
         raise WorkbenchError(f"{origin}: a logarithmic range begins above 0, not at {low!r}")
     return OptionRange(low, high, log, ())
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,14 +1,17 @@
-"""The interfaces between a training's frame (training.py) and its algorithm.
+"""The interface between a training's frame (training.py) and its algorithm.
 
-The frame opens and resumes, evaluates, saves and reports. An algorithm provides its environments, its
-learning loop, and the content of a checkpoint.
+The frame makes the environments, opens and resumes, evaluates, saves and reports. An algorithm provides its
+learning loop and the content of a checkpoint. Its module has two functions:
+
+    make(options, envs) -> Algorithm                     new, in the training's environments
+    load_policy(options, checkpoint, env) -> Policy      of a checkpoint's content
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -16,62 +19,12 @@ from torch import nn
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options import TrainingOptions
-from rl_workbench.training.scalar_log import ScalarLog
 
 Say = Callable[[str], None]  # reports a line to the user
 
 
-class Frame(Protocol):
-    """The frame, as an algorithm sees it while it learns."""
-
-    @property
-    def log(self) -> ScalarLog:
-        """For the algorithm's own figures."""
-        ...
-
-    @property
-    def folder(self) -> Path:
-        """The run folder, for the algorithm's own files."""
-        ...
-
-    def is_over(self) -> bool:
-        """Returns whether to stop: the training is complete, or the user interrupts."""
-        ...
-
-    def is_interrupted(self) -> bool:
-        """Returns whether the user interrupts."""
-        ...
-
-    def episode_done(
-        self,
-        total_reward: float,
-        length: int,
-        scalars: Mapping[str, float],
-        note: str = "",
-        success: bool | None = None,
-        step: int | None = None,
-    ) -> None:
-        """Records an episode.
-
-        Args:
-            total_reward: The undiscounted return.
-            length: Its steps.
-            scalars: The algorithm's own figures, logged at the step of the episode's end.
-            note: Shown in the line of every 20th episode, instead of the speed.
-            success: Whether it reached its goal; None if the environment doesn't say.
-            step: The step of its end; None means now.
-        """
-        ...
-
-    def step_done(self) -> None:
-        """Evaluates and saves what is due. The training must be able to continue from here."""
-        ...
-
-
 class Algorithm(ABC):
     """One algorithm at work in its environments."""
-
-    env: gymnasium.Env[Any, Any]  # for learning, and for evaluations if there is no other
 
     @property
     @abstractmethod
@@ -93,8 +46,11 @@ class Algorithm(ABC):
         """
 
     @abstractmethod
-    def learn(self, frame: Frame) -> None:
-        """Learns until it is over. It calls `frame.step_done()` wherever it can be saved.
+    def learn(self, frame: Any) -> None:
+        """Learns until `frame.is_over()`. It calls `frame.step_done()` wherever it can be saved.
+
+        Args:
+            frame: The `training.Training`.
 
         Raises:
             WorkbenchError: If the environment or the arithmetic fails.
@@ -157,27 +113,11 @@ class Algorithm(ABC):
         """
         return
 
-    def close(self) -> None:
-        """Closes the environments."""
-        self.env.close()
-
-
-def make_algorithm(options: TrainingOptions) -> Algorithm:
-    """Makes a new training's algorithm with its environments.
-
-    Raises:
-        WorkbenchError: If an environment can't be made, or doesn't suit.
-    """
-    made: Algorithm = import_module(options.kind.implementation).make(options)
-    return made
-
 
 class Policy(NamedTuple):
     """A learned policy."""
 
     act: Callable[[Any], Any]  # greedily, for one observation: (D,), or a dict as it learned from
-    preference: Callable[[np.ndarray], np.ndarray]  # of (N, D): (N,), see meaning
-    meaning: str  # of the preference: positive is the last action, or a push to the right
     network: nn.Module  # for TorchScript: of (N, D), float32, a Dict's parts side by side: (N, ...)
 
 

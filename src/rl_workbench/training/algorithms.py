@@ -86,7 +86,7 @@ _OURS = (
     ),
     AlgorithmKind(
         name="reinforce-document",
-        about="a linear policy by the algorithm of the ROS policy-gradient document,\n"
+        about="a linear policy by the policy-gradient document's algorithm,\n"
         "in an environment with 4 observations and 2 actions",
         config="pg.yaml",
         section="reinforce-document {env_id}",

@@ -5,7 +5,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, finding_modules
+from rl_workbench import errors
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
 from rl_workbench.storage import write_atomically
 from rl_workbench.training.scalar_log import CONFIRMED, EVAL_SUCCESS, EVALUATION, RETURN, SUCCESS
 
@@ -132,7 +133,9 @@ def _load(name: str) -> Callback:
     try:
         made = getattr(import_module(module), class_name)()
     except ModuleNotFoundError as error:
-        raise WorkbenchError(f"--callback {name}: {error}; {finding_modules()}") from error
+        raise WorkbenchError(
+            f"--callback {name}: {error}; {errors.hints.finding_modules()}"
+        ) from error
     except Exception as error:
         raise WorkbenchError(f"--callback {name}: {error_line(error)}") from error
     if not isinstance(made, Callback):

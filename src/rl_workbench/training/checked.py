@@ -24,11 +24,12 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     Args:
         env: Its observations are vectors, or a Dict of arrays.
         env_id: For errors.
+        which: Begins every error, as "environment 2 of 3: ".
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any], env_id: str) -> None:
+    def __init__(self, env: gymnasium.Env[Any, Any], env_id: str, which: str = "") -> None:
         super().__init__(env)
-        self._id, self._begin_step = env_id, _begin_method(env)
+        self._id, self._which, self._begin_step = env_id, which, _begin_method(env)
 
     def begin_step(self, action: Any) -> None:
         """Begins a step, where the environment can. The next `step`, by the same action, waits for it."""
@@ -50,7 +51,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         try:
             size = abs(float(reward))
         except (TypeError, ValueError) as error:
-            raise WorkbenchError(f"the reward of {self._id} isn't a number: {reward!r}") from error
+            raise self._error(f"the reward of {self._id} isn't a number: {reward!r}") from error
         if not size <= LARGEST:  # true for NaN, too
             raise self._not_finite("reward", reward)
         return observation, reward, terminated, truncated, info
@@ -77,14 +78,14 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         try:
             rewards = np.asarray(found, np.float32)
         except (TypeError, ValueError) as error:
-            raise WorkbenchError(f"{name} gives no numbers: {found!r}") from error
+            raise self._error(f"{name} gives no numbers: {found!r}") from error
         if rewards.shape != (len(achieved),):
-            raise WorkbenchError(
+            raise self._error(
                 f"{name} isn't vectorised: for {len(achieved)} goals at once, {achieved.shape}, it gives "
                 f"the shape {rewards.shape}, not {(len(achieved),)}; norms take axis=-1"
             )
         if not np.isfinite(rewards).all():
-            raise WorkbenchError(f"{name} gives a reward that isn't finite")
+            raise self._error(f"{name} gives a reward that isn't finite")
         return rewards
 
     def render(self) -> Any:
@@ -93,8 +94,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         except gymnasium.error.Error:  # the caller adds what it draws for
             raise
         except (Exception, SystemExit) as error:
-            text = f"{self._id} failed in render(): {error_line(error)}"
-            raise EnvironmentFailure(text) from error
+            raise self._failure("render", error) from error
 
     def close(self) -> None:
         with self._running("close"):
@@ -105,10 +105,17 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         try:
             yield
         except gymnasium.error.Error as error:  # its text is made for the user
-            raise WorkbenchError(str(error) or type(error).__name__) from error
+            raise self._error(str(error) or type(error).__name__) from error
         except (Exception, SystemExit) as error:
-            text = f"{self._id} failed in {method}(): {error_line(error)}"
-            raise EnvironmentFailure(text) from error
+            raise self._failure(method, error) from error
+
+    def _failure(self, method: str, error: BaseException) -> EnvironmentFailure:
+        return EnvironmentFailure(
+            f"{self._which}{self._id} failed in {method}(): {error_line(error)}"
+        )
+
+    def _error(self, text: str) -> WorkbenchError:
+        return WorkbenchError(f"{self._which}{text}")
 
     def _check(self, observation: Any) -> None:
         space = self.observation_space
@@ -117,7 +124,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
             return
         if not isinstance(observation, dict) or observation.keys() != space.keys():
             keys = list(observation) if isinstance(observation, dict) else observation
-            raise WorkbenchError(
+            raise self._error(
                 f"the observation of {self._id} has {' '.join(str(keys).split())}, its "
                 f"observation_space {list(space)}"
             )
@@ -129,9 +136,9 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
             is_finite = np.abs(array).max(initial=0) <= LARGEST
         except (TypeError, ValueError) as error:
             what = f"the {name} of {self._id} isn't a vector of numbers"
-            raise WorkbenchError(f"{what}: {' '.join(repr(array).split())}") from error
+            raise self._error(f"{what}: {' '.join(repr(array).split())}") from error
         if np.shape(array) != space.shape:
-            raise WorkbenchError(
+            raise self._error(
                 f"the {name} of {self._id} has the shape {np.shape(array)}, its "
                 f"observation_space {space.shape}"
             )
@@ -140,7 +147,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def _not_finite(self, what: str, value: Any) -> WorkbenchError:
         text = " ".join(str(value).split())
-        return WorkbenchError(f"the {what} of {self._id} isn't finite in float32: {text}")
+        return self._error(f"the {what} of {self._id} isn't finite in float32: {text}")
 
 
 def _begin_method(env: gymnasium.Env[Any, Any]) -> Callable[[Any], object]:

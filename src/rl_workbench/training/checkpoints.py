@@ -7,7 +7,6 @@ Each holds everything. last.pt and best.pt are further names of numbered files.
 """
 
 import contextlib
-import errno
 import os
 import pickle
 import shutil
@@ -23,7 +22,7 @@ from file_access.content import open_file
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.storage import save_tensors
 
-LAST, BEST, FAILURE = "last.pt", "best.pt", "failure.pt"
+LAST, BEST = "last.pt", "best.pt"
 FOLDER = "checkpoints"
 LEFTOVERS = (".*.pt.*", ".*.pt.new", ".*.pth.*", ".*.json.*", ".*.png.*")  # of a killed write
 FORMAT = "rl_workbench 2"  # changes when older files can't be read any more
@@ -41,26 +40,7 @@ class Checkpoints:
     """
 
     def __init__(self, run: Path, keep: int) -> None:
-        self._run = run
-        self._keep = keep
-        self._place = run.stat()
-
-    def are_in_place(self) -> bool:
-        """Returns whether the run folder is still where it was."""
-        try:
-            return os.path.samestat(self._run.stat(), self._place)
-        except FileNotFoundError:
-            return False
-
-    def check_place(self) -> None:
-        """Checks the run folder: another run may be in its place by now, which mustn't be overwritten.
-
-        Raises:
-            OSError: If the folder isn't the one in which the training began.
-        """
-        if not self.are_in_place():
-            moved = "the folder was moved or removed"
-            raise FileNotFoundError(errno.ENOENT, moved, str(self._run))
+        self._run, self._keep = run, keep
 
     def save(self, step: int, content: dict[str, Any], best: bool = False) -> Path:
         """Writes a checkpoint as the last one, and also as the best one if `best`; returns its path.
@@ -68,7 +48,6 @@ class Checkpoints:
         Raises:
             OSError: If it can't be written. The earlier checkpoints are untouched.
         """
-        self.check_place()
         path = self._run / FOLDER / f"step_{step:09d}.pt"
         path.parent.mkdir(exist_ok=True)
         save_tensors(path, {"format": FORMAT, **content})
@@ -81,22 +60,8 @@ class Checkpoints:
                     old.unlink()
         return path
 
-    def save_failure(self, content: dict[str, Any]) -> None:
-        """Writes `failure.pt`: what was learned until something failed in the middle of a step.
-
-        Nothing resumes from it: from `last.pt` a training gets to the same place again, exactly.
-        """
-        path = self._run / FAILURE
-        with contextlib.suppress(OSError):  # a full disk may well be the failure
-            self.check_place()
-            save_tensors(path, {"format": FORMAT, **content})
-
     def remove_leftovers(self) -> None:
-        """Removes what a killed training had begun to write. Nobody else may be writing.
-
-        Raises:
-            OSError: If a file can't be removed.
-        """
+        """Removes what a killed training had begun to write. Nobody else may be writing."""
         for folder in (self._run, self._run / FOLDER):
             for pattern in LEFTOVERS:
                 for path in folder.glob(pattern):
@@ -121,11 +86,7 @@ def _numbered(run: Path) -> list[Path]:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Reads a checkpoint into main memory. A foreign file can't run code.
-
-    Raises:
-        WorkbenchError: If there is none, or it is damaged or something else.
-    """
+    """Reads a checkpoint into main memory. A foreign file can't run code."""
     try:
         # torch doesn't verify the checksums of a file that it reads.
         with open_file(path) as file:
@@ -146,14 +107,7 @@ def read(path: Path) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def fitting(what: str) -> Iterator[None]:
-    """Turns errors into one line while something is loaded from a checkpoint.
-
-    Args:
-        what: What is loaded, for the error.
-
-    Raises:
-        WorkbenchError: If it doesn't fit.
-    """
+    """Turns errors into one line while something is loaded from a checkpoint."""
     try:
         yield
     except _MISFITS as error:
@@ -162,11 +116,7 @@ def fitting(what: str) -> Iterator[None]:
 
 
 def read_newest(run: Path, say: Callable[[str], None]) -> dict[str, Any]:
-    """Reads the last checkpoint, or the newest before it that is readable; reports what it skips.
-
-    Raises:
-        WorkbenchError: If there is none.
-    """
+    """Reads the last checkpoint, or the newest before it that is readable; reports what it skips."""
     for path in candidates(run):
         try:
             return read(path)

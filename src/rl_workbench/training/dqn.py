@@ -8,31 +8,21 @@ import numpy as np
 from rl_workbench.agents.dqn_agent import DQNAgent, Learned
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import number, sequence
-from rl_workbench.training.algorithm import Algorithm, Frame, Policy, Say
+from rl_workbench.training.algorithm import Algorithm, Policy, Say
 from rl_workbench.training.checkpoints import fitting
-from rl_workbench.training.environments import (
-    as_vector,
-    discrete_actions,
-    in_its_environments,
-    succeeded,
-)
+from rl_workbench.training.environments import as_vector, discrete_actions, succeeded
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.repeatable import RepeatableEnvironment
+from rl_workbench.training.training import Training
 
 
-def make(options: TrainingOptions) -> "DQNTraining":
-    """Makes a new training; see `make_algorithm`."""
-    return in_its_environments(
-        options, lambda envs: DQNTraining(options, envs[0], make_agent(options, envs[0]))
-    )
+def make(options: TrainingOptions, envs: list[Any]) -> "DQNTraining":
+    """Makes a new training; see `algorithm`."""
+    return DQNTraining(options, envs[0], make_agent(options, envs[0]))
 
 
 def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> DQNAgent:
-    """Makes a new agent for an environment.
-
-    Raises:
-        WorkbenchError: If the environment's actions don't suit DQN, or torch lacks the device.
-    """
+    """Makes a new agent for an environment."""
     run = options.run
     actions = discrete_actions(env, run.env_id, "DQN")
     shape = env.observation_space.shape or (0,)
@@ -46,31 +36,19 @@ def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> DQNAge
 def load_policy(
     options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
 ) -> Policy:
-    """Makes the policy of a checkpoint; see `algorithm.load_policy`."""
+    """Makes the policy of a checkpoint; see `algorithm`."""
     agent = make_agent(options, env)
     agent.load_policy_state(content)
-
-    def preference(observations: np.ndarray) -> np.ndarray:
-        values = agent.q_values(observations)
-        return np.asarray(values[:, -1] - values[:, 0])
-
-    network = agent.greedy_network()
-    return Policy(agent.act_greedily, preference, "Q(right) - Q(left)", network)
+    return Policy(agent.act_greedily, agent.greedy_network())
 
 
 class DQNTraining(Algorithm):
-    """Steps the environment and lets the agent learn.
-
-    Args:
-        options: What the user chose.
-        env: The environment to learn in.
-        agent: It counts the steps.
-    """
+    """Steps the environment and lets the agent learn."""
 
     def __init__(
         self, options: TrainingOptions, env: gymnasium.Env[Any, Any], agent: DQNAgent
     ) -> None:
-        self.env, self._agent = env, agent
+        self._agent = agent
         self._seed, self._log_frequency = options.run.seed, options.run.log_frequency
         self._repeatable = RepeatableEnvironment(env)
         self._observation: np.ndarray | None = None  # None: the next step begins an episode
@@ -84,7 +62,7 @@ class DQNTraining(Algorithm):
     def act_greedily(self, observation: np.ndarray) -> int:
         return self._agent.act_greedily(observation)
 
-    def learn(self, frame: Frame) -> None:
+    def learn(self, frame: Training) -> None:
         while not frame.is_over():
             self._step(frame)
             if self._last is not None and self.steps % self._log_frequency == 0:
@@ -93,7 +71,7 @@ class DQNTraining(Algorithm):
                 frame.log.add(self.steps, losses)
             frame.step_done()
 
-    def _step(self, frame: Frame) -> None:
+    def _step(self, frame: Training) -> None:
         agent, env = self._agent, self._repeatable
         observation = self._observation
         if observation is None:

@@ -5,28 +5,31 @@ same robot), `own_robot_options` (the options by which a copy has a robot of its
 `side_by_side(count)` (a context manager within which that many start, or close, at the same time).
 """
 
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
-from typing import Any, TypeGuard, TypeVar
+from typing import Any, TypeGuard
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from rl_workbench.env_ids import import_module_of, unknown_environment
-from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, installing
+from rl_workbench import errors
+from rl_workbench.env_ids import FORM, import_module_of, module_of
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
 from rl_workbench.training.checked import CheckedEnvironment
 from rl_workbench.training.options import TrainingOptions
 
 FLAT = (spaces.Box, spaces.Discrete, spaces.MultiBinary, spaces.MultiDiscrete)
 # What constructors raise for options that they reject.
 _REFUSED = (gymnasium.error.Error, ImportError, TypeError, ValueError, LookupError, AssertionError)
-Made = TypeVar("Made")
 
 
 def make_environment(
-    env_id: str, options: Mapping[str, Any] | None = None, *, keep_dict: bool = False
+    env_id: str,
+    options: Mapping[str, Any] | None = None,
+    *,
+    keep_dict: bool = False,
+    which: str = "",
 ) -> CheckedEnvironment:
     """Makes an environment that refuses observations and rewards that aren't finite.
 
@@ -34,6 +37,7 @@ def make_environment(
         env_id: Gymnasium's, also as module:id.
         options: Of the environment.
         keep_dict: Leave a Dict of arrays as it is. Other observations are flattened to a vector (D,).
+        which: Begins the errors while it runs, as "environment 2 of 3: ".
 
     Raises:
         WorkbenchError: If there is no such environment, something that it needs isn't installed, or its
@@ -43,12 +47,12 @@ def make_environment(
     try:
         env: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **(options or {}))
     except gymnasium.error.DependencyNotInstalled as error:
-        # Without ws, Gymnasium's own text names the command.
-        workspace = os.environ.get("CARTPOLE_WS")
-        hint = f" ({installing(env_id)} may install them)" if workspace else ""
+        extras = errors.hints.extras  # else Gymnasium's own text names the command
+        hint = f" ({extras} may install them)" if extras else ""
         raise WorkbenchError(f"{env_id} needs more packages{hint}: {error}") from error
-    except (gymnasium.error.UnregisteredEnv, gymnasium.error.DeprecatedEnv) as error:
-        raise WorkbenchError(unknown_environment(env_id)) from error
+    except gymnasium.error.UnregisteredEnv as error:
+        hint = "" if module_of(env_id) else f" {FORM}"
+        raise WorkbenchError(f"can't make {env_id}: {error}{hint}") from error
     except _REFUSED as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise WorkbenchError(f"can't make {env_id}: {reason}") from error
@@ -60,7 +64,7 @@ def make_environment(
         and isinstance(space, spaces.Dict)
         and all(_is_box(part) for part in space.values())
     ):
-        return CheckedEnvironment(env, env_id)
+        return CheckedEnvironment(env, env_id, which)
     if not (_is_box(space) and len(space.shape or ()) == 1):
         if not _is_numbers(space):
             env.close()
@@ -68,55 +72,30 @@ def make_environment(
                 f"{env_id} observes {space}; agents learn only from vectors of numbers"
             )
         env = gymnasium.wrappers.FlattenObservation(env)
-    return CheckedEnvironment(env, env_id)
+    return CheckedEnvironment(env, env_id, which)
 
 
-def environment_for(options: TrainingOptions, given: Mapping[str, Any]) -> CheckedEnvironment:
-    """Makes an environment as a training's algorithm observes it.
-
-    Args:
-        options: Of the training.
-        given: The environment's own options.
-
-    Raises:
-        WorkbenchError: See `make_environment`.
-    """
-    return make_environment(options.run.env_id, given, keep_dict=options.kind.keeps_dict)
+def environment_for(
+    options: TrainingOptions, given: Mapping[str, Any], which: str = ""
+) -> CheckedEnvironment:
+    """Makes an environment as a training's algorithm observes it."""
+    return make_environment(
+        options.run.env_id, given, keep_dict=options.kind.keeps_dict, which=which
+    )
 
 
-def in_its_environments(
-    options: TrainingOptions, make: Callable[[list[gymnasium.Env[Any, Any]]], Made]
-) -> Made:
-    """Makes an algorithm in new environments. It closes them if they don't suit the algorithm.
-
-    Raises:
-        WorkbenchError: If the environments can't be made, or don't suit.
-    """
-    envs = training_environments(options)
-    with ExitStack() as making:
-        making.callback(close_all, envs)
-        made = make(envs)
-        making.pop_all()
-    return made
-
-
-def training_environments(options: TrainingOptions) -> list[gymnasium.Env[Any, Any]]:
+def training_environments(options: TrainingOptions) -> list[CheckedEnvironment]:
     """Makes the `num_envs` environments of a training, each with a robot of its own.
 
     The caller closes them with `close_all`.
-
-    Raises:
-        WorkbenchError: If they can't be made, or all would move the same robot.
     """
     run, given = options.run, options.run.training_environment
-    first = environment_for(options, given)
     count = run.num_envs
-    if count == 1:
-        return [first]
+    first = environment_for(options, given, _which(0, count))
     made = [first]
     with ExitStack() as making:
         making.callback(close_all, made)
-        if shares_robot(first):
+        if count > 1 and shares_robot(first):
             own_robot = _attribute(first, "own_robot_options")
             if not own_robot:
                 raise WorkbenchError(
@@ -126,62 +105,21 @@ def training_environments(options: TrainingOptions) -> list[gymnasium.Env[Any, A
             given = {**given, **own_robot}
         with _side_by_side(first, count - len(made)):
             for index in range(len(made), count):
-                with _numbered(index, count):
-                    made.append(environment_for(options, given))
+                which = _which(index, count)
+                try:
+                    made.append(environment_for(options, given, which))
+                except WorkbenchError as error:
+                    raise type(error)(f"{which}{error}") from error.__cause__
         making.pop_all()
-    return [NumberedEnvironment(env, index, count) for index, env in enumerate(made)]
+    return made
 
 
-class NumberedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """One of several environments: its errors have its number.
-
-    Args:
-        env: The environment.
-        index: Its number, from 0 on.
-        count: How many there are.
-    """
-
-    env: CheckedEnvironment
-
-    def __init__(self, env: CheckedEnvironment, index: int, count: int) -> None:
-        super().__init__(env)
-        self._index, self._count = index, count
-
-    def begin_step(self, action: Any) -> None:
-        """Begins a step; see `CheckedEnvironment.begin_step`."""
-        with _numbered(self._index, self._count):
-            self.env.begin_step(action)
-
-    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        with _numbered(self._index, self._count):
-            return self.env.step(action)
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Any, dict[str, Any]]:
-        with _numbered(self._index, self._count):
-            return self.env.reset(seed=seed, options=options)
-
-    def close(self) -> None:
-        with _numbered(self._index, self._count):
-            self.env.close()
-
-
-@contextmanager
-def _numbered(index: int, count: int) -> Iterator[None]:
-    try:
-        yield
-    except WorkbenchError as error:
-        text = f"environment {index + 1} of {count}: {error}"
-        raise type(error)(text) from error.__cause__
+def _which(index: int, count: int) -> str:
+    return f"environment {index + 1} of {count}: " if count > 1 else ""
 
 
 def close_all(envs: Sequence[gymnasium.Env[Any, Any]]) -> None:
-    """Closes environments, the others too if one fails.
-
-    Raises:
-        WorkbenchError: If one fails.
-    """
+    """Closes environments, the others too if one fails."""
     if not envs:
         return
     with _side_by_side(envs[0], len(envs)), ExitStack() as closing:
@@ -194,7 +132,7 @@ def _side_by_side(env: gymnasium.Env[Any, Any], count: int) -> Iterator[None]:
     """Lets environments like `env` start or close at the same time, if they can."""
     waiting = _attribute(env, "side_by_side")
     try:
-        with waiting(count) if waiting else nullcontext():
+        with waiting(count) if waiting and count else nullcontext():
             yield
     except gymnasium.error.Error as error:  # its text is made for the user
         raise WorkbenchError(str(error) or type(error).__name__) from error
@@ -203,6 +141,13 @@ def _side_by_side(env: gymnasium.Env[Any, Any], count: int) -> Iterator[None]:
 def shares_robot(env: gymnasium.Env[Any, Any]) -> bool:
     """Returns whether another environment of this kind would move the same robot."""
     return bool(_attribute(env, "shares_robot"))
+
+
+def robot_options(env: gymnasium.Env[Any, Any], given: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Returns the options by which other environments would move the same robot; None if none would."""
+    if not shares_robot(env):
+        return None
+    return {name: given.get(name) for name in _attribute(env, "own_robot_options") or given}
 
 
 def _attribute(env: gymnasium.Env[Any, Any], name: str) -> Any:

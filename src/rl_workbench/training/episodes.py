@@ -11,7 +11,7 @@ from rl_workbench.agents.document import Episode, PolicyGradientAgent
 from rl_workbench.agents.reinforce import ReinforceAgent
 from rl_workbench.states import sequence, set_generator
 from rl_workbench.training.checked import BEGIN_STEP
-from rl_workbench.training.environments import as_vector, close_all, succeeded
+from rl_workbench.training.environments import as_vector, succeeded
 from rl_workbench.training.generators import (
     generator_state,
     mark_random_states,
@@ -92,11 +92,6 @@ class EpisodeSource:
 
     An episode that is interrupted has drawn from the generators, but nothing was learned from it. `rewind`
     takes its draws back, so that it can be played again as it would have been.
-
-    Args:
-        envs: Each moves a robot of its own.
-        agent: Plays in them.
-        seed: Of the training.
     """
 
     def __init__(self, envs: Sequence[gymnasium.Env[Any, Any]], agent: Agent, seed: int) -> None:
@@ -105,25 +100,15 @@ class EpisodeSource:
         self._actions = [agent.generator, *others]
 
     def seed(self) -> None:
-        """Seeds all environments, before their first episode.
-
-        Raises:
-            WorkbenchError: If one fails.
-        """
+        """Seeds all environments, before their first episode."""
         for index, env in enumerate(self._envs):
             env.reset(seed=self._seed + index)
 
     def collect(self, should_stop: Callable[[], bool]) -> list[Episode] | None:
         """Plays one episode in each environment, all by the agent's present policy.
 
-        Args:
-            should_stop: Called before each step.
-
         Returns:
             The episodes in the order of the environments; None if `should_stop()` became true.
-
-        Raises:
-            WorkbenchError: If an environment fails.
         """
         agent = self._agent
         # Nobody else waits while a single environment takes its step.
@@ -158,11 +143,7 @@ class EpisodeSource:
         return {"environments": environments, "actions": actions} if actions else environments[0]
 
     def load_state(self, state: Any) -> None:
-        """Loads what `state` returned.
-
-        Raises:
-            TypeError, ValueError, LookupError: If it is something else.
-        """
+        """Loads what `state` returned."""
         count = len(self._envs)
         texts = [state]
         if count > 1:
@@ -171,7 +152,3 @@ class EpisodeSource:
         del generators[count]  # the agent's own
         for generator, text in zip(generators, texts, strict=True):
             set_generator(generator, text)
-
-    def close(self) -> None:
-        """Closes all environments."""
-        close_all(self._envs)

@@ -82,23 +82,22 @@ class Evaluator:
     Args:
         options: Of the training.
         algorithm: Acts greedily.
+        env: The training's first environment.
         should_stop: Called before each step.
         say: Called if there can be no second environment.
-
-    Raises:
-        WorkbenchError: If the second environment can't be made but must differ from the training's.
     """
 
     def __init__(
         self,
         options: TrainingOptions,
         algorithm: Algorithm,
+        env: gymnasium.Env[Any, Any],
         should_stop: Callable[[], bool],
         say: Say,
     ) -> None:
         self._run, self._algorithm, self._should_stop = options.run, algorithm, should_stop
-        self._is_guest = shares_robot(algorithm.env)
-        self._env = algorithm.env
+        self._is_guest = shares_robot(env)
+        self._env = self._training_env = env
         is_same = self._run.evaluation_environment == self._run.training_environment
         if not (self._is_guest and is_same):
             try:
@@ -121,9 +120,6 @@ class Evaluator:
             best: The mean return of the best policy so far.
             say: Called if the episode under way can't be brought back.
             is_last: Whether the training is over, so that no episode has to be brought back.
-
-        Raises:
-            WorkbenchError: If the environment fails, or the weights aren't finite.
         """
         self._algorithm.check_weights()
         with self._undisturbed(say, is_last):
@@ -152,6 +148,6 @@ class Evaluator:
         return run_greedily(self._env, act, seed, episodes, self._should_stop)
 
     def close(self) -> None:
-        """Closes the environment, unless it is the algorithm's."""
-        if self._env is not self._algorithm.env:
+        """Closes the environment, unless it is the training's."""
+        if self._env is not self._training_env:
             self._env.close()

@@ -31,10 +31,10 @@ def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]
     name = as_file_name(f"{env}__{experiment}__{seed}__{int(time.time())}")
     folder = Path(run_dir or Path("runs") / name)
     try:
-        if run_dir:
-            _make(folder)
-        else:
-            folder = _make_new(folder)
+        number = 2
+        while not run_dir and folder.exists():  # two runs of one second get two
+            folder, number = folder.with_name(f"{name}_{number}"), number + 1
+        folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _no_place(folder, error) from error
     with held(folder):
@@ -46,31 +46,9 @@ def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]
                 folder.rmdir()
 
 
-def _make(folder: Path) -> None:
-    while True:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            return
-        except FileExistsError:  # somebody who can't begin may have removed it in this moment
-            if folder.exists():
-                raise
-
-
-def _make_new(wanted: Path) -> Path:
-    """Makes a folder; two runs of one second get two."""
-    wanted.parent.mkdir(parents=True, exist_ok=True)
-    folder, number = wanted, 2
-    while True:
-        try:
-            folder.mkdir()
-            return folder
-        except FileExistsError:
-            folder, number = wanted.with_name(f"{wanted.name}_{number}"), number + 1
-
-
 def _check_empty(folder: Path) -> None:
     try:
-        taken = next(folder.iterdir(), None) is not None
+        taken = any(folder.iterdir())
         if not taken:
             write_atomically(folder / ".probe", lambda stream: None)
             (folder / ".probe").unlink()
@@ -88,18 +66,10 @@ def _no_place(folder: Path, error: OSError) -> WorkbenchError:
 
 @contextlib.contextmanager
 def held(folder: Path, holder: str = "a training") -> Iterator[None]:
-    """Keeps a second training out of a run's folder. The lock ends with the process.
-
-    Args:
-        folder: Of the run.
-        holder: What may hold it, for the error.
-
-    Raises:
-        WorkbenchError: If another process holds it, or there is no such folder.
-    """
+    """Keeps a second training out of a run's folder. The lock ends with the process."""
     with contextlib.ExitStack() as holding:
         try:
-            holding.enter_context(locked_folder(folder, wait=False))
+            holding.enter_context(locked_folder(folder))
         except BlockingIOError as error:
             raise WorkbenchError(f"{holder} is running in {folder}") from error
         except OSError as error:

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 import torch
 
-from rl_workbench.errors import EnvironmentFailure, WorkbenchError, replaying, watching
+from rl_workbench import errors
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError
 from rl_workbench.states import array, number, sequence, whole
 from rl_workbench.storage import as_json, write_atomically
 from rl_workbench.training.checkpoints import candidates
@@ -81,11 +82,7 @@ class History:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Loads what `state_dict` returned.
-
-        Raises:
-            TypeError, ValueError, LookupError: If it is something else.
-        """
+        """Loads what `state_dict` returned."""
         self.returns = array(state["returns"], torch.float64, (None,)).tolist()
         lengths = array(state["lengths"], torch.int64, (len(self.returns),))
         self.lengths = [whole(each) for each in lengths.tolist()]
@@ -117,14 +114,9 @@ class Outcome(NamedTuple):
     is_complete: bool
     is_interrupted: bool
     evaluation: Evaluation | None  # the last one
-    is_in_place: bool  # else the run folder was moved or removed
 
     def write_summary(self, failure: str | None) -> None:
-        """Writes summary.json.
-
-        Raises:
-            OSError: If it can't be written.
-        """
+        """Writes summary.json."""
         history = self.history
         summary = {
             **self.options.record(),
@@ -160,21 +152,14 @@ class Outcome(NamedTuple):
             if evaluation.success_rate is not None:
                 line += f", success {evaluation.success_rate:.0%}"
         tell(line)
-        if not self.is_in_place:
-            return
         tell(f"all results are in {self.folder}")
         if self.is_interrupted:
             tell(f"interrupted{self._how_to_resume()}")
-        tell(f"watch: {replaying(self.folder)}")
-        tell(f"curves: {watching(self.folder)}")
+        tell(f"watch: {errors.hints.replaying(self.folder)}")
+        tell(f"curves: {errors.hints.watching(self.folder)}")
 
     def failure_text(self, failure: WorkbenchError, is_written: bool) -> str:
-        """Returns the line for a training that failed.
-
-        Args:
-            failure: What ended it.
-            is_written: Whether everything could be saved.
-        """
+        """Returns the line for a training that failed."""
         text = (
             f"{failure}{_write_traceback(self.folder, failure)}; stopped after {self.steps} steps, "
         )
@@ -184,7 +169,7 @@ class Outcome(NamedTuple):
         return text + self._how_to_resume()
 
     def _how_to_resume(self) -> str:
-        if not self.is_in_place or not candidates(self.folder):
+        if not candidates(self.folder):
             return ""
         return f"; --resume {shlex.quote(str(self.folder))} goes on from the last checkpoint"
 

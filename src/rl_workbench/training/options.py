@@ -1,7 +1,5 @@
 """What one training does: the common options, the algorithm's own, and how config.json records them."""
 
-import contextlib
-import importlib.util
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -20,16 +18,12 @@ from rl_workbench.training.algorithms import AlgorithmKind, algorithm
 EXTENDING = ("total_timesteps", "episodes", "stop_at_length", "stop_at_return", "device")
 LARGEST = 2**53
 TREE = Path(__file__).resolve().parents[3]
-SHARE = Path(__file__).resolve().parents[1] / "share"  # in a wheel (setup.py)
+SHARE = Path(__file__).resolve().parents[1] / "share"  # where it is installed (setup.py)
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """The options that every training has. All frequencies count steps of the environment.
-
-    Raises:
-        WorkbenchError: If a value is outside its limits.
-    """
+    """The options that every training has. All frequencies count steps of the environment."""
 
     env_id: str = option("CartPole-v1", "Gymnasium's id of the environment")
     env_kwargs: dict[str, Any] = option({}, "options of the environment, KEY=VALUE with commas")
@@ -132,11 +126,7 @@ class TrainingOptions(NamedTuple):
 
 
 def known_options(kind: AlgorithmKind) -> Options:
-    """Returns all recorded options of an algorithm's trainings.
-
-    Raises:
-        WorkbenchError: If the algorithm isn't installed.
-    """
+    """Returns all recorded options of an algorithm's trainings."""
     kind.check_installed()
     return Options(RunOptions, kind.hyperparameters())
 
@@ -144,11 +134,7 @@ def known_options(kind: AlgorithmKind) -> Options:
 def make_options(
     kind: AlgorithmKind, values: Mapping[str, Any], resume: Path | None = None
 ) -> TrainingOptions:
-    """Makes options of converted values. What is missing gets its default.
-
-    Raises:
-        WorkbenchError: If a value is outside its limits.
-    """
+    """Makes options of converted values. What is missing gets its default."""
     options = known_options(kind)
     merged = until_the_steps({"exp_name": kind.name, **kind.defaults}, values)
     run = options.make(RunOptions, merged)
@@ -171,9 +157,6 @@ def recorded_options(content: Any, origin: str) -> TrainingOptions:
     Args:
         content: What config.json or a checkpoint's `config` holds.
         origin: The file, for errors.
-
-    Raises:
-        WorkbenchError: If it holds something else.
     """
     values = _flat(content, origin)
     kind = algorithm(str(values.pop("algorithm")))
@@ -181,11 +164,7 @@ def recorded_options(content: Any, origin: str) -> TrainingOptions:
 
 
 def recorded_kind(folder: Path) -> AlgorithmKind:
-    """Returns the algorithm of the training in a run folder.
-
-    Raises:
-        WorkbenchError: If there is none.
-    """
+    """Returns the algorithm of the training in a run folder."""
     return recorded_options(read_record(folder), str(folder / CONFIG_RECORD)).kind
 
 
@@ -196,9 +175,6 @@ def resumed_options(kind: AlgorithmKind, folder: Path, given: Mapping[str, Any])
         kind: The algorithm that was asked for.
         folder: The run folder.
         given: Converted values, all of them of `EXTENDING`.
-
-    Raises:
-        WorkbenchError: If there is no training, or it is another algorithm's.
     """
     origin = str(folder / CONFIG_RECORD)
     old = recorded_options(read_record(folder), origin)
@@ -222,20 +198,11 @@ def _flat(record: Any, origin: str) -> dict[str, Any]:
 
 
 def default_file(name: str) -> Path:
-    """Finds the project's own config/NAME: in the source tree, in a wheel, or in a catkin workspace.
-
-    Raises:
-        WorkbenchError: If it is in none of them.
-    """
+    """Finds the project's own config/NAME: in the source tree, or beside the installed modules."""
     for folder in (TREE, SHARE):
         path = folder / "config" / name
         if path.is_file():
             return path
-    if importlib.util.find_spec("rospkg"):
-        import rospkg
-
-        with contextlib.suppress(rospkg.ResourceNotFound):
-            return Path(rospkg.RosPack().get_path("cartpole")) / "config" / name
     raise WorkbenchError(f"config/{name} is neither in {TREE} nor in an installed package")
 
 
@@ -259,9 +226,6 @@ def read_section(path: Path, names: Sequence[str], preset: str | None) -> dict[s
         path: The YAML file.
         names: Names of sections, see `section_names`.
         preset: A section that must exist.
-
-    Raises:
-        WorkbenchError: If the file can't be read, or has no such preset.
     """
     content = _read_yaml(path)
     if content and not any(isinstance(value, dict) for value in content.values()):

@@ -13,26 +13,19 @@ from rl_workbench.agents.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import whole
 from rl_workbench.storage import save_tensors
-from rl_workbench.training.algorithm import Algorithm, Frame, Policy, Say
+from rl_workbench.training.algorithm import Algorithm, Policy, Say
 from rl_workbench.training.checkpoints import fitting
-from rl_workbench.training.environments import (
-    discrete_actions,
-    in_its_environments,
-    is_continuous,
-)
+from rl_workbench.training.environments import discrete_actions, is_continuous
 from rl_workbench.training.episodes import Agent, EpisodeSource
 from rl_workbench.training.options import TrainingOptions
+from rl_workbench.training.training import Training
 
 
-def make(options: TrainingOptions) -> "PolicyGradientTraining":
-    """Makes a new training; see `make_algorithm`."""
-
-    def learning_in(envs: list[gymnasium.Env[Any, Any]]) -> PolicyGradientTraining:
-        agent = make_agent(options, envs[0])
-        source = EpisodeSource(envs, agent, options.run.seed)
-        return PolicyGradientTraining(options, envs[0], agent, source)
-
-    return in_its_environments(options, learning_in)
+def make(options: TrainingOptions, envs: list[Any]) -> "PolicyGradientTraining":
+    """Makes a new training; see `algorithm`."""
+    agent = make_agent(options, envs[0])
+    source = EpisodeSource(envs, agent, options.run.seed)
+    return PolicyGradientTraining(agent, source, options.hyperparameters.save_every)
 
 
 def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
@@ -67,43 +60,23 @@ def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
 def load_policy(
     options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
 ) -> Policy:
-    """Makes the policy of a checkpoint; see `algorithm.load_policy`."""
+    """Makes the policy of a checkpoint; see `algorithm`."""
     agent = make_agent(options, env)
     agent.load_state_dict(content["agent"])
-    network = agent.greedy_network()
-    if is_continuous(env.action_space):
-
-        def first_action(seen: np.ndarray) -> np.ndarray:
-            return np.array([np.ravel(agent.act_greedily(each))[0] for each in seen])
-
-        return Policy(agent.act_greedily, first_action, "action", network)
-
-    def preference(observations: np.ndarray) -> np.ndarray:
-        found = [agent.probabilities(each) for each in observations]
-        return np.array([each[-1] - each[0] for each in found])
-
-    return Policy(agent.act_greedily, preference, "P(right) - P(left)", network)
+    return Policy(agent.act_greedily, agent.greedy_network())
 
 
 class PolicyGradientTraining(Algorithm):
     """Learns from rounds of one episode from each environment. It can be saved between two rounds.
 
     Args:
-        options: What the user chose.
-        env: The first environment; evaluations take place there if there is no other.
         agent: Acts and learns.
         source: Plays the episodes.
+        save_every: Episodes between saves of the networks; 0: at the end only.
     """
 
-    def __init__(
-        self,
-        options: TrainingOptions,
-        env: gymnasium.Env[Any, Any],
-        agent: Agent,
-        source: EpisodeSource,
-    ) -> None:
-        self.env, self._agent, self._source = env, agent, source
-        self._save_every = options.hyperparameters.save_every
+    def __init__(self, agent: Agent, source: EpisodeSource, save_every: int) -> None:
+        self._agent, self._source, self._save_every = agent, source, save_every
         self._episodes = self._steps = self._stride = 0
 
     @property
@@ -117,7 +90,7 @@ class PolicyGradientTraining(Algorithm):
     def act_greedily(self, observation: np.ndarray) -> Any:
         return self._agent.act_greedily(observation)
 
-    def learn(self, frame: Frame) -> None:
+    def learn(self, frame: Training) -> None:
         self._source.mark()
         while not frame.is_over():
             episodes = self._source.collect(frame.is_interrupted)
@@ -132,7 +105,7 @@ class PolicyGradientTraining(Algorithm):
             frame.step_done()
         self._source.rewind()
 
-    def _record(self, episode: Episode, losses: Losses | None, frame: Frame) -> None:
+    def _record(self, episode: Episode, losses: Losses | None, frame: Training) -> None:
         self._steps += episode.length
         self._stride += episode.length
         by_episode = {"Reward": episode.total_reward}  # the tags of the existing script
@@ -181,6 +154,3 @@ class PolicyGradientTraining(Algorithm):
 
     def restore_environment(self, state: Any, say: Say) -> None:
         self._source.load_state(state)  # the next episode begins with a reset anyway
-
-    def close(self) -> None:
-        self._source.close()

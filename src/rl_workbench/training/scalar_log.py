@@ -13,13 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from file_access.content import open_file
+from web_viewer.table import HEADER, NAME
 
-NAME = "scalars.csv"
 # Tags, as CleanRL and Stable-Baselines3 name them.
 RETURN, EVALUATION = "charts/episodic_return", "eval/mean_reward"
 CONFIRMED = "eval/confirmed_reward"  # of a policy that became the best one
 SUCCESS, EVAL_SUCCESS = "rollout/success_rate", "eval/success_rate"  # from 0 to 1
-HEADER = "step,tag,value,wall_time\n"
 EVENTS = "events.out.tfevents."
 VERSION = "brain.Event:2"  # of TensorBoard's format, in the first record of its files
 SHOWN_AFTER = 10.0  # [s], longest time until TensorBoard can see a point
@@ -37,9 +36,6 @@ class ScalarLog:
         settings: Shown as a table under TEXT, and under HPARAMS beside those of other trainings.
         length: The CSV's length [bytes] at the checkpoint to continue from; 0 starts a new one.
         say: Is called if the CSV has lost rows since then. The training doesn't depend on them.
-
-    Raises:
-        OSError: If the files can't be written.
     """
 
     def __init__(
@@ -52,7 +48,7 @@ class ScalarLog:
         path = folder / NAME
         points = _truncated(path, length, say) if length else []
         if not points:
-            path.write_text(HEADER, encoding="utf-8")
+            path.write_bytes(HEADER)
         self._file = path.open("a", encoding="utf-8")
         self._flushed = time.monotonic()
         for old in folder.glob(f"{EVENTS}*"):
@@ -63,11 +59,7 @@ class ScalarLog:
             self._events.add_scalar(tag, value, step, wall_time)
 
     def add(self, step: int, values: Mapping[str, float]) -> None:
-        """Writes one row for each tag.
-
-        Raises:
-            OSError: If the files can't be written.
-        """
+        """Writes one row for each tag."""
         now = time.time()
         for tag, value in values.items():
             self._file.write(f"{step},{tag},{float(value)!r},{now:.3f}\n")
@@ -77,22 +69,14 @@ class ScalarLog:
             self._file.flush()
 
     def sync(self) -> int:
-        """Puts the CSV on disk; returns its length [bytes].
-
-        Raises:
-            OSError: If the files can't be written.
-        """
+        """Puts the CSV on disk; returns its length [bytes]."""
         self._events.flush()
         self._file.flush()
         os.fsync(self._file.fileno())
         return os.fstat(self._file.fileno()).st_size
 
     def close(self) -> None:
-        """Writes what is still in memory.
-
-        Raises:
-            OSError: If the files can't be written.
-        """
+        """Writes what is still in memory."""
         try:
             self._events.close()
         finally:
@@ -106,9 +90,6 @@ class EventFile:
 
     Args:
         folder: Where it is made, under a name of its own.
-
-    Raises:
-        OSError: If it can't be written, like each method.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -171,7 +152,7 @@ def _truncated(path: Path, length: int, say: Callable[[str], None]) -> list[Poin
             break
         points.append(point)
         complete += len(row)
-    if header.decode(errors="replace") != HEADER:
+    if header != HEADER:
         points, complete = [], 0
     if complete < length:
         say(f"{path} lacks rows that it had at the checkpoint; going on without them")

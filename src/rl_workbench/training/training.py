@@ -3,6 +3,8 @@
 import contextlib
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from rl_workbench.starting import Interrupt
 from rl_workbench.states import whole
 from rl_workbench.storage import read_record
 from rl_workbench.training import folder as run_folder
-from rl_workbench.training.algorithm import make_algorithm
+from rl_workbench.training.algorithm import Algorithm
 from rl_workbench.training.callbacks import (
     Callback,
     CallbackList,
@@ -23,6 +25,11 @@ from rl_workbench.training.callbacks import (
     ScalarLogger,
 )
 from rl_workbench.training.checkpoints import Checkpoints, candidates, fitting, read_newest
+from rl_workbench.training.environments import (
+    close_all,
+    robot_options,
+    training_environments,
+)
 from rl_workbench.training.evaluator import Evaluation, Evaluator
 from rl_workbench.training.generators import random_states, restore_random_states, seed_all
 from rl_workbench.training.history import History, Outcome, evaluation_of
@@ -63,9 +70,13 @@ class Training:
         self._resumed = self._read_checkpoint() if options.resume else None
         seed_all(self._run.seed)
         with contextlib.ExitStack() as making:
-            self._algorithm = make_algorithm(options)
-            making.callback(self._algorithm.close)
-            self._evaluator = Evaluator(options, self._algorithm, interrupt.requested, tell)
+            self._envs = training_environments(options)
+            making.callback(close_all, self._envs)
+            make = import_module(options.kind.implementation).make
+            self._algorithm: Algorithm = make(options, self._envs)
+            self._evaluator = Evaluator(
+                options, self._algorithm, self._envs[0], interrupt.requested, tell
+            )
             making.callback(self._evaluator.close)
             if self._resumed:
                 self._load(self._resumed)
@@ -110,11 +121,7 @@ class Training:
     # --- the course of a training ---------------------------------------------------------------
 
     def run(self) -> None:
-        """Trains and writes everything. What was learned is saved also when it fails.
-
-        Raises:
-            WorkbenchError: If the disk, the environment, a callback or the arithmetic fails.
-        """
+        """Trains and writes everything. What was learned is saved also when it fails."""
         failure: WorkbenchError | None = None
         try:
             self._train()
@@ -123,9 +130,9 @@ class Training:
         except (OSError, MemoryError) as error:
             failure = self._not_written(error)
         finally:
-            for part in (self._evaluator, self._algorithm):
+            for close in (self._evaluator.close, partial(close_all, self._envs)):
                 try:
-                    part.close()
+                    close()
                 except WorkbenchError as error:
                     failure = failure or error
         self._finish(failure)
@@ -133,7 +140,10 @@ class Training:
     def _train(self) -> None:
         self._checkpoints.remove_leftovers()
         record = self.options.record()
-        run_folder.write_record(self.folder, record, bool(self._resumed))
+        shared = robot_options(self._envs[0], self._run.training_environment)
+        run_folder.write_record(
+            self.folder, {**record, "shared_robot": shared}, bool(self._resumed)
+        )
         settings = {**record["run"], **record["hyperparameters"]}
         self.log = ScalarLog(self.folder, settings, self._log_bytes, tell)
         try:
@@ -183,8 +193,6 @@ class Training:
             with contextlib.suppress(OSError, WorkbenchError):
                 if self._algorithm.settle():
                     self._save()
-                else:
-                    self._checkpoints.save_failure(self._content())
             raise
 
     # --- what an algorithm calls while it learns ------------------------------------------------
@@ -194,7 +202,7 @@ class Training:
         return self._interrupt.requested()
 
     def is_over(self) -> bool:
-        """Returns whether the training is complete, or the user interrupts."""
+        """Returns whether to stop: the training is complete, or the user interrupts."""
         return self._is_complete() or self._interrupt.requested()
 
     def _is_complete(self) -> bool:
@@ -209,7 +217,16 @@ class Training:
         success: bool | None = None,
         step: int | None = None,
     ) -> None:
-        """Records an episode; see `Frame.episode_done`."""
+        """Records an episode.
+
+        Args:
+            total_reward: The undiscounted return.
+            length: Its steps.
+            scalars: The algorithm's own figures, logged at the step of the episode's end.
+            note: Shown in the line of every 20th episode, instead of the speed.
+            success: Whether it reached its goal; None if the environment doesn't say.
+            step: The step of its end; None means now.
+        """
         history, steps = self.history, self._algorithm.steps
         history.returns.append(total_reward)
         history.lengths.append(length)
@@ -222,7 +239,7 @@ class Training:
         self._callbacks.call("on_episode", self, episode)
 
     def step_done(self) -> None:
-        """Evaluates and saves what is due at this step."""
+        """Evaluates and saves what is due. The training must be able to continue from here."""
         self._callbacks.step(self)
         self._evaluate_if_due()
         if self._is_due(self._run.checkpoint_frequency):
@@ -310,10 +327,9 @@ class Training:
         """Writes and reports the outcome; then raises a failure, unless the user had stopped anyway."""
         outcome = Outcome(
             self.options, self.folder, self.history, self._algorithm.steps, self._is_complete(),
-            self._interrupt.requested(), self._evaluation, self._checkpoints.are_in_place(),
+            self._interrupt.requested(), self._evaluation,
         )  # fmt: skip
         try:
-            self._checkpoints.check_place()
             self._algorithm.export(self.folder)
             self._callbacks.call("on_training_end", self)
             outcome.write_summary(str(failure) if failure else None)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import enum
 import os
 import re
 import secrets
@@ -28,7 +27,7 @@ from ros_calls import master as _master
 from ros_calls.waiting import wait_until
 from ros_utils._internal import log as _log
 from ros_utils._internal import processes as _processes
-from ros_utils.readiness import Ready
+from ros_utils.readiness import Ready, still_missing
 
 COLLECTED = 5.0  # [s] longest time from the end of a process's main thread to its exit code
 # A caller in a shell's background ignores SIGINT, and its children would inherit that.
@@ -304,36 +303,6 @@ def _end_own() -> None:
     end([handle.start for handle in _handles])
 
 
-class Readiness(enum.Enum):
-    """How a wait ended."""
-
-    READY = "ready"
-    ENDED = "ended"
-    LATE = "late"
-
-
-def wait_until_ready(ready: Callable[[], bool], handle: Handle, timeout: float) -> Readiness:
-    """Waits until `ready` is true, the program ends, or time is up; returns which.
-
-    Args:
-        ready: returns whether the wait is over.
-        handle: the program.
-        timeout: limit of the wait [s].
-
-    Raises:
-        rospy.ROSInterruptException: the caller's node was shut down meanwhile.
-    """
-
-    def look() -> Readiness | None:
-        # Checked before `ready`, so that a program's last act before its end isn't missed.
-        ended = handle.exit_code() is not None
-        if ready():
-            return Readiness.READY
-        return Readiness.ENDED if ended else None
-
-    return wait_until(look, timeout, handle.start.label) or Readiness.LATE
-
-
 def await_start(
     handle: Handle,
     is_there: Callable[[], bool],
@@ -356,15 +325,22 @@ def await_start(
         rospy.ROSInterruptException: the caller's node was shut down meanwhile.
     """
     begin = time.monotonic()
-    readiness = wait_until_ready(is_there, handle, timeout)
+
+    def look() -> str:
+        # Checked before `is_there`, so that a program's last act before its end isn't missed.
+        ended = handle.exit_code() is not None
+        return "there" if is_there() else "ended" if ended else ""
+
+    found = wait_until(look, timeout, handle.start.label)
     fault, code = "", handle.exit_code()
-    if readiness is Readiness.LATE:
+    if not found:
         fault = f"{absent} after {timeout:g} s; ended it"
-    elif code or (readiness is Readiness.ENDED and not may_end):
+    elif code or (found == "ended" and not may_end):
         fault = f"ended with exit code {code}"
     if fault:
+        reason = handle.reason()  # before it is told to end, and reports that
         handle.end()
-        _log.error(f"{handle.start.label}: {fault}: {handle.reason()}{handle.where()}")
+        _log.error(f"{handle.start.label}: {fault}: {reason}{handle.where()}")
         return False
     return wait_for_world(Started(handle), ready, begin + timeout, timeout)
 
@@ -385,23 +361,18 @@ def wait_for_world(
     """
     if ready is None:
         return started
-    missing = ""
-    ended = False
     handle = started._handle
 
-    def look() -> bool:
-        nonlocal missing, ended
-        # A node may have done its work and end before the rest is ready.
+    def has_ended() -> bool:
         code = started.exit_code()
-        ended = bool(code) or (code == 0 and handle is not None and handle.start.kind == "launch")
-        missing = ready.missing()
-        return ended or not missing
+        # A node may have done its work and end before the rest is ready.
+        return bool(code) or (code == 0 and handle is not None and handle.start.kind == "launch")
 
-    wait_until(look, max(0.0, deadline - time.monotonic()), "a world that is ready")
+    missing = still_missing(ready, max(0.0, deadline - time.monotonic()), has_ended)
     if not missing:
         return started
     what = f"not ready after {timeout:g} s"
-    if handle and ended:
+    if handle and has_ended():
         what = f"ended with exit code {handle.exit_code()} before it was ready: {handle.reason()}"
     label, where = (handle.start.label, handle.where()) if handle else ("the world", "")
     _log.error(f"{label}: {what}: {missing}{where}")

@@ -14,13 +14,13 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from rl_workbench.starting import Interrupt
 from rl_workbench.training.algorithms import algorithm
-from rl_workbench.training.command_line import choose
 from rl_workbench.training.options import (
     TrainingOptions,
     known_options,
     make_options,
     recorded_kind,
 )
+from rl_workbench.training.train import choose
 from rl_workbench.training.training import Training
 
 EXACT = ("dqn", "reinforce", "reinforce-document")  # our own; they need no extras

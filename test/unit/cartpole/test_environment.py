@@ -30,15 +30,6 @@ def test_set_points_start_where_the_cart_stands() -> None:
     assert robot.set_points == pytest.approx([observation[0] + 0.02, observation[0] + 0.04])
 
 
-def test_each_episode_starts_its_set_point_anew() -> None:
-    robot = RecordingRobot()
-    env = CartPoleEnv(BalanceTask(), robot)
-    for _ in range(2):
-        env.reset()
-        env.step(0)
-    assert robot.set_points == [-0.02, -0.02]
-
-
 def test_a_fall_terminates_and_costs_ten() -> None:
     env = CartPoleEnv(BalanceTask(), FakePlant())
     env.reset()
@@ -47,12 +38,6 @@ def test_a_fall_terminates_and_costs_ten() -> None:
         _, reward, terminated, truncated, _ = env.step(1)
         assert not truncated
     assert reward < -9.0
-
-
-def test_close_closes_the_robot() -> None:
-    robot = FakePlant()
-    CartPoleEnv(BalanceTask(), robot).close()
-    assert robot.closed == 1
 
 
 def test_reward_and_end_go_by_the_truth_not_by_what_is_measured() -> None:

@@ -9,12 +9,8 @@ import pytest
 from support.training.environment_conformance import EnvironmentConformance
 
 import cartpole  # noqa: F401 - registers the environments
-from cartpole.environment import CartPoleEnv
 from cartpole.robot import CONTROLLER
-from cartpole.tasks import BalanceTask
-from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.errors import RobotEnvError
-from robot_envs.world_state import StateQuery
 
 
 class TestBalance(EnvironmentConformance):
@@ -77,21 +73,6 @@ def test_importing_the_package_loads_no_engine_no_ros_and_no_torch():
 def test_options_that_make_no_sense_are_refused(options, text):
     with pytest.raises((ValueError, RobotEnvError), match=text):
         gymnasium.make("cartpole/Balance-v0", **options).close()
-
-
-def test_a_backend_that_got_no_environment_is_closed(monkeypatch):
-    closed, close = [], InProcessWorld.close
-
-    def watched(backend):
-        closed.append(backend)
-        close(backend)
-
-    monkeypatch.setattr(InProcessWorld, "close", watched)
-    asks = BalanceTask()
-    asks.query = StateQuery(models=("pole",))
-    with pytest.raises(RobotEnvError, match="no model 'pole'"):
-        CartPoleEnv(asks)
-    assert len(closed) == 1
 
 
 def test_an_engine_that_is_not_installed_is_named_with_the_command_that_installs_it(monkeypatch):

@@ -72,21 +72,3 @@ def test_the_engine_makes_no_difference_to_the_picture():
         pictures.append(env.render())
         env.close()
     assert np.array_equal(*pictures) and pictures[0].shape == (48, 64, 3)
-
-
-def test_a_size_that_is_none_is_refused():
-    with pytest.raises(ValueError, match="width and height"):
-        gymnasium.make("cartpole/Classic-v0", width=0)
-
-
-def test_gymnasiums_recorder_writes_an_episode(tmp_path):
-    """moviepy asks for an older Pillow than ours, so it isn't installed: docs/watching.md."""
-    pytest.importorskip("moviepy", reason="moviepy isn't installed")
-    env = gymnasium.make("cartpole/Classic-v0", render_mode="rgb_array", max_steps=5)
-    env = gymnasium.wrappers.RecordVideo(env, str(tmp_path), episode_trigger=lambda _: True)
-    env.reset(seed=0)
-    while not any(env.step(0)[2:4]):
-        pass
-    env.close()
-    (video,) = tmp_path.glob("*.mp4")
-    assert video.stat().st_size > 1000

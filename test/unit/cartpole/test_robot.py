@@ -1,6 +1,5 @@
 """The cart-pole in a world of this process: what it is made of, resets, variations."""
 
-import dataclasses
 import math
 import subprocess
 import sys
@@ -86,14 +85,6 @@ def test_an_episode_knows_nothing_of_those_before(before):
     assert run(used) == run(fresh)
 
 
-def test_not_even_of_the_stops_that_it_hit():
-    fresh, used = cartpole(), cartpole()
-    used.reset(MOVING)
-    states = [used.act(2.0) for _ in range(300)]
-    assert max(state.cart_position for state in states) > 0.49
-    assert run(used) == run(fresh)
-
-
 def test_the_height_of_the_stand_does_not_matter():
     assert run(cartpole(height=0.5)) == run(cartpole())
 
@@ -132,13 +123,6 @@ def test_friction_brakes(backend):
     backend.vary(CartPoleVariation(pole_friction=0.05).of_robot())
     backend.reset(UPRIGHT._replace(pole_angle=math.pi, pole_velocity=1.0))
     assert abs([backend.act(0.0) for _ in range(500)][-1].pole_velocity) < 0.05
-
-
-def test_friction_of_the_rail_slows_the_cart(backend):
-    free = run(backend, UPRIGHT, 5)
-    backend.vary(CartPoleVariation(cart_friction=10.0).of_robot())
-    braked = run(backend, UPRIGHT, 5)
-    assert 0.0 < braked[-1].cart_position < free[-1].cart_position
 
 
 def test_draws_fill_their_ranges():
@@ -184,23 +168,8 @@ def test_the_robot_is_found_from_anywhere_without_ros(tmp_path, root: Path):
     assert "made" in shown.stdout, shown.stderr
 
 
-def test_files_that_are_nowhere_are_an_error_that_says_where_they_were_sought(
-    tmp_path, monkeypatch
-):
-    monkeypatch.setattr(files, "TREE", tmp_path)
-    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
-    with pytest.raises(RobotEnvError, match="source the workspace"):
-        own_file("cartpole_controller", "config/joint_position_control.yaml")
-
-
 def test_also_where_there_is_no_ros_to_ask(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "TREE", tmp_path)
     monkeypatch.setitem(sys.modules, "rospkg", None)
     with pytest.raises(RobotEnvError, match="'cartpole' is neither beside"):
         own_file("cartpole", "urdf/cartpole.urdf.xacro")
-
-
-def test_a_controller_that_is_none_of_its_own_is_told_with_the_nearest_name():
-    other = dataclasses.replace(ROBOT, run=("stand_cart_position_controler",))
-    with pytest.raises(RobotEnvError, match=f"did you mean '{CONTROLLER}'"):
-        other.check()

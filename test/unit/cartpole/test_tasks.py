@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.robots.fake_plant import cartpole_world
 
-from cartpole.robot import CART_JOINT, CONTROLLER, MODEL, POLE_JOINT
+from cartpole.robot import CONTROLLER
 from cartpole.tasks import (
     ANGLE_LIMIT,
     POSITION_LIMIT,
@@ -14,7 +14,6 @@ from cartpole.tasks import (
     ClassicTask,
     SwingUpTask,
 )
-from robot_envs.world_state import InitialState, Pose
 
 UPRIGHT = CartPoleState(0.0, 0.0, 0.0, 0.0)
 
@@ -46,11 +45,6 @@ def test_observation_is_float32_in_order() -> None:
     observation = BalanceTask().observe(cartpole_world(CartPoleState(1.0, 2.0, 3.0, 4.0)))
     assert observation.dtype == np.float32
     assert observation.tolist() == [1.0, 2.0, 3.0, 4.0]
-
-
-def test_initial_state_is_upright_without_noise() -> None:
-    begun = BalanceTask().initial_state(np.random.default_rng(0))
-    assert begun == InitialState({CART_JOINT: (0.0, 0.0), POLE_JOINT: (0.0, 0.0)})
 
 
 def test_initial_noise_is_seeded_at_rest_and_within_bounds() -> None:
@@ -131,8 +125,3 @@ def test_swing_up_starts_hanging_and_sees_no_jump_at_a_full_turn() -> None:
     assert seen.tolist() == pytest.approx([0.0, 0.0, 0.0, -1.0, 0.0], abs=1e-6)
     turned = task.observe(cartpole_world(state._replace(pole_angle=-np.pi)))
     assert turned == pytest.approx(seen, abs=1e-6)
-
-
-def test_swing_up_raises_the_stand() -> None:
-    begun = SwingUpTask().initial_state(np.random.default_rng(0))
-    assert begun.models == {MODEL: Pose((0.0, 0.0, 0.5))}

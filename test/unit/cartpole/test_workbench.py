@@ -1,6 +1,7 @@
 """workbench.py: rl_workbench's command line, which knows the cart-pole and roslaunch's arguments."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,8 @@ from pathlib import Path
 import pytest
 from support.training import workbench_runs
 
-from cartpole.workbench import PROGRAM, main
+from cartpole.workbench import PROGRAM, WorkspaceHints, main
+from rl_workbench.starting import JOB
 
 pytestmark = pytest.mark.usefixtures("signals")
 
@@ -41,3 +43,34 @@ def test_its_trainings_in_processes_of_their_own_know_the_cart_pole(tmp_path: Pa
              "--eval-episodes=1", f"--run-dir={tmp_path / 'run'}"]  # fmt: skip
     subprocess.run([*PROGRAM, "train", *flags], check=True, timeout=120)
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["complete"]
+
+
+def test_each_of_several_trainings_has_a_master_of_its_own(monkeypatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:11311")
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert os.environ["ROS_MASTER_URI"] == "http://127.0.0.1:11311"
+    monkeypatch.setenv(JOB, "1")
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert 30000 <= int(os.environ["ROS_MASTER_URI"].removeprefix("http://127.0.0.1:")) < 32768
+
+
+def test_recommended_commands_go_by_way_of_ws(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the folders that the user gave to --with; ws names one with a space by a link."""
+    for name in ("mine", "other arm"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "other arm")
+    monkeypatch.setenv("CARTPOLE_WITH", f"{tmp_path}/mine:{tmp_path}/link")
+    hints = WorkspaceHints(f"{root}/ws")
+    folders = f"--with {tmp_path}/mine --with '{tmp_path}/other arm'"
+    command = f"{root}/ws {folders} rosrun cartpole workbench.py view {tmp_path}/run"
+    assert hints.replaying(tmp_path / "run") == command
+    assert hints.watching(tmp_path / "run") == f"{root}/ws tensorboard --logdir {tmp_path}/run"
+    assert hints.installing("optuna") == hints.extras == f"{root}/ws extras"
+    done = subprocess.run(
+        [root / "ws", "tensorboard", "--version_tb"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split()[-1][0].isdigit(), done.stdout

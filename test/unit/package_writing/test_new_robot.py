@@ -24,7 +24,7 @@ from support.robots.new_robots import (
 from package_writing import package
 from package_writing.cli import main
 from rl_workbench.training.algorithms import algorithm
-from rl_workbench.training.command_line import choose
+from rl_workbench.training.train import choose
 
 ROBOTS = Path(__file__).resolve().parents[2] / "data/robots"
 

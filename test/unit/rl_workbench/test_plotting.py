@@ -88,16 +88,6 @@ def test_the_band_lies_around_the_mean_and_one_seed_has_none() -> None:
     assert not axes.collections and not lines(axes, "seed"), "the thick line is the seed itself"
 
 
-def test_every_seed_is_drawn_thinly() -> None:
-    curves = [seed([1, 2, 3], [value, value, value + 1]) for value in (1.0, 2.0, 6.0)]
-    (axes,) = evaluation_curves([panel({"dqn": curves})]).axes
-    drawn = lines(axes, "seed")
-    assert [line.get_ydata().tolist() for line in drawn] == [
-        each.values.tolist() for each in curves
-    ]
-    assert all(line.get_linewidth() < the_mean(axes).get_linewidth() for line in drawn)
-
-
 def test_where_seeds_ended_is_marked_and_whether_they_were_complete() -> None:
     curves = [seed([1, 5], [0, 7]), seed([1, 9], [0, 3], complete=False), seed([1, 4], [0, 8])]
     (axes,) = evaluation_curves([panel({"dqn": curves})]).axes
@@ -105,13 +95,6 @@ def test_where_seeds_ended_is_marked_and_whether_they_were_complete() -> None:
     assert ended.get_marker() != stopped.get_marker()
     assert ended.get_xydata().tolist() == [[5, 7], [4, 8]]
     assert stopped.get_xydata().tolist() == [[9, 3]]
-
-
-def test_of_episodes_the_moving_average_is_drawn() -> None:
-    curves = [seed([1, 2, 3], [0, 3, 3]), seed([1, 2, 3], [6, 3, 0])]
-    (axes,) = seed_curves([panel({"dqn": curves})]).axes
-    assert [line.get_ydata().tolist() for line in lines(axes, "seed")] == [[0, 1.5, 2], [6, 4.5, 3]]
-    assert the_mean(axes).get_ydata().tolist() == [3, 3, 2.5]
 
 
 # Panels.

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from rl_workbench.statistics import bands, describe, interval, iqm
 
@@ -28,23 +27,6 @@ def test_the_interval_is_that_of_a_bootstrap() -> None:
     rng = np.random.default_rng(2)
     means = [rng.choice(scores, len(scores)).mean() for _ in range(10_000)]
     assert interval(scores, np.mean) == pytest.approx(np.percentile(means, [2.5, 97.5]), abs=0.4)
-
-
-def test_intervals_and_the_interquartile_mean_are_scipys() -> None:
-    table = np.random.default_rng(3).normal(100.0, 15.0, (9, 4))
-    assert iqm(table, axis=0) == pytest.approx(stats.trim_mean(table, 0.25, axis=0))
-    for statistic in (np.mean, iqm):
-        theirs = stats.bootstrap(
-            (table,), statistic, axis=0, n_resamples=1_000, method="percentile",
-            rng=np.random.default_rng(0),
-        ).confidence_interval  # fmt: skip
-        low, high = bands(table, statistic)
-        assert low == pytest.approx(theirs.low) and high == pytest.approx(theirs.high)
-
-
-def test_the_same_scores_give_the_same_interval() -> None:
-    scores = np.array([3.0, 1.0, 7.0])
-    assert interval(scores, iqm) == interval(scores, iqm)
 
 
 @pytest.mark.filterwarnings("error")

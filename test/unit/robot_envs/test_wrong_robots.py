@@ -59,14 +59,12 @@ ROBOTS = {
         {"controllers": {"pair": {"joints": ["elbow"]}}},
         "'pair': its parameters have no type",
     ),
-    "no parameters": ({"controllers": {"pair": 3}}, "'pair': its parameters have no type"),
     "two controllers of one joint": (
         {"run": ("pair", "one"), "controllers": {**LEFT_CONTROLLERS, "one": ELBOW}},
         "'pair' and 'one' both claim joint 'elbow'",
     ),
     "a controller twice": ({"run": ("pair", "pair")}, "the controllers to run name 'pair' twice"),
     "a name for names": ({"run": "pair"}, r"run lists names: \('pair',\) and not 'pair'"),
-    "another name for names": ({"commanded": "pair"}, r"commanded lists names: \('pair',\)"),
     "a command to what doesn't run": (
         {"commanded": ("pear",)},
         "'pear' is commanded, but not among the controllers that run; did you mean 'pair'",
@@ -84,14 +82,11 @@ ROBOTS = {
         {"pose": (0, 0, 1)},
         r"its pose is a Pose\(\(x, y, z\)\), not \(0, 0, 1\)",
     ),
-    "a place at infinity": ({"pose": Pose((math.inf, 0.0, 0.0))}, "its pose isn't finite"),
     "no package": (
         {"urdf": "package://my_rm/a.urdf"},
         "there is no package 'my_rm' on ROS_PACKAGE_PATH",
     ),
     "no URDF": ({"urdf": None}, "a file is a path .* not None"),
-    "an empty URDF": ({"urdf": ""}, "a file is a path .* not ''"),
-    "no parameters at all": ({"controllers": None}, "a file is a path .* not None"),
     "a broken text of parameters": (
         {"controllers": "pair:\n  - ]"},
         "the controllers' text: line 2",
@@ -101,10 +96,6 @@ ROBOTS = {
     "an engine that doesn't exist": (
         {"engine": "bulet"},
         "no backend 'bulet'; did you mean 'bullet'",
-    ),
-    "a period that is no multiple": (
-        {"control_period": 0.0085},
-        "control period 0.0085 s is no multiple of the physics step 0.001 s",
     ),
 }
 

@@ -15,7 +15,7 @@ import pytest
 from ros_utils import ros_launch, ros_node
 from ros_utils._internal import processes as _processes
 from ros_utils._internal import programs as _programs
-from ros_utils._internal.programs import CannotStart, Readiness, wait_until_ready
+from ros_utils._internal.programs import CannotStart
 
 SLEEP = ["sleep", "1000"]
 BOUND = 60.0  # [s] for anything that a test waits for
@@ -218,16 +218,29 @@ def test_killing_without_a_master_waits_for_nothing(monkeypatch):
 def test_output_goes_to_a_log_and_its_error_is_the_reason():
     code = "echo one; echo 'ValueError: two'; echo three; exit 3"
     handle = _programs.start(["sh", "-c", code], "node", "talker")
-    assert wait_until_ready(lambda: False, handle, BOUND) is Readiness.ENDED
+    handle.process.wait(BOUND)
     assert handle.exit_code() == 3
     assert handle.reason() == "ValueError: two"
     assert handle.lines("t") == ["ValueError: two", "three"]
 
 
-def test_a_wait_has_a_bound():
-    handle = _programs.start(SLEEP, "node", "sleeper")
-    assert wait_until_ready(lambda: False, handle, 0.1) is Readiness.LATE
-    assert wait_until_ready(lambda: True, handle, 0.1) is Readiness.READY
+@pytest.mark.parametrize(
+    ("command", "is_there", "text"),
+    [
+        (SLEEP, False, "sleeper: not there after 0.1 s; ended it: it said nothing"),
+        (["sh", "-c", "exit 3"], False, "sleeper: ended with exit code 3"),
+        (["true"], False, "sleeper: ended with exit code 0"),
+        (SLEEP, True, ""),
+    ],
+)
+def test_a_start_is_waited_for(capsys, command, is_there, text):
+    handle = _programs.start(command, "node", "sleeper")
+    timeout = BOUND if command is not SLEEP else 0.1
+    started = _programs.await_start(
+        handle, lambda: is_there, "not there", timeout, None, may_end=False
+    )
+    assert bool(started) is is_there
+    assert text in capsys.readouterr().err
 
 
 def test_a_missing_program_is_refused():
@@ -243,7 +256,7 @@ def test_in_a_window_the_programs_exit_code_is_known(place, monkeypatch, code):
     monkeypatch.setenv("PATH", f"{place}:{os.environ['PATH']}")
     monkeypatch.setenv("DISPLAY", ":0")
     handle = _programs.start(["sh", "-c", f"exit {code}"], "node", "a 'quoted' name", window=True)
-    assert wait_until_ready(lambda: False, handle, BOUND) is Readiness.ENDED
+    handle.process.wait(BOUND)
     assert handle.exit_code() == code
 
 

@@ -21,7 +21,9 @@ from bullet_gazebo.physics.model import Model
 from bullet_gazebo.ros.common.publishing import Thinner
 from bullet_gazebo.simulator import Simulator
 
-BUILT_IN = {  # library's file name: "module:Factory"
+# Library's file name: "module:Factory". Another one of ours, such as a sensor's, is a module of this folder
+# and a line here; what it measures with knows no ROS and belongs to bullet_gazebo/sensors.
+BUILT_IN = {
     "libgazebo_ros_control.so": "bullet_gazebo.ros.plugins.control_plugin:ControlPlugin",
     "libgazebo_ros_joint_state_publisher.so": "bullet_gazebo.ros.plugins.joint_state_plugin:JointStatePlugin",
 }  # fmt: skip

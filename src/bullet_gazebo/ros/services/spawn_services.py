@@ -30,6 +30,7 @@ from bullet_gazebo.physics.pose import Pose, is_finite
 from bullet_gazebo.physics.world import NameTaken
 from bullet_gazebo.ros.common.messages import from_pose_msg
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
+from bullet_gazebo.ros.services import Refused, offer
 from bullet_gazebo.simulator import Simulator
 from file_access.content import MAX_BYTES, FileError, read_file
 from file_access.xml_text import decode, parse
@@ -61,7 +62,7 @@ class SpawnServices:
         self._services = [
             rospy.Service("~spawn_urdf_model", srv.SpawnModel, self._spawn_urdf),
             rospy.Service("~spawn_sdf_model", srv.SpawnModel, self._spawn_sdf),
-            rospy.Service("~delete_model", srv.DeleteModel, self._delete),
+            offer("~delete_model", srv.DeleteModel, self._delete),
         ]
 
     def _spawn_urdf(self, request: srv.SpawnModelRequest) -> srv.SpawnModelResponse:
@@ -131,18 +132,18 @@ class SpawnServices:
             with self._sim.lock:
                 model = world.spawn(name, entity, pose)
             self._plugins.load(model, request.robot_namespace)
-        _warn(model.name, entity)
+        _log(f"Model '{shown(name)}'", entity)
 
-    def _delete(self, request: srv.DeleteModelRequest) -> srv.DeleteModelResponse:
+    def _delete(self, request: srv.DeleteModelRequest) -> str:
         with self._one_at_a_time:
             with self._sim.lock:
                 model = self._sim.world.model(request.model_name)
             if model is None:
-                return srv.DeleteModelResponse(False, "DeleteModel: model does not exist")
+                raise Refused("model does not exist")
             self._plugins.unload(model)
             with self._sim.lock:
                 self._sim.delete_model(model)
-        return srv.DeleteModelResponse(True, "DeleteModel: successfully deleted model")
+        return "DeleteModel: successfully deleted model"
 
 
 def read_world(name: str, interrupted: Callable[[], bool]) -> WorldDescription:
@@ -161,7 +162,7 @@ def read_world(name: str, interrupted: Callable[[], bool]) -> WorldDescription:
     except DescriptionError as error:
         rospy.logerr("%s. The world is empty but for a ground plane", error)
         return empty_world()
-    _log(f"World '{path}'", world.warnings, world.left_out)
+    _log(f"World '{path}'", world)
     return world
 
 
@@ -191,25 +192,19 @@ def load_plugins(sim: Simulator, plugins: PluginRegistry) -> None:
     with plugins.time_held("the world"):
         for model in list(sim.world.models.values()):
             plugins.load(model, "")
-            _warn(model.name, model.description)
+            _log(f"Model '{shown(model.name)}'", model.description)
 
 
-def _warn(name: str, description: ModelDescription) -> None:
-    _log(f"Model '{shown(name)}'", description.warnings, description.left_out)
-
-
-def _log(what: str, warnings: list[str], left_out: list[str]) -> None:
+def _log(what: str, found: WorldDescription | ModelDescription) -> None:
     """Logs a file's warnings, and what was left out of the world."""
-    for warning in _at_most(warnings):
+    for warning in _at_most(found.warnings):
         rospy.logwarn("%s: %s", what, warning)
-    if left_out:
-        rospy.logwarn(
-            "%s: not simulated here, so left out: %s", what, ", ".join(_at_most(left_out))
-        )
+    if found.left_out:
+        text = ", ".join(_at_most(found.left_out))
+        rospy.logwarn("%s: not simulated here, so left out: %s", what, text)
 
 
 def _at_most(texts: list[str]) -> list[str]:
-    """Returns the first of `texts`: a file may have any number of the same fault."""
     rest = len(texts) - MOST_WARNINGS
     return texts if rest <= 0 else [*texts[:MOST_WARNINGS], f"and {rest} more of the kind"]
 

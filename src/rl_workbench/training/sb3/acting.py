@@ -1,15 +1,13 @@
 """What a model of Stable-Baselines3 has learned: a policy, also as a torch module without the library."""
 
-from collections.abc import Callable
 from typing import Any
 
 import gymnasium
-import numpy as np
 import torch
 from gymnasium import spaces
 from torch import nn
 
-from rl_workbench.agents.greedy import Choice, ClippedAction, Continuous, SingleChoice, lead
+from rl_workbench.agents.greedy import Choice, ClippedAction, Continuous, SingleChoice
 from rl_workbench.training.algorithm import Policy
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.sb3.hyperparameters import ON_POLICY
@@ -19,36 +17,18 @@ from rl_workbench.training.sb3.models import make_acting_model
 def load_policy(
     options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
 ) -> Policy:
-    """Makes the policy of a checkpoint; see `algorithm.load_policy`.
+    """Makes the policy of a checkpoint; see `algorithm`.
 
     The checkpoint holds plain tensors, and the model is made from the recorded options. So a foreign file
     can't run code, as it could in Stable-Baselines3's own zip.
     """
     model = make_acting_model(options, env)
     model.policy.load_state_dict(content["policy"])
-    name = options.kind.name
 
     def act(observation: Any) -> Any:
         return model.policy.predict(observation, deterministic=True)[0]
 
-    def first_action(seen: np.ndarray) -> np.ndarray:
-        return np.asarray(act(seen), float).reshape(len(seen), -1)[:, 0]
-
-    preference, meaning = first_action, "action"
-    if isinstance(env.action_space, spaces.Discrete):
-        is_probability = name in ON_POLICY
-        rate = _probabilities(model) if is_probability else model.q_net
-        meaning = "P(right) - P(left)" if is_probability else "Q(right) - Q(left)"
-
-        def preference(seen: np.ndarray) -> np.ndarray:
-            values = rate(torch.as_tensor(seen, dtype=torch.float32))
-            return np.asarray((values[:, -1] - values[:, 0]).detach().cpu())
-
-    return Policy(act, preference, meaning, greedy_network(model, name))
-
-
-def _probabilities(model: Any) -> Callable[[torch.Tensor], torch.Tensor]:
-    return lambda seen: model.policy.get_distribution(seen).distribution.probs
+    return Policy(act, greedy_network(model, options.kind.name))
 
 
 def greedy_network(model: Any, algorithm: str) -> nn.Module:
@@ -77,12 +57,7 @@ def greedy_network(model: Any, algorithm: str) -> nn.Module:
 
 
 class SeveralChoices(Choice):
-    """One action of each group of scores, (N, groups).
-
-    Args:
-        scores: Of all groups side by side.
-        actions: Gives the sizes of the groups.
-    """
+    """One action of each group of scores, (N, groups)."""
 
     def __init__(self, scores: nn.Module, actions: spaces.MultiDiscrete) -> None:
         super().__init__(scores)
@@ -92,19 +67,12 @@ class SeveralChoices(Choice):
         groups = self.scores(observations).split(self.sizes, dim=1)
         return torch.stack([group.argmax(dim=1) for group in groups], dim=1)
 
-    def margins(self, observations: torch.Tensor) -> torch.Tensor:
-        groups = self.scores(observations).split(self.sizes, dim=1)
-        return torch.stack([lead(group) for group in groups], dim=1).amin(dim=1)
-
 
 class Switches(Choice):
     """Whether each score is positive: 0 or 1, (N, A)."""
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         return (self.scores(observations) > 0.0).long()
-
-    def margins(self, observations: torch.Tensor) -> torch.Tensor:
-        return self.scores(observations).abs().amin(dim=1)
 
 
 class ScaledAction(Continuous):

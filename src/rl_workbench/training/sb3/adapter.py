@@ -8,7 +8,6 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import gymnasium
 import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
@@ -17,18 +16,19 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import array, check_optimizer, number, whole
 from rl_workbench.storage import write_atomically
-from rl_workbench.training.algorithm import Algorithm, Frame, Say
+from rl_workbench.training.algorithm import Algorithm, Say
 from rl_workbench.training.checkpoints import fitting
 from rl_workbench.training.environments import succeeded
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.sb3.acting import load_policy
-from rl_workbench.training.sb3.models import checked_environment, make_learning_model
+from rl_workbench.training.sb3.models import make_learning_model
 from rl_workbench.training.sb3.positions import (
     ModelMark,
     Positions,
     buffer_state,
     restore_buffer,
 )
+from rl_workbench.training.training import Training
 
 __all__ = ["load_policy", "make"]
 
@@ -47,27 +47,20 @@ LOSSES = {  # Stable-Baselines3's names: our tags
 }
 
 
-def make(options: TrainingOptions) -> "SB3Training":
-    """Makes a new training; see `make_algorithm`."""
+def make(options: TrainingOptions, envs: list[Any]) -> "SB3Training":
+    """Makes a new training; see `algorithm`."""
     if not options.run.total_timesteps:
         raise WorkbenchError(
             f"{options.kind.name} needs total_timesteps: its schedules depend on them"
         )
-    model = make_learning_model(options)
-    return SB3Training(options, model, checked_environment(model.get_env()))
+    return SB3Training(options, make_learning_model(options, envs))
 
 
 class SB3Training(Algorithm):
-    """A model of Stable-Baselines3, evaluated and saved between two rollouts.
+    """A model of Stable-Baselines3, evaluated and saved between two rollouts."""
 
-    Args:
-        options: What the user chose.
-        model: With its environments.
-        env: The first of them.
-    """
-
-    def __init__(self, options: TrainingOptions, model: Any, env: gymnasium.Env[Any, Any]) -> None:
-        self._run, self._name, self._model, self.env = options.run, options.kind.name, model, env
+    def __init__(self, options: TrainingOptions, model: Any) -> None:
+        self._run, self._name, self._model = options.run, options.kind.name, model
         self._positions = Positions(model)
         self._callback: FrameCallback | None = None
 
@@ -82,7 +75,7 @@ class SB3Training(Algorithm):
     def act_greedily(self, observation: np.ndarray) -> Any:
         return self._model.policy.predict(observation, deterministic=True)[0]
 
-    def learn(self, frame: Frame) -> None:
+    def learn(self, frame: Training) -> None:
         remaining = max(self._run.total_timesteps - self.steps, 0)
         self._callback = FrameCallback(frame, self._positions, self._run.log_frequency)
         try:
@@ -177,9 +170,6 @@ class SB3Training(Algorithm):
     def export(self, folder: Path) -> None:
         write_atomically(folder / MODEL, self._model.save)
 
-    def close(self) -> None:
-        self._model.get_env().close()
-
 
 def _pending_losses(model: Any) -> dict[str, float]:
     """Returns the losses that the model has recorded since they were last logged, by its own names."""
@@ -201,14 +191,9 @@ class FrameCallback(BaseCallback):
 
     On-policy, an interrupt discards the rollout under way: its episodes are reported when it is complete.
     Off-policy, rollouts are short and change what was learned, so they are completed.
-
-    Args:
-        frame: Of the training.
-        positions: Of its model.
-        log_frequency: Steps between two points of losses.
     """
 
-    def __init__(self, frame: Frame, positions: Positions, log_frequency: int) -> None:
+    def __init__(self, frame: Training, positions: Positions, log_frequency: int) -> None:
         super().__init__()
         self._frame, self._positions, self._log_frequency = frame, positions, log_frequency
         self._ended: list[EndedEpisode] = []  # not reported yet

@@ -16,11 +16,7 @@ ON_POLICY = ("ppo", "a2c")
 
 @dataclass(frozen=True, kw_only=True)
 class SB3Options:
-    """Options that all of the algorithms have.
-
-    Raises:
-        WorkbenchError: If a value is outside its limits, or JSON can't hold it.
-    """
+    """Options that all of the algorithms have."""
 
     library_class: ClassVar[str]
 

@@ -19,14 +19,8 @@ from stable_baselines3.common.type_aliases import RolloutReturn
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.checked import BEGIN_STEP, COMPUTE_REWARD, CheckedEnvironment
-from rl_workbench.training.environments import (
-    NumberedEnvironment,
-    close_all,
-    has_goal,
-    training_environments,
-)
+from rl_workbench.training.environments import has_goal
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.repeatable import RepeatableEnvironment
 from rl_workbench.training.sb3.hyperparameters import ON_POLICY
@@ -75,9 +69,6 @@ class ParallelVecEnv(DummyVecEnv):
     """Begins a step in all environments before it waits for the first.
 
     So steps that take time in other processes run at the same time.
-
-    Args:
-        envs: Each moves a robot of its own.
     """
 
     def __init__(self, envs: Sequence[gymnasium.Env[Any, Any]]) -> None:
@@ -89,49 +80,24 @@ class ParallelVecEnv(DummyVecEnv):
         for begin, action in zip(self._begins, actions, strict=False):
             begin(action)
 
-    def close(self) -> None:
-        close_all(self.envs)
-
 
 def _given(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
     return env
 
 
-def algorithm_class(name: str) -> Any:
-    """Returns Stable-Baselines3's class by the value of --algo."""
-    return getattr(stable_baselines3, ALGORITHMS[name].hyperparameters().library_class)
-
-
-def make_learning_model(options: TrainingOptions) -> Any:
-    """Makes a new model with its environments. The caller closes `model.get_env()`.
-
-    Raises:
-        WorkbenchError: If the environments can't be made, the algorithm doesn't fit them, or an option
-            makes no sense.
-    """
-    name = options.kind.name
+def make_learning_model(options: TrainingOptions, envs: Sequence[CheckedEnvironment]) -> Any:
+    """Makes a new model in a training's environments."""
     # Monitor counts the episodes inside, so that a repeated episode brings its counts back.
-    vector = ParallelVecEnv(
-        [RepeatableEnvironment(Monitor(env)) for env in training_environments(options)]
-    )
-    try:
-        _check_fit(options, vector.action_space)
-        own = algorithm_class(name)
-        mixin = StoppableOnPolicy if name in ON_POLICY else StoppableOffPolicy
-        stoppable = type(own.__name__, (mixin, own), {})
-        arguments = options.hyperparameters.own | _hindsight(options, vector)
-        return _model_in(vector, options, arguments, stoppable)
-    except WorkbenchError:
-        vector.close()
-        raise
+    vector = ParallelVecEnv([RepeatableEnvironment(Monitor(env)) for env in envs])
+    _check_fit(options, vector.action_space)
+    own = getattr(stable_baselines3, options.hyperparameters.library_class)
+    mixin = StoppableOnPolicy if options.kind.name in ON_POLICY else StoppableOffPolicy
+    arguments = options.hyperparameters.own | _hindsight(options, envs[0])
+    return _model_in(vector, options, arguments, type(own.__name__, (mixin, own), {}))
 
 
 def make_acting_model(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Any:
-    """Makes a model that only acts, in another environment than those that it learned in.
-
-    Raises:
-        WorkbenchError: If the algorithm doesn't fit the environment, or an option makes no sense.
-    """
+    """Makes a model that only acts, in another environment than those that it learned in."""
     vector = DummyVecEnv([lambda: env])
     _check_fit(options, vector.action_space)
     arguments = options.hyperparameters.own
@@ -139,15 +105,8 @@ def make_acting_model(options: TrainingOptions, env: gymnasium.Env[Any, Any]) ->
         arguments["n_steps"] *= options.run.num_envs
     else:
         arguments["buffer_size"] = 1  # nothing is learned, so nothing is kept
-    return _model_in(vector, options, arguments, algorithm_class(options.kind.name))
-
-
-def checked_environment(vector: Any) -> CheckedEnvironment:
-    """Returns a model's first environment, below what counts, repeats and numbers it."""
-    env = vector.envs[0].env.env
-    checked = env.env if isinstance(env, NumberedEnvironment) else env
-    assert isinstance(checked, CheckedEnvironment)
-    return checked
+    own = getattr(stable_baselines3, options.hyperparameters.library_class)
+    return _model_in(vector, options, arguments, own)
 
 
 def _check_fit(options: TrainingOptions, space: gymnasium.Space[Any]) -> None:
@@ -194,17 +153,17 @@ def _model_in(
     return model
 
 
-def _hindsight(options: TrainingOptions, vector: Any) -> dict[str, Any]:
+def _hindsight(options: TrainingOptions, env: CheckedEnvironment) -> dict[str, Any]:
     """Returns the arguments for hindsight experience replay, if it is asked for."""
     settings, env_id = options.hyperparameters, options.run.env_id
     if not getattr(settings, "her", False):
         return {}
-    if not has_goal(vector.observation_space):
+    if not has_goal(env.observation_space):
         raise WorkbenchError(
             f"her needs goals: a Dict of observation, achieved_goal and desired_goal; {env_id} observes "
-            f"{' '.join(str(vector.observation_space).split())}"
+            f"{' '.join(str(env.observation_space).split())}"
         )
-    if not checked_environment(vector).can_compute_reward:
+    if not env.can_compute_reward:
         raise WorkbenchError(
             f"her needs {env_id}'s method {COMPUTE_REWARD}(achieved_goal, desired_goal, info)"
         )

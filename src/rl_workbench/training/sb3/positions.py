@@ -93,9 +93,6 @@ class Positions:
 
         Returns:
             The numbers of those whose episode was cut off.
-
-        Raises:
-            TypeError, ValueError, LookupError: If the state is something else.
         """
         model, count = self._model, len(self._envs)
         episodes = sequence(state["episodes"], count)
@@ -175,11 +172,7 @@ def buffer_state(buffer: Any) -> dict[str, Any] | None:
 
 
 def restore_buffer(buffer: Any, state: dict[str, Any]) -> None:
-    """Fills a new buffer with what `buffer_state` returned.
-
-    Raises:
-        TypeError, ValueError, LookupError: If the state is another buffer's.
-    """
+    """Fills a new buffer with what `buffer_state` returned."""
     position, is_full = whole(state["position"]), switch(state["full"])
     count = buffer.buffer_size if is_full else position
     if position >= buffer.buffer_size:

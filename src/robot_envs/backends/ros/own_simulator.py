@@ -97,11 +97,6 @@ class OwnSimulator:
         """Whether it has exited by itself with an error; another one would do the same."""
         return self._process.poll() in range(1, 128)
 
-    @property
-    def processes(self) -> list[int]:
-        """Process ids of the simulator and of the supervisor, which is the master."""
-        return [*([self.pid] if self.pid else []), self._process.pid]
-
     def has_died(self) -> bool:
         """Returns whether it has died; gives the supervisor time to notice."""
         with contextlib.suppress(subprocess.TimeoutExpired):

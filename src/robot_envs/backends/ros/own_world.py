@@ -62,13 +62,9 @@ class Journal:
             state = checked(world.act(commands), count * step)
         if repr(state) == repr(self.last):  # shows all bits of a number, and tells -0.0 from 0.0
             return
-        pairs = zip(WorldState._fields, state, self.last or (), strict=False)
-        difference = next(
-            f"{name} {here!r}, not {there!r}" for name, here, there in pairs if repr(here) != repr(there)
-        )  # fmt: skip
         raise SimulatorFault(
             f"the same reset and {len(self.commands)} steps lead to another state, as where a plugin draws "
-            f"random numbers: {difference}"
+            f"random numbers: {state}, not {self.last}"
         )
 
 
@@ -121,17 +117,12 @@ class OwnWorld:
         self._journal = Journal()
         self._world: LockstepWorld | None = None  # None: not connected
         self._failed = self._closed = False
-        self._simulator = self._start()
+        self.simulator = self._start()  # the one that moves the robots now
         try:
             backend.connect_in_turn(self.connect, self.close)
         except BaseException:  # Ctrl-C, too
             self.close()
             raise
-
-    @property
-    def simulator(self) -> OwnSimulator:
-        """The one that moves the robots now."""
-        return self._simulator
 
     def _start(self) -> OwnSimulator:
         return OwnSimulator(self._slot, self.scene.robots[0].world, SEED)
@@ -173,7 +164,7 @@ class OwnWorld:
         """See `RobotBackend.begin`; if the simulator fails, `act` replaces it."""
         self._need_episode()
         if self._world is not None:
-            with contextlib.suppress(SimulatorFault), master.using(self._simulator.uri):
+            with contextlib.suppress(SimulatorFault), master.using(self.simulator.uri):
                 self._world.begin(commands)
 
     def act(self, commands: Commands) -> WorldState:
@@ -191,7 +182,7 @@ class OwnWorld:
 
     def _need_episode(self) -> None:
         if self._journal.initial is None:
-            raise SimulatorError(f"{self._simulator} has no episode; begin one with reset()")
+            raise SimulatorError(f"{self.simulator} has no episode; begin one with reset()")
 
     def _perform(self, action: Callable[[LockstepWorld], Result]) -> Result:
         """Performs an action in the simulator or in its replacement; only this method decides which.
@@ -200,24 +191,24 @@ class OwnWorld:
         replacement, unless the simulator never came up and another one would do the same.
         """
         if self._closed:
-            raise SimulatorError(f"{self._simulator} was closed")
+            raise SimulatorError(f"{self.simulator} was closed")
         failures: list[str] = []
         while True:
             try:
                 world = self._world or self._connect()
-                with master.using(self._simulator.uri):
+                with master.using(self.simulator.uri):
                     return action(world)
             except RobotEnvError as error:
                 starting, hangs = self._world is None, isinstance(error, SimulatorHangs)
                 if not isinstance(error, SimulatorFault) and not (
-                    starting and (failures or self._simulator.has_died())
+                    starting and (failures or self.simulator.has_died())
                 ):
                     raise
                 self._disconnect()
                 self._failed = True
-                end = self._simulator.post_mortem(hangs)
-                failures.append(f"{self._simulator} failed: {error}; {end}")
-                if len(failures) == 2 or (starting and (hangs or self._simulator.gave_up)):
+                end = self.simulator.post_mortem(hangs)
+                failures.append(f"{self.simulator} failed: {error}; {end}")
+                if len(failures) == 2 or (starting and (hangs or self.simulator.gave_up)):
                     self._journal.forget_episode()
                     raise SimulatorError("; before that ".join(reversed(failures))) from error
             self.restarts += 1
@@ -226,10 +217,10 @@ class OwnWorld:
     def _connect(self) -> LockstepWorld:
         """Waits for the simulator, starting another one if it has failed, and replays the journal."""
         if self._failed:
-            self._simulator, self._failed = self._start(), False
+            self.simulator, self._failed = self._start(), False
         try:
-            self._simulator.wait()
-            with master.using(self._simulator.uri):
+            self.simulator.wait()
+            with master.using(self.simulator.uri):
                 step = physics_step()
                 ticks = ticks_per_action(self._period, step)
                 self._step = ticks * round(step * NANOSECONDS)  # [ns] of one action
@@ -243,7 +234,7 @@ class OwnWorld:
             if not isinstance(error, RobotEnvError):  # Ctrl-C: the simulator is in an unknown state
                 self._disconnect()
                 self._failed = True
-                self._simulator.terminate()
+                self.simulator.terminate()
             raise
 
     def _disconnect(self) -> None:
@@ -258,8 +249,8 @@ class OwnWorld:
         self._closed = True
         self._disconnect()
         self._journal.forget_episode()
-        self._simulator.terminate()
-        backend.join_in_turn(self._simulator.join)
+        self.simulator.terminate()
+        backend.join_in_turn(self.simulator.join)
 
 
 def _warn(text: str) -> None:

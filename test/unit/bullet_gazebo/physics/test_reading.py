@@ -11,7 +11,7 @@ from bullet_gazebo.physics.files.meshes import read_mesh
 from bullet_gazebo.physics.files.reading import Reading, Resources
 from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.files.world_file import load_world, parse_world, read_entity
+from bullet_gazebo.physics.files.world_file import parse_world, read_entity
 
 WIDTH, LEVELS = 10, 7  # a bomb: ten includes of ten includes of ...
 MODEL = '<sdf version="1.6"><model name="{}">{}</model></sdf>'
@@ -243,20 +243,3 @@ def test_versions_of_any_length_are_versions_or_none(tmp_path):
     assert parse_sdf(
         MODEL.format("x", INCLUDE.format("m", "y")), resources=Resources(models=(tmp_path,))
     )
-
-
-@pytest.mark.parametrize("codec", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
-@pytest.mark.parametrize("before", ["", "\r\n<!-- mine -->\r\n "])
-def test_worlds_models_and_configurations_of_every_encoding(tmp_path, before, codec):
-    def put(path, text):
-        declaration = f'<?xml version="1.0" encoding="{codec.removesuffix("-sig")}"?>\r\n'
-        path.write_bytes(f"{before}{declaration}{text}".encode(codec))
-
-    folder = tmp_path / "crate"
-    folder.mkdir()
-    put(folder / "model.config", '<model><sdf version="1.6">mine.sdf</sdf></model>')
-    put(folder / "mine.sdf", MODEL.format("crate", LINK))
-    include = INCLUDE.format("crate", "Kiste für Äpfel")
-    put(tmp_path / "w", f'<sdf version="1.6"><world name="w">{include}</world></sdf>')
-    world = load_world(tmp_path / "w", Resources(models=(tmp_path,)))
-    assert (list(world.models), world.warnings) == (["Kiste für Äpfel"], [])

@@ -1,92 +1,16 @@
 """step_world as a function: random numbers, groups, joints of every interface, several robots, refusals."""
 
-import contextlib
 import random
-import threading
-from functools import lru_cache
 
 import numpy as np
 import pytest
-import xacro
-import yaml
-from bullet_gazebo_msgs.srv import PreparedStepRequest, PrepareStepRequest, StepWorldRequest
+from bullet_gazebo_msgs.srv import StepWorldRequest
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
 
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.control.transmissions import read_description
-from bullet_gazebo.physics.engines import make_engine
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
-from bullet_gazebo.robot import ControlledRobot
-from bullet_gazebo.ros.services import step_service
-from bullet_gazebo.ros.services.step_service import StepService
-from bullet_gazebo.simulator import Simulator
-
 WORLD = StepWorldRequest.WORLD
 FREE = {"effort_a": 2.0, "position_a": 0.01, "velocity_a": 0.3}  # joints, and commands to them
-BOX = """<robot name="crate"><link name="crate">
-<inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
-<collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link></robot>"""
 HIGH = PoseMsg(Point(1.0, 2.0, 3.0), Quaternion(0.0, 0.0, 0.0, 0.0))  # turned by nothing
-
-
-@lru_cache(maxsize=1)
-def slides(root):
-    return xacro.process_file(str(root / "test/data/robots/slides.urdf")).toxml()
-
-
-class Slides:
-    """A world in lock-step with robots of six carriages, and its step service without ROS."""
-
-    def __init__(self, root):
-        self.sim = Simulator(World(make_engine()), lockstep=True)
-        self._urdf = slides(root)
-        self._params = yaml.safe_load((root / "test/data/robots/slides.yaml").read_text())
-        self.service = StepService(self.sim, contextlib.nullcontext(), threading.Lock())
-
-    def add(self, name, *controllers):
-        model = self.sim.world.spawn(name, parse_urdf(self._urdf), Pose())
-        hardware = RobotHardware(read_description(self._urdf))
-        robot = ControlledRobot(model, hardware, ControllerManager(hardware), namespace=f"/{name}")
-        self.sim.add_robot(robot)
-        for controller in controllers:
-            robot.manager.load(controller, self._params[controller])
-        robot.manager.switch(list(controllers), [], STRICT)
-
-    def call(self, ticks=0, **fields):
-        return self.service._step(StepWorldRequest(ticks=ticks, **fields))
-
-    def prepare(self, **names):
-        answer = self.service._prepare(PrepareStepRequest(**names))
-        assert answer.success, answer.status_message
-        return answer
-
-    def prepared(self, prepared, ticks, *commands):
-        return self.service._step_prepared(PreparedStepRequest(prepared.handle, ticks, commands))
-
-    def step(self, ticks, **fields):
-        """Joints by name: (position, velocity, effort)."""
-        answer = self.call(ticks, **fields)
-        assert answer.success, answer.status_message
-        states = answer.joint_states
-        return dict(
-            zip(
-                states.name,
-                zip(states.position, states.velocity, states.effort, strict=True),
-                strict=True,
-            )
-        )
-
-
-@pytest.fixture
-def world(root, monkeypatch):
-    monkeypatch.setattr(step_service.rospy, "Service", lambda *args: None)
-    made = Slides(root)
-    yield made
-    made.sim.world.close()
 
 
 def drawn():
@@ -223,15 +147,6 @@ def test_a_long_request_gives_others_their_turn(world, monkeypatch):
     monkeypatch.setattr(world.sim.lock, "yield_turn", lambda: turns.append(world.sim.now))
     assert world.call(1200).sim_time == pytest.approx(1.2)
     assert turns == [500_000_000, 1_000_000_000]
-
-
-@pytest.fixture
-def objects(world):
-    """The world with a robot, the ground, and a crate on it."""
-    world.add("slides", "effort_joint")
-    world.sim.world.spawn("ground_plane", ground_plane(), Pose())
-    world.sim.world.spawn("crate", parse_urdf(BOX), Pose((0.0, 3.0, 0.1)))
-    return world
 
 
 def test_nothing_is_told_that_was_not_asked_for(objects):
@@ -392,117 +307,6 @@ def test_who_comes_goes_stops_or_is_another_one_is_noticed_by_the_same_request(w
     world.add("right", "effort_joint")
     assert world.step(1, **everything)["effort_a"][2] == 1.0
     assert gone.hardware.joints["velocity_b"].position == pytest.approx(0.5)
-
-
-QUESTION = {
-    "model_states_of": ["crate"], "link_states_of": ["crate", "crate"], "contacts_of": ["crate"],
-    "link_frames": ["", "ground_plane::link"],
-}  # fmt: skip
-
-
-def test_a_prepared_step_has_the_numbers_of_step_world(objects):
-    objects.add("other", "effort_group")
-    names = {
-        "controllers": ["/slides/effort_joint", "effort_group"],
-        "commanded_joints": ["slides::position_a"],
-        **QUESTION,
-    }
-    prepared = objects.prepare(**names)
-    assert prepared.models == ["crate"]
-
-    def by_name():
-        return objects.call(
-            8, commands=[1.0, 2.0, -1.0], joint_commands=[0.3], **names, reset=StepWorldRequest.SIMULATION
-        )  # fmt: skip
-
-    expected, again = by_name(), by_name()
-    assert again == expected
-    for _ in range(100):
-        expected = objects.call(8, commands=[1.0, 2.0, -1.0], joint_commands=[0.3], **names)
-    by_name()
-    for _ in range(100):
-        answer = objects.prepared(prepared, 8, 1.0, 2.0, -1.0, 0.3)
-    assert answer.success, answer.status_message
-    joints = expected.joint_states
-    numbers = [*joints.position, *joints.velocity, *joints.effort]
-    poses = [*expected.model_poses, *expected.link_poses]
-    for pose, twist in zip(poses, [*expected.model_twists, *expected.link_twists], strict=True):
-        for part in (pose.position, pose.orientation, twist.linear, twist.angular):
-            numbers += [getattr(part, name) for name in part.__slots__]
-    assert answer.numbers == numbers
-    assert prepared.joints == joints.name
-    assert answer.contacts == expected.contacts
-    assert answer.now == joints.header.stamp.to_nsec()
-    assert objects.prepared(prepared, 0, 1.0, 2.0, -1.0, 0.3).numbers == numbers
-
-
-def test_a_handle_is_stale_once_its_names_may_mean_something_else(world):
-    world.add("left", "effort_joint")
-    names = {"controllers": ["/left/effort_joint"], "commanded_joints": ["left::position_a"]}
-    manager = world.sim.robots[0].manager
-    for change in (
-        lambda: world.add("right"),
-        lambda: world.sim.remove_robot(world.sim.robots[1]),
-        lambda: manager.load("effort_group", world._params["effort_group"]),
-        lambda: manager.unload("effort_group"),
-        lambda: world.sim.world.spawn("ground_plane", ground_plane(), Pose()),
-    ):
-        prepared = world.prepare(**names)
-        assert world.prepared(prepared, 1, 1.0, 0.0).success
-        change()
-        answer = world.prepared(prepared, 1, 1.0, 0.0)
-        assert (answer.success, answer.stale) == (False, True)
-    # A controller that starts or stops: the names are refused until it has its old state again.
-    prepared = world.prepare(**names)
-    manager.switch([], ["effort_joint"])
-    assert world.prepared(prepared, 1, 1.0, 0.0).stale
-    answer = world.service._prepare(PrepareStepRequest(**names))
-    assert "effort_joint' is stopped, not running" in answer.status_message
-    manager.switch(["effort_joint"], [])
-    assert world.prepared(prepared, 1, 1.0, 0.0).success
-
-
-def test_an_unknown_handle_is_stale_and_handles_are_bounded(world):
-    assert world.service._step_prepared(PreparedStepRequest(1, 1, [])).stale
-    first = world.prepare()
-    for _ in range(step_service.MOST_HANDLES):
-        last = world.prepare()
-    assert world.prepared(first, 1).stale
-    assert world.prepared(last, 1).success
-    assert len(world.service._prepared) == step_service.MOST_HANDLES
-
-
-@pytest.mark.parametrize(
-    ("ticks", "commands", "text"),
-    [
-        (1, [1.0], "1 commands where 1 controllers take 1 and 1 joints one each"),
-        (1, [1.0, float("nan")], "commands has nan"),
-        (1, [1e300, 0.0], "commands has 1e+300"),
-        (-1, [1.0, 0.0], "ticks is -1"),
-        (10**7, [1.0, 0.0], "ticks is 10000000"),
-    ],
-)
-def test_numbers_that_do_not_fit_are_refused_and_nothing_done(world, ticks, commands, text):
-    world.add("slides", "effort_joint")
-    prepared = world.prepare(controllers=["effort_joint"], commanded_joints=["position_a"])
-    answer = world.prepared(prepared, ticks, *commands)
-    assert not answer.success
-    assert text in answer.status_message
-    assert (answer.stale, answer.now) == (False, 0)
-
-
-def test_a_prepared_step_says_what_has_gone_during_a_long_request(objects, monkeypatch):
-    sim = objects.sim
-    linked, every = objects.prepare(link_states_of=["crate"]), objects.prepare(model_states=True)
-    monkeypatch.setattr(
-        sim.lock, "yield_turn", lambda: sim.world.spawn("new", parse_urdf(BOX), Pose())
-    )
-    answer = objects.prepared(every, 600)
-    assert "the ticks are done, but meanwhile robots or models" in answer.status_message
-    linked = objects.prepare(link_states_of=["crate::crate"])
-    monkeypatch.setattr(sim.lock, "yield_turn", lambda: sim.delete_model(sim.world.models["crate"]))
-    answer = objects.prepared(linked, 600)
-    assert "the ticks are done, but meanwhile there is no link" in answer.status_message
 
 
 def test_a_count_and_a_controller_that_are_wrong_are_refused(world):

@@ -1,5 +1,7 @@
 """The parts of DQN against slow and obvious oracles: networks, replay, returns, schedules."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -200,7 +202,7 @@ def test_epsilon_by_step_and_by_episode() -> None:
 def test_learning_rates() -> None:
     constant = DQNSettings(total_timesteps=100, learning_rate=0.1)
     assert learning_rate(constant, 99) == 0.1
-    falling = constant.changed(lr_schedule="linear")
+    falling = replace(constant, lr_schedule="linear")
     assert [learning_rate(falling, steps) for steps in (0, 50, 100, 150)] == [0.1, 0.05, 0, 0]
 
 

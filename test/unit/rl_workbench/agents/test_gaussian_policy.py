@@ -65,13 +65,6 @@ def test_actions_are_in_the_space_whatever_is_drawn(space: gymnasium.spaces.Box)
     assert space.contains(made.act_greedily(np.zeros(2, np.float32)))
 
 
-def test_the_same_seed_draws_the_same() -> None:
-    first, second = agent(), agent()
-    observation = np.ones(2, np.float32)
-    for _ in range(5):
-        assert np.array_equal(first.act(observation), second.act(observation))
-
-
 def test_its_deviation_has_an_end() -> None:
     made = agent()
     made.policy.log_std.data.fill_(-9.0)

@@ -115,24 +115,6 @@ def test_actions_follow_the_probability() -> None:
     assert greedy == (0 if agent.probability_of_zero(observation) >= 0.5 else 1)
 
 
-def test_the_documents_classes_load_the_weights(tmp_path) -> None:
-    class PolicyNetwork(nn.Module):
-        def __init__(self) -> None:
-            super().__init__()
-            self.fc = nn.Linear(4, 2)
-
-    class ValueNetwork(nn.Module):
-        def __init__(self) -> None:
-            super().__init__()
-            self.fc1 = nn.Linear(4, 10)
-            self.relu = nn.ReLU()
-            self.fc2 = nn.Linear(10, 1)
-
-    agent = PolicyGradientAgent(0)
-    PolicyNetwork().load_state_dict(agent.policy.state_dict())
-    ValueNetwork().load_state_dict(agent.value.state_dict())
-
-
 def test_same_seed_gives_the_same_weights_whatever_else_is_random() -> None:
     def trained(seed: int) -> list[torch.Tensor]:
         torch.rand(random.randrange(1, 9))  # somebody else's use of the global generator
@@ -160,28 +142,9 @@ def test_a_random_weights_is_torchs_own() -> None:
     assert all(torch.equal(mine, its) for mine, its in zip(drawn, expected, strict=True))
 
 
-def test_seeding_leaves_torchs_global_generator_alone() -> None:
-    state = torch.get_rng_state()
-    PolicyGradientAgent(9)
-    assert torch.equal(state, torch.get_rng_state())
-
-
 def test_it_learns() -> None:
     lengths = learned_lengths(PolicyGradientAgent(2), 200)
     assert np.mean(lengths[-20:]) > 2 * np.mean(lengths[:20])
-
-
-def test_its_rates_and_its_discount_are_options() -> None:
-    settings = DocumentSettings(gamma=0.5, policy_learning_rate=0.2, value_learning_rate=0.3)
-    plain, other = PolicyGradientAgent(1), PolicyGradientAgent(1, settings)
-    rates = [each.param_groups[0]["lr"] for agent in (plain, other)
-             for each in (agent.policy_optimizer, agent.value_optimizer)]  # fmt: skip
-    assert rates == [0.01, 0.1, 0.2, 0.3]
-    episode = random_episode(5, 0)
-    # From a value of 0 everywhere the value's loss is the mean of the squared returns.
-    for agent, gamma in ((plain, 0.99), (other, 0.5)):
-        wanted = np.mean(discounted_returns(episode.rewards, gamma) ** 2)
-        assert agent.learn(episode).value == pytest.approx(wanted, rel=1e-5)
 
 
 def test_a_loss_that_is_no_number_leaves_the_weights_alone() -> None:

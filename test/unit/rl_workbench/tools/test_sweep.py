@@ -156,33 +156,6 @@ def test_trials_that_fall_behind_are_ended(tmp_path: Path, pruner: str) -> None:
     assert max(scores, key=lambda row: row[0])[1] == best
 
 
-class Killed(BaseException):
-    """What a kill -9 is to this process: nothing is told or written any more."""
-
-
-def killed_after(evaluations: int) -> Curve:
-    left = iter(range(evaluations))
-
-    def curve(seed: int, x: float) -> float:
-        if next(left, None) is None:
-            raise Killed
-        return parabola(seed, x)
-
-    return curve
-
-
-def test_a_search_that_is_killed_again_and_again_comes_to_the_same(tmp_path: Path) -> None:
-    search(tmp_path / "one", 12, pruner="median")
-    for _ in range(100):
-        try:
-            search(tmp_path / "killed", 12, killed_after(9), pruner="median")
-        except Killed:
-            continue
-        break
-    assert "pruned" in states(tmp_path / "one")
-    assert trials(tmp_path / "killed") == trials(tmp_path / "one")
-
-
 def test_a_kill_between_any_two_lines_of_the_journal_changes_nothing(tmp_path: Path) -> None:
     """Optuna's first ten trials are random, later ones learn from what was found."""
     search(tmp_path / "one", 12, pruner="median")
@@ -301,17 +274,6 @@ def test_the_command_trains_and_its_best_options_can_be_used(
     assert "its options are in" in capsys.readouterr().out
     best = yaml.safe_load((tmp_path / "study" / "best.yaml").read_text())
     assert list(best) == ["ppo CartPole-v1" if algorithm == "ppo" else "CartPole-v1"]
-
-
-def test_the_same_command_goes_on_in_the_same_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    brief = ("--total-timesteps=20", "--params", "eval_episodes=1", "confirm_episodes=1")
-    for done in (0, 1):
-        assert cli.main(["sweep", "--trials=1", *brief]) == 0
-        assert f"{done} of 1 trials are done" in capsys.readouterr().out
-    assert [each.name for each in (tmp_path / "runs").iterdir()] == ["sweep__CartPole-v1__dqn"]
 
 
 def test_a_folder_of_another_search_is_refused(

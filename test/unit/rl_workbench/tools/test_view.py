@@ -1,5 +1,6 @@
 """A run's page without a browser: what is recorded, what the player does, and what is refused."""
 
+import json
 import os
 import shutil
 import socket
@@ -188,11 +189,14 @@ def test_an_environment_that_draws_nothing_is_said(tmp_path, make_recorder) -> N
     recorder = make_recorder(record(tmp_path / "blind", [1.0], env_id="Blind-v0"))
     assert "the environment draws no pictures" in whole(recorder.play("random", 0)).note
     recorder = make_recorder(record(tmp_path / "none", [1.0], env_id="NoSuch-v0"))
-    assert "unknown environment 'NoSuch-v0'" in whole(recorder.play("random", 0)).note
+    assert (
+        "can't make NoSuch-v0: Environment `NoSuch` doesn't exist."
+        in whole(recorder.play("random", 0)).note
+    )
 
 
 class Shared(Endless):
-    """One that moves a robot elsewhere, which its options name."""
+    """One that moves a robot, which its options name."""
 
     made: ClassVar[list[str]] = []
 
@@ -202,22 +206,23 @@ class Shared(Endless):
 
 
 @pytest.mark.parametrize(
-    ("given", "wanted", "played"),
+    ("shared", "wanted", "played"),
     [
-        ({"env_kwargs": {"backend": "ros"}}, {}, None),
-        ({"env_kwargs": {"backend": "ros"}}, {"backend": "bullet"}, "bullet"),
-        ({"train_env_kwargs": {"backend": "ros"}}, {}, "bullet"),
-        ({"train_env_kwargs": {"backend": "ros"}}, {"backend": "ros-realtime"}, None),
-        ({"env_kwargs": {"backend": "bullet"}}, {"backend": "ros"}, "ros"),
+        ({"backend": "ros"}, {}, None),
+        ({"backend": "ros"}, {"backend": "bullet"}, "bullet"),
+        (None, {}, "ros"),
     ],
 )
 def test_the_robot_of_a_training_isnt_moved(
-    tmp_path, make_recorder, monkeypatch, given, wanted, played
+    tmp_path, make_recorder, monkeypatch, shared, wanted, played
 ) -> None:
     monkeypatch.setattr(recording, "MAX_STEPS", 5)
     monkeypatch.setattr(Shared, "made", [])
     gymnasium.register("Shared-v0", Shared)
+    given = {"env_kwargs": {"backend": "ros"}}
     folder = record(tmp_path / "shared", [1.0], env_id="Shared-v0", **given)
+    content = json.loads((folder / "config.json").read_text())
+    (folder / "config.json").write_text(json.dumps({**content, "shared_robot": shared}))
     recorder = make_recorder(folder, wanted)
     with held(folder):
         episode = whole(recorder.play("random", 0))

@@ -1,7 +1,6 @@
 """The commands of rl-workbench on small trainings: what they print, write and refuse."""
 
 import json
-import os
 import shutil
 from pathlib import Path
 
@@ -302,21 +301,6 @@ def test_a_picture_of_another_format(runs: Path, tmp_path: Path, capsys) -> None
     assert "PNG" in refused(capsys, "plot", runs / "dqn_0", "--out", tmp_path / "a.jpg")
 
 
-def test_an_older_file_is_replaced_as_a_whole(runs: Path, tmp_path: Path, monkeypatch) -> None:
-    out = tmp_path / "a.gif"
-    out.write_bytes(b"older")
-
-    def full(descriptor: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    with monkeypatch.context() as patched:
-        patched.setattr(os, "fsync", full)
-        assert work("record", runs / "dqn_0", "--out", out, "--max-steps", 5) == 1
-    assert out.read_bytes() == b"older" and list(tmp_path.iterdir()) == [out]
-    assert work("record", runs / "dqn_0", "--out", out, "--max-steps", 5) == 0
-    assert out.read_bytes().startswith(b"GIF89a") and list(tmp_path.iterdir()) == [out]
-
-
 def test_a_place_where_nothing_can_be_written(runs: Path, tmp_path: Path, capsys) -> None:
     (tmp_path / "file").write_text("")
     for arguments in (
@@ -330,7 +314,7 @@ def test_a_place_where_nothing_can_be_written(runs: Path, tmp_path: Path, capsys
 def test_an_extra_that_is_missing(runs: Path, tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     monkeypatch.setattr("shutil.which", lambda name: None)
-    assert "/ws extras installs it" in refused(capsys, "sweep", "--out", tmp_path / "sweep")
+    assert "installs it" in refused(capsys, "sweep", "--out", tmp_path / "sweep")
     with pytest.raises(SystemExit):
         work("train", "--algo", "ppo")
-    assert "/ws extras installs it" in capsys.readouterr().err
+    assert "installs it" in capsys.readouterr().err

@@ -9,8 +9,8 @@ from support.training.training_runs import ALL, EXACT
 from rl_workbench.agents.settings import DocumentSettings, DQNSettings, ReinforceSettings
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import ALGORITHMS, AlgorithmKind, algorithm
-from rl_workbench.training.command_line import choose
 from rl_workbench.training.options import RunOptions, TrainingOptions
+from rl_workbench.training.train import choose
 
 DQN, REINFORCE, DOCUMENT = (ALGORITHMS[name] for name in EXACT)
 
@@ -92,22 +92,6 @@ def test_every_option_of_dqn_is_a_flag(empty: str) -> None:
         learning_starts=6, train_frequency=5, gradient_steps=4, double=False, dueling=True,
         hidden_sizes=(8, 9),
     )  # fmt: skip
-
-
-def test_every_option_of_reinforce_is_a_flag(empty: str) -> None:
-    text = """--gamma 0.9 --gae-lambda 0.8 --policy-learning-rate 0.1 --value-epochs 3
-        --value-learning-rate 0.2 --batch-episodes 4 --policy-hidden 8 --value-hidden 9
-        --entropy-coefficient 0.01 --no-normalize-observations --observation-scale 0.5,2
-        --save-every 7"""
-    assert choose(REINFORCE, [empty, *text.split()]).hyperparameters == ReinforceSettings(
-        gamma=0.9, gae_lambda=0.8, policy_learning_rate=0.1, value_learning_rate=0.2,
-        value_epochs=3, batch_episodes=4, entropy_coefficient=0.01, policy_hidden=8,
-        value_hidden=9, observation_scale=(0.5, 2.0), save_every=7,
-    )  # fmt: skip
-    text = "--gamma 0.9 --policy-learning-rate 0.1 --value-learning-rate 0.2 --random-weights"
-    assert choose(DOCUMENT, [empty, *text.split()]).hyperparameters == DocumentSettings(
-        gamma=0.9, policy_learning_rate=0.1, value_learning_rate=0.2, random_weights=True
-    )
 
 
 def test_file_params_rosparams_flags_in_this_order(tmp_path: Path) -> None:

@@ -144,16 +144,6 @@ def test_training_and_evaluation_may_have_options_of_their_own(
     assert robot.made == [{"a": 2, "b": 1}, {"a": 2, "b": 3}]
 
 
-def test_a_robot_that_repeats_itself_is_evaluated_from_several_starts(tmp_path: Path) -> None:
-    alike = {"env_kwargs": None, "eval_episodes": 5}
-    plain = summary(train(tmp_path / "plain", "reinforce-document", **alike))
-    noisy = {"eval_env_kwargs": {"noise": 0.05}}
-    varied = summary(train(tmp_path / "varied", "reinforce-document", **alike, **noisy))
-    assert len(set(plain["evaluation"]["returns"])) == 1
-    assert len(set(varied["evaluation"]["returns"])) > 1
-    assert plain["returns"] == varied["returns"]
-
-
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("kind", [Dicing, OnlyOne])
 def test_an_evaluation_leaves_the_generators_alone_that_it_shares(
@@ -236,15 +226,6 @@ def test_stable_baselines_moves_the_one_robot_and_learns_the_same(
     assert rows(alone) == rows(shared)
     for part in ("policy", "buffer"):
         assert_same(checkpoint(alone).get(part), checkpoint(shared).get(part), part)
-
-
-@pytest.mark.extras("stable_baselines3")
-def test_several_environments_would_move_the_one_robot(tmp_path: Path) -> None:
-    options = options_of("ppo", {"env_id": SHARED_REACH, "num_envs": 2})
-    with pytest.raises(
-        WorkbenchError, match="a robot that there is only one of: num_envs must be 1, not 2"
-    ):
-        run(options, tmp_path)
 
 
 @pytest.mark.parametrize("name", ["dqn", "reinforce"])

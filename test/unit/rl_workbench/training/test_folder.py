@@ -1,7 +1,6 @@
 """Run folders: new each time, one training in each, nothing left of one that never began."""
 
 import fcntl
-import multiprocessing
 import os
 from pathlib import Path
 
@@ -11,7 +10,6 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.folder import held, opened
 
 PLACE = ("cartpole/Classic-v0", "a/b:c", 7)
-RACES, RACERS = 20, 6
 
 
 def begin(*place: object) -> Path:
@@ -89,49 +87,3 @@ def test_one_that_its_last_holder_removes_meanwhile(
     with pytest.raises(WorkbenchError, match="is no run folder"), held(tmp_path / "run"):
         pass
     assert (tmp_path / "run").exists() == again
-
-
-def race(barriers: list, folder: Path, index: int, results: multiprocessing.Queue) -> None:
-    """Opens each folder at once with others.
-
-    Racers of odd numbers begin, and hold theirs until all others have tried; those of even
-    numbers can't begin, and give it up at once.
-    """
-    for number, (start, tried) in enumerate(barriers):
-        start.wait()
-        try:
-            with opened(str(folder / str(number)), *PLACE) as mine:
-                if index % 2 == 0:
-                    raise WorkbenchError("can't begin")
-                (mine / "config.json").write_text(str(index))
-                tried.wait()
-                told = "began"
-        except WorkbenchError as error:
-            told = str(error)
-            tried.wait()
-        results.put((number, index, told))
-
-
-@pytest.mark.slow
-def test_several_trainings_started_into_one_folder_at_once(tmp_path: Path) -> None:
-    """At most one begins; the others are told, and take nothing away from it."""
-    processes = multiprocessing.get_context("fork")
-    barriers = [tuple(processes.Barrier(RACERS, timeout=60) for _ in "ab") for _ in range(RACES)]
-    results = processes.Queue()
-    racers = [
-        processes.Process(target=race, args=(barriers, tmp_path, index, results))
-        for index in range(RACERS)
-    ]
-    for each in racers:
-        each.start()
-    told = [results.get(timeout=60) for _ in range(RACES * RACERS)]
-    for each in racers:
-        each.join(60)
-        assert each.exitcode == 0
-    began = {number: str(index) for number, index, text in told if text == "began"}
-    assert len(began) == sum(text == "began" for *_, text in told), "one each"
-    assert began, "some did"
-    found = {int(path.name): (path / "config.json").read_text() for path in tmp_path.iterdir()}
-    assert found == began
-    refusals = ("began", "can't begin", "is running in", "is no run folder")
-    assert all(any(each in text for each in refusals) for *_, text in told)

@@ -21,7 +21,6 @@ from support.training.training_runs import (
 )
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.environments import make_environment
 
 pytestmark = pytest.mark.slow
 
@@ -162,35 +161,3 @@ def test_where_hindsight_has_nothing_to_see(
 def _unrewarded(self: Reach, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
     self._taken += 1
     return self._observation(), -1.0, False, self._taken >= 20, {}
-
-
-def test_other_parts_than_the_space_has(monkeypatch) -> None:
-    class Silent(Reach):
-        def _observation(self):
-            return {"observation": np.zeros(2), "achieved_goal": np.zeros(2)}
-
-    class Long(Reach):
-        def _observation(self):
-            return {**super()._observation(), "desired_goal": np.zeros(3)}
-
-    class Spoilt(Reach):
-        def _observation(self):
-            return {**super()._observation(), "achieved_goal": np.full(2, np.nan)}
-
-    for kind, words in (
-        (Silent, r"has \['observation', 'achieved_goal'\], its observation_space \["),
-        (Long, r"the desired_goal of Long-v0 has the shape \(3,\), its observation_space \(2,\)"),
-        (Spoilt, "the achieved_goal of Spoilt-v0 isn't finite in float32"),
-    ):
-        env = make_environment(register_with(monkeypatch, kind), keep_dict=True)
-        with pytest.raises(WorkbenchError, match=words):
-            env.reset(seed=0)
-
-
-def test_a_goal_is_the_first_numbers_of_a_vector_where_dicts_are_not_learned_from() -> None:
-    env = make_environment(REACH)
-    assert isinstance(env.observation_space, gymnasium.spaces.Box)
-    vector, _ = env.reset(seed=4)
-    whole, _ = make_environment(REACH, keep_dict=True).reset(seed=4)
-    keys = sorted(whole)
-    assert np.array_equal(vector, np.concatenate([whole[key] for key in keys]))

@@ -2,7 +2,6 @@
 
 import random
 import re
-import resource
 import shlex
 import signal
 import subprocess
@@ -108,26 +107,6 @@ def test_a_signal_saves_and_tells_how_to_go_on(
     assert_same_run(whole(name), run)
 
 
-def test_the_soft_limit_of_cpu_time_is_such_a_signal(start: Start, whole, tmp_path: Path) -> None:
-    run = tmp_path / "run"
-    process = start(*new("dqn", run))
-    newer_checkpoint(run, process)
-    resource.prlimit(process.pid, resource.RLIMIT_CPU, (1, resource.RLIM_INFINITY))
-    ended(process, 128 + signal.SIGXCPU)
-    assert summary(run)["interrupted"]
-    ended(start("--resume", str(run)))
-    assert_same_run(whole("dqn"), run)
-
-
-def test_a_closed_terminal_under_nohup_is_ignored(start: Start, whole, tmp_path: Path) -> None:
-    run = tmp_path / "run"
-    process = start(*new("dqn", run), by="nohup")
-    newer_checkpoint(run, process)
-    process.send_signal(signal.SIGHUP)
-    ended(process)
-    assert_same_run(whole("dqn"), run)
-
-
 def test_two_trainings_in_one_folder(start: Start, tmp_path: Path) -> None:
     run = tmp_path / "run"
     process = start(*new("dqn", run), "--total-timesteps=1000000")
@@ -137,14 +116,3 @@ def test_two_trainings_in_one_folder(start: Start, tmp_path: Path) -> None:
     assert process.poll() is None
     process.send_signal(signal.SIGTERM)
     ended(process, 143)
-
-
-def test_two_trainings_started_into_a_new_folder_at_once(start: Start, tmp_path: Path) -> None:
-    """The loser says so in one line, and leaves the winner's alone."""
-    few = ["--total-timesteps=300", "--learning-starts=400"]
-    both = [start(*new("dqn", tmp_path / "run"), *few) for _ in range(2)]
-    told = {each.wait(120): each.stdout.read() for each in both}
-    assert set(told) == {0, 1}
-    assert re.search(r"is running in|isn't empty|is no run folder", told[1])
-    assert "Traceback" not in told[1] and len(told[1].splitlines()) == 1
-    assert summary(tmp_path / "run")["complete"]

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from support.training.learning_fakes import POLE, SPOILT, Died
 
+from rl_workbench import errors
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.environments import (
     discrete_actions,
     make_environment,
+    robot_options,
     shares_robot,
 )
 
@@ -58,16 +60,17 @@ def test_options_that_an_environment_refuses(env_id: str, options: dict, words: 
 @pytest.mark.parametrize(
     ("env_id", "words"),
     [
-        ("CartPol-v1", "unknown environment 'CartPol-v1'; did you mean CartPole-v1?"),
-        ("CartPole-v7", "did you mean CartPole-v1?"),
-        ("zzz", "^unknown environment 'zzz'; one of your own is named with its module"),
+        ("CartPol-v1", "^can't make CartPol-v1: .*Did you mean: `CartPole`?"),
+        ("CartPole-v7", "It provides versioned environments: "),
+        ("zzz", "^can't make zzz: .* One of your own is named with its module"),
         (
             "my_module:Env-v0",
-            "can't make my_module:Env-v0: there is no module 'my_module'; .*--with FO",
+            "can't make my_module:Env-v0: there is no module 'my_module'; its folder",
         ),
     ],
 )
-def test_an_environment_that_is_none(env_id: str, words: str) -> None:
+def test_an_environment_that_is_none(env_id: str, words: str, monkeypatch) -> None:
+    monkeypatch.setattr(errors, "hints", errors.Hints())
     with pytest.raises(WorkbenchError, match=words):
         make_environment(env_id)
 
@@ -77,9 +80,9 @@ def test_one_whose_package_is_missing(monkeypatch) -> None:
         raise gymnasium.error.DependencyNotInstalled("MuJoCo is not installed")
 
     monkeypatch.setattr(gymnasium, "make", missing)
-    with pytest.raises(
-        WorkbenchError, match="Ant-v5 needs more packages .*/ws extras may install them.: MuJoCo"
-    ):
+    monkeypatch.setattr(errors.hints, "extras", "./ws extras")
+    words = r"Ant-v5 needs more packages \(./ws extras may install them\): MuJoCo"
+    with pytest.raises(WorkbenchError, match=words):
         make_environment("Ant-v5")
 
 
@@ -127,3 +130,13 @@ def test_a_wrapper_may_say_that_there_is_one_robot() -> None:
 
     env = Connected(gymnasium.make(POLE))
     assert shares_robot(gymnasium.wrappers.TimeLimit(env, 5))
+
+
+def test_which_options_name_a_robot_that_is_shared(monkeypatch) -> None:
+    env, given = make_environment(POLE), {"backend": "ros", "noise": 0.1}
+    assert robot_options(env, given) is None
+    monkeypatch.setattr(env.unwrapped, "shares_robot", True, raising=False)
+    assert robot_options(env, given) == given, "whatever it was made with"
+    own = {"backend": "ros-own"}
+    monkeypatch.setattr(env.unwrapped, "own_robot_options", own, raising=False)
+    assert robot_options(env, given) == {"backend": "ros"}

@@ -77,14 +77,6 @@ def test_a_checkpoint_has_it_all(whole) -> None:
     assert len(agent["batch"]) == 1, "13 episodes are four batches and one more"
 
 
-def test_the_documents_constants_are_on_record(tmp_path: Path) -> None:
-    train(tmp_path, "reinforce-document", episodes=1, save_every=None)
-    assert record(tmp_path)["hyperparameters"] == {
-        "gamma": 0.99, "policy_learning_rate": 0.01, "value_learning_rate": 0.1,
-        "random_weights": False, "save_every": 100,
-    }  # fmt: skip
-
-
 def test_three_actions_and_two_observations(tmp_path: Path) -> None:
     options = {"env_id": "MountainCar-v0", "env_kwargs": {"max_episode_steps": 30}}
     run = train(tmp_path, "reinforce", **options, episodes=2, policy_hidden=0)

@@ -1,7 +1,6 @@
 """What the user sees while training: lines in a pipe, a bar on a terminal."""
 
 import io
-import os
 import sys
 import time
 from types import SimpleNamespace
@@ -42,12 +41,6 @@ def test_without_a_terminal_a_line_every_20_episodes() -> None:
     ]
 
 
-def test_what_an_algorithm_says_of_itself_takes_the_speeds_place() -> None:
-    """As in the DQN document, whose line ends in epsilon."""
-    line = "Episode   20 | Reward:  10 | Avg(20):    4.8 | ε: 0.905\n"
-    assert shown(io.StringIO(), 25, 45, "ε: 0.905") == line
-
-
 def test_on_a_terminal_a_bar_over_episodes() -> None:
     told = shown(Terminal(), 5, 5, "ε: 0.905")
     assert "5/5" in told and "return 2, length 4, ε 0.905, 99 steps/s" in told
@@ -70,23 +63,6 @@ def test_or_over_steps_which_ends_where_the_training_has_ended() -> None:
     assert "100/100" in stream.getvalue()
 
 
-def test_episodes_do_not_move_a_bar_over_steps() -> None:
-    stream = Terminal()
-    bar = Progress(100, "step", 0, stream)
-    show_episode(bar, [1.0] * 20, 7)
-    bar.close()
-    assert "0/100" in stream.getvalue() and "20/100" not in stream.getvalue()
-
-
-def test_a_pipe_that_is_gone_costs_no_training() -> None:
-    reader, writer = os.pipe()
-    os.close(reader)
-    pipe = os.fdopen(writer, "w")
-    tell("nobody listens", pipe)
-    with pytest.raises(BrokenPipeError):  # it was gone indeed
-        pipe.close()
-
-
 @pytest.mark.parametrize("terminal", [False, True])
 def test_a_sign_that_the_output_cannot_write_costs_no_training(terminal: bool) -> None:
     """Paths hold any bytes, and LC_ALL=C or PYTHONIOENCODING make any output ASCII."""
@@ -99,11 +75,6 @@ def test_a_sign_that_the_output_cannot_write_costs_no_training(terminal: bool) -
     tell("runs/\u4e16\udcff", stream)
     assert rb"runs/\xfc\udcff: going on" in raw.getvalue()
     assert raw.getvalue().endswith(rb"runs/\u4e16\udcff" + b"\n")
-
-
-def test_bytes_of_a_path_that_are_no_text(capsys) -> None:
-    tell("runs/\udcff")
-    assert capsys.readouterr().out == "runs/\\udcff\n"
 
 
 def test_without_a_standard_error_it_goes_nowhere(monkeypatch, capsys) -> None:

@@ -8,8 +8,8 @@ from support.training.training_runs import ALL, EXACT, flags, resume, small, sum
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm
-from rl_workbench.training.command_line import choose
 from rl_workbench.training.options import EXTENDING, recorded_options
+from rl_workbench.training.train import choose
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -60,17 +60,6 @@ def test_what_may_not(done: Path, name: str, flag: str, given: list[str]) -> Non
         choose(algorithm(name), [f"--resume={done}", *given])
     others = "--total-timesteps, --episodes, --stop-at-length, --stop-at-return, --device"
     assert f"--resume allows no {flag}, only {others}" in str(raised.value)
-
-
-def test_a_training_by_another_algorithm(done: Path) -> None:
-    with pytest.raises(WorkbenchError, match="is of a training by reinforce, not by dqn"):
-        choose(ALGORITHMS["dqn"], [f"--resume={done}"])
-
-
-def test_no_run_folder(tmp_path: Path) -> None:
-    for folder in (tmp_path, tmp_path / "none"):
-        with pytest.raises(WorkbenchError, match=r"is no run folder: .*config.json: No such file"):
-            choose(ALGORITHMS["dqn"], [f"--resume={folder}"])
 
 
 def test_a_resumed_training_remembers_its_new_length(tmp_path: Path) -> None:

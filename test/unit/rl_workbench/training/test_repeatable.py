@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 from support.training.goal_environments import REACH
-from support.training.learning_fakes import POLE, Dicing
+from support.training.learning_fakes import POLE
 
 from rl_workbench.training.environments import as_vector, make_environment
 from rl_workbench.training.repeatable import RepeatableEnvironment
@@ -86,26 +86,3 @@ def test_actions_that_are_none(spoilt: float) -> None:
     state["actions"] = state["actions"] * spoilt
     with pytest.raises(ValueError, match="other actions|a tensor of torch.int64"):
         place.load_state_dict(state)
-
-
-def test_an_environment_that_writes_over_its_observations() -> None:
-    class Writing(gymnasium.ObservationWrapper):
-        array = np.zeros(4, np.float32)
-
-        def observation(self, observation):
-            self.array[:] = observation
-            return self.array
-
-    place = RepeatableEnvironment(Writing(make_environment(POLE)))
-    place.reset(seed=0)
-    first = place.state_dict()["observation"]
-    place.step(1)
-    second = place.state_dict()["observation"]
-    assert first.tolist() == [0.0] * 4 and second.any()
-
-
-def test_one_that_draws_from_others_generators_goes_another_way() -> None:
-    place = RepeatableEnvironment(Dicing())
-    place.reset(seed=0)
-    state = place.state_dict()
-    assert place.load_state_dict(state) is None

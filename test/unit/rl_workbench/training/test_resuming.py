@@ -49,16 +49,6 @@ def test_ctrl_c_anywhere_and_resumed_is_the_same_training(
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_interrupted_again_and_again(whole, times, tmp_path: Path, name: str) -> None:
-    run = train(tmp_path / "run", name, InterruptAfter(40))
-    for share in (0.05, 0.0, 0.15, 0.3, 0.01):
-        resume(run, InterruptAfter(2 + round(share * times(name))))
-        assert summary(run)["interrupted"]
-    assert_same_run(whole(name), resume(run))
-    assert_no_doubles(run)
-
-
-@pytest.mark.parametrize("name", EXACT)
 def test_ctrl_c_in_an_evaluation(whole, tmp_path: Path, name: str) -> None:
     class InEvaluation(InterruptAfter):
         def requested(self) -> bool:

@@ -162,12 +162,3 @@ def test_others_learn_in_one(name: str) -> None:
     words = f"^{name} learns in one environment: num_envs must be 1, not 2$"
     with pytest.raises(WorkbenchError, match=words):
         small(name, num_envs=2)
-
-
-def test_actions_of_many_numbers(tmp_path: Path) -> None:
-    options = {"env_id": "Pendulum-v1", "env_kwargs": {"max_episode_steps": 20}, "num_envs": 2,
-               "episodes": 6, "normalize_observations": True}  # fmt: skip
-    whole = train(tmp_path / "whole", "reinforce", **options)
-    broken = train(tmp_path / "broken", "reinforce", InterruptAfter(150), **options)
-    assert_same_run(whole, resume(broken))
-    assert np.unique(summary(whole)["returns"]).size == 6

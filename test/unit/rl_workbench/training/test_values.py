@@ -8,11 +8,10 @@ import yaml
 from support.training.training_runs import EXACT
 
 import robot_envs.robots  # noqa: F401 - registers what some sections are for
-from rl_workbench.agents.settings import DQNSettings, ReinforceSettings
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.command_line import choose
 from rl_workbench.training.options import default_file, known_options
+from rl_workbench.training.train import choose
 
 DQN, REINFORCE, DOCUMENT = (ALGORITHMS[name] for name in EXACT)
 EMPTY = "{}"
@@ -142,6 +141,7 @@ def test_every_section_is_valid_and_counts(algorithm: str, name: str) -> None:
     assert wanted and {key: found[key] for key in wanted} == wanted
     assert options.run.seed == 0, "a seed is nothing to tune"
     if kind.config == "sb3.yaml":
+        from rl_workbench.training.environments import training_environments
         from rl_workbench.training.sb3.models import make_learning_model
 
         assert options.run.total_timesteps >= 5_000
@@ -150,24 +150,5 @@ def test_every_section_is_valid_and_counts(algorithm: str, name: str) -> None:
         if env_id.startswith("cartpole/"):
             like_it[env_id] = "Pendulum-v1" if is_continuous else "CartPole-v1"
         run = dataclasses.replace(options.run, env_id=like_it.get(env_id, env_id), env_kwargs={})
-        make_learning_model(options._replace(run=run)).get_env().close()
-
-
-def test_the_robots_section_is_the_defaults() -> None:
-    """So that benchmark and documentation say the same."""
-    options = choose(REINFORCE, ["--env-id=cartpole/Balance-v0"])
-    assert options.hyperparameters == ReinforceSettings(observation_scale=(0.4, 1.0, 0.2, 2.0))
-    assert (options.run.episodes, options.run.stop_at_length) == (600, 2400)
-    assert choose(REINFORCE, ["--env-id=Some-v0"]).hyperparameters.normalize_observations
-
-
-def test_the_tutorials_settings() -> None:
-    _, run, dqn, *_ = choose(DQN, ["--preset", "tutorial"])
-    assert (run.env_id, run.episodes) == ("CartPole-v1", 500)
-    assert dqn == DQNSettings(
-        total_timesteps=250_000, learning_rate=1e-3, buffer_size=10_000, learning_starts=0,
-        batch_size=64, train_frequency=1, gradient_steps=1, gamma=0.99, double=False,
-        hidden_sizes=(128, 128), loss="mse", max_grad_norm=10, target_network_frequency=10,
-        epsilon_schedule="step", start_e=1, end_e=0.01, epsilon_decay=0.995,
-        bootstrap_truncated=False,
-    )  # fmt: skip
+        options = options._replace(run=run)
+        make_learning_model(options, training_environments(options)).get_env().close()

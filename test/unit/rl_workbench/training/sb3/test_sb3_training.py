@@ -1,15 +1,13 @@
 """What is Stable-Baselines3's own in a training: what is saved, gone on with, and goes wrong."""
 
-import json
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from support.training.learning_fakes import POLE, Elsewhere, Fragile, register_with
+from support.training.learning_fakes import POLE, Elsewhere, register_with
 from support.training.training_runs import (
-    InterruptAfter,
     assert_no_doubles,
     assert_same,
     checkpoint,
@@ -94,27 +92,10 @@ def test_steps_are_begun_in_all_before_one_is_taken(tmp_path: Path, monkeypatch)
     assert summary(alone)["complete"], "a single one takes its steps at once"
 
 
-def test_the_one_that_fails_is_named(tmp_path: Path, monkeypatch) -> None:
-    env_id = register_with(monkeypatch, Fragile)
-    monkeypatch.setattr(Fragile, "made", 0)
-    words = "^environment 2 of 3: its simulator has ended; .*what was learned is saved"
-    with pytest.raises(WorkbenchError, match=words):
-        train(tmp_path, "ppo", num_envs=3, env_id=env_id)
-
-
 def test_the_record_says_with_which_version(whole) -> None:
     import stable_baselines3
 
     assert record(whole("ppo"))["versions"]["stable_baselines3"] == stable_baselines3.__version__
-
-
-def test_another_version_is_told(whole, tmp_path: Path, capsys) -> None:
-    folder = Path(shutil.copytree(whole("ppo"), tmp_path / "run"))
-    content = record(folder)
-    content["versions"]["stable_baselines3"] = "1.0"
-    (folder / "config.json").write_text(json.dumps(content))
-    resume(folder)
-    assert "stable_baselines3 1.0 is now " in capsys.readouterr().out
 
 
 # --resume
@@ -136,17 +117,20 @@ def test_a_resumed_training_goes_on_with_figures_and_networks(whole, tmp_path: P
 
 
 def test_the_state_comes_back_whole(whole) -> None:
+    from rl_workbench.training.environments import close_all, training_environments
     from rl_workbench.training.sb3.adapter import make
 
     saved = torch.load(whole("sac") / "last.pt", weights_only=True)
-    training = make(small("sac"))
+    options = small("sac")
+    envs = training_environments(options)
+    training = make(options, envs)
     training.load_state_dict(saved)
     again = training.state_dict()
     assert saved["buffer"]["full"] and saved["entropy"] is not None
     for name in again:
         mine, other = saved[name], again[name]
         assert_same(*(dict(each) if isinstance(each, dict) else each for each in (mine, other)))
-    training.close()
+    close_all(envs)
 
 
 def test_what_is_learned_after_the_last_step_is_saved(tmp_path: Path) -> None:
@@ -177,21 +161,3 @@ def test_a_rate_that_torch_refuses(tmp_path: Path) -> None:
     with pytest.raises(WorkbenchError, match=r"^dqn-sb3 failed: [^\n]*--resume"):
         run(options_of("dqn-sb3", options), tmp_path)
     assert summary(tmp_path)["failure"]
-
-
-def test_many_environments_of_training_are_one_when_playing(tmp_path: Path, recwarn) -> None:
-    folder = train(tmp_path, "ppo", num_envs=8, n_steps=1, batch_size=8)
-    recwarn.clear()
-    content = torch.load(folder / "best.pt", weights_only=True)
-    options = recorded_options(content["config"], "here")
-    load_policy(options, content, make_environment("CartPole-v1"), "here")
-    assert not [each for each in recwarn if "mini-batch" in str(each.message)]
-
-
-@pytest.mark.parametrize("asked", [2, 30, 130])
-def test_ctrl_c_anywhere(tmp_path: Path, asked: int) -> None:
-    train(tmp_path, "ppo", InterruptAfter(asked))
-    before = summary(tmp_path)
-    assert before["interrupted"] and before["steps"] < 256
-    assert checkpoint(tmp_path)["steps"] == before["steps"]
-    assert summary(resume(tmp_path))["complete"]

@@ -254,7 +254,7 @@ os.kill(simulators[1].pid, signal.SIGSTOP)
 if os.fork() == 0:  # a child that has inherited all, and outlives its parent
     signal.alarm(100)
     signal.pause()
-print(*(pid for each in simulators for pid in each.processes), flush=True)
+print(*(pid for each in simulators for pid in (each.pid, each._process.pid)), flush=True)
 signal.pause()
 """
 

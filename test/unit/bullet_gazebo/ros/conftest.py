@@ -1,0 +1,91 @@
+"""A world of robots in lock-step with its step services, without ROS."""
+
+import contextlib
+import threading
+from functools import lru_cache
+
+import pytest
+import xacro
+import yaml
+from bullet_gazebo_msgs.srv import PreparedStepRequest, PrepareStepRequest, StepWorldRequest
+
+from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.manager import STRICT, ControllerManager
+from bullet_gazebo.control.transmissions import read_description
+from bullet_gazebo.physics.engines import make_engine
+from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.world import World, ground_plane
+from bullet_gazebo.robot import ControlledRobot
+from bullet_gazebo.ros.services import step_service
+from bullet_gazebo.ros.services.step_service import StepService
+from bullet_gazebo.simulator import Simulator
+
+BOX = """<robot name="crate"><link name="crate">
+<inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link></robot>"""
+
+
+@lru_cache(maxsize=1)
+def slides(root):
+    return xacro.process_file(str(root / "test/data/robots/slides.urdf")).toxml()
+
+
+class Slides:
+    """A world in lock-step with robots of six carriages, and its step service without ROS."""
+
+    def __init__(self, root):
+        self.sim = Simulator(World(make_engine()), lockstep=True)
+        self._urdf = slides(root)
+        self._params = yaml.safe_load((root / "test/data/robots/slides.yaml").read_text())
+        self.service = StepService(self.sim, contextlib.nullcontext(), threading.Lock())
+
+    def add(self, name, *controllers):
+        model = self.sim.world.spawn(name, parse_urdf(self._urdf), Pose())
+        hardware = RobotHardware(read_description(self._urdf))
+        robot = ControlledRobot(model, hardware, ControllerManager(hardware), namespace=f"/{name}")
+        self.sim.add_robot(robot)
+        for controller in controllers:
+            robot.manager.load(controller, self._params[controller])
+        robot.manager.switch(list(controllers), [], STRICT)
+
+    def call(self, ticks=0, **fields):
+        return self.service._step(StepWorldRequest(ticks=ticks, **fields))
+
+    def prepare(self, **names):
+        answer = self.service._prepare(PrepareStepRequest(**names))
+        assert answer.success, answer.status_message
+        return answer
+
+    def prepared(self, prepared, ticks, *commands):
+        return self.service._step_prepared(PreparedStepRequest(prepared.handle, ticks, commands))
+
+    def step(self, ticks, **fields):
+        """Joints by name: (position, velocity, effort)."""
+        answer = self.call(ticks, **fields)
+        assert answer.success, answer.status_message
+        states = answer.joint_states
+        return dict(
+            zip(
+                states.name,
+                zip(states.position, states.velocity, states.effort, strict=True),
+                strict=True,
+            )
+        )
+
+
+@pytest.fixture
+def world(root, monkeypatch):
+    monkeypatch.setattr(step_service.rospy, "Service", lambda *args: None)
+    made = Slides(root)
+    yield made
+    made.sim.world.close()
+
+
+@pytest.fixture
+def objects(world):
+    """The world with a robot, the ground, and a crate on it."""
+    world.add("slides", "effort_joint")
+    world.sim.world.spawn("ground_plane", ground_plane(), Pose())
+    world.sim.world.spawn("crate", parse_urdf(BOX), Pose((0.0, 3.0, 0.1)))
+    return world
