@@ -86,6 +86,7 @@ def work(action: Callable[..., object], *arguments: object) -> int:
     return count
 
 
+@pytest.mark.slow
 def test_a_robot_among_64_moves_as_it_does_alone_to_the_bit():
     many = tracks(range(64))
     for index in (0, 29, 63):

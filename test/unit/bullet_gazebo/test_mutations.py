@@ -11,6 +11,7 @@ from bullet_gazebo.physics.world import World
 EXAMPLES = {"xacro": 8}  # each takes a process; of the others 150
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_a_mutated_model_is_read_or_refused(name):
     case = CASES[name]

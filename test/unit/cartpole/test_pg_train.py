@@ -146,6 +146,7 @@ def test_a_backend_among_the_environments_options_counts(flag: str) -> None:
 # Trainings in this process.
 
 
+@pytest.mark.slow
 def test_the_robot_in_this_process_and_resumed(tmp_path: Path, capsys) -> None:
     assert main([*BULLET, "--exp-name=mine", "--start-noise=0.02"]) == 0
     (run,) = (tmp_path / "runs").iterdir()

@@ -27,6 +27,7 @@ def options(name: str) -> dict[str, object]:
     return {"env_id": f"cartpole/{NAMES[name]}-v0", "env_kwargs": {"noise": 0.02}, **length}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_it_resumes_exactly(tmp_path: Path, name: str) -> None:
     assert cartpole.__name__  # registers the environments
@@ -68,6 +69,7 @@ def test_in_two_simulators_it_comes_to_the_bits_of_two_worlds_here(
     assert rows(here) == rows(there)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dqn", "reinforce"])
 def test_one_robot_for_training_and_evaluation(tmp_path: Path, monkeypatch, name: str) -> None:
     """Over ROS there is one; the episode under way goes on as if nobody had moved the robot."""

@@ -137,6 +137,7 @@ def test_every_command_is_looked_at() -> None:
     assert strange == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", GROUPS["trainings"], ids=str)
 def test_a_training_runs(command: Command, tmp_path: Path, monkeypatch, capsys) -> None:
     """A short one, without ROS."""

@@ -1,5 +1,6 @@
 """Damaged mesh files: read sensibly or refused in one line, and the process lives."""
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from support.mutations.meshes import mesh_files
 
@@ -14,6 +15,7 @@ SDF = """<sdf version="1.6"><model name="m"><static>{static}</static><link name=
 <geometry><mesh><uri>{path}</uri></mesh></geometry></collision></link></model></sdf>"""
 
 
+@pytest.mark.slow
 @settings(QUICK, max_examples=300)
 @given(mesh_files())
 def test_what_is_read_is_whole(tmp_path_factory, file):
@@ -31,6 +33,7 @@ def test_what_is_read_is_whole(tmp_path_factory, file):
     assert mesh.faces.max() < len(mesh.vertices)
 
 
+@pytest.mark.slow
 @settings(QUICK, max_examples=60)
 @given(mesh_files())
 def test_no_mesh_ends_an_engine(new_engine, tmp_path_factory, file):

@@ -49,6 +49,7 @@ def test_an_include_bomb_without_links_is_refused_by_the_number_of_models(bomb, 
     assert str(raised.value).endswith("more than 5000 models (MAX_MODELS)")
 
 
+@pytest.mark.slow
 def test_a_world_with_a_bomb_is_refused_as_a_whole(bomb):
     """Each of its models alone would be within all limits."""
     includes = "".join(INCLUDE.format(f"b{LEVELS}", f"m{i}") for i in range(6000))

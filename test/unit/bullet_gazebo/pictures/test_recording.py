@@ -48,6 +48,7 @@ def options(path: Path, **changed: object) -> RecordingOptions:
     return RecordingOptions(path / "a.mp4", **{"rate": 20.0, "width": 64, "height": 48, **changed})
 
 
+@pytest.mark.slow
 def test_pictures_come_at_simulated_times_and_show_who_comes_and_goes(sim, tmp_path):
     recorder = SimulationRecorder(sim, options(tmp_path))
     sim.advance(200)

@@ -110,6 +110,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return train(tmp_path_factory.mktemp("runs") / "dueling", "dueling")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [*KINDS, *(pytest.param(name, marks=pytest.mark.extras("stable_baselines3")) for name in SB3)]
 )  # fmt: skip

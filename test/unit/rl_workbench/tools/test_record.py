@@ -140,6 +140,7 @@ def record(run: Path, out: Path, *words: str) -> int:
     return cli.main(["record", str(run), "--out", str(out), "--max-steps", "20", *words])
 
 
+@pytest.mark.slow
 def test_best_last_and_random_side_by_side(robot_run: Path, tmp_path: Path, capsys):
     out = tmp_path / "three.gif"
     words = ("--checkpoint", "best", "last", "random", "--size", "64x48", "--fps", "10")

@@ -49,6 +49,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
 ALL = ["dqn_0", "robot", "reinforce", "reinforce-document"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_eval_tells_every_episode_and_writes_json(
     runs: Path, tmp_path: Path, name: str, capsys
