@@ -165,13 +165,7 @@ def _options(value: Any, origin: str) -> dict[str, Any]:
 
 
 def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
-    """Makes a variant, and checks names and types of its options if the algorithm is our own.
-
-    Args:
-        origin: the file and suite, for errors.
-        name: of the variant.
-        options: of the training, with the algorithm as `algo`.
-    """
+    """Makes a variant, and checks names and types of its options if the algorithm is our own."""
     if not NAME.fullmatch(name):
         raise WorkbenchError(
             f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}"

@@ -81,18 +81,21 @@ def show_run(
         stack.callback(stop, server)
         recorder = EpisodeRecorder(folder, server, env_options)
         stack.callback(recorder.close)
-        for line in address.advice("the run", "plays its episodes") if not is_over() else ():
+        if is_over():  # the training was shorter than this page's start
+            return
+        for line in address.advice("the run", "plays its episodes"):
             tell(line)
         if browser:  # some browsers block until the user closes them
             threading.Thread(target=open_browser, args=(address, warn), daemon=True).start()
-        while not server.get_clients() and not is_over():  # nothing is played without a viewer
+        while not server.get_clients():  # nothing is played without a viewer
+            if is_over():
+                return
             time.sleep(IDLE_PERIOD)
-        if not is_over():
-            with server.gui.add_folder("Episode"):
-                playback = Playback(server.gui, recorder, policies, seed, episodes)
-            curves = Curves(server.gui, server.gui.add_folder("Training"))
-            curves.follow(folder)
-            _play(server, playback, curves, is_over)
+        with server.gui.add_folder("Episode"):
+            playback = Playback(server.gui, recorder, policies, seed, episodes)
+        curves = Curves(server.gui, server.gui.add_folder("Training"))
+        curves.follow(folder)
+        _play(server, playback, curves, is_over)
 
 
 def _served(host: str, port: int | None, title: str) -> tuple[Address, viser.ViserServer]:
