@@ -69,13 +69,7 @@ def show_run(
     draw_without_display()
     torch.set_num_threads(1)  # networks this small are slower on more
     interrupt.defer()
-    training_ended = threading.Event()
-    if beside_training:
-        threading.Thread(target=_await_end, args=(training_ended,), daemon=True).start()
-
-    def is_over() -> bool:
-        return training_ended.is_set() or interrupt.requested()
-
+    is_over = _end(interrupt, beside_training)
     address, server = _served(host, port, folder.name)
     with contextlib.ExitStack() as stack:
         stack.callback(stop, server)
@@ -104,6 +98,14 @@ def _served(host: str, port: int | None, title: str) -> tuple[Address, viser.Vis
         return address, serve(address, title, CAMERA, LOOK_AT)
     except PortInUse as error:
         raise WorkbenchError(str(error)) from error
+
+
+def _end(interrupt: Interrupt, beside_training: bool) -> Callable[[], bool]:
+    """Returns what says whether the serving is over."""
+    training_ended = threading.Event()
+    if beside_training:
+        threading.Thread(target=_await_end, args=(training_ended,), daemon=True).start()
+    return lambda: training_ended.is_set() or interrupt.requested()
 
 
 def _await_end(ended: threading.Event) -> None:
