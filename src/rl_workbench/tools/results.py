@@ -75,15 +75,15 @@ def examine(
     if "returns" not in summary:
         returns, steps = attempt(lambda: _trained_so_far(run)) or (returns, steps)
     trained = float(returns[-LAST:].mean()) if len(returns) else None
-    score, success, final = trained, summary.get(f"success_rate_last_{LAST}"), None
+    score, success = trained, summary.get(f"success_rate_last_{LAST}")
     if episodes:
         played = attempt(lambda: _greedy(run, episodes, which, warn))
         score, success = (played.mean_return, played.success_rate) if played else (None, None)
-    if also_last and (last := attempt(lambda: _greedy(run, episodes, "last", warn))):
-        final = last.mean_return
+    last = attempt(lambda: _greedy(run, episodes, "last", warn)) if also_last else None
     solved_step, solved_seconds = attempt(lambda: _solved(run)) or (None, None)
     return RunResult(
-        group=group, seed=run.seed, run=run.name, score=score, success=success, final=final,
+        group=group, seed=run.seed, run=run.name, score=score, success=success,
+        final=last.mean_return if last else None,
         training_mean=trained, evaluations=attempt(lambda: _mean_evaluation(run)),
         avg20=_largest_mean(returns), solved_step=solved_step, solved_seconds=solved_seconds,
         steps=steps, episodes=summary.get("episodes") or len(returns) or None,
