@@ -83,12 +83,11 @@ def examine(
     solved_step, solved_seconds = attempt(lambda: _solved(run)) or (None, None)
     return RunResult(
         group=group, seed=run.seed, run=run.name, score=score, success=success,
-        final=last.mean_return if last else None,
-        training_mean=trained, evaluations=attempt(lambda: _mean_evaluation(run)),
-        avg20=_largest_mean(returns), solved_step=solved_step, solved_seconds=solved_seconds,
-        steps=steps, episodes=summary.get("episodes") or len(returns) or None,
-        seconds=summary.get("seconds"), cpu_seconds=cost_of(run.folder).get("cpu_seconds"),
-        fault="; ".join(dict.fromkeys(faults)),
+        final=last.mean_return if last else None, training_mean=trained,
+        evaluations=attempt(lambda: _mean_evaluation(run)), avg20=_largest_mean(returns),
+        solved_step=solved_step, solved_seconds=solved_seconds, steps=steps,
+        episodes=summary.get("episodes") or len(returns) or None, seconds=summary.get("seconds"),
+        cpu_seconds=cost_of(run.folder).get("cpu_seconds"), fault="; ".join(dict.fromkeys(faults)),
     )  # fmt: skip
 
 
