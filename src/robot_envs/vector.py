@@ -17,7 +17,7 @@ from robot_envs.environment import RobotEnv
 Results = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
 
 
-class RobotVectorEnv(SyncVectorEnv[Any, Any]):
+class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
     """`num_envs` environments with robots of their own: Gymnasium's `SyncVectorEnv`, also over ROS.
 
     With `backend="ros"` each has a simulator and a master of its own; all start side by side, and end with

@@ -13,7 +13,7 @@ import queue
 import threading
 import time
 import types
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import thread as pools
 from dataclasses import dataclass, field
@@ -177,6 +177,13 @@ class _Tasks:
                 if self.begun == self.submitted and not self.over:  # else more tasks wait
                     self.clock.ended(threading.current_thread())
 
+    def shut_down(self, threads: Iterable[threading.Thread]) -> None:
+        """Lets the executor's threads end."""
+        with self.guard:
+            self.over = True
+            for thread in threads:
+                self.clock.began(thread)  # it computes until it ends; resting ones end later
+
 
 class _Task:
     """A function that the script submitted to an executor."""
@@ -212,12 +219,8 @@ def replace_futures(runner: ScriptRunner) -> None:
             run(item)
 
     def shutting_down(self: ThreadPoolExecutor, *args: Any, **kwds: Any) -> None:
-        tasks = executors.get(self)
-        if tasks is not None:
-            with tasks.guard:
-                tasks.over = True
-                for thread in self._threads:
-                    runner.clock.began(thread)  # it computes until it ends; resting ones end later
+        if self in executors:
+            executors[self].shut_down(self._threads)
         shut_down(self, *args, **kwds)
 
     ThreadPoolExecutor.shutdown = shutting_down  # type: ignore[method-assign, assignment]

@@ -216,7 +216,8 @@ def _bytes(request: Any) -> bytes:
 
 def replace_time(runner: ScriptRunner) -> None:
     """Replaces rospy's sleep, spin, Timer and time readings."""
-    sleep, spin, start_timer = rospy.timer.sleep, rospy.spin, rospy.timer.Timer.__init__
+    _replace_spin(runner)
+    sleep, start_timer = rospy.timer.sleep, rospy.timer.Timer.__init__
 
     def ros_sleep(duration: float | genpy.Duration) -> None:
         if not runner.is_connected():
@@ -228,6 +229,20 @@ def replace_time(runner: ScriptRunner) -> None:
         if rospy.core.is_shutdown():
             raise rospy.ROSInterruptException("ROS shutdown request")
 
+    def timer(self: rospy.Timer, *args: Any, **kwds: Any) -> None:
+        start_timer(self, *args, **kwds)
+        if runner.is_connected():
+            runner.clock.began(self)
+
+    rospy.sleep = rospy.timer.sleep = ros_sleep
+    rospy.timer.Timer.__init__ = timer
+    for owner, name in ((rospy, "get_time"), (rospy, "get_rostime"), (rospy.Time, "now")):
+        setattr(owner, name, _counted(runner, getattr(owner, name)))
+
+
+def _replace_spin(runner: ScriptRunner) -> None:
+    spin = rospy.spin
+
     def ros_spin() -> None:
         if not rospy.core.is_initialized():
             spin()
@@ -237,16 +252,7 @@ def replace_time(runner: ScriptRunner) -> None:
             else:
                 originals.sleep(0.05)
 
-    def timer(self: rospy.Timer, *args: Any, **kwds: Any) -> None:
-        start_timer(self, *args, **kwds)
-        if runner.is_connected():
-            runner.clock.began(self)
-
-    rospy.sleep = rospy.timer.sleep = ros_sleep
     rospy.spin = rospy.client.spin = ros_spin
-    rospy.timer.Timer.__init__ = timer
-    for owner, name in ((rospy, "get_time"), (rospy, "get_rostime"), (rospy.Time, "now")):
-        setattr(owner, name, _counted(runner, getattr(owner, name)))
 
 
 def _counted(runner: ScriptRunner, read: Callable[[], Any]) -> Callable[[], Any]:

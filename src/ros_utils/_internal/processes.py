@@ -75,14 +75,12 @@ def family(token: str) -> dict[int, psutil.Process]:
     found: set[int] = set()
     for process in psutil.process_iter():
         with contextlib.suppress(psutil.Error):
-            if process.status() in (psutil.STATUS_ZOMBIE, psutil.STATUS_DEAD):
-                continue
             everything[process.pid], parents[process.pid] = process, process.ppid()
             if token in process.environ().get(MARK, ""):
                 found.add(process.pid)
     while grown := {pid for pid, parent in parents.items() if parent in found} - found:
         found |= grown
-    return {pid: everything[pid] for pid in found}
+    return {pid: everything[pid] for pid in found if _lives(pid)}
 
 
 def started(own: Sequence[Start]) -> list[Start]:

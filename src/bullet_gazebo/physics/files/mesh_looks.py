@@ -134,6 +134,8 @@ def _color(material: Any) -> np.ndarray:
 def _rgba(color: Any) -> np.ndarray:
     """Converts a trimesh colour: integers range from 0 to 255, floats from 0 to 1."""
     numbers = np.ravel(color)
+    if len(numbers) < 3:
+        raise ValueError("a colour has three numbers or four")
     scale = 255.0 if np.issubdtype(numbers.dtype, np.integer) or numbers.max() > 1.0 else 1.0
     return np.append(np.clip(numbers / scale, 0.0, 1.0), 1.0)[:4]
 

@@ -225,7 +225,7 @@ def _obj_lines(text: str, only: str) -> list[str]:
     """
     lines: list[str] = []
     faces: list[tuple[int, int]] = []  # the highest vertex of each face, and its line
-    count, name, found, others = 0, "", False, set()
+    count, name, others = 0, "", set()
     joined = text.replace("\\\r\n", " ").replace("\\\n", " ")
     for number, line in enumerate(joined.splitlines(), 1):
         words = line.split()
@@ -243,7 +243,6 @@ def _obj_lines(text: str, only: str) -> list[str]:
             if only and name != only:
                 others.add(name)
                 continue
-            found = True
             words[1:] = map(str, corners)
         else:
             name = " ".join(words[1:])
@@ -251,7 +250,7 @@ def _obj_lines(text: str, only: str) -> list[str]:
     for corner, number in faces:
         if corner > count:
             raise DescriptionError(f"line {number}: a face names vertex {corner} of {count}")
-    if only and not found:
+    if only and not any(line.startswith("f ") for line in lines):
         raise _not_found(only, others)
     return lines
 

@@ -74,9 +74,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     source.add_argument("-database", metavar="MODEL", help="model://MODEL, on GAZEBO_MODEL_PATH")
     source.add_argument("-stdin", action="store_true", help="read it from standard input")
     parser.add_argument("-model", required=True, metavar="NAME", help="name of the new model")
-    parser.add_argument(
-        "-reference_frame", default="", help="model or link that the pose refers to"
-    )
+    parser.add_argument("-reference_frame", default="", help="model or link of the pose")
     parser.add_argument("-gazebo_namespace", default="/gazebo", help="of the simulator's services")
     parser.add_argument("-robot_namespace", help="of the model's plugins; default: the node's")
     parser.add_argument("-unpause", action="store_true", help="unpause the world afterwards")

@@ -4,7 +4,7 @@
 - `wait_until_sent`: a message published just before its topic closes is lost (test_rospy_internals.py)
 - `divert_messages`, `divert_connections`, `deliver`, `is_connected`, `on_topics_changed`: the messages of a
   node in lock-step go with its calls (scripts.test)
-- `publish_without_yielding`: a step in lock-step would spend most of its time there (test_mailboxes.py)
+- `publish_without_yielding`: a step in lock-step would spend most of its time there (test_advance_service.py)
 - `answer_xmlrpc`: rospy has no way to answer one more XML-RPC call (gazebo_ros.test, `gz`)
 - `stop_hearing_clock`, `set_time`: the node that publishes /clock would hear it over a socket to itself
   (gazebo_parameters.test, gazebo_ros.test)

@@ -9,7 +9,7 @@ import rospy
 from bullet_gazebo.ros.common.messages import LARGEST, bad_number
 
 
-class Refused(Exception):
+class ServiceRefused(Exception):
     """A request can't be carried out, and nothing has changed; the text says why."""
 
 
@@ -19,21 +19,21 @@ def offer(name: str, kind: type, act: Callable[[Any], str]) -> rospy.Service:
     Args:
         name: of the service.
         kind: its type; the name of the type begins the text of a refusal.
-        act: carries out a request and returns the answer's text, or raises Refused.
+        act: carries out a request and returns the answer's text, or raises ServiceRefused.
     """
     answer: Any = kind
 
     def handle(request: genpy.Message) -> genpy.Message:
         try:
             return answer._response_class(True, act(request))
-        except Refused as refusal:
+        except ServiceRefused as refusal:
             return answer._response_class(False, f"{kind.__name__}: {refusal}")
 
     return rospy.Service(name, kind, handle)
 
 
 def check_message(message: genpy.Message, largest: float = LARGEST) -> None:
-    """Raises Refused for a message with a number that the world can't take."""
+    """Raises ServiceRefused for a message with a number that the world can't take."""
     fault = bad_number(message, largest)
     if fault:
-        raise Refused(fault)
+        raise ServiceRefused(fault)

@@ -10,7 +10,7 @@ from bullet_gazebo.applied_forces import ActingTime, AppliedEffort, AppliedWrenc
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.properties import JointProperties, PropertyError, set_joint_properties
 from bullet_gazebo.ros.common.messages import to_vector
-from bullet_gazebo.ros.services import Refused, check_message, offer
+from bullet_gazebo.ros.services import ServiceRefused, check_message, offer
 from bullet_gazebo.simulator import Simulator
 
 LONGEST_NAME = 80  # of a joint in the log
@@ -65,7 +65,7 @@ class JointServices:
             try:
                 set_joint_properties(*found, wanted, self._sim.world.time_step)
             except PropertyError as error:
-                raise Refused(str(error)) from error
+                raise ServiceRefused(str(error)) from error
         return "SetJointProperties: properties set"
 
     def _set_configuration(self, request: srv.SetModelConfigurationRequest) -> str:
@@ -73,11 +73,11 @@ class JointServices:
         with self._sim.lock:
             model = self._sim.world.model(request.model_name)
             if model is None:
-                raise Refused("model does not exist")
+                raise ServiceRefused("model does not exist")
             if len(names) != len(positions):
-                raise Refused("joint name and position list have different lengths")
+                raise ServiceRefused("joint name and position list have different lengths")
             if not all(math.isfinite(position) for position in positions):
-                raise Refused(f"joint positions must be finite, not {list(positions)}")
+                raise ServiceRefused(f"joint positions must be finite, not {list(positions)}")
             plain = [name.removeprefix(f"{model.name}::") for name in names]
             self._sim.set_joint_positions(model, dict(zip(plain, positions, strict=True)))
         unknown = sorted(set(plain) - set(model.joint_names))
@@ -114,10 +114,10 @@ class ForceServices:
             world = self._sim.world
             found = world.link(request.body_name)
             if found is None:
-                raise Refused("body does not exist")
+                raise ServiceRefused("body does not exist")
             frame = world.frame(request.reference_frame)
             if frame is None:
-                raise Refused("reference_frame not found")
+                raise ServiceRefused("reference_frame not found")
             check_message(request)
             wrench = in_world(
                 (to_vector(request.wrench.force), to_vector(request.wrench.torque)),
@@ -145,8 +145,8 @@ class ForceServices:
 
 
 def _find_joint(sim: Simulator, name: str) -> tuple[Model, str]:
-    """Returns the model and plain name of a joint; raises Refused if there is none."""
+    """Returns the model and plain name of a joint; raises ServiceRefused if there is none."""
     found = sim.world.joint(name)
     if found is None:
-        raise Refused("joint not found")
+        raise ServiceRefused("joint not found")
     return found

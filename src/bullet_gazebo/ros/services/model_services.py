@@ -24,7 +24,7 @@ from bullet_gazebo.ros.common.messages import (
     to_twist_msg,
     to_vector,
 )
-from bullet_gazebo.ros.services import Refused, check_message, offer
+from bullet_gazebo.ros.services import ServiceRefused, check_message, offer
 from bullet_gazebo.simulator import Simulator
 
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -102,7 +102,7 @@ class ModelServices:
         return rospy.get_rostime() if rospy.rostime.is_wallclock() else to_time(self._sim.now)
 
     def _hear(self, state: ModelState) -> None:
-        with contextlib.suppress(Refused):
+        with contextlib.suppress(ServiceRefused):
             self._set_state(srv.SetModelStateRequest(state))
 
     def _set_state(self, request: srv.SetModelStateRequest) -> str:
@@ -110,10 +110,10 @@ class ModelServices:
         with self._sim.lock:
             model = self._sim.world.model(wanted.model_name)
             if model is None:
-                raise Refused("model does not exist")
+                raise ServiceRefused("model does not exist")
             frame = self._sim.world.frame(wanted.reference_frame)
             if frame is None:
-                raise Refused("specified reference frame entity does not exist")
+                raise ServiceRefused("specified reference frame entity does not exist")
             check_message(wanted)
             # The twist is turned with the frame; the frame's own velocity is not added.
             linear, angular = (
@@ -160,7 +160,7 @@ class LinkServices:
         with self._sim.lock:
             found = self._sim.world.link(request.link_name)
             if found is None:
-                raise Refused(f"link not found, {SCOPE}")
+                raise ServiceRefused(f"link not found, {SCOPE}")
             check_message(request)
             old = link_inertia(*found)
             inertia = replace(
@@ -172,7 +172,7 @@ class LinkServices:
             try:
                 set_link_properties(self._sim.world, *found, inertia, request.gravity_mode)
             except (PropertyError, DescriptionError) as error:
-                raise Refused(str(error)) from error
+                raise ServiceRefused(str(error)) from error
         return "SetLinkProperties: properties set"
 
     def _get_state(self, request: srv.GetLinkStateRequest) -> srv.GetLinkStateResponse:
@@ -195,7 +195,7 @@ class LinkServices:
         return srv.GetLinkStateResponse(state, True, "GetLinkState: got state")
 
     def _hear(self, state: LinkState) -> None:
-        with contextlib.suppress(Refused):
+        with contextlib.suppress(ServiceRefused):
             self._set_state(srv.SetLinkStateRequest(state))
 
     def _set_state(self, request: srv.SetLinkStateRequest) -> str:
@@ -203,10 +203,10 @@ class LinkServices:
         with self._sim.lock:
             found = self._sim.world.link(wanted.link_name)
             if found is None:
-                raise Refused("link does not exist")
+                raise ServiceRefused("link does not exist")
             frame = self._frame(wanted.reference_frame)
             if frame is None:
-                raise Refused("failed")
+                raise ServiceRefused("failed")
             check_message(wanted)
             linear, angular = from_twist_msg(wanted.twist)
             # Gazebo subtracts the frame's velocity, and doesn't turn the request's.

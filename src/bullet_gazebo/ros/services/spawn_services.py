@@ -30,7 +30,7 @@ from bullet_gazebo.physics.pose import Pose, is_finite
 from bullet_gazebo.physics.world import NameTaken
 from bullet_gazebo.ros.common.messages import from_pose_msg
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
-from bullet_gazebo.ros.services import Refused, offer
+from bullet_gazebo.ros.services import ServiceRefused, offer
 from bullet_gazebo.simulator import Simulator
 from file_access.content import MAX_BYTES, FileError, read_file
 from file_access.xml_text import decode, parse
@@ -139,7 +139,7 @@ class SpawnServices:
             with self._sim.lock:
                 model = self._sim.world.model(request.model_name)
             if model is None:
-                raise Refused("model does not exist")
+                raise ServiceRefused("model does not exist")
             self._plugins.unload(model)
             with self._sim.lock:
                 self._sim.delete_model(model)

@@ -38,7 +38,7 @@ from bullet_gazebo.ros.common.messages import (
     to_twist_msg,
 )
 from bullet_gazebo.ros.common.node_process import seed_random_numbers
-from bullet_gazebo.ros.services import Refused, offer
+from bullet_gazebo.ros.services import ServiceRefused, offer
 from bullet_gazebo.ros.services.step_requests import MAX_TICKS, Addresses, StepPlan, query_of
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import NOTHING, StateQuery, StateReader, UnknownName
@@ -279,9 +279,11 @@ class StepService:
         with self._sim.lock:
             found = self._sim.world.link(request.link_name)
             if found is None:
-                raise Refused("link not found, did you forget to scope the link by model name?")
+                raise ServiceRefused(
+                    "link not found, did you forget to scope the link by model name?"
+                )
             try:
                 set_link_friction(*found, request.factor)
             except PropertyError as error:
-                raise Refused(str(error)) from error
+                raise ServiceRefused(str(error)) from error
         return "SetLinkFriction: friction set"

@@ -20,7 +20,7 @@ from bullet_gazebo.ros.clients.gz import CHUNK, METHOD
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import bad_number, from_pose_msg, to_vector
 from bullet_gazebo.ros.common.rospy_internals import answer_xmlrpc
-from bullet_gazebo.ros.services import Refused, check_message, offer
+from bullet_gazebo.ros.services import ServiceRefused, check_message, offer
 from bullet_gazebo.ros.services.joint_services import ForceServices, JointServices
 from bullet_gazebo.ros.services.model_services import LinkServices, ModelServices
 from bullet_gazebo.simulator import Simulator
@@ -129,7 +129,7 @@ class PhysicsServices:
         """Sets all fields, none of which is optional; one bad value refuses the whole request."""
         check_message(request)
         if not SHORTEST_STEP <= request.time_step <= LONGEST_STEP:
-            raise Refused(
+            raise ServiceRefused(
                 f"time_step is {request.time_step}; "
                 f"it must be between {SHORTEST_STEP:g} and {LONGEST_STEP:g} s"
             )
@@ -167,7 +167,7 @@ class PhysicsReconfigure(DynamicServer):
         )
         try:
             self._physics.set(request)
-        except Refused as refusal:
+        except ServiceRefused as refusal:
             rospy.logwarn("set_parameters: %s", refusal)
             config.update(self._in_force())
         return config

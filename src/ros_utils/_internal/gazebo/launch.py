@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import time
 from collections.abc import Mapping
@@ -117,17 +118,17 @@ def launch_Gazebo(
     world = (custom_world_path, custom_world_pkg, custom_world_name)
     screen = output == "screen" and not launch_new_term
     service = f"{gazebo_ns.rstrip('/')}/{READY}"
+    answers = functools.partial(service_answers, service)
     with _master.using(master_uri):
-        if service_answers(service):
+        if answers():
             _log.warn(
-                f"{LABEL} runs already under {_master.uri()}: using it as it is"
-                " (ros_kill_all_processes ends it)"
+                f"{LABEL} runs already under {_master.uri()}: using it (ros_kill_all_processes ends it)"
             )
             return wait_for_world(Started(), ready, time.monotonic() + timeout, timeout)
         handle = _start(switches, world, launch_new_term, screen, log_file, env)
         absent = f"service {service} doesn't answer"
         return handle is not None and await_start(
-            handle, lambda: service_answers(service), absent, timeout, ready, may_end=False
+            handle, answers, absent, timeout, ready, may_end=False
         )
 
 
