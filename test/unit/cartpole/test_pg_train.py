@@ -122,21 +122,6 @@ def test_what_is_the_robots_alone(capsys, given: str) -> None:
     assert f"{flag} is for the cart-pole: not with --env-id X-v0" in line
 
 
-def test_what_goes_for_every_environment() -> None:
-    plain = choose(["--env-id=X-v0"], {})[0]
-    flags = ["--backend=bullet", "--no-gui", "--headless", "--no-realtime", "--start-noise=0"]
-    assert choose(["--env-id=X-v0", *flags], {})[0] == plain
-    assert plain.run.train_env_kwargs == {}
-
-
-def test_help_explains_both(capsys) -> None:
-    with pytest.raises(SystemExit) as stop:
-        choose(["--help"], {})
-    told = capsys.readouterr().out
-    assert stop.value.code == 0
-    assert all(flag in told for flag in ("--backend", "--start-noise", "--gae-lambda", "--resume"))
-
-
 @pytest.mark.parametrize("flag", ["--env-kwargs", "--train-env-kwargs"])
 def test_a_backend_among_the_environments_options_counts(flag: str) -> None:
     options, _ = choose([flag, "backend=bullet", "--start-noise=0.1"], {})

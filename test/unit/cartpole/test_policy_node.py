@@ -74,15 +74,6 @@ def renamed(env_id: str):
     return opened
 
 
-@pytest.mark.parametrize("path", ["nothing", "damaged.pt", "empty"])
-def test_paths_without_a_policy(path: str, tmp_path: Path, capsys) -> None:
-    (tmp_path / "damaged.pt").write_bytes(b"PK")
-    (tmp_path / "empty").mkdir()
-    assert policy_node.main([str(tmp_path / path)]) == 1
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("policy_node.py: ") and path in line
-
-
 @pytest.mark.parametrize(
     "wrong",
     [["--late", "0"], ["--late", "nan"], ["--max-speed", "-1"], ["--goal", "a"], ["--sead", "1"],

@@ -16,8 +16,6 @@ from support.training.training_runs import (
 
 import cartpole
 from cartpole.environment import CartPoleEnv
-from rl_workbench.errors import WorkbenchError
-from robot_envs.errors import SimulatorError
 
 NAMES = {"dqn": "Classic", "reinforce": "Balance", "reinforce-document": "Balance"}
 
@@ -78,14 +76,3 @@ def test_one_robot_for_training_and_evaluation(tmp_path: Path, monkeypatch, name
     run = train(tmp_path / "run", name, InterruptAfter(150), **options(name), eval_frequency=30)
     assert rows(run) != rows(whole), "interrupted"
     assert_same_run(whole, resume(run))
-
-
-def test_an_error_of_its_simulator_is_one_of_the_training(tmp_path: Path, monkeypatch) -> None:
-    def step(env: CartPoleEnv, action: int) -> tuple:
-        raise SimulatorError("the simulator has ended")
-
-    monkeypatch.setattr(CartPoleEnv, "step", step)
-    with pytest.raises(
-        WorkbenchError, match=r"^the simulator has ended; stopped after 0.*--resume"
-    ):
-        train(tmp_path, "reinforce", **options("reinforce"))

@@ -86,16 +86,6 @@ def test_a_disk_that_fills_up_keeps_the_checkpoint_before(
         assert summary(run)["returns"] == summary(whole(name))["returns"]
 
 
-@pytest.mark.parametrize("name", EXACT)
-def test_ctrl_c_on_a_full_disk_tells_that_it_could_not_save(
-    tmp_path: Path, monkeypatch, name: str
-) -> None:
-    interrupt = InterruptAfter(40)
-    fill_disk(monkeypatch, lambda: interrupt.signal is not None)
-    line = failure(lambda: train(tmp_path, name, interrupt))
-    assert "No space left on device" in line and "--resume" in line and "is saved" not in line
-
-
 # No memory.
 
 
