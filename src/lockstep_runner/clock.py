@@ -5,8 +5,6 @@ threads (timers, callbacks, threads with a rospy.Rate) one at a time when they a
 one of them computes, so the order of events doesn't depend on the machine's speed.
 """
 
-from __future__ import annotations
-
 import math
 import threading
 from collections.abc import Callable, Collection, Sequence

@@ -4,8 +4,6 @@ Nodes that follow the clock rest while the script computes and wake when they ar
 passes until the processes that the script has started are at rest.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import os

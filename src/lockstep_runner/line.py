@@ -1,7 +1,5 @@
 """The transport between the script's process and a node that follows its clock: one JSON object per line."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import socket

@@ -1,7 +1,5 @@
 """Observes processes and threads through /proc: whether they compute or wait."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from lockstep_runner import originals

@@ -1,7 +1,5 @@
 """The state that the replaced functions share: world, clock, and when time passes without a wait."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import math
@@ -42,7 +40,7 @@ def _ends_with_the_world(instead: bool | None) -> Callable[[Method], Method]:
 
     def decorate(method: Method) -> Method:
         @functools.wraps(method)
-        def guarded(self: ScriptRunner, *args: Any, **kwds: Any) -> Any:
+        def guarded(self: "ScriptRunner", *args: Any, **kwds: Any) -> Any:
             try:
                 return method(self, *args, **kwds)
             except WorldGone as gone:

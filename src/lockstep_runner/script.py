@@ -1,7 +1,5 @@
 """Compiles and runs the script as if started directly, seeds it, and tells its code from libraries'."""
 
-from __future__ import annotations
-
 import ast
 import builtins
 import importlib.abc

@@ -1,7 +1,5 @@
 """The simulator of a script in lock-step: time on request, and the messages that come with it."""
 
-from __future__ import annotations
-
 import math
 import sys
 import threading

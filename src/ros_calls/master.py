@@ -4,8 +4,6 @@ rospy's own XML-RPC proxies have none: on a dead network they block for minutes.
 per process; here each thread can switch to another one for a while.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import http.client

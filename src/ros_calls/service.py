@@ -4,8 +4,6 @@ rospy's proxies have no time limit, keep a dead connection, and ask the process'
 know the address.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import select
@@ -158,7 +156,7 @@ class ServiceClient:
                 pass
         return self(*request)
 
-    def _connected(self) -> Connection:
+    def _connected(self) -> "Connection":
         if self._connection is None:
             self._connection = Connection(self._address(), self.name, self._kind, self.timeout)
         return self._connection

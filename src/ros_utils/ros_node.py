@@ -1,7 +1,5 @@
 """Starts and ends nodes and the master."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Mapping, Sequence
 

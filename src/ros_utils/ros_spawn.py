@@ -1,7 +1,5 @@
 """Brings a robot into the simulation in one call: description, state publisher, model, controllers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import rosgraph

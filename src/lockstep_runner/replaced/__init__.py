@@ -1,7 +1,5 @@
 """What replaces the functions that docs/lockstep.md lists, in this process."""
 
-from __future__ import annotations
-
 import argparse
 import os
 

@@ -4,8 +4,6 @@ Event.wait, Condition.wait, Thread.start and join; through them queue, threading
 time.sleep; with --virtual-wall-clock also time.time, monotonic and perf_counter.
 """
 
-from __future__ import annotations
-
 import concurrent.futures._base as futures
 import contextlib
 import math

@@ -3,8 +3,6 @@
 Messages to and from the simulator travel with its time; connections to services are kept.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import select

@@ -1,7 +1,5 @@
 """Finds packages and the files in them; expands robot descriptions (xacro)."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Sequence

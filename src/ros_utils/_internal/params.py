@@ -3,8 +3,6 @@
 rospy's own functions know one master per process.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import rosgraph

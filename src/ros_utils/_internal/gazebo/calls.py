@@ -1,7 +1,5 @@
 """Calls the simulator's services, and defines results with several values. Part of `ros_gazebo`."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

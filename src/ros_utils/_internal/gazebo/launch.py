@@ -1,7 +1,5 @@
 """Starts and ends the simulator. Part of `ros_gazebo`."""
 
-from __future__ import annotations
-
 import functools
 import os
 import time

@@ -1,7 +1,5 @@
 """Reads and sets the states of models, links and joints. Part of `ros_gazebo`."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from typing import Any
