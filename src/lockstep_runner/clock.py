@@ -120,10 +120,6 @@ class Clock:
         finally:
             self.driving = False
 
-    def step(self, ticks: int) -> None:
-        """Lets `ticks` physics steps pass; only for the main thread."""
-        self.wait(ticks * self.world.step / NANOSECONDS)
-
     def exchange(self) -> None:
         """Sends the script's messages and delivers those received; no time passes."""
         self._advance(0, ())

@@ -103,10 +103,6 @@ class _Node:
     seen: Seen = field(init=False)
 
     def __post_init__(self) -> None:
-        self.look_anew()
-
-    def look_anew(self) -> None:
-        """Starts counting idle checks anew."""
         self.seen = Seen(Path("/proc", str(self.pid)))
 
 
@@ -206,7 +202,7 @@ class Followers(Others):
                     node.began = self.passed()
                     node.wake = math.inf if rest is None else node.began + rest
                     node.rests = node.covered = True
-                    node.look_anew()
+                    node.seen = Seen(node.seen.place)
                     self._guard.notify_all()
         except (LineEnded, KeyError, TypeError, ValueError):
             line.close()

@@ -27,11 +27,7 @@ class Line:
             raise LineEnded from fault
 
     def receive(self) -> dict[str, Any]:
-        """Waits for the next object and returns it.
-
-        Raises:
-            LineEnded: the other side has gone, or sent no JSON object.
-        """
+        """Waits for the next object; raises LineEnded if the other side has gone, or sent something else."""
         try:
             line = self._reader.readline()
             content = json.loads(line) if line.endswith("\n") else None

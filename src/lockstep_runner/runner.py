@@ -134,11 +134,6 @@ class ScriptRunner:
         self.clock.exchange()
         return self._looks * seconds < OTHERS
 
-    def post(self, topic: str, data: bytes) -> bool:
-        """Keeps a message for the simulator until the next call."""
-        self.world.post(topic, data)
-        return True
-
     @_ends_with_the_world(None)
     def before_publishing(self, topic: str) -> None:
         """Lets time pass before a message is published, if its topic triggers that."""

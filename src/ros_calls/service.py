@@ -323,11 +323,7 @@ class Connection:
 
 
 def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
-    """Returns the request message, given as such or by its fields in order.
-
-    Raises:
-        CallFailed: the fields don't fit the request.
-    """
+    """Returns the request, given as a message or by its fields; raises CallFailed if they don't fit."""
     if len(request) == 1 and isinstance(request[0], kind._request_class):
         return request[0]
     try:

@@ -114,11 +114,7 @@ def _replace_start(runner: ScriptRunner) -> None:
 
 
 def wait_for_notice(runner: ScriptRunner, condition: Any, timeout: float | None) -> bool:
-    """As Condition.wait in simulated time: releases the lock while it waits.
-
-    Raises:
-        RuntimeError: the caller doesn't hold the lock.
-    """
+    """As Condition.wait, in simulated time."""
     if not condition._is_owned():
         raise RuntimeError("cannot wait on un-acquired lock")
     waiter = threading.Lock()

@@ -62,7 +62,7 @@ def _divert(runner: ScriptRunner) -> None:
 
     def adding(topic: _TopicImpl, connection: Any) -> bool:
         if isinstance(topic, _PublisherImpl) and connection.endpoint_id == NODE:
-            connection.write_data = partial(runner.post, topic.resolved_name)
+            connection.write_data = partial(runner.world.post, topic.resolved_name)
         return bool(add_connection(topic, connection))
 
     _TopicImpl.add_connection = adding

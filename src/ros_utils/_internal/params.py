@@ -30,11 +30,7 @@ def get(name: str) -> Any:
 
 
 def put(name: str, value: Any) -> None:
-    """Sets a parameter; a mapping sets each of its entries.
-
-    Raises:
-        MasterDown: no master, or it refuses.
-    """
+    """Sets a parameter, or each entry of a mapping; raises MasterDown without a master, or if it refuses."""
     _master.require()
     resolved = rospy.resolve_name(name)
     values = value.items() if isinstance(value, dict) and value else [("", value)]
