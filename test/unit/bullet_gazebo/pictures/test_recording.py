@@ -11,7 +11,7 @@ from support.robots.cartpole import cartpole_urdf
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
+from bullet_gazebo.physics.world import World
 from bullet_gazebo.pictures import recording
 from bullet_gazebo.pictures.recording import RecordingError, RecordingOptions, SimulationRecorder
 from bullet_gazebo.simulator import Simulator
@@ -24,11 +24,10 @@ BALL = """<robot name="ball"><link name="base">
 
 
 @pytest.fixture
-def sim():
-    made = Simulator(World(make_engine()), lockstep=True)
-    made.world.spawn("ground_plane", ground_plane(), Pose())
-    yield made
-    made.world.close()
+def sim(sim: Simulator) -> Simulator:
+    """With ground, which is drawn."""
+    sim.world.spawn("ground_plane", ground_plane(), Pose())
+    return sim
 
 
 def frames(path: Path) -> list[np.ndarray]:
