@@ -11,7 +11,7 @@ from support.robots.cartpole import cartpole_urdf
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World
+from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.pictures import recording
 from bullet_gazebo.pictures.recording import RecordingError, RecordingOptions, SimulationRecorder
 from bullet_gazebo.simulator import Simulator
