@@ -143,6 +143,7 @@ def test_the_robot_in_this_process_and_resumed(tmp_path: Path, capsys) -> None:
     assert "--resume allows no --backend" in refused(capsys, f"--resume={run}", "--backend=bullet")
 
 
+@pytest.mark.slow
 def test_another_environment(tmp_path: Path) -> None:
     private = ["_gamma:=0.5", "_batch_episodes:=2"]
     assert main([*PLAIN, "--run-dir=run", "--seed=5", *private]) == 0

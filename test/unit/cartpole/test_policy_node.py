@@ -33,6 +33,7 @@ def exported(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["run", "exported"])
 def test_a_run_or_a_file_brings_robot_task_and_period(kind: str, request) -> None:
     path = request.getfixturevalue(kind)

@@ -192,7 +192,7 @@ def test_the_workbench_takes_it(command: Command, only_parsing: None, monkeypatc
         if "--resume" in arguments:  # needs a run; test_tutorial.py has one
             return
 
-        def begin(*_: object) -> NoReturn:
+        def begin(*_: object, **__: object) -> NoReturn:
             raise Parsed
 
         monkeypatch.setattr(training_cli, "run_training", begin)

@@ -189,6 +189,8 @@ def test_crossed_limits_are_swapped():
         ('<axis xyz="0 0 0"/>' + LIMIT, "the axis has length 0"),
         ('<axis xyz="1e200 1e200 0"/>' + LIMIT, "the axis has length inf"),
         ('<dynamics damping="soft"/>' + LIMIT, "<dynamics damping>: 'soft' is not a number"),
+        ("<mimic/>" + LIMIT, "<mimic> needs the attribute 'joint'"),
+        ("<safety_controller/>" + LIMIT, "<safety_controller> needs the attribute 'k_velocity'"),
     ],
 )
 def test_a_joint_that_cannot_be_read_refuses_the_robot(joint, fault):

@@ -136,6 +136,7 @@ def test_a_random_weights_is_torchs_own() -> None:
     assert all(torch.equal(mine, its) for mine, its in zip(drawn, expected, strict=True))
 
 
+@pytest.mark.slow
 def test_it_learns() -> None:
     lengths = learned_lengths(PolicyGradientAgent(2), 200)
     assert np.mean(lengths[-20:]) > 2 * np.mean(lengths[:20])
