@@ -1,10 +1,9 @@
 """The command policy_node.py: moves a robot over ROS with a trained policy."""
 
 import argparse
-import contextlib
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -70,23 +69,15 @@ def main(argv: list[str] | None = None) -> int:
             late, seed, goal = arguments.late, arguments.seed, arguments.goal
             return PolicyNode(robot, task, act, period, late, seed, goal, way)
 
-        with _errors_in_one_line():
+        try:
             run_node(name, words, make, interrupt.requested)
+        except RobotEnvError:
+            raise
+        except Exception as error:  # of the user's task; the robot has stopped
+            text = f"the robot is stopped, the task failed: {error_line(error)}"
+            raise RobotEnvError(text) from error
 
     return run_command(f"{NODE}.py", command, RobotEnvError)
-
-
-@contextlib.contextmanager
-def _errors_in_one_line() -> Iterator[None]:
-    """Turns any error of the user's task into one line, once the robot has stopped."""
-    try:
-        yield
-    except RobotEnvError:
-        raise
-    except Exception as error:
-        raise RobotEnvError(
-            f"the robot is stopped, the task failed: {error_line(error)}"
-        ) from error
 
 
 def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:

@@ -70,9 +70,6 @@ class Options:
     """The options of one or more dataclasses, by name.
 
     If two dataclasses have an option of the same name, the first one explains it and both get its value.
-
-    Args:
-        classes: Dataclasses whose fields were made by `option`.
     """
 
     def __init__(self, *classes: type) -> None:

@@ -36,13 +36,7 @@ def switch(value: Any) -> bool:
 
 
 def array(value: Any, dtype: torch.dtype, shape: tuple[int | None, ...]) -> np.ndarray:
-    """Checks a tensor and returns a copy as an array.
-
-    Args:
-        value: The tensor. All of its values must be finite.
-        dtype: Its type.
-        shape: Its shape, with None for any size.
-    """
+    """Checks a tensor and returns a copy as an array."""
     if not isinstance(value, torch.Tensor) or value.dtype != dtype or value.is_sparse:
         raise ValueError(f"a tensor of {dtype} is expected, not {_short(value)}")
     fits = len(value.shape) == len(shape)

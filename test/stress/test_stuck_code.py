@@ -4,6 +4,7 @@ import contextlib
 import random
 import signal
 
+import pytest
 from gazebo_msgs.srv import GetWorldProperties, SpawnModel
 from geometry_msgs.msg import Pose
 from support.ros.pg_train_runs import Place, Process
@@ -75,6 +76,7 @@ def simulator(here: Place) -> Process:
     return node
 
 
+@pytest.mark.stress
 def test_code_that_never_returns(scenario: Scenario) -> None:
     """It is named in the log, once it has lasted for long and when the node is ended, with exit code 1."""
 

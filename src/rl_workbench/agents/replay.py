@@ -97,10 +97,6 @@ class ReplayBuffer:
     def load_state_dict(self, state: dict[str, Any], actions: int) -> None:
         """Loads what `state_dict` returned.
 
-        Args:
-            state: the return value of `state_dict`.
-            actions: A; the transitions' actions must be below it.
-
         Raises:
             WorkbenchError: if it doesn't fit into this buffer.
             TypeError, ValueError, LookupError: if it is malformed.

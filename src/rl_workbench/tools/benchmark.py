@@ -165,13 +165,7 @@ def _options(value: Any, origin: str) -> dict[str, Any]:
 
 
 def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
-    """Makes a variant, and checks names and types of its options if the algorithm is our own.
-
-    Args:
-        origin: the file and suite, for errors.
-        name: of the variant.
-        options: of the training, with the algorithm as `algo`.
-    """
+    """Makes a variant, and checks names and types of its options if the algorithm is our own."""
     if not NAME.fullmatch(name):
         raise WorkbenchError(
             f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}"
@@ -240,17 +234,10 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
     costs = figures.summary_table(groups, figures.COSTS_SUMMARY)
     costs += f"\n\n{figures.table(results, figures.COSTS)}"
     about = f"{suite.about}\n\n{_measured(episodes, {threshold(run.env_id) for run in runs})}"
-    content = {
-        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "versions": run_folder.versions(),
-        "episodes": episodes,
-        "where": where,
-        "runs": figures.rows(results, {**figures.RESULTS, **figures.COSTS}),
-    }
     for name, write in (
         ("results.md", as_text(f"# {suite.name}\n\n{about}\n\n{summary}\n\n{every}\n")),
         ("costs.md", as_text(f"# {suite.name}: costs\n\n{_machine()}, {where}.\n\n{costs}\n")),
-        ("results.json", as_json(content)),
+        ("results.json", as_json(_figures(results, episodes, where))),
     ):
         write_file(folder / name, write)
     _draw(folder, runs)
@@ -260,6 +247,19 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
         raise WorkbenchError(
             f"{len(failed)} of {len(results)} trainings failed; the first one: {failed[0].fault}"
         )
+
+
+def _figures(results: "list[RunResult]", episodes: int, where: str) -> dict[str, Any]:
+    """Returns the content of results.json."""
+    from rl_workbench.tools.results import COSTS, RESULTS, rows
+
+    return {
+        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "versions": run_folder.versions(),
+        "episodes": episodes,
+        "where": where,
+        "runs": rows(results, {**RESULTS, **COSTS}),
+    }
 
 
 def _machine() -> str:

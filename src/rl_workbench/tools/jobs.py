@@ -48,14 +48,7 @@ TIME_TO_END = 4.0  # [s] for all trainings after Ctrl-C
 def job_pool(
     arguments: argparse.Namespace, folder: Path, interrupt: Interrupt, jobs: Sequence[Job] = ()
 ) -> Iterator["JobPool"]:
-    """Makes the pool that a command's flags choose, on this machine or on a Ray cluster.
-
-    Args:
-        arguments: the flags of `add_job_flags`, and the program.
-        folder: contains all run folders.
-        interrupt: ends all jobs.
-        jobs: those known from the beginning.
-    """
+    """Makes the pool that a command's flags choose, on this machine or on a Ray cluster."""
     program = Program(arguments.program, search_path())
     with contextlib.ExitStack() as stack:
         if arguments.ray is None:

@@ -44,12 +44,7 @@ class LearnedPolicy(NamedTuple):
 
 
 def environment_of(run: Run, options: Mapping[str, Any]) -> gymnasium.Env[Any, Any]:
-    """Makes an environment with the observations that a run's policies expect.
-
-    Args:
-        run: the run.
-        options: of the environment, on top of the training's own.
-    """
+    """Makes an environment with the observations that a run's policies expect."""
     keeps_dict = algorithm(run.algorithm).keeps_dict
     return make_environment(run.env_id, {**run.env_kwargs, **options}, keep_dict=keeps_dict)
 

@@ -72,26 +72,28 @@ def examine(
     if not summary.get("complete"):
         faults.append(str(summary.get("failure") or "not complete"))
     returns, steps = np.array(summary.get("returns") or []), summary.get("steps")
-    if "returns" not in summary and (curve := attempt(lambda: training_curve(run))):
-        returns, steps = curve.values, int(curve.steps[-1])
+    if "returns" not in summary:
+        returns, steps = attempt(lambda: _trained_so_far(run)) or (returns, steps)
     trained = float(returns[-LAST:].mean()) if len(returns) else None
-    score, success, final = trained, summary.get(f"success_rate_last_{LAST}"), None
+    score, success = trained, summary.get(f"success_rate_last_{LAST}")
     if episodes:
         played = attempt(lambda: _greedy(run, episodes, which, warn))
-        score = played.mean_return if played else None
-        success = played.success_rate if played else None
-    if also_last and (last := attempt(lambda: _greedy(run, episodes, "last", warn))):
-        final = last.mean_return
+        score, success = (played.mean_return, played.success_rate) if played else (None, None)
+    last = attempt(lambda: _greedy(run, episodes, "last", warn)) if also_last else None
     solved_step, solved_seconds = attempt(lambda: _solved(run)) or (None, None)
     return RunResult(
-        group=group, seed=run.seed, run=run.name,
-        score=score, success=success, final=final, training_mean=trained,
+        group=group, seed=run.seed, run=run.name, score=score, success=success,
+        final=last.mean_return if last else None, training_mean=trained,
         evaluations=attempt(lambda: _mean_evaluation(run)), avg20=_largest_mean(returns),
-        solved_step=solved_step, solved_seconds=solved_seconds,
-        steps=steps, episodes=summary.get("episodes") or len(returns) or None,
-        seconds=summary.get("seconds"), cpu_seconds=cost_of(run.folder).get("cpu_seconds"),
-        fault="; ".join(dict.fromkeys(faults)),
+        solved_step=solved_step, solved_seconds=solved_seconds, steps=steps,
+        episodes=summary.get("episodes") or len(returns) or None, seconds=summary.get("seconds"),
+        cpu_seconds=cost_of(run.folder).get("cpu_seconds"), fault="; ".join(dict.fromkeys(faults)),
     )  # fmt: skip
+
+
+def _trained_so_far(run: Run) -> tuple[np.ndarray, int]:
+    curve = training_curve(run)
+    return curve.values, int(curve.steps[-1])
 
 
 def _greedy(run: Run, episodes: int, which: str, warn: Callable[[str], None]) -> Evaluation:

@@ -69,30 +69,27 @@ def show_run(
     draw_without_display()
     torch.set_num_threads(1)  # networks this small are slower on more
     interrupt.defer()
-    training_ended = threading.Event()
-    if beside_training:
-        threading.Thread(target=_await_end, args=(training_ended,), daemon=True).start()
-
-    def is_over() -> bool:
-        return training_ended.is_set() or interrupt.requested()
-
+    is_over = _end(interrupt, beside_training)
     address, server = _served(host, port, folder.name)
     with contextlib.ExitStack() as stack:
         stack.callback(stop, server)
         recorder = EpisodeRecorder(folder, server, env_options)
         stack.callback(recorder.close)
-        for line in address.advice("the run", "plays its episodes") if not is_over() else ():
+        if is_over():  # the training was shorter than this page's start
+            return
+        for line in address.advice("the run", "plays its episodes"):
             tell(line)
         if browser:  # some browsers block until the user closes them
             threading.Thread(target=open_browser, args=(address, warn), daemon=True).start()
-        while not server.get_clients() and not is_over():  # nothing is played without a viewer
+        while not server.get_clients():  # nothing is played without a viewer
+            if is_over():
+                return
             time.sleep(IDLE_PERIOD)
-        if not is_over():
-            with server.gui.add_folder("Episode"):
-                playback = Playback(server.gui, recorder, policies, seed, episodes)
-            curves = Curves(server.gui, server.gui.add_folder("Training"))
-            curves.follow(folder)
-            _play(server, playback, curves, is_over)
+        with server.gui.add_folder("Episode"):
+            playback = Playback(server.gui, recorder, policies, seed, episodes)
+        curves = Curves(server.gui, server.gui.add_folder("Training"))
+        curves.follow(folder)
+        _play(server, playback, curves, is_over)
 
 
 def _served(host: str, port: int | None, title: str) -> tuple[Address, viser.ViserServer]:
@@ -101,6 +98,14 @@ def _served(host: str, port: int | None, title: str) -> tuple[Address, viser.Vis
         return address, serve(address, title, CAMERA, LOOK_AT)
     except PortInUse as error:
         raise WorkbenchError(str(error)) from error
+
+
+def _end(interrupt: Interrupt, beside_training: bool) -> Callable[[], bool]:
+    """Returns what says whether the serving is over."""
+    training_ended = threading.Event()
+    if beside_training:
+        threading.Thread(target=_await_end, args=(training_ended,), daemon=True).start()
+    return lambda: training_ended.is_set() or interrupt.requested()
 
 
 def _await_end(ended: threading.Event) -> None:

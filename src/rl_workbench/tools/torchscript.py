@@ -174,11 +174,6 @@ class OfDicts(nn.Module):
 def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement]:
     """Returns the file's content, and how it compares with the policy.
 
-    Args:
-        run: the policy's run.
-        policy: its environment is stepped.
-        seed: seeds the observations for the comparison.
-
     Raises:
         WorkbenchError: if the environment fails, its observations can't be exported, or the file
             would act differently.

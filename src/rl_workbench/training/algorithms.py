@@ -124,11 +124,7 @@ ALGORITHMS = {kind.name: kind for kind in (*_OURS, *_THEIRS)}
 
 
 def algorithm(name: str) -> AlgorithmKind:
-    """Returns the algorithm of that name.
-
-    Raises:
-        WorkbenchError: If there is none. The text names the nearest.
-    """
+    """Returns the algorithm of that name."""
     if name not in ALGORITHMS:
         raise WorkbenchError(unknown("algorithm", name, list(ALGORITHMS)))
     return ALGORITHMS[name]

@@ -32,12 +32,7 @@ _MISFITS = (LookupError, TypeError, ValueError, RuntimeError, AttributeError, Ar
 
 
 class Checkpoints:
-    """Writes the checkpoints of one run.
-
-    Args:
-        run: The run folder.
-        keep: How many of the newest to keep; 0 keeps all.
-    """
+    """Writes the checkpoints of one run."""
 
     def __init__(self, run: Path, keep: int) -> None:
         self._run, self._keep = run, keep

@@ -78,13 +78,6 @@ class Evaluator:
     """Evaluates an algorithm's policy, in an environment of its own wherever there can be one.
 
     If all environments share one robot, an evaluation moves the training's, which is brought back afterwards.
-
-    Args:
-        options: Of the training.
-        algorithm: Acts greedily.
-        env: The training's first environment.
-        should_stop: Called before each step.
-        say: Called if there can be no second environment.
     """
 
     def __init__(

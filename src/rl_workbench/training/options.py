@@ -152,12 +152,7 @@ def until_the_steps(values: Mapping[str, Any], given: Mapping[str, Any]) -> dict
 
 
 def recorded_options(content: Any, origin: str) -> TrainingOptions:
-    """Returns the options that `TrainingOptions.record` wrote.
-
-    Args:
-        content: What config.json or a checkpoint's `config` holds.
-        origin: The file, for errors.
-    """
+    """Returns the options that `TrainingOptions.record` wrote."""
     values = _flat(content, origin)
     kind = algorithm(str(values.pop("algorithm")))
     return make_options(kind, known_options(kind).read(values, origin))
@@ -169,13 +164,7 @@ def recorded_kind(folder: Path) -> AlgorithmKind:
 
 
 def resumed_options(kind: AlgorithmKind, folder: Path, given: Mapping[str, Any]) -> TrainingOptions:
-    """Returns the options of the training in a run folder, with a new length.
-
-    Args:
-        kind: The algorithm that was asked for.
-        folder: The run folder.
-        given: Converted values, all of them of `EXTENDING`.
-    """
+    """Returns the options of the training in a run folder, with a new length."""
     origin = str(folder / CONFIG_RECORD)
     old = recorded_options(read_record(folder), origin)
     if old.kind != kind:
@@ -221,11 +210,6 @@ def read_section(path: Path, names: Sequence[str], preset: str | None) -> dict[s
     """Reads the options of a preset, or else of the first section that exists; {} if none does.
 
     A file without sections holds options for every environment.
-
-    Args:
-        path: The YAML file.
-        names: Names of sections, see `section_names`.
-        preset: A section that must exist.
     """
     content = _read_yaml(path)
     if content and not any(isinstance(value, dict) for value in content.values()):

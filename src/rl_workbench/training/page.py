@@ -15,11 +15,7 @@ POLICIES = ("last", "best", "random")
 
 
 class Page(Callback):
-    """Serves the run's page. The training neither waits for it nor needs it.
-
-    Args:
-        program: The command that starts rl_workbench's command line.
-    """
+    """Serves the run's page. The training neither waits for it nor needs it."""
 
     def __init__(self, program: Sequence[str]) -> None:
         self._program = program

@@ -29,11 +29,7 @@ def make(options: TrainingOptions, envs: list[Any]) -> "PolicyGradientTraining":
 
 
 def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
-    """Makes a new agent for an environment.
-
-    Raises:
-        WorkbenchError: If the environment doesn't suit it. The text says what does.
-    """
+    """Makes a new agent for an environment."""
     run, settings = options.run, options.hyperparameters
     (size,) = env.observation_space.shape or (0,)
     space = env.action_space

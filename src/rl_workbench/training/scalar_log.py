@@ -87,9 +87,6 @@ class EventFile:
     """TensorBoard's file, written by the thread that calls.
 
     TensorBoard's own writer has a thread of its own, which a full disk ends with a traceback.
-
-    Args:
-        folder: Where it is made, under a name of its own.
     """
 
     def __init__(self, folder: Path) -> None:

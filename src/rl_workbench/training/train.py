@@ -249,9 +249,8 @@ def choose(
     known = [*special, *options.names, *SESSION.names]
     from_flags = _parse(_parser(kind, options, prog, default, parents), flags, known)
     parameters = parameters or {}
-    for name in parameters:
-        if name not in known:
-            raise WorkbenchError(f"parameters: {unknown('parameter', name, known)}")
+    for name in (each for each in parameters if each not in known):
+        raise WorkbenchError(f"parameters: {unknown('parameter', name, known)}")
 
     # What isn't an option of the training: files, presets, and what holds for this session only.
     files = {name: str(parameters[name]) for name in special if parameters.get(name)}

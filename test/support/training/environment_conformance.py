@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+import pytest
 
 import cartpole
 from robot_envs.testing import check_robot_env
@@ -29,9 +30,11 @@ class EnvironmentConformance:
     def make(self, **options: Any) -> gymnasium.Env:
         return gymnasium.make(self.identifier, backend=self.backend, **options)
 
+    @pytest.mark.slow
     def test_it_keeps_what_environments_of_robots_promise(self) -> None:
         check_robot_env(self.identifier, (self.backend,), steps=self.steps)
 
+    @pytest.mark.slow
     def test_so_it_does_with_all_options(self) -> None:
         check_robot_env(self.identifier, (self.backend,), options=RICH, steps=self.steps)
 

@@ -9,7 +9,6 @@ import pytest
 from support.training.environment_conformance import EnvironmentConformance
 
 import cartpole  # noqa: F401 - registers the environments
-from cartpole.robot import CONTROLLER
 from robot_envs.errors import RobotEnvError
 
 
@@ -92,17 +91,3 @@ def test_a_backend_over_ros_says_that_ros_is_not_there(monkeypatch, backend):
 class TestMujoco(EnvironmentConformance):
     identifier = "cartpole/Classic-v0"
     backend = "mujoco"
-
-
-def test_the_control_period_is_that_of_the_physics():
-    slow, quick = (
-        gymnasium.make("cartpole/Balance-v0", control_period=period).unwrapped
-        for period in (0.016, 0.008)
-    )
-    for env in (slow, quick):
-        env.reset(seed=0)
-    state = slow.backend.act({CONTROLLER: 0.02})
-    quick.backend.act({CONTROLLER: 0.02})
-    assert quick.backend.act({CONTROLLER: 0.02}) == state
-    slow.close()
-    quick.close()

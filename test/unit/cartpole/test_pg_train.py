@@ -122,21 +122,6 @@ def test_what_is_the_robots_alone(capsys, given: str) -> None:
     assert f"{flag} is for the cart-pole: not with --env-id X-v0" in line
 
 
-def test_what_goes_for_every_environment() -> None:
-    plain = choose(["--env-id=X-v0"], {})[0]
-    flags = ["--backend=bullet", "--no-gui", "--headless", "--no-realtime", "--start-noise=0"]
-    assert choose(["--env-id=X-v0", *flags], {})[0] == plain
-    assert plain.run.train_env_kwargs == {}
-
-
-def test_help_explains_both(capsys) -> None:
-    with pytest.raises(SystemExit) as stop:
-        choose(["--help"], {})
-    told = capsys.readouterr().out
-    assert stop.value.code == 0
-    assert all(flag in told for flag in ("--backend", "--start-noise", "--gae-lambda", "--resume"))
-
-
 @pytest.mark.parametrize("flag", ["--env-kwargs", "--train-env-kwargs"])
 def test_a_backend_among_the_environments_options_counts(flag: str) -> None:
     options, _ = choose([flag, "backend=bullet", "--start-noise=0.1"], {})
@@ -146,6 +131,7 @@ def test_a_backend_among_the_environments_options_counts(flag: str) -> None:
 # Trainings in this process.
 
 
+@pytest.mark.slow
 def test_the_robot_in_this_process_and_resumed(tmp_path: Path, capsys) -> None:
     assert main([*BULLET, "--exp-name=mine", "--start-noise=0.02"]) == 0
     (run,) = (tmp_path / "runs").iterdir()
@@ -157,6 +143,7 @@ def test_the_robot_in_this_process_and_resumed(tmp_path: Path, capsys) -> None:
     assert "--resume allows no --backend" in refused(capsys, f"--resume={run}", "--backend=bullet")
 
 
+@pytest.mark.slow
 def test_another_environment(tmp_path: Path) -> None:
     private = ["_gamma:=0.5", "_batch_episodes:=2"]
     assert main([*PLAIN, "--run-dir=run", "--seed=5", *private]) == 0

@@ -59,16 +59,3 @@ def episode(render_mode, **options):
 
 def test_rendering_between_steps_changes_no_bit():
     assert np.array_equal(episode(None)[0], episode("rgb_array", width=40, height=30)[0])
-
-
-def test_the_engine_makes_no_difference_to_the_picture():
-    pytest.importorskip("mujoco")
-    pictures = []
-    for backend in ("bullet", "mujoco"):
-        env = gymnasium.make(
-            "cartpole/Classic-v0", backend=backend, render_mode="rgb_array", width=64, height=48
-        )
-        env.reset(seed=2)
-        pictures.append(env.render())
-        env.close()
-    assert np.array_equal(*pictures) and pictures[0].shape == (48, 64, 3)

@@ -33,6 +33,7 @@ def exported(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["run", "exported"])
 def test_a_run_or_a_file_brings_robot_task_and_period(kind: str, request) -> None:
     path = request.getfixturevalue(kind)
@@ -72,15 +73,6 @@ def renamed(env_id: str):
         return ExportedPolicy(act, metadata | {"env_id": env_id})
 
     return opened
-
-
-@pytest.mark.parametrize("path", ["nothing", "damaged.pt", "empty"])
-def test_paths_without_a_policy(path: str, tmp_path: Path, capsys) -> None:
-    (tmp_path / "damaged.pt").write_bytes(b"PK")
-    (tmp_path / "empty").mkdir()
-    assert policy_node.main([str(tmp_path / path)]) == 1
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("policy_node.py: ") and path in line
 
 
 @pytest.mark.parametrize(

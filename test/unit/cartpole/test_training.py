@@ -16,8 +16,6 @@ from support.training.training_runs import (
 
 import cartpole
 from cartpole.environment import CartPoleEnv
-from rl_workbench.errors import WorkbenchError
-from robot_envs.errors import SimulatorError
 
 NAMES = {"dqn": "Classic", "reinforce": "Balance", "reinforce-document": "Balance"}
 
@@ -27,6 +25,7 @@ def options(name: str) -> dict[str, object]:
     return {"env_id": f"cartpole/{NAMES[name]}-v0", "env_kwargs": {"noise": 0.02}, **length}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_it_resumes_exactly(tmp_path: Path, name: str) -> None:
     assert cartpole.__name__  # registers the environments
@@ -68,6 +67,7 @@ def test_in_two_simulators_it_comes_to_the_bits_of_two_worlds_here(
     assert rows(here) == rows(there)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dqn", "reinforce"])
 def test_one_robot_for_training_and_evaluation(tmp_path: Path, monkeypatch, name: str) -> None:
     """Over ROS there is one; the episode under way goes on as if nobody had moved the robot."""
@@ -76,14 +76,3 @@ def test_one_robot_for_training_and_evaluation(tmp_path: Path, monkeypatch, name
     run = train(tmp_path / "run", name, InterruptAfter(150), **options(name), eval_frequency=30)
     assert rows(run) != rows(whole), "interrupted"
     assert_same_run(whole, resume(run))
-
-
-def test_an_error_of_its_simulator_is_one_of_the_training(tmp_path: Path, monkeypatch) -> None:
-    def step(env: CartPoleEnv, action: int) -> tuple:
-        raise SimulatorError("the simulator has ended")
-
-    monkeypatch.setattr(CartPoleEnv, "step", step)
-    with pytest.raises(
-        WorkbenchError, match=r"^the simulator has ended; stopped after 0.*--resume"
-    ):
-        train(tmp_path, "reinforce", **options("reinforce"))

@@ -38,6 +38,7 @@ def test_errors_begin_with_the_name_it_was_called_by(
     assert capsys.readouterr().err.splitlines()[-1].startswith("workbench.py train: error: ")
 
 
+@pytest.mark.slow
 def test_its_trainings_in_processes_of_their_own_know_the_cart_pole(tmp_path: Path) -> None:
     flags = ["--algo=dqn", "--env-id=cartpole/Classic-v0", "--total-timesteps=50",
              "--eval-episodes=1", f"--run-dir={tmp_path / 'run'}"]  # fmt: skip

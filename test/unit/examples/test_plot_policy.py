@@ -11,6 +11,7 @@ from support.training import workbench_runs
 SCRIPT = Path(__file__).resolve().parents[3] / "examples/plot_policy.py"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("env_id", ["CartPole-v1", "cartpole/SwingUp-v0"])
 def test_it_draws_the_plane(tmp_path: Path, env_id: str) -> None:
     run = workbench_runs.policy_gradient(tmp_path / "run", "reinforce", env_id=env_id)

@@ -165,6 +165,7 @@ def test_help_explains_every_option(name: str, monkeypatch: pytest.MonkeyPatch, 
         assert each.metadata["help"] in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_it_is_short_and_imports_nothing_of_ours(name: str) -> None:
     text = (EXAMPLES / name).read_text(encoding="utf-8")

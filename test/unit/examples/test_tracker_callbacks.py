@@ -31,6 +31,7 @@ class Tracker(ModuleType):
         return called
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("example", "made", "logged", "ended"),
     [("WandbCallback", "init", "log", "finish"), ("MlflowCallback", "start_run", "log_metric", "end_run")],

@@ -49,6 +49,7 @@ def refused(path, **limits):
     return str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
@@ -72,6 +73,7 @@ def test_a_file_that_is_missing_is_told_once(bad, tmp_path):
     assert refused(path) == f"{path}: No such file or directory: {tmp_path}/none.xacro"
 
 
+@pytest.mark.slow
 def test_a_bomb_of_macros(bad):
     """Each macro calls the one before ten times."""
     macros = '<xacro:macro name="m0"><link/></xacro:macro>' + "".join(
@@ -102,6 +104,7 @@ except CannotExpand as fault:
     assert "of memory" in done.stdout
 
 
+@pytest.mark.slow
 def test_ros_utils_and_the_environments_are_bounded(bad, short, capsys):
     assert ros_urdf.urdf_parse_from_path(bad(ENDLESS)) is None
     assert re.fullmatch(r"\[ERROR\] .*: does it compute without end\?\n", capsys.readouterr().err)
@@ -124,6 +127,7 @@ def test_the_files_that_one_includes(bad, tmp_path):
         included_files(bad('<xacro:include filename="none.xacro"/>'))
 
 
+@pytest.mark.slow
 def test_many_at_once(bad):
     """Each has its own state, which xacro keeps in module variables."""
     path = bad('<xacro:arg name="n" default=""/><link name="l$(arg n)"/>')
@@ -174,6 +178,7 @@ def run(*arguments, **constants):
     )
 
 
+@pytest.mark.slow
 def test_the_program_writes_what_the_function_returns(bad, tmp_path):
     path = bad('<xacro:arg name="n" default="1"/><link name="l$(arg n)"/>')
     done = run(path, "n:=7")
@@ -188,6 +193,7 @@ def test_the_program_writes_what_the_function_returns(bad, tmp_path):
     assert run("--deps", include).stdout == str(tmp_path / "new" / "out.urdf")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "reason"),
     [

@@ -60,6 +60,7 @@ def test_an_error_refuses_a_request_and_the_next_one_is_answered(process, reques
     assert child.ask(b"os.getpid()") == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("request_", "reason"),
     [

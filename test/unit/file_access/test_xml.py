@@ -91,6 +91,7 @@ def test_what_is_no_xml_says_so_in_one_line(data, fault):
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "fault"),
     [

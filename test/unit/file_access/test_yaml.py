@@ -32,6 +32,7 @@ def test_angles_are_radians(text, angle):
     assert load_parameters(f"a: {text}") == [{"a": pytest.approx(angle)}]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "fault"),
     [

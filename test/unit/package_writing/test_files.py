@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import pytest
 from support.mutations.mesh_files import binary_stl
 from support.robots.new_robots import (
     BARE,
@@ -80,6 +81,7 @@ def test_meshes_of_a_package_that_was_downloaded_without_its_package_xml_come_al
     assert made.links.links["rod"].collisions[0].mesh == str(copy)
 
 
+@pytest.mark.slow
 def test_a_package_that_it_needs_is_depended_on(new, tmp_path, monkeypatch):
     other = tmp_path / "ws/their_description"
     (other / "urdf").mkdir(parents=True)

@@ -29,6 +29,7 @@ from rl_workbench.training.train import choose
 ROBOTS = Path(__file__).resolve().parents[2] / "data/robots"
 
 
+@pytest.mark.slow
 def test_the_arm_that_comes_along(new):
     folder, made, task, told = new("my_arm")
     assert made.joints == ("elbow", "shoulder")
@@ -48,6 +49,7 @@ def _umask() -> int:
     return mask
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["arm", "light_hand", "pendulum", "slides", "two_link_arm"])
 def test_robots_of_many_kinds_reach_with_the_gains_that_they_get(new, name):
     """Six joints of 17 kg, fingers of grams, slides with all three interfaces."""
@@ -66,6 +68,7 @@ def test_what_is_written_is_tidy(new):
         assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interface", ["effort", "position", "velocity"])
 def test_transmissions_plugin_and_base_that_lack_are_added_beside(new, interface):
     folder, made, task, told = new(
@@ -81,6 +84,7 @@ def test_transmissions_plugin_and_base_that_lack_are_added_beside(new, interface
     assert reaches(made, task)
 
 
+@pytest.mark.slow
 def test_a_base_without_mass_can_be_fixed(new):
     """As of most arms, which Gazebo would drop."""
     _, made, task, _ = new("my_light", robot('<link name="base"/>', *BARE[1:]), "--base", "fixed")
@@ -150,6 +154,7 @@ def test_its_options_are_those_of_trainings(new, algo, tmp_path):
     assert options.run.num_envs == 1
 
 
+@pytest.mark.slow
 def test_its_test_holds_for_a_task_that_takes_the_place_of_reach(new):
     """Who follows the README's list of what goes together has a package that works."""
     folder, *_ = new("my_other")

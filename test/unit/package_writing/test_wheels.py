@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 import yaml
 from support.mutations.mesh_files import binary_stl
 from support.robots.new_robots import (
@@ -66,6 +67,7 @@ def test_wheels_whose_motors_give_an_effort(new):
     assert reaches(made, task)
 
 
+@pytest.mark.slow
 def test_joints_without_end_keep_positions_where_that_is_asked_for_or_the_base_is_fixed(new):
     folder, *_ = new(
         "my_asked", robot(*ROVER), "--base", "free", "--interface", "position", "--height", "0.1"
@@ -77,6 +79,7 @@ def test_joints_without_end_keep_positions_where_that_is_asked_for_or_the_base_i
     assert "(--passive JOINT leaves one without)" in told
 
 
+@pytest.mark.slow
 def test_a_height_below_the_ground_is_told_with_one_that_is_enough(new):
     *_, told = new("my_low", robot(*ROVER), "--base", "free", "--height", "0.1")
     assert "height of 0.1 m its lowest collision lies below the ground; --height 0.15" in told

@@ -120,6 +120,7 @@ def test_what_lies_in_a_folder_imports_in_no_circle(folder: Path) -> None:
         pytest.fail(f"{folder.relative_to(SRC)}: {' -> '.join(error.args[1])}")
 
 
+@pytest.mark.slow
 def test_only_the_rooms_for_it_ask_for_ros() -> None:
     """What is made for this process alone works where no ROS is installed."""
     script = f"""
@@ -148,6 +149,7 @@ def loaded_by(*names: str) -> set[str]:
     return {name.partition(".")[0] for name in done.stdout.split()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "absent"),
     [

@@ -137,6 +137,7 @@ def test_every_command_is_looked_at() -> None:
     assert strange == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", GROUPS["trainings"], ids=str)
 def test_a_training_runs(command: Command, tmp_path: Path, monkeypatch, capsys) -> None:
     """A short one, without ROS."""
@@ -191,7 +192,7 @@ def test_the_workbench_takes_it(command: Command, only_parsing: None, monkeypatc
         if "--resume" in arguments:  # needs a run; test_tutorial.py has one
             return
 
-        def begin(*_: object) -> NoReturn:
+        def begin(*_: object, **__: object) -> NoReturn:
             raise Parsed
 
         monkeypatch.setattr(training_cli, "run_training", begin)

@@ -40,6 +40,7 @@ def calls(path: Path) -> Iterator[tuple[str, ast.Call]]:
             yield ast.unparse(node.func), node
 
 
+@pytest.mark.slow
 def test_no_file_is_run_as_code() -> None:
     for path in MODULES:
         for name, call in calls(path):

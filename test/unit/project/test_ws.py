@@ -79,6 +79,7 @@ def test_ready_workspace_is_quiet(ws):
 # --- the environment of a command --------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["python", "python3"])
 def test_interpreter_is_the_workspaces(ws, root, name):
     code = "import bullet_gazebo_msgs.srv, rospy, torch, cartpole, sys; print(sys.prefix)"
@@ -86,6 +87,7 @@ def test_interpreter_is_the_workspaces(ws, root, name):
     assert Path(result.stdout.strip()).resolve() == root / ".ws/venv", result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [
@@ -104,6 +106,7 @@ def test_ros_commands(ws, command):
     assert result.stdout.strip()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [("xacro",), ("rosrun", "xacro", "xacro")])
 def test_xacro_is_the_one_with_limits(ws, tmp_path, command):
     path = tmp_path / "robot.xacro"
@@ -170,6 +173,7 @@ def test_the_users_network_stays(ws, name, environment, value):
     assert variable(ws, name, **environment) == (value or environment[name])
 
 
+@pytest.mark.slow
 def test_roscore_is_the_master_that_the_workspace_looks_for(ws, root, tmp_path):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -193,6 +197,7 @@ def test_roscore_is_the_master_that_the_workspace_looks_for(ws, root, tmp_path):
 # --- tests -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_fast_leaves_out_what_takes_long(ws):
     paths = ["test/unit/project/test_ci.py", "test/unit/project/test_catkin_workspace.py"]
     result = ws("test", "--collect-only", "-q", "--fast", *paths, "test/ros/robot_envs")

@@ -54,6 +54,7 @@ def foreign(root):
         yield folder
 
 
+@pytest.mark.slow
 @only_root
 def test_missing_package_without_root_or_sudo(foreign):
     (foreign / "checkout/requirements/debian.txt").write_text("no-such-package  # a comment\n")
@@ -104,6 +105,7 @@ def test_nowhere_to_write_is_one_line(foreign, home):
     assert "set CARTPOLE_WS_DIR to a folder that can" in line
 
 
+@pytest.mark.slow
 @only_root
 def test_a_workspace_that_is_ready_serves_who_cannot_write_it(root):
     """As on a read-only disk; what commands write goes to the user's own folders."""

@@ -38,6 +38,7 @@ def imported(*arguments: str) -> tuple[list[str], list[str]]:
     return [line for line in lines if line.partition(".")[0] in OURS], heavy.split()
 
 
+@pytest.mark.slow
 def test_a_training_imports_few_of_our_files(tmp_path: Path) -> None:
     short = ["--total-timesteps=50", "--eval-episodes=1", "--confirm-episodes=0"]
     flags = ["--algo=dqn", "--env-id=CartPole-v1", *short, f"--run-dir={tmp_path / 'run'}"]

@@ -119,17 +119,6 @@ def test_each_environment_has_axes_and_a_line_of_its_own() -> None:
         assert names[dqn] == same[dqn], "one group, one colour, in every panel"
 
 
-def test_groups_can_be_told_apart() -> None:
-    curves = {f"group {index}": [seed([1, 2], [index, index])] * 2 for index in range(12)}
-    (axes,) = seed_curves([panel(curves, line=3.0)]).axes
-    drawn = lines(axes, "mean")
-    assert len({(line.get_color(), line.get_linestyle()) for line in drawn}) == 12
-    (line,) = lines(axes, "threshold")
-    assert line.get_color() not in [each.get_color() for each in drawn]
-    names = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert len(set(names)) == 13 and "group 3 (2 seeds)" in names
-
-
 def test_a_variant_is_held_against_the_first_of_its_own_environment() -> None:
     low, high = seed([1, 2], [0, 1]), seed([1, 2], [0, 2])
     panels = [
@@ -146,10 +135,3 @@ def test_a_variant_is_held_against_the_first_of_its_own_environment() -> None:
         "tuned (1 seed), A-v0",
         "other (1 seed), B-v0",
     ]
-
-
-def test_training_curves_show_episodes_unless_there_are_too_many_runs() -> None:
-    few = {f"seed {index}": [seed([1, 2], [0, 1])] for index in range(3)}
-    many = {f"seed {index}": [seed([1, 2], [0, 1])] for index in range(20)}
-    assert len(lines(training_curves([panel(few)], "episode").axes[0], "episodes")) == 3
-    assert not lines(training_curves([panel(many)], "episode").axes[0], "episodes")

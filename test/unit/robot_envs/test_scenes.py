@@ -209,6 +209,7 @@ def test_the_next_episode_touches_the_ground_as_the_first_one_did(make):
     assert not differences(runs[0], runs[3])
 
 
+@pytest.mark.slow
 def test_worlds_of_one_process_know_nothing_of_each_other(make):
     alone = [
         rollout(make(name), 40, seed) for name, seed in (("arms", 1), ("rover", 2), ("arms", 3))

@@ -19,15 +19,18 @@ from robot_envs.testing.rollouts import Subject
 STEPS = 12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", [Hold, Reach, wobbling])
 def test_sound_environments_pass(task):
     check_robot_env(of(task), steps=STEPS)
 
 
+@pytest.mark.slow
 def test_so_does_a_rover_that_pushes_something():
     check_robot_env(lambda **options: RobotEnv(ROVER, Push(), **options), steps=STEPS)
 
 
+@pytest.mark.slow
 def test_so_does_one_with_an_id_and_options():
     register("suite/Reach-v0", "support.scenes.solo_arm:SOLO", "support.scenes.solo_arm:Reach")
     options = {"sensor_noise": 0.01, "sensor_delay": 2, "action_delay": 1}
@@ -238,6 +241,7 @@ def test_an_environments_own_error_is_told_once_and_is_the_cause():
     assert str(error.value).count("ZeroDivisionError: here") == 1
 
 
+@pytest.mark.slow
 def test_all_faults_are_told_together():
     with pytest.raises(AssertionError) as error:
         check_robot_env(

@@ -37,6 +37,7 @@ def many():
         each.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 def test_all_ways_give_the_same_bits(mode):
     identifier = IDS[mode == "SameStep"]

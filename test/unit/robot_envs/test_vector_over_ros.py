@@ -81,6 +81,7 @@ def rollout(vector, mode):
     return given
 
 
+@pytest.mark.slow
 def test_two_simulators_give_the_bits_of_two_worlds_also_with_resets_apart(both):
     pair = both(
         "cartpole/Classic-v0", max_steps=25, render_mode="rgb_array", width=32, height=16, **RICH
@@ -95,6 +96,7 @@ def test_two_simulators_give_the_bits_of_two_worlds_also_with_resets_apart(both)
     assert same(*pictures, exact=True)
 
 
+@pytest.mark.slow
 def test_a_simulator_that_dies_in_the_middle_costs_no_bit_and_none_is_left_in_the_end(both, caplog):
     """A robot of the user's kind, with observations that are dicts."""
     pair = both("robot_envs/TwoLinkReachGoal-v0")

@@ -78,6 +78,7 @@ def test_debians_python_is_told_how_to_install(tmp_path: Path) -> None:
     assert arguments == ["-m", "pip", "install", *flags, "--requirement"]
 
 
+@pytest.mark.slow
 def test_the_command_is_one_that_pip_takes() -> None:
     """In an environment that has them all, where there is nothing to fetch."""
     code = "import sys; from ros_calls.requirements import require; require(('no_such_module',))"

@@ -109,6 +109,7 @@ def test_children_in_other_sessions_are_ended_too(place):
     assert not runs(child)
 
 
+@pytest.mark.slow
 def test_orphans_of_a_killed_parent_are_ended_too(place):
     code = "setsid sleep 1000 & echo $! > $0; wait"
     handle = _programs.start(["sh", "-c", code, str(place / "pid")], "launch", "parent")

@@ -38,28 +38,15 @@ class Elements:
     free: mujoco.MjsJoint | None = None
 
 
+@dataclass
 class ModelWriter:
     """Writes one model. Names begin with `key` to be unique in the world."""
 
-    def __init__(
-        self,
-        spec: mujoco.MjSpec,
-        key: str,
-        model: ModelDescription,
-        inertias: Mapping[str, Inertia | None],
-    ) -> None:
-        """
-        Args:
-            spec: of the world.
-            key: prefix of names.
-            model: the model.
-            inertias: of links, which replace those of the description.
-        """
-        self._spec = spec
-        self._key = key
-        self._model = model
-        self._inertias = inertias
-        self._elements = Elements()
+    _spec: mujoco.MjSpec  # of the world
+    _key: str
+    _model: ModelDescription
+    _inertias: Mapping[str, Inertia | None]  # of links, which replace those of the description
+    _elements: Elements = field(default_factory=Elements)
 
     def write(self, pose: Pose) -> Elements:
         """Adds the model with its root link's frame at `pose`.

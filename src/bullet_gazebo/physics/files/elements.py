@@ -19,10 +19,6 @@ def parse_xml(text: str | bytes, count: Callable[[int], None] | None = None) -> 
     Args:
         text: the text or content.
         count: called now and then with the number of further elements; it may raise.
-
-    Raises:
-        DescriptionError: if it isn't well-formed, or has a document type.
-        LimitExceeded: if it is too large.
     """
     try:
         return parse(text) if count is None else parse(text, count)
@@ -53,11 +49,7 @@ def files_named_by_a_model(where: str) -> Iterator[None]:
 
 
 def finite(text: str, where: str) -> float:
-    """Returns the number in `text`.
-
-    Raises:
-        DescriptionError: if it isn't a finite number; the text begins with `where`.
-    """
+    """Returns the number in `text`."""
     try:
         value = float(text)
     except ValueError as error:
@@ -91,11 +83,7 @@ def truth(text: str | None, default: bool = False) -> bool:
 
 
 def named(element: Element, what: str) -> str:
-    """Returns the attribute `name`.
-
-    Raises:
-        DescriptionError: if it is missing, or too long for an engine.
-    """
+    """Returns the attribute `name`."""
     name = element.get("name", "")
     if not name:
         raise DescriptionError(f"a <{what}> has no name")
@@ -111,11 +99,7 @@ def shown(text: str) -> str:
 
 
 def positive(sizes: tuple[float, ...], where: str) -> tuple[float, ...]:
-    """Returns `sizes` [m].
-
-    Raises:
-        DescriptionError: if one of them isn't positive.
-    """
+    """Returns `sizes` [m]."""
     if min(sizes) <= 0.0:
         raise DescriptionError(f"{where}: sizes must be above 0, not {sizes}")
     return sizes

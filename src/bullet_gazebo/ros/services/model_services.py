@@ -4,7 +4,6 @@ import contextlib
 from collections import Counter
 from dataclasses import replace
 
-import genpy
 import rospy
 from gazebo_msgs import srv
 from gazebo_msgs.msg import LinkState, ModelState
@@ -78,11 +77,12 @@ class ModelServices:
                 response.status_message = "GetModelState: model does not exist"
                 return response
             self._calls[request.model_name] += 1
-            response.header = Header(
-                self._calls[request.model_name],
-                self._stamp(),
-                request.relative_entity_name,
-            )
+            # The wall's time with use_sim_time:=false, as in Gazebo. rospy's simulated time may lag behind
+            # where /clock is thinned.
+            wall = rospy.rostime.is_wallclock()
+            stamp = rospy.get_rostime() if wall else to_time(self._sim.now)
+            count = self._calls[request.model_name]
+            response.header = Header(count, stamp, request.relative_entity_name)
             frame = self._sim.world.frame(request.relative_entity_name)
             if frame is None:
                 response.status_message = (
@@ -95,11 +95,6 @@ class ModelServices:
         response.success = True
         response.status_message = "GetModelState: got properties"
         return response
-
-    def _stamp(self) -> genpy.Time:
-        """Returns the node's own time, as Gazebo does: the wall's with use_sim_time:=false."""
-        # rospy's simulated time may lag behind where /clock is thinned.
-        return rospy.get_rostime() if rospy.rostime.is_wallclock() else to_time(self._sim.now)
 
     def _hear(self, state: ModelState) -> None:
         with contextlib.suppress(ServiceRefused):

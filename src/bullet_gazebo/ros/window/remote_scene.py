@@ -1,4 +1,7 @@
-"""The window's connection to the simulator: the scene that it sees, and the commands that it sends."""
+"""The window's connection to the simulator: the scene that it sees, and the commands that it sends.
+
+Without a simulator or its answer, services raise ServiceFailed; what `gz world` does raises ControlFailed.
+"""
 
 import threading
 import time
@@ -96,27 +99,16 @@ class RemoteScene:
         return (last - now) / max(last_wall - wall, 1e-6)
 
     def get(self, known: list[int], collisions: bool) -> GetSceneResponse:
-        """Returns the scene without the models whose numbers are `known`.
-
-        Raises:
-            ServiceFailed: the simulator doesn't answer.
-        """
+        """Returns the scene without the models whose numbers are `known`."""
         return self._get(known, collisions)
 
     def world(self) -> RemoteWorld:
-        """Returns the client of `gz world`.
-
-        Raises:
-            ControlFailed: there is no simulator.
-        """
+        """Returns the client of `gz world`."""
         return RemoteWorld(self.node, rosgraph.get_master_uri())
 
 
 class Commands:
-    """Calls the simulator's services, each over a connection of its own; for any thread.
-
-    Each method raises ServiceFailed where the simulator doesn't answer or refuses.
-    """
+    """Calls the simulator's services, each over a connection of its own; for any thread."""
 
     def __init__(self, node: str) -> None:
         """`node` is the simulator's full name, usually /gazebo."""
@@ -144,11 +136,7 @@ class Commands:
             return False
 
     def step(self, ticks: int) -> None:
-        """Moves a paused world, or one in lock-step, by `ticks` physics steps.
-
-        Raises:
-            ControlFailed: the simulator doesn't do it.
-        """
+        """Moves a paused world, or one in lock-step, by `ticks` physics steps."""
         if not self.in_lockstep:
             RemoteWorld(self._node, rosgraph.get_master_uri()).step(ticks)
             return

@@ -36,6 +36,7 @@ assert locale.localeconv()["decimal_point"] == ("," if sys.argv[1] == "comma" el
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "engine", ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
 )

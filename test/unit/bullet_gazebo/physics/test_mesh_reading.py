@@ -148,6 +148,7 @@ def test_an_index_that_counts_back_counts_from_its_own_line(tmp_path):
     assert mesh.vertices[mesh.faces][:, :, 0].tolist() == [[1, 1, 1], [2, 2, 2]]
 
 
+@pytest.mark.slow
 def test_nodes_that_show_each_other_ten_times_over_do_not_fill_the_memory(tmp_path, monkeypatch):
     levels = "".join(
         f'<node id="l{level + 1}">' + f'<instance_node url="#l{level}"/>' * 10 + "</node>"

@@ -24,11 +24,10 @@ BALL = """<robot name="ball"><link name="base">
 
 
 @pytest.fixture
-def sim():
-    made = Simulator(World(make_engine()), lockstep=True)
-    made.world.spawn("ground_plane", ground_plane(), Pose())
-    yield made
-    made.world.close()
+def sim(sim: Simulator) -> Simulator:
+    """With ground, which is drawn."""
+    sim.world.spawn("ground_plane", ground_plane(), Pose())
+    return sim
 
 
 def frames(path: Path) -> list[np.ndarray]:
@@ -48,6 +47,7 @@ def options(path: Path, **changed: object) -> RecordingOptions:
     return RecordingOptions(path / "a.mp4", **{"rate": 20.0, "width": 64, "height": 48, **changed})
 
 
+@pytest.mark.slow
 def test_pictures_come_at_simulated_times_and_show_who_comes_and_goes(sim, tmp_path):
     recorder = SimulationRecorder(sim, options(tmp_path))
     sim.advance(200)

@@ -112,6 +112,7 @@ def ball_stl(rows: int) -> str:
     return "\n".join([*lines, "endsolid ball"])
 
 
+@pytest.mark.slow
 def test_a_mesh_of_more_triangles_than_the_renderer_takes_at_once(scene, tmp_path):
     path = tmp_path / "ball.stl"
     path.write_text(ball_stl(135))  # 36450 triangles

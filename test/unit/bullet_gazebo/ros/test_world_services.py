@@ -55,6 +55,7 @@ def test_what_is_no_command_is_refused(control, arguments) -> None:
     assert 0 < len(text) < 200
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(
     st.tuples(COMMANDS, COUNTS) | st.lists(ANY, max_size=4).map(tuple)

@@ -89,6 +89,7 @@ def test_observations_are_normalised_by_what_was_seen_before():
     assert seen.std(0) == pytest.approx([1.0] * 4, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_entropy_draws_towards_a_uniform_policy():
     chances = []
     for weight in (0.0, 5.0):
@@ -213,6 +214,7 @@ def test_an_episode_that_is_not_over_is_refused():
         ReinforceAgent(0).learn(episode)
 
 
+@pytest.mark.slow
 def test_it_learns() -> None:
     torch.set_num_threads(1)
     lengths = learned_lengths(ReinforceAgent(1), 60)

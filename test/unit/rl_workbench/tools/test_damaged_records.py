@@ -51,6 +51,7 @@ def test_a_summary_of_other_types_is_a_fault_in_the_table(own: Path, capsys, con
     assert f"{own / 'summary.json'} isn't the summary of a training" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_reader_that_goes_away_costs_no_file(made: Path, tmp_path: Path) -> None:
     out, (reading, writing) = tmp_path / "x.json", os.pipe()
     os.close(reading)

@@ -110,6 +110,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return train(tmp_path_factory.mktemp("runs") / "dueling", "dueling")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [*KINDS, *(pytest.param(name, marks=pytest.mark.extras("stable_baselines3")) for name in SB3)]
 )  # fmt: skip
@@ -135,6 +136,7 @@ def test_the_file_acts_as_the_policy(tmp_path: Path, name: str, capsys) -> None:
     policy.env.close()
 
 
+@pytest.mark.slow
 def test_torch_alone_runs_it(run: Path, tmp_path: Path) -> None:
     """Without our package, from double precision, and many observations at once."""
     out = tmp_path / "policy.pt"

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from PIL import Image
 from support.pages import viser_recording
-from support.training import workbench_runs
 
 import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli
@@ -140,6 +139,7 @@ def record(run: Path, out: Path, *words: str) -> int:
     return cli.main(["record", str(run), "--out", str(out), "--max-steps", "20", *words])
 
 
+@pytest.mark.slow
 def test_best_last_and_random_side_by_side(robot_run: Path, tmp_path: Path, capsys):
     out = tmp_path / "three.gif"
     words = ("--checkpoint", "best", "last", "random", "--size", "64x48", "--fps", "10")
@@ -222,20 +222,6 @@ def test_several_are_seen_beside_each_other(robot_run: Path, tmp_path: Path, cap
     assert [each.split()[0] for each in captions] == ["best", "last", "random"]
 
 
-def test_captions_may_be_left_out(robot_run: Path, tmp_path: Path):
-    out = tmp_path / "a.html"
-    assert record_short(robot_run, out, "--no-captions") == 0
-    assert "/caption0" not in viser_recording.of_page(out.read_text()).at()
-
-
 def test_a_size_is_refused_where_it_has_none(robot_run: Path, tmp_path: Path, capsys):
     assert record_short(robot_run, tmp_path / "a.html", "--size", "64x48") == 1
     assert "as large as the browser's window" in capsys.readouterr().err
-
-
-def test_what_is_no_robot_of_ours_is_played_as_pictures(tmp_path: Path):
-    folder = tmp_path / "classic"
-    workbench_runs.dqn(folder, env_id="CartPole-v1", total_timesteps=200)
-    out = tmp_path / "a.html"
-    assert record_short(folder, out, "--size", "64x48") == 0
-    assert 'width="64"' in out.read_text()

@@ -104,6 +104,7 @@ def returns(folder: Path, which: str, seed: int) -> list[float]:
 # What is recorded.
 
 
+@pytest.mark.slow
 def test_an_episode_is_that_of_record_with_pictures(run, make_recorder) -> None:
     recorder = make_recorder(run)
     for which, seed in (("best", 0), ("last", 3)):

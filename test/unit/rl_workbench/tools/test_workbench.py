@@ -49,6 +49,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
 ALL = ["dqn_0", "robot", "reinforce", "reinforce-document"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_eval_tells_every_episode_and_writes_json(
     runs: Path, tmp_path: Path, name: str, capsys
@@ -227,17 +228,6 @@ def test_no_run_folder(tmp_path: Path, capsys) -> None:
     assert "no run folder at" in refused(capsys, "plot", tmp_path, "--out", tmp_path / "a.png")
 
 
-def test_a_damaged_run_costs_no_other(tmp_path: Path, capsys) -> None:
-    workbench_runs.record(tmp_path / "good", [1.0, 2.0])
-    (tmp_path / "damaged").mkdir()
-    (tmp_path / "damaged" / "config.json").write_text("{")
-    assert work("compare", tmp_path, "--episodes", 0) == 0
-    assert work("plot", str(tmp_path / "*"), "--out", tmp_path / "a.png") == 0
-    out, err = capsys.readouterr()
-    assert "| good |" in out and err.count("config.json isn't JSON") == 2
-    assert "isn't JSON" in refused(capsys, "compare", tmp_path / "damaged")
-
-
 def test_a_damaged_checkpoint_gives_way_to_an_earlier_one(own: Path, capsys) -> None:
     (own / "best.pt").write_bytes(b"PK half a file")
     assert work("eval", own, "--episodes", 1, "--json", "-") == 0
@@ -299,16 +289,6 @@ def test_a_video_of_another_format(runs: Path, tmp_path: Path, name: str, capsys
 
 def test_a_picture_of_another_format(runs: Path, tmp_path: Path, capsys) -> None:
     assert "PNG" in refused(capsys, "plot", runs / "dqn_0", "--out", tmp_path / "a.jpg")
-
-
-def test_a_place_where_nothing_can_be_written(runs: Path, tmp_path: Path, capsys) -> None:
-    (tmp_path / "file").write_text("")
-    for arguments in (
-        ["record", runs / "dqn_0", "--out", tmp_path / "file" / "a.gif"],
-        ["compare", runs, "--json", tmp_path / "file" / "a.json"],
-        ["eval", runs / "dqn_0", "--json", tmp_path],
-    ):
-        assert "can't write" in refused(capsys, *arguments)
 
 
 def test_an_extra_that_is_missing(runs: Path, tmp_path: Path, monkeypatch, capsys) -> None:

@@ -62,6 +62,7 @@ def run(name: str, folder: Path, *callbacks: Callback) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dqn", "reinforce"])
 def test_they_see_every_event_in_order(name: str, tmp_path: Path) -> None:
     seen = Recorder()
@@ -82,6 +83,7 @@ def module(tmp_path: Path, monkeypatch) -> str:
     return "my_callbacks"
 
 
+@pytest.mark.slow
 def test_one_that_fails_ends_the_training_with_a_line(tmp_path: Path, module: str, capsys) -> None:
     folder = tmp_path / "run"
     flags = ["--total-timesteps=2000", "--eval-frequency=0", "--eval-episodes=1"]

@@ -4,6 +4,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
+import pytest
 import torch
 from support.training.training_runs import (
     InterruptAfter,
@@ -18,6 +19,7 @@ from support.training.training_runs import (
 from rl_workbench.agents.dqn_agent import DQNAgent, Epsilon
 
 
+@pytest.mark.slow
 def test_a_checkpoint_has_the_documents_keys_and_no_more_than_its_weights(whole) -> None:
     content = checkpoint(whole("dqn"))
     assert {"q_net", "target_net", "epsilon", "optimizer", "replay"} <= set(content)
@@ -51,6 +53,7 @@ def test_losses_are_logged_every_so_many_steps_from_the_first_one_on(whole) -> N
     assert steps == [step for step, _ in points(whole("dqn"))["losses/q_values"]]
 
 
+@pytest.mark.slow
 def test_an_environment_that_goes_another_way_costs_its_episode(tmp_path: Path, capsys) -> None:
     run = train(tmp_path / "run", "dqn", InterruptAfter(90))
     content = torch.load(run / "last.pt", weights_only=True)

@@ -102,15 +102,6 @@ def test_prolonged_a_worse_one_does_not_take_the_place_of_the_best(
     assert (best["steps"], best["best_at_the_end"]) == (first["steps"], first["best"])
 
 
-def test_a_worse_or_equal_one_later_does_not_take_its_place(tmp_path: Path, monkeypatch) -> None:
-    verdicts = [Evaluation([1], [value]) for value in (5.0, 9.0, 3.0, 9.0)]
-    monkeypatch.setattr(evaluator, "run_greedily", lambda *_: verdicts.pop(0))
-    result = summary(train(tmp_path, "dqn", confirm_episodes=0))
-    assert result["evaluations"] == [[150, 5.0], [300, 9.0], [450, 3.0], [600, 9.0]]
-    assert result["best"] == [300, 9.0]
-    assert checkpoint(tmp_path, "best.pt")["steps"] == 300
-
-
 @pytest.mark.parametrize("name", ["dqn", *OTHERS[:1]])
 def test_a_policy_is_the_best_one_only_if_more_episodes_confirm_it(
     tmp_path: Path, monkeypatch, name: str

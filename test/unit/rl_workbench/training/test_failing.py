@@ -9,7 +9,6 @@ import pytest
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import whole
 from rl_workbench.training.checked import CheckedEnvironment
-from rl_workbench.training.environments import make_environment
 
 
 class Device(gymnasium.Env[np.ndarray, int]):
@@ -59,19 +58,6 @@ def test_the_place_is_in_the_users_code_where_a_library_refuses_what_that_asks_f
         CheckedEnvironment(Asking(0.0), "Device-v0").step(0)
 
 
-def test_a_constructor_with_a_mistake(monkeypatch) -> None:
-    class Broken(Device):
-        def __init__(self) -> None:
-            raise ZeroDivisionError("of mine")
-
-    monkeypatch.setitem(
-        gymnasium.registry, "Broken-v0", gymnasium.envs.registration.EnvSpec("Broken-v0", Broken)
-    )
-    words = r"^can't make Broken-v0: ZeroDivisionError: of mine \(.*test_failing.py:\d+\)$"
-    with pytest.raises(WorkbenchError, match=words):
-        make_environment("Broken-v0")
-
-
 @pytest.mark.parametrize(
     ("observation", "words"),
     [
@@ -91,16 +77,6 @@ def test_an_observation_of_another_form(observation: Any, words: str) -> None:
 
     with pytest.raises(WorkbenchError, match=f"^the observation of Odd-v0 {words}"):
         CheckedEnvironment(Odd(1.0), "Odd-v0").reset()
-
-
-@pytest.mark.parametrize("answer", [None, (1, 2), (np.zeros(2), 1.0, False, {})])
-def test_a_step_that_answers_something_else(answer: Any) -> None:
-    class Odd(Device):
-        def step(self, action: int) -> Any:
-            return answer
-
-    with pytest.raises(WorkbenchError, match=r"^Odd-v0 failed in step\(\): (Type|Value)Error: "):
-        CheckedEnvironment(Odd(1.0), "Odd-v0").step(0)
 
 
 @pytest.mark.parametrize("reward", [None, "much", [1.0, 2.0]])

@@ -64,6 +64,7 @@ def test_a_disk_that_is_full_from_the_beginning_fails_before_tensorboard(
     assert not list(tmp_path.glob("events.*"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_a_disk_that_fills_up_keeps_the_checkpoint_before(
     whole, tmp_path: Path, monkeypatch, name: str
@@ -85,19 +86,10 @@ def test_a_disk_that_fills_up_keeps_the_checkpoint_before(
         assert summary(run)["returns"] == summary(whole(name))["returns"]
 
 
-@pytest.mark.parametrize("name", EXACT)
-def test_ctrl_c_on_a_full_disk_tells_that_it_could_not_save(
-    tmp_path: Path, monkeypatch, name: str
-) -> None:
-    interrupt = InterruptAfter(40)
-    fill_disk(monkeypatch, lambda: interrupt.signal is not None)
-    line = failure(lambda: train(tmp_path, name, interrupt))
-    assert "No space left on device" in line and "--resume" in line and "is saved" not in line
-
-
 # No memory.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXACT)
 def test_memory_that_ends_in_the_training(whole, tmp_path: Path, monkeypatch, name: str) -> None:
     def learn(self: History) -> dict:
@@ -166,6 +158,7 @@ def dying(monkeypatch: pytest.MonkeyPatch, after: int) -> None:
     monkeypatch.setitem(gymnasium.registry[POLE].kwargs, "dies_after", after)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXACT)
 def test_a_simulator_that_dies_costs_nothing_that_was_saved(
     tmp_path: Path, monkeypatch, name: str
@@ -200,6 +193,7 @@ def test_one_under_stable_baselines(tmp_path: Path, monkeypatch) -> None:
     assert_same_run(whole, resume(tmp_path / "run"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXACT)
 def test_one_that_is_dead_from_the_start(tmp_path: Path, monkeypatch, name: str) -> None:
     """Neither a new training nor one that is gone on with; that one keeps what it has."""
@@ -232,6 +226,7 @@ def test_a_simulator_that_dies_of_the_same_ctrl_c_is_no_failure(
     assert summary(train(tmp_path, "dqn", interrupt, **ON_A_ROBOT))["interrupted"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [None, 100])
 @pytest.mark.parametrize("name", LEARNERS)
 def test_every_environment_is_closed_once(
@@ -304,6 +299,7 @@ PLACE = next(
 ERRORS = ["ZeroDivisionError", "ConnectionResetError", "SystemExit", "KeyError"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LEARNERS)
 @pytest.mark.parametrize(
     ("where", "error"), [*(("step", error) for error in ERRORS), ("reset", "TypeError")]
@@ -325,6 +321,7 @@ def test_a_mistake_in_an_environment_is_one_line_with_its_place(
     assert f"{error}: " in summary(tmp_path)["failure"]
 
 
+@pytest.mark.slow
 def test_one_that_cannot_be_closed_has_learned_all_the_same(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(Mistaken, "steps", 0)
     options = {"env_id": register_with(monkeypatch, Mistaken), "env_kwargs": {"where": "close"}}

@@ -77,12 +77,6 @@ def test_a_checkpoint_has_it_all(whole) -> None:
     assert len(agent["batch"]) == 1, "13 episodes are four batches and one more"
 
 
-def test_three_actions_and_two_observations(tmp_path: Path) -> None:
-    options = {"env_id": "MountainCar-v0", "env_kwargs": {"max_episode_steps": 30}}
-    run = train(tmp_path, "reinforce", **options, episodes=2, policy_hidden=0)
-    assert checkpoint(run)["agent"]["policy"]["fc.weight"].shape == (3, 2)
-
-
 def test_the_scale_of_observations_counts(whole, tmp_path: Path) -> None:
     scaled = train(tmp_path / "scaled", "reinforce", observation_scale="1,1,0.1,2")
     assert summary(scaled)["returns"] != summary(whole("reinforce"))["returns"]

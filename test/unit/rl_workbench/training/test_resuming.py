@@ -104,13 +104,6 @@ def test_a_complete_training_prolonged_is_a_longer_one(tmp_path: Path, name: str
     assert_same(mine, other)
 
 
-def test_a_training_by_episodes_prolonged_by_steps(tmp_path: Path) -> None:
-    run = train(tmp_path, "reinforce", episodes=3, eval_frequency=0)
-    before = summary(run)["steps"]
-    after = summary(resume(run, total_timesteps=before + 100))
-    assert after["complete"] and after["steps"] >= before + 100 and after["episodes"] > 3
-
-
 def test_an_evaluation_that_a_checkpoint_knows_of_is_not_held_again(tmp_path: Path) -> None:
     options = {"checkpoint_frequency": 50, "keep_checkpoints": 0, "total_timesteps": 200}
     whole, run = (train(tmp_path / name, "dqn", **options) for name in ("whole", "run"))

@@ -65,6 +65,7 @@ def test_each_plays_what_it_would_play_alone() -> None:
     assert len({length for each in lengths for length in each}) > 3, "they differ"
 
 
+@pytest.mark.slow
 def test_rounds_are_whole_and_batches_are_of_all(tmp_path: Path) -> None:
     run = train(tmp_path / "run", "reinforce", **MANY)
     assert summary(run)["episodes"] == 15, "whole rounds of three"
@@ -79,6 +80,7 @@ def test_rounds_are_whole_and_batches_are_of_all(tmp_path: Path) -> None:
     assert_same_run(longer, resume(run, episodes=21))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asked", [40, 333, 700])
 def test_broken_off_in_a_round_it_comes_to_the_same_bits(tmp_path: Path, asked: int) -> None:
     whole = train(tmp_path / "whole", "reinforce", **MANY)
@@ -88,6 +90,7 @@ def test_broken_off_in_a_round_it_comes_to_the_same_bits(tmp_path: Path, asked: 
     assert_no_doubles(broken)
 
 
+@pytest.mark.slow
 def test_steps_are_begun_in_all_before_one_is_taken(tmp_path: Path, monkeypatch) -> None:
     plain = train(tmp_path / "plain", "reinforce", **MANY)
     env_id = register_with(monkeypatch, Elsewhere)
@@ -102,6 +105,7 @@ def test_steps_are_begun_in_all_before_one_is_taken(tmp_path: Path, monkeypatch)
     assert_same(checkpoint(plain)["agent"], checkpoint(begun)["agent"])
 
 
+@pytest.mark.slow
 def test_the_one_that_fails_is_named(tmp_path: Path, monkeypatch) -> None:
     env_id = register_with(monkeypatch, Fragile)
     monkeypatch.setattr(Fragile, "made", 0)
@@ -114,6 +118,7 @@ def test_the_one_that_fails_is_named(tmp_path: Path, monkeypatch) -> None:
     assert_same(checkpoint(whole)["agent"], checkpoint(resume(tmp_path / "broken"))["agent"])
 
 
+@pytest.mark.slow
 def test_a_round_that_nothing_can_be_learned_from_is_given_up_whole(
     tmp_path: Path, monkeypatch
 ) -> None:

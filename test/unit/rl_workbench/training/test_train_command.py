@@ -57,6 +57,7 @@ def told_and_left(capsys, *arguments: str) -> tuple[int, str, str]:
 # What it does.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "options"),
     [("dqn", SMALL["dqn"]), ("reinforce", {"episodes": 22}), ("reinforce-document", {"episodes": 22}),
@@ -76,6 +77,7 @@ def test_a_training_from_the_command_line(tmp_path: Path, capsys, name: str, opt
     assert re.search(line, output.err, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_resumed_by_its_folder_alone(tmp_path: Path, capsys) -> None:
     assert main([*REINFORCE, "--run-dir=run"]) == 0
     steps = summary(tmp_path / "run")["steps"]
@@ -136,6 +138,7 @@ def test_wrong_values(capsys, arguments: list[str], words: str) -> None:
     assert words in refused(capsys, "--algo=reinforce", *arguments)
 
 
+@pytest.mark.slow
 def test_a_reader_that_goes_away_before_the_help(tmp_path: Path) -> None:
     reading, writing = os.pipe()
     os.close(reading)

@@ -4,7 +4,6 @@ import csv
 from pathlib import Path
 
 import pytest
-import torch
 from support.training.training_runs import (
     ALL,
     EXACT,
@@ -136,6 +135,7 @@ def test_the_user_is_told_of_begin_and_end(tmp_path: Path, capsys, monkeypatch) 
 # The same seed and options: the same bits.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_the_same_seed_gives_the_same_bits_and_another_one_others(
     whole, tmp_path: Path, name: str
@@ -144,6 +144,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_one_others(
     assert rows(train(tmp_path / "other", name, seed=4)) != rows(whole(name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_evaluations_and_checkpoints_change_nothing_that_is_learned(
     tmp_path: Path, name: str
@@ -171,19 +172,10 @@ def test_the_newest_checkpoints_are_kept(whole, tmp_path: Path) -> None:
     assert set(steps) >= {0, 70, 140, 200} and set(steps) <= {0, 70, 140, 150, 200}
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_a_checkpoint_loads_safely_and_says_of_which_training_it_is(whole, name: str) -> None:
-    content = torch.load(whole(name) / "last.pt", weights_only=True)
-    assert {"format", "config", "history", "random", "environment", "steps", "log_bytes"} <= set(
-        content
-    )
-    assert content["config"]["algorithm"] == name
-    assert content["steps"] == summary(whole(name))["steps"]
-
-
 # How long it lasts.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXACT)
 def test_a_number_of_episodes_or_of_steps(tmp_path: Path, name: str) -> None:
     few = train(tmp_path / "few", name, episodes=4)
@@ -200,6 +192,7 @@ def test_a_mean_return_ends_it_once_it_is_confirmed(tmp_path: Path, name: str) -
     assert len(result["evaluations"]) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXACT)
 def test_the_mean_length_of_20_episodes_ends_it(tmp_path: Path, name: str) -> None:
     free = {"total_timesteps": None, "episodes": 45, "eval_frequency": 0}

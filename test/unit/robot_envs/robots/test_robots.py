@@ -39,6 +39,7 @@ def test_each_has_options_to_train_it_with() -> None:
 
 @pytest.mark.parametrize("identifier", IDS)
 class TestEach:
+    @pytest.mark.slow
     def test_it_keeps_what_environments_promise(self, identifier: str) -> None:
         check_robot_env(identifier, steps=120)
 
@@ -73,6 +74,7 @@ class TestEach:
             assert np.abs(seen).max() < 10.0
         env.close()
 
+    @pytest.mark.slow
     def test_pictures_show_the_whole_robot(self, identifier: str) -> None:
         """Its colours are there, and nothing of them is cut off at an edge."""
         env = gymnasium.make(identifier, render_mode="rgb_array", width=160, height=120)

@@ -119,6 +119,7 @@ class TestSixJointArm:
         found = env._state.links["tip"].pose.position
         assert found == pytest.approx(self.tip(np.array(angles)), abs=1e-6)
 
+    @pytest.mark.slow
     def test_every_target_is_reached_and_held(self) -> None:
         env = gymnasium.make("robot_envs/SixJointReach-v0")
         for seed in range(10):

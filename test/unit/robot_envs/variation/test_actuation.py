@@ -27,6 +27,7 @@ def test_without_options_commands_arrive_as_they_are():
         assert not Actuator(KINDS, PERIOD, **options).is_ideal
 
 
+@pytest.mark.slow
 @given(st.lists(commands, max_size=8), st.integers(0, 4), commands)
 def test_a_delay_shifts_all_commands_and_begins_with_what_is_held(sent, delay, held):
     actuator = Actuator(KINDS, PERIOD, delay=delay)
