@@ -1,47 +1,18 @@
 """Expands robot descriptions (xacro) and puts them on the parameter server."""
 
-import re
 from collections.abc import Sequence
 
-from file_access.expansion import CannotExpand as _CannotExpand
-from file_access.expansion import expand as _expand
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
-from ros_utils._internal import packages as _packages
 from ros_utils._internal import params as _params
+from ros_utils._internal.packages import urdf_parse_from_path, urdf_parse_from_pkg
 
-
-def urdf_parse_from_pkg(
-    pkg_name: str, model_name: str, folder: str = "/urdf", args_xacro: Sequence[str] | None = None
-) -> str | None:
-    """Expands a package's URDF or xacro file.
-
-    Returns:
-        The XML text, or None, with an error in the log, if the package or file is missing or the
-        file is broken.
-    """
-    try:
-        path = _packages.file(pkg_name, folder, model_name)
-    except _packages.NotFound as fault:
-        _log.error(f"urdf: {fault}")
-        return None
-    return urdf_parse_from_path(path, args_xacro)
-
-
-def urdf_parse_from_path(model_path: str, args_xacro: Sequence[str] | None = None) -> str | None:
-    """Expands a URDF or xacro file, given by its path. See `urdf_parse_from_pkg`."""
-    mappings = {}
-    for argument in args_xacro or []:
-        name, sign, value = argument.partition(":=")
-        if not sign or not re.fullmatch(r"\w+", name):
-            _log.error(f"urdf: xacro argument {argument!r}: expected 'name:=value'")
-            return None
-        mappings[name] = value
-    try:
-        return _expand(_packages.existing(model_path), mappings)
-    except (_packages.NotFound, _CannotExpand) as fault:
-        _log.error(f"urdf: {fault}")
-        return None
+__all__ = [
+    "urdf_load_from_path",
+    "urdf_load_from_pkg",
+    "urdf_parse_from_path",
+    "urdf_parse_from_pkg",
+]
 
 
 def urdf_load_from_pkg(

@@ -24,7 +24,7 @@ from ros_utils._internal.gazebo.calls import (
     not_finite,
     succeeded,
 )
-from ros_utils.ros_urdf import urdf_parse_from_path, urdf_parse_from_pkg
+from ros_utils._internal.packages import urdf_parse_from_path, urdf_parse_from_pkg
 
 __all__ = [
     "gazebo_delete_model",
