@@ -1,6 +1,7 @@
 """What a client asks of a world beside its joints: models, links in any frame, contacts.
 
-`step_world` and in-process environments share this code. Names are looked up once for each query.
+`step_world` and in-process environments share this code. Names are looked up once for each query; one that
+refers to nothing, or to several entities, raises UnknownName.
 """
 
 from collections.abc import Callable, Iterable
@@ -84,11 +85,7 @@ class UnknownName(ValueError):
 
 
 def find_model(world: World, name: str) -> Model:
-    """Returns the model of that name.
-
-    Raises:
-        UnknownName: if there is none.
-    """
+    """Returns the model of that name."""
     if name not in world.models:
         raise UnknownName(f"there is no model '{name}'{did_you_mean(name, world.models)}")
     return world.models[name]
@@ -100,16 +97,15 @@ def find_link(world: World, name: str) -> tuple[Model, str]:
     Args:
         world: all models.
         name: of the link; model::link where several models have such a link.
-
-    Raises:
-        UnknownName: if there is none, or there are several.
     """
     scope, _, plain = name.rpartition(SCOPE)
-    if scope:
+    if plain == WORLD:
+        models: list[Model] = []
+    elif scope:
         models = [world.models[scope]] if scope in world.models else []
     else:
         models = list(world.models.values())
-    found = [model for model in models if _has_link(model, plain)]
+    found = [m for m in models if plain in m.description.links or plain in m.description.lumped]
     if not found:
         raise UnknownName(f"there is no link '{name}'{did_you_mean(name, link_names(world))}")
     if len(found) > 1:
@@ -126,11 +122,6 @@ def link_names(world: World) -> list[str]:
             if link != WORLD:
                 names += [link, f"{model.name}{SCOPE}{link}"]
     return names
-
-
-def _has_link(model: Model, name: str) -> bool:
-    description = model.description
-    return name != WORLD and (name in description.links or name in description.lumped)
 
 
 @dataclass
@@ -165,9 +156,6 @@ def find_collisions(world: World, names: Iterable[str]) -> set[Collision]:
         world: all models.
         names: of models, links and collisions: plain, or scoped as model::link and
             model::link::collision where several models have such a name.
-
-    Raises:
-        UnknownName: if a name refers to no collision, or to those of several models.
     """
     found: set[Collision] = set()
     for name in names:
@@ -328,9 +316,6 @@ class StateReader:
         Args:
             stepped: whether a step led to the present state. After a reset or a placing none has, and
                 there are no contacts yet.
-
-        Raises:
-            UnknownName: if an entity of the query has gone.
         """
         if self.is_stale:
             self._resolve()

@@ -1,10 +1,11 @@
 """Trajectories as clients send them, and goals of follow_joint_trajectory: checks and outcomes.
 
-See docs/contract/ros_control.md 3.5.
+See docs/contract/ros_control.md 3.5. What can't be followed raises TrajectoryRefused.
 """
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from bullet_gazebo.control.errors import ControlError
@@ -12,7 +13,6 @@ from bullet_gazebo.control.trajectory import NANOSECONDS, Axis, Waypoint
 
 SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS = 0, -1, -2  # control_msgs/FollowJointTrajectoryResult
 PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = -4, -5
-MOST_NAMED = 10  # joints in an error text
 LARGEST = (
     1e12  # of a position and its derivatives: the coefficients of a spline would overflow beyond it
 )
@@ -55,18 +55,14 @@ class Trajectory(NamedTuple):
 
 
 def check_joints(names: Sequence[str], joints: Sequence[str], partial: bool) -> None:
-    """Checks that `names` are `joints` in any order, or some of them if `partial`.
-
-    Raises:
-        TrajectoryRefused: if they aren't.
-    """
+    """Checks that `names` are `joints` in any order, or some of them if `partial`."""
     unknown = [name for name in names if name not in joints]
     missing = [joint for joint in joints if joint not in names]
     fault = ""
     if unknown:
-        fault = f"the controller has no joint {_shortened(unknown)}; it has {list(joints)}"
+        fault = f"the controller has no joint {unknown}; it has {list(joints)}"
     elif len(set(names)) < len(names):
-        fault = f"a joint is named twice: {_shortened(names)}"
+        fault = f"a joint is named twice: {list(names)}"
     elif not names:
         fault = "it names no joint"
     elif missing and not partial:
@@ -75,18 +71,8 @@ def check_joints(names: Sequence[str], joints: Sequence[str], partial: bool) -> 
         raise TrajectoryRefused(INVALID_JOINTS, f"The trajectory's joints don't match: {fault}")
 
 
-def _shortened(names: Sequence[str]) -> str:
-    """Returns a list of names, cut to a length for the log and the client."""
-    rest = len(names) - MOST_NAMED
-    return str(list(names[:MOST_NAMED])) + (f" and {rest} more" if rest > 0 else "")
-
-
 def check_points(trajectory: Trajectory) -> None:
-    """Checks that all points are complete, finite and later than the one before.
-
-    Raises:
-        TrajectoryRefused: if one isn't.
-    """
+    """Checks that all points are complete, finite and later than the one before."""
     before = -1
     for number, point in enumerate(trajectory.points):
         fault = _fault(point, len(trajectory.names))
@@ -101,11 +87,7 @@ def check_points(trajectory: Trajectory) -> None:
 
 
 def dropped_points(trajectory: Trajectory, elapsed: int) -> tuple[int, str]:
-    """Returns the number of points that are over, `elapsed` [ns] after the trajectory begins, and a warning.
-
-    Raises:
-        TrajectoryRefused: if all of them do.
-    """
+    """Returns how many points are over, `elapsed` [ns] after the trajectory begins, and a warning."""
     points = trajectory.points
     dropped = sum(point.time <= elapsed for point in points)
     if dropped == len(points):
@@ -210,58 +192,39 @@ class MonitoredJoint(NamedTuple):
     goal: Tolerance
 
 
+@dataclass
 class Goal:
-    """An accepted goal. `key` identifies it; `outcome` is a success that isn't reported yet."""
+    """An accepted goal, identified by `key`."""
 
-    def __init__(
-        self,
-        key: str,
-        listener: GoalObserver,
-        monitored: list[MonitoredJoint],
-        start: int,
-        late: int,
-    ) -> None:
-        """
-        Args:
-            key: identifies the goal.
-            listener: takes progress and outcome.
-            monitored: its joints.
-            start: uptime at which it begins [ns].
-            late: how long after its last point it may be reached [ns].
-        """
-        self.key = key
-        self.listener = listener
-        self.outcome: GoalOutcome | None = None
-        self._monitored = monitored
-        self._start = start
-        self._late = late
+    key: str
+    listener: GoalObserver
+    monitored: list[MonitoredJoint]
+    start: int  # uptime [ns]
+    late: int  # [ns] after its last point, when it must be reached
+    outcome: GoalOutcome | None = None  # a success that isn't reported yet
 
     def check(self, uptime: int) -> GoalOutcome | None:
         """Returns the outcome; None while the joints are on their way."""
         reached = True
-        for axis, path, goal in self._monitored:
+        for axis, path, goal in self.monitored:
             if uptime < axis.spline.end:
                 reached = False
                 fault = (
                     path.violation(axis.position_error, axis.velocity_error)
-                    if uptime >= self._start
+                    if uptime >= self.start
                     else ""
                 )
                 if fault:
                     return _aborted(PATH_TOLERANCE_VIOLATED, axis, "path", fault)
             elif fault := goal.violation(axis.position_error, axis.velocity_error):
                 reached = False
-                if uptime >= axis.spline.end + self._late:
+                if uptime >= axis.spline.end + self.late:
                     return _aborted(GOAL_TOLERANCE_VIOLATED, axis, "goal", fault)
         return GoalOutcome(SUCCEEDED) if reached else None
 
 
 def check_tolerances(request: GoalRequest) -> None:
-    """Checks that all tolerances are numbers: no error ever exceeds NaN.
-
-    Raises:
-        TrajectoryRefused: if one isn't.
-    """
+    """Checks that all tolerances are numbers: no error ever exceeds NaN."""
     for joint, tolerance in (*request.path.items(), *request.goal.items()):
         if any(math.isnan(value) for value in tolerance):
             raise TrajectoryRefused(INVALID_GOAL, f"A tolerance of joint '{joint}' is not a number")

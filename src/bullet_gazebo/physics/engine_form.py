@@ -1,4 +1,7 @@
-"""Prepares a model for an engine: checks bounds, moves link frames onto joints, sets one friction a link."""
+"""Prepares a model for an engine: checks bounds, moves link frames onto joints, sets one friction a link.
+
+A value out of bounds raises DescriptionError, which names the place.
+"""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -20,11 +23,7 @@ STRONGEST = 1e12  # damping [N m s/rad, N s/m] and friction [N m, N]
 
 
 def check_bounds(model: ModelDescription) -> None:
-    """Refuses a model that would crash or hang an engine, or make it lose the world.
-
-    Raises:
-        DescriptionError: if a value is out of bounds; it names the place.
-    """
+    """Refuses a model that would crash or hang an engine, or make it lose the world."""
     _check_counts(model)
     for link in model.links.values():
         _check_link(link, model.static)
@@ -43,11 +42,7 @@ def _check_counts(model: ModelDescription) -> None:
 
 
 def check_shapes(links: Iterable[Link]) -> None:
-    """Refuses links with too many shapes. It is called before lumping, which would take long, and after it.
-
-    Raises:
-        DescriptionError: if there are more than MOST_SHAPES.
-    """
+    """Refuses links with too many shapes, before lumping, which would take long, and after it."""
     shapes = sum(len(link.collisions) + len(link.visuals) for link in links)
     if shapes > MOST_SHAPES:
         raise DescriptionError(
@@ -112,9 +107,6 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
     Returns:
         The model, and by link name the original frames as seen from the new ones, where they differ. Every
         URDF has that form already.
-
-    Raises:
-        DescriptionError: if a value is out of bounds.
     """
     if model.static:
         model = _rigid(model)

@@ -31,11 +31,7 @@ LUMPED = "_fixed_joint_lump__"
 
 
 def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
-    """Returns `items` by name.
-
-    Raises:
-        DescriptionError: if two have the same name.
-    """
+    """Returns `items` by name."""
     found: dict[str, Named] = {}
     for item in items:
         if item.name in found:
@@ -44,25 +40,14 @@ def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
     return found
 
 
-def check_count(links: int) -> None:
-    """Refuses a model with too many links, before time is spent on them.
-
-    Raises:
-        DescriptionError: if there are more than MAX_LINKS.
-    """
-    if links > MAX_LINKS:
-        raise DescriptionError(f"there are {links} links; up to {MAX_LINKS} are read (MAX_LINKS)")
-
-
 def find_roots(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:
-    """Returns the links without a parent joint, in document order; all others hang from one of them.
-
-    Raises:
-        DescriptionError: for missing links, a link with two parents, and loops.
-    """
+    """Returns the links without a parent joint, in document order; all others hang from one of them."""
     if not links:
         raise DescriptionError("there is no <link>")
-    check_count(len(links))
+    if len(links) > MAX_LINKS:
+        raise DescriptionError(
+            f"there are {len(links)} links; up to {MAX_LINKS} are read (MAX_LINKS)"
+        )
     below = _children(links, joints)
     children = {name for names in below.values() for name in names}
     roots = [name for name in links if name not in children]

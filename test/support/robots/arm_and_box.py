@@ -5,16 +5,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import yaml
+from support.robots.worlds import add_robot, start
 
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.control.transmissions import read_description
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.physics.world import World, ground_plane
-from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import LinkQuery, StateAnswer, StateQuery, StateReader
 
@@ -52,14 +49,10 @@ class ArmAndBox:
         self.sim = Simulator(World(make_engine(engine)), lockstep=True)
         world = self.sim.world
         world.spawn("ground_plane", ground_plane(), Pose())
-        urdf = ARM.read_text()
-        arm = world.spawn("two_link_arm", parse_urdf(urdf), Pose())
-        hardware = RobotHardware(read_description(urdf))
-        self.robot = ControlledRobot(arm, hardware, ControllerManager(hardware))
-        self.sim.add_robot(self.robot)
+        self.robot = add_robot(self.sim, "two_link_arm", ARM.read_text())
         parameters = yaml.safe_load(ARM_PARAMETERS.read_text())
-        self.controllers = [self.robot.manager.load(n, parameters[n]) for n in CONTROLLERS]
-        self.robot.manager.switch(CONTROLLERS, [], STRICT)
+        start(self.robot, {name: parameters[name] for name in CONTROLLERS})
+        self.controllers = [self.robot.manager.get(name) for name in CONTROLLERS]
         world.spawn("box", parse_urdf(BOX), Pose((1.0, 0.0, 0.1)))
 
     def reset(

@@ -24,8 +24,3 @@ ROVER = """<robot name="rover"><link name="hull">
     <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
 </robot>"""
 ROVER_ROBOT = Robot(ROVER, world=None)
-
-
-def run(world, ticks):
-    for _ in range(ticks):
-        world.step()

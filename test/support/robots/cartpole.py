@@ -5,6 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 GRAVITY = 9.8  # [m/s²]
+CONTROLLERS = {
+    "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 120},
+    "cart": {
+        "type": "effort_controllers/JointPositionController",
+        "joint": "stand_cart",
+        "pid": {"p": 100.0, "i": 0.01, "d": 10.0},
+    },
+}
 
 
 @dataclass(frozen=True)

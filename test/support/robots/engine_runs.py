@@ -6,15 +6,12 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import solve_ivp
 from support.robots.cartpole import GRAVITY, CartPole, cartpole_urdf
+from support.robots.worlds import add_robot, start
 
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.control.transmissions import read_description
 from bullet_gazebo.physics.engine import Engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 
 PLANT = CartPole()
@@ -107,13 +104,9 @@ def loop_error(new_engine: Callable[[], Engine], step: float) -> float:
 
 def control(sim: Simulator) -> tuple:
     """Puts a cart-pole with a running position controller into `sim`; its manager and its model."""
-    model = sim.world.spawn("cartpole", parse_urdf(cartpole_urdf()), Pose())
-    hardware = RobotHardware(read_description(cartpole_urdf()))
-    manager = ControllerManager(hardware)
-    sim.add_robot(ControlledRobot(model, hardware, manager))
-    manager.load("cart", CART)
-    manager.switch(["cart"], [], STRICT)
-    return manager, model
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    start(robot, {"cart": CART})
+    return robot.manager, robot.model
 
 
 def _held(state: np.ndarray, force: float, step: float) -> np.ndarray:

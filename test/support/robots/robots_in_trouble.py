@@ -4,13 +4,10 @@ import logging
 from pathlib import Path
 
 import xacro
+from support.robots.worlds import add_robot
 
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.control.transmissions import read_description
+from bullet_gazebo.control.manager import STRICT
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 
@@ -24,18 +21,12 @@ def urdf_of(name):
 class Rig:
     """One robot above the ground; `told` is its log, as pairs of level and text."""
 
-    def __init__(self, engine, text, step):
-        self.sim = Simulator(World(engine, time_step=step), lockstep=True)
-        self.sim.world.spawn("ground_plane", ground_plane(), Pose())
-        description = parse_urdf(text)
-        self.model = self.sim.world.spawn(description.name, description, Pose())
-        self.hardware = RobotHardware(read_description(text))
-        self.manager = ControllerManager(self.hardware)
+    def __init__(self, world, text):
+        self.sim = Simulator(world, lockstep=True)
         self.told = []
-        robot = ControlledRobot(
-            self.model, self.hardware, self.manager, log=lambda *entry: self.told.append(entry)
-        )
-        self.sim.add_robot(robot)
+        name = parse_urdf(text).name
+        robot = add_robot(self.sim, name, text, log=lambda *entry: self.told.append(entry))
+        self.model, self.hardware, self.manager = robot.model, robot.hardware, robot.manager
 
     def use_default_log(self):
         """Goes on with a robot that logs as it does for who says nothing about it."""

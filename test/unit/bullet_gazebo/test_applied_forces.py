@@ -1,4 +1,4 @@
-"""Efforts and wrenches that act for a time: spans, adding up, overwriting, clearing.
+"""Efforts and wrenches on joints and links: limits, adding up, overwriting, frames.
 
 See docs/contract/gazebo.md 2.18 and 2.19.
 """
@@ -38,8 +38,10 @@ class FakeModel:
     joint_names = ("a", "b")
     all_joints = ("a", "b", "fixed")
 
-    def __init__(self, name="robot"):
-        self.name, self.body, self.speed = name, FakeBody(), 0.0
+    name = "robot"
+
+    def __init__(self):
+        self.body, self.speed = FakeBody(), 0.0
         limits = {"a": (-1.0, -1.0), "b": (2.0, 7.0)}
         self.description = SimpleNamespace(
             joints={
@@ -55,45 +57,14 @@ class FakeModel:
         return 0.0, self.speed
 
 
-def ticks(each, count=20, now=0):
-    """On which ticks after `now` an effort acts."""
-    applied, acted = AppliedForces(), []
-    applied.efforts.append(each)
-    for tick in range(1, count + 1):
-        each.model.body.efforts.clear()
-        applied.apply(now + tick * TICK)
-        if each.model.body.efforts:
-            acted.append(tick)
-    return acted, applied
-
-
-def effort(start=0, duration=-1, joint="a", value=1.0, model=None):
-    return AppliedEffort(model or FakeModel(), joint, value, ActingTime(start, duration))
-
-
-@pytest.mark.parametrize(
-    "start, duration, acted",
-    [
-        (0, -1, list(range(1, 21))),  # for ever
-        (0, 0, []),
-        (0, TICK - 1, []),  # shorter than a step
-        (0, TICK, [1]),
-        (0, 3 * TICK + 5, [1, 2, 3]),
-        (5 * TICK, 0, [5]),  # in the future: one more
-        (5 * TICK, 3 * TICK, [5, 6, 7, 8]),
-        (18 * TICK, -1, [18, 19, 20]),
-    ],
-)
-def test_when_an_effort_acts(start, duration, acted):
-    found, applied = ticks(effort(start, duration))
-    assert found == acted
-    assert bool(applied.efforts) == (duration < 0)
+def effort(joint, model, value=1.0):
+    return AppliedEffort(model, joint, value, ActingTime(0, -1))
 
 
 def test_efforts_add_up_each_clamped_to_the_joint():
     model, applied = FakeModel(), AppliedForces()
     for value in (1.0, 5.0, -9.0):
-        applied.efforts.append(effort(joint="b", value=value, model=model))
+        applied.efforts.append(effort("b", model, value))
     applied.apply(TICK)
     assert model.body.efforts == [(1, 1.0), (1, 2.0), (1, -2.0)]
 
@@ -103,14 +74,14 @@ def test_efforts_add_up_each_clamped_to_the_joint():
 def test_no_effort_beyond_the_velocity_limit(speed, value, expected):
     model, applied = FakeModel(), AppliedForces()
     model.speed = speed
-    applied.efforts.append(effort(joint="b", value=value, model=model))
+    applied.efforts.append(effort("b", model, value))
     applied.apply(TICK)
     assert model.body.efforts == [(1, expected)]
 
 
 def test_an_effort_on_a_fixed_joint_does_nothing():
     model, applied = FakeModel(), AppliedForces()
-    applied.efforts.append(effort(joint="fixed", model=model))
+    applied.efforts.append(effort("fixed", model))
     applied.apply(TICK)
     assert model.body.efforts == []
 
@@ -128,44 +99,6 @@ def test_the_wrench_queued_last_counts():
     applied.apply(2 * TICK)
     forces = [(link, force[0]) for link, force, _ in model.body.wrenches]
     assert forces == [("cart", 2.0), ("pole", 3.0), ("cart", 1.0), ("pole", 3.0)]
-
-
-def test_joint_forces_are_cleared_by_plain_name_in_all_models():
-    applied = AppliedForces()
-    one, other = FakeModel("one"), FakeModel("other")
-    for model in (one, other):
-        applied.efforts.append(effort(model=model))
-    applied.clear_efforts("one::a")
-    applied.apply(TICK)
-    applied.clear_efforts("a")
-    applied.apply(2 * TICK)
-    assert one.body.efforts == other.body.efforts == [(0, 1.0)]
-    assert applied.efforts == []
-
-
-def test_wrenches_are_cleared_by_scoped_name():
-    applied = AppliedForces()
-    one, other = FakeModel("one"), FakeModel("other")
-    for model in (one, other):
-        applied.wrenches.append(wrench(model, (1.0, 0.0, 0.0)))
-    applied.clear_wrenches("cart")
-    applied.clear_wrenches("one::cart")
-    applied.apply(TICK)
-    assert one.body.wrenches == []
-    assert len(other.body.wrenches) == 1
-
-
-def test_a_deleted_model_takes_what_acts_on_it_along():
-    """As in Gazebo, efforts on equally named joints of other models as well."""
-    applied = AppliedForces()
-    one, other = FakeModel("one"), FakeModel("other")
-    for model in (one, other):
-        applied.efforts.append(effort(model=model))
-        applied.wrenches.append(wrench(model, (1.0, 0.0, 0.0)))
-    applied.forget(one)
-    applied.apply(TICK)
-    assert one.body.wrenches == one.body.efforts == other.body.efforts == []
-    assert len(other.body.wrenches) == 1
 
 
 def turned(angle, position=NOTHING):

@@ -7,11 +7,9 @@ from types import FrameType
 from typing import Any
 
 import pytest
-from support.robots.cartpole import cartpole_urdf
+from support.robots.cartpole import CONTROLLERS, cartpole_urdf
+from support.robots.worlds import add_robot, start
 
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.control.transmissions import read_description
 from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
@@ -19,30 +17,19 @@ from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 
-CART = {"type": "effort_controllers/JointPositionController", "joint": "stand_cart",
-        "pid": {"p": 100.0, "i": 0.01, "d": 10.0}}  # fmt: skip
-STATES = {"type": "joint_state_controller/JointStateController", "publish_rate": 120}
 APART, HEIGHT = 2.0, 1.0  # [m]; poles clear the ground
 TICKS, STEPS = 8, 50
-
-
-def add_robot(sim: Simulator, index: int) -> ControlledRobot:
-    """A cart-pole where the one of that number stands, whoever else is there."""
-    pose = Pose((0.0, APART * index, HEIGHT))
-    model = sim.world.spawn(f"robot{index}", parse_urdf(cartpole_urdf()), pose)
-    hardware = RobotHardware(read_description(cartpole_urdf()))
-    robot = ControlledRobot(model, hardware, ControllerManager(hardware))
-    sim.add_robot(robot)
-    robot.manager.load("states", STATES)
-    robot.manager.load("cart", CART)
-    robot.manager.switch(["states", "cart"], [], STRICT)
-    return robot
 
 
 def add_robots(indices: Sequence[int]) -> tuple[Simulator, dict[int, ControlledRobot]]:
     sim = Simulator(World(BulletEngine()), lockstep=True)
     sim.world.spawn("ground_plane", ground_plane(), Pose())
-    return sim, {index: add_robot(sim, index) for index in indices}
+    robots = {}
+    for index in indices:  # each stands where it would without the others
+        pose = Pose((0.0, APART * index, HEIGHT))
+        robots[index] = add_robot(sim, f"robot{index}", cartpole_urdf(), pose)
+        start(robots[index], CONTROLLERS)
+    return sim, robots
 
 
 def tracks(indices: Sequence[int]) -> dict[int, list[tuple[float, ...]]]:
@@ -133,28 +120,6 @@ def one():
     sim, robots = add_robots([0])
     yield sim, robots[0]
     sim.world.close()
-
-
-def count_reads(robot: ControlledRobot, monkeypatch: pytest.MonkeyPatch) -> list[object]:
-    reads: list[object] = []
-    read = robot.model.body.joint_states
-
-    def counted():
-        reads.append(None)
-        return read()
-
-    monkeypatch.setattr(robot.model.body, "joint_states", counted)
-    return reads
-
-
-def test_steps_of_one_tick_read_the_state_once_each(one, monkeypatch):
-    sim, robot = one
-    with sim.lock:
-        sim.advance(1)
-        reads = count_reads(robot, monkeypatch)
-        for _ in range(5):
-            sim.advance(1)
-    assert len(reads) == 5
 
 
 @pytest.mark.parametrize("whoever", ["service", "plugin"])

@@ -6,8 +6,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from support.mutations.models import CASES, CONTROLLERS, spawn
 
-from bullet_gazebo.physics.world import World
-
 EXAMPLES = {"xacro": 8}  # each takes a process; of the others 150
 
 
@@ -33,8 +31,8 @@ def test_a_duration_beyond_all_clocks_is_one():
     assert CASES["controllers"].read(CONTROLLERS | {"position_arm": arm}) == "read"
 
 
-def test_a_mutated_model_that_is_read_stands_in_a_world(new_engine):
-    world, seen = World(new_engine()), Counter()
+def test_a_mutated_model_that_is_read_stands_in_a_world(make_world):
+    world, seen = make_world(), Counter()
 
     @settings(max_examples=60, deadline=None, database=None, derandomize=True,
               suppress_health_check=list(HealthCheck))  # fmt: skip
@@ -44,4 +42,3 @@ def test_a_mutated_model_that_is_read_stands_in_a_world(new_engine):
 
     look()
     assert seen[True]
-    world.close()

@@ -43,17 +43,9 @@ EXACT = wheel(plugin="<pOnlyDamping>0</pOnlyDamping>")
 
 
 @pytest.fixture
-def rig(new_engine):
+def rig(make_world):
     """Makes robots in a lock-step world, each with a log of what it told."""
-    made = []
-
-    def make(text, step=0.001):
-        made.append(Rig(new_engine(), text, step))
-        return made[-1]
-
-    yield make
-    for each in made:
-        each.sim.world.close()
+    return lambda text, step=0.001: Rig(make_world(ground=True, time_step=step), text)
 
 
 # how high is too high

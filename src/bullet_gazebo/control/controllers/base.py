@@ -3,6 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from bullet_gazebo.control.errors import ControlError
@@ -11,6 +12,7 @@ from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.pid import Loop, Pid, one_listener
 
 
+@dataclass(slots=True, eq=False)
 class Output:
     """A topic that a controller publishes.
 
@@ -22,14 +24,11 @@ class Output:
     so that a controller needs to make no record without any.
     """
 
-    __slots__ = ("kind", "listeners", "shared", "sink", "topic")
-
-    def __init__(self, topic: str, kind: str | type, shared: bool = False) -> None:
-        self.topic = topic
-        self.kind = kind
-        self.shared = shared
-        self.sink: Callable[[Any], None] | None = None
-        self.listeners: Callable[[], int] = one_listener
+    topic: str
+    kind: str | type
+    shared: bool = False
+    sink: Callable[[Any], None] | None = None
+    listeners: Callable[[], int] = one_listener
 
     @property
     def wanted(self) -> bool:
@@ -42,6 +41,7 @@ class Output:
             self.sink(record)
 
 
+@dataclass(slots=True, eq=False)
 class Input:
     """A topic that a controller subscribes to when it is loaded.
 
@@ -49,12 +49,9 @@ class Input:
     type (the message). `receive` is called between two ticks; a ControlError that it raises is logged.
     """
 
-    __slots__ = ("kind", "receive", "topic")
-
-    def __init__(self, topic: str, kind: str | type, receive: Callable[[Any], None]) -> None:
-        self.topic = topic
-        self.kind = kind
-        self.receive = receive
+    topic: str
+    kind: str | type
+    receive: Callable[[Any], None]
 
 
 class Controller(ABC):
@@ -100,18 +97,6 @@ class Controller(ABC):
         """Called when something other than time has changed the joints' state."""
 
 
-def text_param(params: Mapping[str, object], key: str, place: str) -> str:
-    """Returns the string parameter `key`.
-
-    Raises:
-        ControlError: if it is missing or not a string.
-    """
-    value = params.get(key)
-    if not isinstance(value, str) or not value:
-        raise ControlError(f"parameter {place}/{key} is missing or is not a string: {value!r}")
-    return value
-
-
 def number_param(params: Mapping[str, object], key: str, place: str) -> float:
     """Returns the numeric parameter `key`.
 
@@ -134,7 +119,10 @@ def joint_param(
     Raises:
         ControlError: if there is no such joint with that interface.
     """
-    return hardware.joint(interface, text_param(params, "joint", name))
+    joint = params.get("joint")
+    if not isinstance(joint, str) or not joint:
+        raise ControlError(f"parameter {name}/joint is missing or is not a string: {joint!r}")
+    return hardware.joint(interface, joint)
 
 
 def joints_param(

@@ -49,11 +49,7 @@ class Settings(NamedTuple):
 def read_settings(
     params: Mapping[str, object], joints: Sequence[JointHandle], name: str
 ) -> Settings:
-    """Reads the settings of controller `name`.
-
-    Raises:
-        ControlError: if a parameter is of the wrong type.
-    """
+    """Reads the settings of controller `name`."""
     state_rate = _number(params, "state_publish_rate", 50.0, name)
     monitor_rate = _number(params, "action_monitor_rate", 20.0, name)
     if monitor_rate <= SLOWEST:
@@ -73,11 +69,7 @@ def read_settings(
 
 
 def read_axes(params: Mapping[str, object], joints: Sequence[JointHandle], name: str) -> list[Axis]:
-    """Makes axes with a PID from `gains` and `velocity_ff`.
-
-    Raises:
-        ControlError: if a joint has no gains, or a parameter is of the wrong type.
-    """
+    """Makes axes with a PID from `gains` and `velocity_ff`."""
     gains, feed = _tree(params, "gains", name), _tree(params, "velocity_ff", name)
     axes = []
     for joint in joints:

@@ -25,29 +25,17 @@ def make_engine(name: str = BULLET[0]) -> Engine:
     Raises:
         EngineError: if it is unknown or not installed.
     """
-    if name == MUJOCO:
-        return _mujoco()
     if name not in ENGINES:
         raise EngineError(f"physics engine '{name}' is not known; there are {', '.join(ENGINES)}")
+    if name == MUJOCO:
+        if importlib.util.find_spec("mujoco") is None:
+            workspace = os.environ.get("CARTPOLE_WS")  # the path of `ws`, which sets it
+            pip = [sys.executable, "-m", "pip", "install", "mujoco"]
+            command = shlex.join([workspace, "extras"] if workspace else pip)
+            raise EngineError(f"physics engine 'mujoco' is not installed; '{command}' installs it")
+        from bullet_gazebo.physics.engines.mujoco_engine import MujocoEngine
+
+        return MujocoEngine()
     from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
 
     return BulletEngine()
-
-
-def _installing() -> str:
-    """Returns the command that installs MuJoCo. `ws` sets CARTPOLE_WS to its own path."""
-    workspace = os.environ.get("CARTPOLE_WS")
-    command = (
-        [workspace, "extras"] if workspace else [sys.executable, "-m", "pip", "install", "mujoco"]
-    )
-    return shlex.join(command)
-
-
-def _mujoco() -> Engine:
-    if importlib.util.find_spec("mujoco") is None:
-        raise EngineError(
-            f"physics engine 'mujoco' is not installed; '{_installing()}' installs it"
-        )
-    from bullet_gazebo.physics.engines.mujoco_engine import MujocoEngine
-
-    return MujocoEngine()

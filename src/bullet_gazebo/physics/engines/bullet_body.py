@@ -5,12 +5,7 @@ from functools import partial
 from itertools import combinations
 from typing import Any
 
-from bullet_gazebo.physics.description import (
-    DescriptionError,
-    Inertia,
-    Link,
-    ModelDescription,
-)
+from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription
 from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Body, Contact, Side, Twist
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, scale, subtract
@@ -79,8 +74,9 @@ class BulletBody(Body):
         self._fixed = description.fixed_base
         self._map_names()
         self.touching = {
-            index: _touching(description.links[name]) for name, index in self._links.items()
-        }
+            index: (link.part_of or link.name, tuple(shape.name for shape in link.collisions))
+            for index, link in ((i, description.links[name]) for name, i in self._links.items())
+        }  # links and collisions of the model that may touch where PyBullet's link does
         dynamics = pybullet.getDynamicsInfo(body, BASE, client)
         self._check_meshes()
         self._com = Pose(dynamics[3], dynamics[4])  # the engine turns it onto the principal axes
@@ -104,7 +100,10 @@ class BulletBody(Body):
     def _map_names(self) -> None:
         """Finds PyBullet's indices of joints and links."""
         description = self._description
-        joints = {name: i for i, name in enumerate(self._engine_joints())}
+        count = pybullet.getNumJoints(self.id, physicsClientId=self._client)
+        joints = {
+            pybullet.getJointInfo(self.id, i, self._client)[1].decode(): i for i in range(count)
+        }
         self.joint_names = tuple(
             name for name, joint in description.joints.items() if joint.movable and name in joints
         )
@@ -127,11 +126,6 @@ class BulletBody(Body):
             fixed = self._fixed and index == BASE
             group, mask = (STATIC, EVERYTHING ^ STATIC) if fixed else (DYNAMIC, EVERYTHING)
             pybullet.setCollisionFilterGroupMask(self.id, index, group, mask, self._client)
-
-    def _engine_joints(self) -> list[str]:
-        """Names of the joints, in the engine's order."""
-        count = pybullet.getNumJoints(self.id, physicsClientId=self._client)
-        return [pybullet.getJointInfo(self.id, i, self._client)[1].decode() for i in range(count)]
 
     def _remove_defaults(self) -> None:
         """Removes all damping and motors that the model doesn't have."""
@@ -160,11 +154,7 @@ class BulletBody(Body):
                 self._keep_moments(self._links[name], link.inertia)
 
     def _check_meshes(self) -> None:
-        """Refuses links whose meshes PyBullet has silently left out.
-
-        Raises:
-            DescriptionError: for such a link.
-        """
+        """Refuses links whose meshes PyBullet has silently left out."""
         for name, link in self._description.links.items():
             meshes = [shape.mesh for shape in link.collisions if shape.mesh]
             if name not in self._links or not meshes or len(meshes) < len(link.collisions):
@@ -363,11 +353,6 @@ class BulletBody(Body):
         linear, angular = pybullet.getBaseVelocity(self.id, self._client)
         pose = com.compose(self._com.inverse())
         return pose, (add(linear, cross(angular, subtract(pose.position, com.position))), angular)
-
-
-def _touching(link: Link) -> tuple[str, tuple[str, ...]]:
-    """Returns the link and collisions of the model that may touch where PyBullet's link does."""
-    return link.part_of or link.name, tuple(shape.name for shape in link.collisions)
 
 
 def _moments(inertia: Inertia) -> Vector:

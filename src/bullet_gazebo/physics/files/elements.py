@@ -1,35 +1,14 @@
 """Numbers and names in XML model files; errors name the place."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from xml.etree.ElementTree import Element
 
-from bullet_gazebo.physics.description import DescriptionError, LimitExceeded, Plugin
+from bullet_gazebo.physics.description import DescriptionError, Plugin
 from bullet_gazebo.physics.pose import Vector
-from file_access.content import FileError, TooLarge
-from file_access.xml_text import parse
 
 SHOWN = 80  # characters of a faulty value that an error quotes
-
-
-def parse_xml(text: str | bytes, count: Callable[[int], None] | None = None) -> Element:
-    """Returns the root element of a text, or of the content of a file.
-
-    Args:
-        text: the text or content.
-        count: called now and then with the number of further elements; it may raise.
-
-    Raises:
-        DescriptionError: if it isn't well-formed, or has a document type.
-        LimitExceeded: if it is too large.
-    """
-    try:
-        return parse(text) if count is None else parse(text, count)
-    except TooLarge as error:
-        raise LimitExceeded(str(error)) from error
-    except FileError as error:
-        raise DescriptionError(str(error)) from error
 
 
 @contextmanager
@@ -53,11 +32,7 @@ def files_named_by_a_model(where: str) -> Iterator[None]:
 
 
 def finite(text: str, where: str) -> float:
-    """Returns the number in `text`.
-
-    Raises:
-        DescriptionError: if it isn't a finite number; the text begins with `where`.
-    """
+    """Returns the number in `text`."""
     try:
         value = float(text)
     except ValueError as error:
@@ -91,11 +66,7 @@ def truth(text: str | None, default: bool = False) -> bool:
 
 
 def named(element: Element, what: str) -> str:
-    """Returns the attribute `name`.
-
-    Raises:
-        DescriptionError: if it is missing, or too long for an engine.
-    """
+    """Returns the attribute `name`."""
     name = element.get("name", "")
     if not name:
         raise DescriptionError(f"a <{what}> has no name")
@@ -111,11 +82,7 @@ def shown(text: str) -> str:
 
 
 def positive(sizes: tuple[float, ...], where: str) -> tuple[float, ...]:
-    """Returns `sizes` [m].
-
-    Raises:
-        DescriptionError: if one of them isn't positive.
-    """
+    """Returns `sizes` [m]."""
     if min(sizes) <= 0.0:
         raise DescriptionError(f"{where}: sizes must be above 0, not {sizes}")
     return sizes

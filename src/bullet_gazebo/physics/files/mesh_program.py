@@ -70,12 +70,7 @@ def answer(request: bytes) -> bytes:
 
 
 def load(path: Path, submesh: Submesh | None = None) -> Mesh:
-    """Returns the mesh of a file, or of one named part of it.
-
-    Raises:
-        DescriptionError: if an engine can't take it, with the place in the file.
-        Exception: whatever a library raises over a broken file.
-    """
+    """Returns the mesh of a file, or of one named part of it."""
     readers: dict[str, Callable[[bytes, str], list[Part]]]
     readers = {".stl": _read_stl, ".dae": _read_collada, ".obj": _read_obj}
     try:

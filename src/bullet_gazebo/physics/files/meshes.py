@@ -128,11 +128,7 @@ def _arrays(stream: BytesIO) -> list[np.ndarray]:
 
 
 def check_mesh(path: Path) -> None:
-    """Refuses what can't be a mesh, without reading it.
-
-    Raises:
-        DescriptionError: the text names the file.
-    """
+    """Refuses what can't be a mesh, without reading it."""
     if path.suffix.lower() not in SUFFIXES:
         raise DescriptionError(f"mesh '{path}': only {', '.join(SUFFIXES)} files are read")
     if not path.is_file():  # reading a pipe would wait for ever

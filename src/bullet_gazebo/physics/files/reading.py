@@ -9,10 +9,10 @@ from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import DescriptionError, LimitExceeded, Mesh
-from bullet_gazebo.physics.files.elements import files_named_by_a_model, parse_xml, place, shown
+from bullet_gazebo.physics.files.elements import files_named_by_a_model, place, shown
 from bullet_gazebo.physics.files.meshes import Submesh, check_mesh, read_mesh
 from file_access.content import MAX_BYTES, FileError, TooLarge, read_file
-from file_access.xml_text import MAX_ELEMENTS
+from file_access.xml_text import MAX_ELEMENTS, parse
 
 MeshFile = tuple[str, Mesh | None]
 """A file's path, and its mesh if it was read."""
@@ -40,11 +40,7 @@ class Resources:
     package: Callable[[str], str] = field(default=_no_packages)
 
     def find(self, uri: str, folder: Path | None = None) -> Path:
-        """Returns the existing file or folder of `uri`, relative names being looked up in `folder`.
-
-        Raises:
-            DescriptionError: if it isn't found; the text lists where it was looked for.
-        """
+        """Returns the existing file or folder of `uri`, relative names being looked up in `folder`."""
         with files_named_by_a_model(f"'{shown(uri)}' is not found"):  # ~ and a null character
             tried = list(self._candidates(unquote(uri.strip()), folder))
         reason = ""
@@ -104,24 +100,19 @@ class Reading:
         self._meshes: dict[tuple[Path, Submesh | None], Mesh] = {}
 
     def parse(self, text: str | bytes) -> Element:
-        """Returns the root element of an XML text or a file's content.
-
-        Raises:
-            DescriptionError: if it isn't well-formed.
-            LimitExceeded: if it is too large.
-        """
+        """Returns the root element of an XML text or a file's content."""
         self._bytes += len(text)
         if self._bytes > MAX_BYTES:
             raise LimitExceeded(f"more than {MAX_BYTES} bytes of XML (MAX_BYTES)")
-        return parse_xml(text, self._count)
+        try:
+            return parse(text, self._count)
+        except TooLarge as error:
+            raise LimitExceeded(str(error)) from error
+        except FileError as error:
+            raise DescriptionError(str(error)) from error
 
     def open(self, path: Path) -> Element:
-        """Returns the root element of a file. It is the same object each time: don't change it.
-
-        Raises:
-            DescriptionError: if it can't be read; the text names it.
-            LimitExceeded: if it exceeds a limit.
-        """
+        """Returns the root element of a file. It is the same object each time: don't change it."""
         with place(str(path)):
             if path in self._files:
                 root, elements = self._files[path]
@@ -141,12 +132,7 @@ class Reading:
             return root
 
     def mesh(self, path: Path, submesh: Submesh | None = None) -> Mesh:
-        """Returns the mesh of a file or of a named part of it. It is the same object each time.
-
-        Raises:
-            DescriptionError: if it can't be simulated; the text names it.
-            LimitExceeded: if it exceeds a limit.
-        """
+        """Returns the mesh of a file or of a named part of it. It is the same object each time."""
         if (path, submesh) not in self._meshes:
             with files_named_by_a_model(f"mesh '{path}'"):
                 self._mesh_bytes += path.stat().st_size
@@ -158,22 +144,14 @@ class Reading:
         return self._meshes[path, submesh]
 
     def model(self) -> None:
-        """Counts one more model.
-
-        Raises:
-            LimitExceeded: if there are too many.
-        """
+        """Counts one more model."""
         self._models += 1
         if self._models > MAX_MODELS:
             raise LimitExceeded(f"more than {MAX_MODELS} models (MAX_MODELS)")
         self.check()
 
     def check(self) -> None:
-        """Checks the time. Readers call it before each link, joint or shape.
-
-        Raises:
-            LimitExceeded: if reading has taken too long or was cancelled.
-        """
+        """Checks the time. Readers call it before each link, joint or shape."""
         if time.thread_time() > self._end:
             raise LimitExceeded(f"reading takes more than {MAX_SECONDS:g} s (MAX_SECONDS)")
         if self._cancelled():
@@ -201,9 +179,6 @@ class MeshFinder:
         """Returns the file's path and its mesh, or the `submesh`; None for one that is left out.
 
         A visual's isn't `needed`: it is looked for but not read, since nothing is drawn here.
-
-        Raises:
-            DescriptionError: if it is `needed` and can't be used.
         """
         try:
             if not uri.strip():

@@ -39,7 +39,6 @@ from bullet_gazebo.physics.files.sdf_parts import (
     read_pose,
 )
 from bullet_gazebo.physics.lumping import (
-    check_count,
     detach_from_world,
     find_roots,
     mend_moments,
@@ -65,11 +64,7 @@ class FileContext:
 
 
 def open_include(include: Element, context: FileContext) -> tuple[Element, FileContext]:
-    """Returns the model or light that `include` names, with the include's name, pose and static flag.
-
-    Raises:
-        DescriptionError: if it isn't found or can't be read.
-    """
+    """Returns the model or light that `include` names, with the include's name, pose and static flag."""
     uri = (include.findtext("uri") or "").strip()
     with place(f"<include> of '{shown(uri)}'"):
         if not uri:
@@ -173,11 +168,7 @@ def parse_sdf(
 
 
 def sdf_version(root: Element) -> tuple[int, int]:
-    """Returns the version of an `<sdf>` or `<gazebo>` root.
-
-    Raises:
-        DescriptionError: if it is another root, or another version.
-    """
+    """Returns the version of an `<sdf>` or `<gazebo>` root."""
     if root.tag not in ("sdf", "gazebo"):
         raise DescriptionError(f"the root element is <{shown(root.tag)}>, not <sdf>")
     version = _version(root.get("version", "1.4"))
@@ -251,9 +242,7 @@ def _read_parts(model: Element, context: FileContext, static: bool, depth: int) 
         for link, pose in inner.poses.items():
             frames.add(f"{name}::{link}", pose, name)
     collide = truth(model.findtext("self_collide"))
-    links = model.findall("link")
-    check_count(len(links))
-    for element in links:
+    for element in model.findall("link"):
         context.reading.check()
         read = _read_link(element, context, frames, parts, static)
         read.self_collide = truth(element.findtext("self_collide"), default=collide)
@@ -294,7 +283,6 @@ def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
                 f"joint '{joint.name}': a nested model can't be joined to the world"
             )
     parts.links += inner.links
-    check_count(len(parts.links))
     parts.joints += inner.joints
     parts.plugins += inner.plugins
     parts.warnings += inner.warnings

@@ -66,11 +66,7 @@ class Frames:
         self._given.setdefault(name, (pose, relative_to or MODEL))
 
     def resolve(self, name: str) -> Pose:
-        """Returns frame `name` seen from the model's.
-
-        Raises:
-            DescriptionError: if it is unknown or circular.
-        """
+        """Returns frame `name` seen from the model's."""
         chain: dict[str, Pose] = {}
         while name not in self._known:
             if name in chain:
@@ -220,11 +216,7 @@ class JointReader:
     warnings: list[str]
 
     def read(self, element: Element) -> Joint:
-        """Reads one joint.
-
-        Raises:
-            DescriptionError: if it is broken, or of a kind that isn't simulated.
-        """
+        """Reads one joint."""
         name = named(element, "joint")
         where = f"joint '{name}'"
         kind = element.get("type", "")

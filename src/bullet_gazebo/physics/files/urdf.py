@@ -34,7 +34,7 @@ from bullet_gazebo.physics.files.elements import (
     shown,
 )
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
-from bullet_gazebo.physics.lumping import check_count, find_roots, lump_fixed_joints, unique
+from bullet_gazebo.physics.lumping import find_roots, lump_fixed_joints, unique
 from bullet_gazebo.physics.pose import Pose, from_rpy
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
@@ -69,11 +69,7 @@ def read_numbers(element: Element, key: str, place: str, count: int) -> tuple[fl
 
 
 def read_joint(element: Element, warnings: list[str]) -> Joint:
-    """Returns the joint of a `<joint>` element.
-
-    Raises:
-        DescriptionError: if it can't be read; the text names place and fault.
-    """
+    """Returns the joint of a `<joint>` element."""
     name = named(element, "joint")
     place = f"joint '{name}'"
     kind = element.get("type", "")
@@ -86,17 +82,20 @@ def read_joint(element: Element, warnings: list[str]) -> Joint:
         child=_referred_link(element, "child", place),
         pose=read_origin(element, place),
     )
-    _set_axis(joint, element, place)
+    axis, dynamics = element.find("axis"), element.find("dynamics")
+    if axis is not None and joint.movable:
+        joint.axis = direction(read_numbers(axis, "xyz", place, 3), f"{place}: the axis")
     _set_limit(joint, element, place, warnings)
-    _set_dynamics(joint, element, place)
+    if dynamics is not None:
+        joint.damping = read_number(dynamics, "damping", place)
+        joint.friction = read_number(dynamics, "friction", place)
+    # Nothing here reads them; urdfdom refuses the robot, and so do other programs.
+    mimic, safety = element.find("mimic"), element.find("safety_controller")
+    if mimic is not None and not mimic.get("joint"):
+        raise DescriptionError(f"{place}: <mimic> needs the attribute 'joint'")
+    if safety is not None:
+        read_number(safety, "k_velocity", place, required=True)
     return joint
-
-
-def _set_axis(joint: Joint, element: Element, place: str) -> None:
-    axis = element.find("axis")
-    if axis is None or not joint.movable:
-        return
-    joint.axis = direction(read_numbers(axis, "xyz", place, 3), f"{place}: the axis")
 
 
 def _set_limit(joint: Joint, element: Element, place: str, warnings: list[str]) -> None:
@@ -114,13 +113,6 @@ def _set_limit(joint: Joint, element: Element, place: str, warnings: list[str]) 
     if lower > upper:
         warnings.append(f"{place}: lower {lower} is above upper {upper}; the two are swapped")
     joint.lower, joint.upper = min(lower, upper), max(lower, upper)
-
-
-def _set_dynamics(joint: Joint, element: Element, place: str) -> None:
-    dynamics = element.find("dynamics")
-    if dynamics is not None:
-        joint.damping = read_number(dynamics, "damping", place)
-        joint.friction = read_number(dynamics, "friction", place)
 
 
 def _referred_link(element: Element, role: str, place: str) -> str:
@@ -153,11 +145,7 @@ class LinkReader:
                         self._materials[name] = color
 
     def read(self, element: Element) -> Link:
-        """Reads one link.
-
-        Raises:
-            DescriptionError: if it has no name, or a collision's mesh can't be used.
-        """
+        """Reads one link."""
         self.meshes.reading.check()
         link = Link(named(element, "link"))
         place = f"link '{link.name}'"
@@ -271,9 +259,6 @@ def apply_extensions(model: ModelDescription, robot: Element) -> None:
 
     They have plugins, friction, gravity, kept fixed joints (docs/contract/gazebo.md 2.4). A value is the
     attribute `value`, or else the text. A reference to an unknown link or joint is a warning, as in Gazebo.
-
-    Raises:
-        DescriptionError: if a value can't be read.
     """
     for block in robot.findall("gazebo"):
         reference = block.get("reference")
@@ -303,7 +288,9 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
     for element in block:
         place = f"<gazebo reference='{shown(link.name)}'>, <{element.tag}>"
         if element.tag == "mu1":
-            mu = _not_negative(_value(element), place)
+            mu = finite(_value(element), place)
+            if mu < 0.0:
+                raise DescriptionError(f"{place}: {mu} is negative")
             link.collisions = [replace(shape, mu=mu) for shape in link.collisions]
         elif element.tag == "turnGravityOff":
             link.gravity = (
@@ -337,13 +324,6 @@ def _value(element: Element | None) -> str:
     return (element.get("value", element.text) or "").strip().lower()
 
 
-def _not_negative(text: str, place: str) -> float:
-    value = finite(text, place)
-    if value < 0.0:
-        raise DescriptionError(f"{place}: {value} is negative")
-    return value
-
-
 def parse_urdf(
     text: str | bytes, source: str = "URDF", resources: Resources | None = None
 ) -> ModelDescription:
@@ -366,9 +346,7 @@ def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDe
     warnings: list[str] = []
     reader = LinkReader(MeshFinder(resources, reading, warnings=warnings))
     reader.learn_materials(robot)
-    found = robot.findall("link")
-    check_count(len(found))
-    links = unique(map(reader.read, found), "link")
+    links = unique(map(reader.read, robot.findall("link")), "link")
     check_shapes(links.values())
 
     def read(element: Element) -> Joint:

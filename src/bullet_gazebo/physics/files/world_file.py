@@ -106,11 +106,7 @@ def _read(root: Element, context: FileContext) -> WorldDescription:
 
 
 def read_light(element: Element) -> Light:
-    """Returns the light of a `<light>` element.
-
-    Raises:
-        DescriptionError: if a value can't be read.
-    """
+    """Returns the light of a `<light>` element."""
     name = named(element, "light")
     where = f"light '{shown(name)}'"
     pose, _ = read_pose(element, where)

@@ -23,14 +23,10 @@ class ControlFailed(Exception):
 
 
 class RemoteWorld:
-    """A running simulator, by its node's name."""
+    """A running simulator, by its node's name. Without it or its answer: ControlFailed."""
 
     def __init__(self, node: str, master_uri: str) -> None:
-        """`node` is the simulator's full name, usually /gazebo.
-
-        Raises:
-            ControlFailed: there is no master, or no such node.
-        """
+        """`node` is the simulator's full name, usually /gazebo."""
         self._node = node
         try:
             self._address = str(master.call_node(master_uri, "lookupNode", node))
@@ -42,11 +38,7 @@ class RemoteWorld:
             ) from fault
 
     def command(self, name: str, count: int = 1) -> None:
-        """Runs one command: pause, unpause, step, reset, reset_models, reset_time or show.
-
-        Raises:
-            ControlFailed: the simulator doesn't answer, or refuses.
-        """
+        """Runs one command: pause, unpause, step, reset, reset_models, reset_time or show."""
         try:
             master.call_node(self._address, METHOD, name, count, timeout=TIMEOUT)
         except master.Refused as fault:
@@ -57,11 +49,7 @@ class RemoteWorld:
             raise ControlFailed(f"{self._node} doesn't answer: {fault}") from fault
 
     def step(self, ticks: int) -> None:
-        """Pauses the world, and returns after `ticks` steps.
-
-        Raises:
-            ControlFailed: see `command`.
-        """
+        """Pauses the world, and returns after `ticks` steps."""
         while ticks > 0:
             count = min(ticks, CHUNK)
             self.command("step", count)

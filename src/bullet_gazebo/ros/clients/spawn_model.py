@@ -21,6 +21,7 @@ from gazebo_ros.gazebo_interface import (
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import Empty
 
+from bullet_gazebo.physics.pose import from_rpy
 from bullet_gazebo.ros.common.node_process import SignalHandler, init_node
 from file_access.content import MAX_BYTES, FileError, read_file
 from file_access.xml_text import decode
@@ -221,13 +222,5 @@ def _prepared(text: str, package_to_model: bool) -> str:
 
 def _pose(options: argparse.Namespace) -> Pose:
     """Returns the pose; -R, -P, -Y are rotations about the fixed x, y and z axis, in this order."""
-    cr, sr = math.cos(options.R / 2), math.sin(options.R / 2)
-    cp, sp = math.cos(options.P / 2), math.sin(options.P / 2)
-    cy, sy = math.cos(options.Y / 2), math.sin(options.Y / 2)
-    turn = Quaternion(
-        x=sr * cp * cy - cr * sp * sy,
-        y=cr * sp * cy + sr * cp * sy,
-        z=cr * cp * sy - sr * sp * cy,
-        w=cr * cp * cy + sr * sp * sy,
-    )
+    turn = Quaternion(*from_rpy(options.R, options.P, options.Y))
     return Pose(Point(options.x, options.y, options.z), turn)

@@ -1,1 +1,1 @@
-"""The node `gazebo`: its start and end, time and state topics, and what keeps it alive."""
+"""The node `gazebo`: its start and end, and what keeps it alive."""

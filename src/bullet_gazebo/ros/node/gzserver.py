@@ -27,7 +27,7 @@ from bullet_gazebo.ros.common.node_process import (
     seed_random_numbers,
     wait_for_master,
 )
-from bullet_gazebo.ros.common.publishing import Thinner
+from bullet_gazebo.ros.common.publishing import Thinner, advertise_states
 from bullet_gazebo.ros.common.rospy_connections import (
     Reception,
     bound_calls,
@@ -36,7 +36,6 @@ from bullet_gazebo.ros.common.rospy_connections import (
 )
 from bullet_gazebo.ros.common.rospy_internals import free_polls_at_once
 from bullet_gazebo.ros.node.master_watch import MasterWatch, NameLoss, NodeNameTaken, refuse_twin
-from bullet_gazebo.ros.node.state_topics import advertise_states
 from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.ros.scene import SceneOffer

@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from types import FrameType, TracebackType
 
 import rospy
@@ -145,14 +145,14 @@ def holder(lock: FairLock) -> str:
     if frame is None:
         return "a thread that has ended without releasing it"
     names = {each.ident: each.name for each in threading.enumerate()}
-    stack = traceback.StackSummary.extract(_outwards(frame), limit=DEPTH)
+    stack = traceback.StackSummary.extract(traceback.walk_stack(frame), limit=DEPTH)
     stack.reverse()
     return f"{_culprit(frame)}, in thread '{names.get(thread, thread)}':\n{''.join(stack.format())}"
 
 
 def _culprit(innermost: FrameType) -> str:
     """Returns the plugin or controller whose code runs; the place in the code if it is neither's."""
-    for frame, _ in _outwards(innermost):
+    for frame, _ in traceback.walk_stack(innermost):
         owner = frame.f_locals.get("self")
         if isinstance(owner, PluginContext):
             return f"plugin {owner.plugin.filename} of model '{owner.model.name}'"
@@ -160,10 +160,3 @@ def _culprit(innermost: FrameType) -> str:
             return f"controller '{owner.name}' ({owner.type_name})"
     code = innermost.f_code
     return f"{code.co_qualname} ({code.co_filename}, line {innermost.f_lineno})"
-
-
-def _outwards(innermost: FrameType) -> Iterator[tuple[FrameType, int]]:
-    frame: FrameType | None = innermost
-    while frame is not None:
-        yield frame, frame.f_lineno
-        frame = frame.f_back

@@ -210,19 +210,13 @@ def _at_most(texts: list[str]) -> list[str]:
 
 
 def without_comments(text: str) -> str:
-    """Returns `text` without its first XML declaration and its comments; an open comment stays."""
-    start = text.find("<?")
-    end = text.find("?>", start) if start >= 0 else -1
-    if end >= 0:
-        text = text[:start] + text[end + 2 :]
-    pieces, position = [], 0
-    while (start := text.find("<!--", position)) >= 0:
-        end = text.find("-->", start + 4)
-        if end < 0:
-            break
-        pieces.append(text[position:start])
-        position = end + 3
-    return "".join([*pieces, text[position:]])
+    """Returns `text` without its first XML declaration and its comments."""
+    before, _, after = text.partition("<?")
+    _, end, rest = after.partition("?>")
+    if end:
+        text = before + rest
+    before, *commented = text.split("<!--")
+    return before + "".join(each.partition("-->")[2] for each in commented)
 
 
 def _with_package_paths(text: str) -> str:

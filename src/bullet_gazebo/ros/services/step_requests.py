@@ -1,4 +1,7 @@
-"""Checks step requests as a whole before any of it is carried out, and finds what they name."""
+"""Checks step requests as a whole before any of it is carried out, and finds what they name.
+
+A request that can't be carried out raises ControlError, or UnknownName; the text says why.
+"""
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
@@ -50,11 +53,7 @@ class Commanded(NamedTuple):
         return all(rival.state != RUNNING for rival in self.rivals)
 
     def send(self, commands: list[float]) -> None:
-        """Passes the commands to the controllers.
-
-        Raises:
-            ControlError: if a user's controller raises.
-        """
+        """Passes the commands to the controllers."""
         topic = ""
         try:
             for port, place in self.ports:
@@ -87,9 +86,6 @@ class Addresses:
         Args:
             controllers: plain names, or /namespace/name.
             joints: plain names, or model::joint.
-
-        Raises:
-            ControlError: for the first name that is wrong or names something again.
         """
         found: dict[int, Controller] = {}  # by identity: a user's class may not be hashable
         ports: list[tuple[Input, int | slice]] = []
@@ -111,11 +107,7 @@ class Addresses:
         return Commanded(list(found.values()), ports, size, handles, list(rivals.values()))
 
     def movable_joints(self, names: Sequence[str]) -> list[tuple[Model, str]]:
-        """Returns the model and plain name of each joint, given plain or scoped names.
-
-        Raises:
-            ControlError: for the first name that is wrong or names a joint again.
-        """
+        """Returns the model and plain name of each joint, given plain or scoped names."""
         joints: dict[tuple[Model, str], None] = {}
         for name in names:
             several = f"several models have a joint '{name}'; write model::{name}"
@@ -213,12 +205,7 @@ class StepPlan:
     """The models and joints to place, the commands, and the question of a StepWorld request."""
 
     def __init__(self, sim: Simulator, request: StepWorldRequest, addresses: Addresses) -> None:
-        """Checks the request; the caller holds the simulator's lock.
-
-        Raises:
-            ControlError: if the request can't be carried out; the text says why.
-            UnknownName: for a model that doesn't exist.
-        """
+        """Checks the request; the caller holds the simulator's lock."""
         self.query = query_of(request)
         _check_ticks(request, self.query is not NOTHING)
         self.placed_models = _placed_models(sim, request)
@@ -235,11 +222,7 @@ class StepPlan:
 
 
 def query_of(request: StepWorldRequest | PrepareStepRequest) -> StateQuery:
-    """Returns what a request asks for beside the joints.
-
-    Raises:
-        ControlError: if links and frames don't go together.
-    """
+    """Returns what a request asks for beside the joints."""
     links, frames = request.link_states_of, request.link_frames
     if frames and len(links) != len(frames):
         raise ControlError(f"{len(links)} link_states_of but {len(frames)} link_frames")

@@ -41,7 +41,7 @@ from bullet_gazebo.ros.common.node_process import seed_random_numbers
 from bullet_gazebo.ros.services import ServiceRefused, offer
 from bullet_gazebo.ros.services.step_requests import MAX_TICKS, Addresses, StepPlan, query_of
 from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.state import NOTHING, StateQuery, StateReader, UnknownName
+from bullet_gazebo.state import NOTHING, StateReader, UnknownName
 
 SLICE = 500  # ticks between which other services get their turn
 MOST_HANDLES = 256  # a client whose handle was dropped prepares its step again
@@ -181,7 +181,8 @@ class StepService:
             try:
                 # Everything is checked before anything is done.
                 plan = StepPlan(self._sim, request, self._addresses())
-                reader = self._reader_of(plan.query)
+                if plan.query != self._reader.query or self._reader.is_stale:
+                    self._reader = StateReader(self._sim.world, plan.query)
                 self._begin(request, plan)  # from here on only a user's controller can fail
             except (ControlError, UnknownName) as error:
                 return self._answer(status_message=f"StepWorld: {error}")
@@ -190,7 +191,7 @@ class StepService:
                 hold = lambda: plan.commanded.hold(request.joint_commands)  # noqa: E731
             self._advance(request.ticks, hold)
             try:
-                state = reader.read(self._knows_contacts)
+                state = self._reader.read(self._knows_contacts)
             except UnknownName as error:
                 fault = f"StepWorld: the ticks are done, but meanwhile {error}"
                 return self._answer(status_message=fault)
@@ -210,11 +211,6 @@ class StepService:
         if self._current.version != self._sim.version:
             self._current = Addresses(self._sim)
         return self._current
-
-    def _reader_of(self, query: StateQuery) -> StateReader:
-        if query != self._reader.query or self._reader.is_stale:
-            self._reader = StateReader(self._sim.world, query)
-        return self._reader
 
     def _begin(self, request: StepWorldRequest, plan: StepPlan) -> None:
         sim = self._sim

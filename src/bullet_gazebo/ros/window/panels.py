@@ -40,7 +40,6 @@ SINGLE, GROUP, TRAJECTORY = (
 MESSAGES = {SINGLE: Float64, GROUP: Float64MultiArray, TRAJECTORY: JointTrajectory}
 MOVE_TIME = 0.5  # [s of simulated time] that a trajectory to the slider's position takes
 CONNECTING = 5.0  # [s]
-MOST_SHOWN = 100  # controllers
 
 
 Attempt = Callable[[Callable[[], None]], None]
@@ -154,7 +153,7 @@ class Controllers:
             lines.append(
                 f"<b>{html.escape(manager)}</b><ul style='margin: 0; padding-left: 1.2em'>"
             )
-            for each in controllers[:MOST_SHOWN]:
+            for each in controllers:
                 joints = ", ".join(html.escape(joint) for joint in _claimed(each))
                 weight = 600 if each.state == "running" else 400
                 lines.append(
@@ -162,8 +161,7 @@ class Controllers:
                     f"{html.escape(each.state)}<br><small>{html.escape(each.type)}"
                     f"{f' of {joints}' if joints else ''}</small></li>"
                 )
-            rest = len(controllers) - MOST_SHOWN
-            lines.append(f"<li>and {rest} more</li></ul>" if rest > 0 else "</ul>")
+            lines.append("</ul>")
         return "".join(lines)
 
     def holder(self, joint: str) -> Holder | str:

@@ -8,7 +8,7 @@ from support.robots.cartpole import cartpole_urdf
 from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.manager import BEST_EFFORT, STRICT, ControllerManager
+from bullet_gazebo.control.manager import STRICT, ControllerManager
 from bullet_gazebo.control.transmissions import read_description
 
 PARAMS = {
@@ -37,14 +37,6 @@ def states(manager):
     return {entry.name: entry.state for entry in manager.listed()}
 
 
-def test_loaded_controllers_are_listed_in_load_order_with_their_claims(manager):
-    listed = manager.listed()
-    assert [entry.name for entry in listed] == list(PARAMS)
-    assert {entry.state for entry in listed} == {"initialized"}
-    assert listed[0].claims == (("hardware_interface::JointStateInterface", ()),)
-    assert listed[1].claims == (("hardware_interface::EffortJointInterface", ("stand_cart",)),)
-
-
 @pytest.mark.parametrize(
     ("name", "params", "text"),
     [
@@ -60,16 +52,6 @@ def test_what_cannot_be_loaded_is_refused_and_leaves_no_trace(manager, name, par
     with pytest.raises(ControlError, match=text):
         manager.load(name, params)
     assert manager.listed() == before
-
-
-def test_start_and_stop(manager):
-    manager.switch(["states", "cart"], [], STRICT)
-    assert states(manager) == {
-        "states": "running", "cart": "running", "cart2": "initialized", "pole": "initialized",
-    }  # fmt: skip
-    manager.switch(["cart2"], ["cart"], STRICT)
-    assert states(manager)["cart"] == "stopped"
-    assert states(manager)["cart2"] == "running"
 
 
 @pytest.mark.parametrize(
@@ -89,42 +71,6 @@ def test_strict_refuses_and_changes_nothing(manager, start, stop):
     with pytest.raises(ControlError):
         manager.switch(start, stop, STRICT)
     assert states(manager) == before
-
-
-def test_best_effort_does_what_it_can(manager):
-    manager.switch(["cart", "nobody"], ["pole"], BEST_EFFORT)
-    assert states(manager)["cart"] == "running"
-    manager.switch([], [], BEST_EFFORT)
-
-
-def test_best_effort_starts_a_running_controller_anew(manager):
-    manager.switch(["cart"], [], STRICT)
-    cart = manager.get("cart")
-    cart.command(0.3)
-    for stop in ([], ["cart"]):
-        cart.command(0.3)
-        manager.switch(["cart"], stop, BEST_EFFORT)
-        assert cart.set_point == 0.0
-        assert states(manager)["cart"] == "running"
-
-
-@pytest.mark.parametrize("strictness", [BEST_EFFORT, STRICT])
-def test_a_joint_has_one_master(manager, strictness):
-    manager.switch(["cart"], [], STRICT)
-    with pytest.raises(ControlError, match="both claim joint 'stand_cart'"):
-        manager.switch(["pole", "cart2"], [], strictness)
-    assert states(manager)["pole"] == "initialized"
-
-
-def test_unload(manager):
-    manager.switch(["cart"], [], STRICT)
-    for name in ("cart", "nobody"):
-        with pytest.raises(ControlError):
-            manager.unload(name)
-    manager.switch([], ["cart"], STRICT)
-    manager.unload("cart")
-    manager.load("cart", PARAMS["cart"])
-    assert [entry.name for entry in manager.listed()] == ["states", "cart2", "pole", "cart"]
 
 
 def test_moved_joints_relatch_running_controllers(manager):
@@ -245,7 +191,14 @@ def test_a_controller_that_raises_while_it_is_made_is_refused_with_the_reason(ma
 
 @pytest.mark.parametrize(
     ("change", "text"),
-    [({"name": "cart"}, "calls itself 'cart'"), ({"interface": 3}, "lacks `interface`")],
+    [
+        ({"name": "cart"}, "calls itself 'cart'"),
+        ({"interface": 3}, "lacks `interface`"),
+        *(
+            ({"claimed": claimed}, "isn't a tuple of names of controlled joints")
+            for claimed in ("stand_cart", ("elbow",), None, (3,))
+        ),
+    ],
 )
 def test_a_controller_that_could_not_be_listed_is_refused(
     manager, faults, change, text, monkeypatch
@@ -261,16 +214,7 @@ def test_a_controller_that_could_not_be_listed_is_refused(
     assert "faulty" not in states(manager)
 
 
-@pytest.mark.parametrize("claimed", ["stand_cart", ("elbow",), None, (3,)])
-def test_claims_that_are_no_joints_are_refused(manager, faults, claimed, monkeypatch):
-    def create(name, params, hardware):
-        made = Faulty(name, "")
-        made.claimed = claimed
-        return made
-
-    monkeypatch.setattr(Faulty, "create", create)
-    with pytest.raises(ControlError, match="isn't a tuple of names of controlled joints"):
-        manager.load("faulty", {"type": "test/Faulty"})
+def test_a_type_that_makes_no_controller_is_refused(manager, faults, monkeypatch):
     monkeypatch.setattr(Faulty, "create", lambda name, params, hardware: None)
     with pytest.raises(ControlError, match="returned None"):
         manager.load("faulty", {"type": "test/Faulty"})

@@ -1,19 +1,15 @@
-"""Position and velocity interfaces, limits, the emergency stop and control periods, in the physics."""
+"""Position and velocity interfaces, limits and control periods, in the physics."""
 
 import math
 
 import pytest
+from support.robots.worlds import add_robot, start
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import PositionDrive, RobotHardware
 from bullet_gazebo.control.joint import JointHandle, JointLimits, SoftLimits
 from bullet_gazebo.control.limits import PositionLimiter, VelocityLimiter
-from bullet_gazebo.control.manager import STRICT, ControllerManager
 from bullet_gazebo.control.transmissions import read_description
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 
 WEIGHT = 2.0 * 9.8  # [N] of the lift
@@ -36,19 +32,15 @@ class Lift:
     """A lift in a lock-step world with one controller."""
 
     def __init__(
-        self, engine, interface, controller="", params=None, gains=None, period=0.0, **urdf
+        self, world, interface, controller="", params=None, gains=None, period=0.0, **urdf
     ):
         text = lift_urdf(interface, **urdf)
-        self.sim = Simulator(World(engine), lockstep=True)
-        self.model = self.sim.world.spawn("lift", parse_urdf(text), Pose())
-        hardware = RobotHardware(read_description(text), gains)
-        self.manager = ControllerManager(hardware)
-        self.robot = ControlledRobot(self.model, hardware, self.manager, period)
-        self.sim.add_robot(self.robot)
-        self.joint = hardware.joints["rail"]
+        self.sim = Simulator(world, lockstep=True)
+        self.robot = add_robot(self.sim, "lift", text, gains=gains, control_period=period)
+        self.model, self.manager = self.robot.model, self.robot.manager
+        self.joint = self.robot.hardware.joints["rail"]
         if controller:
-            self.manager.load("c", {"type": controller, "joint": "rail"} | (params or {}))
-            self.manager.switch(["c"], [], STRICT)
+            start(self.robot, {"c": {"type": controller, "joint": "rail"} | (params or {})})
 
     def advance(self, seconds):
         with self.sim.lock:
@@ -60,16 +52,8 @@ class Lift:
 
 
 @pytest.fixture
-def make(new_engine):
-    lifts = []
-
-    def build(*args, **kwargs):
-        lifts.append(Lift(new_engine(), *args, **kwargs))
-        return lifts[-1]
-
-    yield build
-    for lift in lifts:
-        lift.sim.world.close()
+def make(make_world):
+    return lambda *args, **kwargs: Lift(make_world(), *args, **kwargs)
 
 
 POSITION = "position_controllers/JointPositionController"
@@ -137,27 +121,19 @@ def test_a_velocity_motor_has_no_more_than_its_effort(make):
     assert lift.joint.position == pytest.approx(0.5 * (10.0 - WEIGHT) / 2.0 * 0.1**2, rel=0.03)
 
 
-def test_velocity_joint_position_controller_goes_to_its_set_point(make):
-    lift = make("Velocity", "velocity_controllers/JointPositionController", {"pid": {"p": 10.0}})
-    lift.command(0.3)
-    assert lift.advance(2.0) == pytest.approx(0.3, abs=1e-4)
-
-
-def test_effort_joint_velocity_controller_goes_at_its_set_point(make):
-    params = {"pid": {"p": 500.0, "i": 5000.0, "i_clamp": 100.0}}
-    lift = make("Effort", "effort_controllers/JointVelocityController", params)
-    lift.command(0.4)
-    lift.advance(0.8)
-    assert lift.joint.velocity == pytest.approx(0.4, abs=1e-3)
-
-
-def test_a_last_effort_stays_when_its_controller_stops(make):
-    lift = make("Effort", "effort_controllers/JointEffortController")
-    lift.command(WEIGHT)
-    lift.advance(0.1)
-    lift.manager.switch([], ["c"], STRICT)
-    assert lift.advance(0.5) == pytest.approx(0.0, abs=2e-4)  # one step without effort at the start
-    assert lift.joint.effort == WEIGHT
+@pytest.mark.parametrize(
+    ("interface", "controller", "pid", "wanted"),
+    [
+        ("Velocity", "JointPositionController", {"p": 10.0}, 0.3),
+        ("Effort", "JointVelocityController", {"p": 500.0, "i": 5000.0, "i_clamp": 100.0}, 0.4),
+    ],
+)
+def test_a_controller_with_a_pid_reaches_its_set_point(make, interface, controller, pid, wanted):
+    lift = make(interface, f"{interface.lower()}_controllers/{controller}", {"pid": pid})
+    lift.command(wanted)
+    lift.advance(2.0 if interface == "Velocity" else 0.8)
+    found = lift.joint.position if interface == "Velocity" else lift.joint.velocity
+    assert found == pytest.approx(wanted, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -179,63 +155,15 @@ def test_what_is_no_number_never_reaches_the_world(make, interface, controller, 
     assert math.isfinite(lift.joint.command)
 
 
-def test_an_emergency_stop_lets_go_of_efforts_and_its_end_restarts_controllers(make):
-    lift = make("Effort", "effort_controllers/JointEffortController")
-    lift.command(2 * WEIGHT)
-    lift.robot.emergency_stop(True)
-    assert lift.advance(0.1) == pytest.approx(-0.5 * 9.8 * 0.1**2, rel=0.02)
-    assert lift.joint.effort == 0.0
-    lift.robot.emergency_stop(False)
-    lift.advance(0.01)
-    assert lift.joint.command == 0.0  # starting() made it so
-    assert lift.manager.listed()[0].state == "running"
-
-
-def test_an_emergency_stop_holds_positions_and_velocities(make):
-    lift = make("Position", POSITION)
-    lift.command(0.5)
-    lift.advance(0.1)
-    held = lift.joint.position
-    lift.robot.emergency_stop(True)
-    lift.robot.emergency_stop(True)
-    assert lift.advance(0.2) == pytest.approx(held, abs=1e-6)
-    lift.robot.emergency_stop(False)
-    assert lift.advance(0.2) == pytest.approx(held, abs=1e-6)  # the restart latched it
-    lift = make("Velocity", VELOCITY)
-    lift.command(1.0)
-    lift.advance(0.1)
-    lift.robot.emergency_stop(True)
-    before = lift.advance(0.1)  # it brakes with no more than its effort
-    assert lift.advance(0.2) == pytest.approx(before, abs=1e-5)
-
-
-class Probe:
-    """Notes what the manager was told."""
-
-    def __init__(self, lift):
-        self.calls = []
-        lift.manager.update = lambda now, dt: self.calls.append((now // 1_000_000, dt))
-
-
 @pytest.mark.parametrize(
     ("period", "ticks"), [(0.0, 1), (0.001, 1), (0.004, 4), (0.0025, 3), (1e-4, 1)]
 )
 def test_controllers_run_on_every_control_period_with_the_nominal_dt(make, period, ticks):
     lift = make("Effort", period=period)
-    probe = Probe(lift)
+    calls = []
+    lift.manager.update = lambda now, dt: calls.append((now // 1_000_000, dt))
     lift.advance(0.012)
-    assert probe.calls == [(now, ticks * DT) for now in range(1, 13, ticks)]
-
-
-def test_after_a_reset_the_next_step_is_a_control_tick_with_the_nominal_dt(make):
-    lift = make("Effort", period=0.004)
-    lift.advance(0.006)
-    probe = Probe(lift)
-    lift.sim.reset_world()
-    lift.advance(0.005)
-    lift.sim.reset_simulation()
-    lift.advance(0.002)
-    assert probe.calls == [(7, 0.004), (11, 0.004), (1, 0.004)]
+    assert calls == [(now, ticks * DT) for now in range(1, 13, ticks)]
 
 
 def test_limits_act_on_each_step_also_between_control_periods(make):
@@ -244,62 +172,48 @@ def test_limits_act_on_each_step_also_between_control_periods(make):
     lift.command(100.0)
     lift.advance(0.04)
     assert lift.joint.effort == 100.0
-    lift.advance(
-        0.02
-    )  # beyond the limit: clipped in place, so it stays so until the next control tick
+    # Beyond the limit it is clipped in place, so it stays so until the next control tick.
+    lift.advance(0.02)
     assert lift.joint.effort == 0.0
     lift.advance(0.041)
     assert lift.joint.position < 0.05
     assert lift.joint.effort == 100.0
 
 
-def limited(kind="prismatic", **limits):
-    return JointHandle("j", kind, JointLimits(**limits))
+SOFT = {"lower": -1.0, "upper": 1.0, "soft": SoftLimits(-0.9, 0.9, 10.0, 20.0)}
 
 
-def test_position_limits_never_open_with_time():
-    joint = limited(lower=-1.0, upper=1.0, velocity=2.0)
+@pytest.mark.parametrize(
+    ("kind", "limits", "position", "commands", "wanted"),
+    [
+        # Where a joint may go depends on what was commanded, and so doesn't open with time.
+        (PositionLimiter, {"lower": -1.0, "upper": 1.0}, 0.0, [9.0, 9.0], [0.2, 0.4]),
+        (PositionLimiter, {"lower": -1.0, "upper": 1.0}, -0.9, [-9.0], [-1.0]),
+        (PositionLimiter, {"lower": -1.0, "upper": 1.0}, 3.0, [3.0], [1.0]),
+        (PositionLimiter, SOFT, 0.85, [9.0], [0.85 + 10.0 * 0.05 * 0.1]),
+        (VelocityLimiter, {"acceleration": 5.0}, 0.0, [9.0] * 5, [0.5, 1.0, 1.5, 2.0, 2.0]),
+        (VelocityLimiter, SOFT, 0.85, [9.0], [0.5]),
+    ],
+)
+def test_commands_are_cut_at_the_limits(kind, limits, position, commands, wanted):
+    joint = JointHandle("j", "prismatic", JointLimits(**limits, velocity=2.0))
+    limiter, seen = kind(joint.limits), []
+    joint.position = position
+    for joint.command in commands:
+        limiter.limit(joint, 0.1)
+        seen.append(joint.command)
+    assert seen == pytest.approx(wanted)
+
+
+def test_a_forgotten_command_limits_the_next_one_no_more():
+    joint = JointHandle("j", "prismatic", JointLimits(-1.0, 1.0, 2.0))
     limiter = PositionLimiter(joint.limits)
-    joint.command = 9.0
+    joint.command = 0.2
     limiter.limit(joint, 0.1)
-    assert joint.command == pytest.approx(0.2)
-    joint.command = 9.0
-    limiter.limit(joint, 0.1)
-    assert joint.command == pytest.approx(0.4)
     limiter.forget()
     joint.position, joint.command = -0.9, -9.0
     limiter.limit(joint, 0.1)
     assert joint.command == -1.0
-
-
-def test_a_joint_beyond_its_range_is_brought_back():
-    joint = limited(lower=-1.0, upper=1.0, velocity=2.0)
-    joint.position = joint.command = 3.0
-    PositionLimiter(joint.limits).limit(joint, 0.1)
-    assert joint.command == 1.0
-
-
-def test_soft_limits_slow_a_position_command_near_its_end():
-    soft = SoftLimits(-0.9, 0.9, 10.0, 20.0)
-    joint = limited(lower=-1.0, upper=1.0, velocity=2.0, soft=soft)
-    joint.position, joint.command = 0.85, 9.0
-    PositionLimiter(joint.limits).limit(joint, 0.1)
-    assert joint.command == pytest.approx(0.85 + 10.0 * 0.05 * 0.1)
-
-
-def test_velocity_limits_with_acceleration_and_soft_limits():
-    joint = limited(velocity=2.0, acceleration=5.0)
-    limiter = VelocityLimiter(joint.limits)
-    seen = []
-    for _ in range(6):
-        joint.command = 9.0
-        limiter.limit(joint, 0.1)
-        seen.append(joint.command)
-    assert seen == pytest.approx([0.5, 1.0, 1.5, 2.0, 2.0, 2.0])
-    joint = limited(lower=-1.0, upper=1.0, velocity=2.0, soft=SoftLimits(-0.9, 0.9, 10.0, 20.0))
-    joint.position, joint.command = 0.85, 9.0
-    VelocityLimiter(joint.limits).limit(joint, 0.1)
-    assert joint.command == pytest.approx(0.5)
 
 
 def test_gains_of_drives_come_from_the_tree_and_bad_ones_are_refused():
@@ -320,13 +234,8 @@ def test_parameters_of_limits_that_are_no_numbers_are_a_warning():
     limits = description.joints["rail"].limits
     assert (limits.velocity, limits.acceleration) == (2.0, 4.0)
     assert any("max_velocity" in text for text in description.warnings)
-    assert (
-        read_description(lift_urdf("Velocity"))
-        .limited_by({"rail": {"angle_wraparound": True}})
-        .joints["rail"]
-        .limits.lower
-        is None
-    )
+    turning = description.limited_by({"rail": {"angle_wraparound": True}})
+    assert turning.joints["rail"].limits.lower is None
 
 
 @pytest.mark.parametrize(

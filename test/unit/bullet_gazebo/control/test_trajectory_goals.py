@@ -112,15 +112,6 @@ def test_a_new_goal_preempts_and_a_refused_one_does_not():
     assert rig.joints["shoulder"].position == pytest.approx(-1.0)
 
 
-def test_a_command_preempts():
-    rig = Rig().start()
-    told = rig.pursue(move((1.0, (1.0,))))
-    rig.run(100)
-    rig.controller.follow(move((1.0, (2.0,))))
-    assert told.outcomes[0].kind == "canceled"
-    assert "command topic" in told.outcomes[0].text
-
-
 def test_a_success_that_was_not_told_yet_is_told_when_something_else_comes():
     rig = Rig(action_monitor_rate=1).start()
     told = rig.pursue(move((0.5, (1.0,))))
@@ -141,26 +132,6 @@ def test_cancel_holds_the_joints_and_knows_its_goal():
     here = rig.joints["shoulder"].position
     rig.run(1000)
     assert rig.joints["shoulder"].position == here
-
-
-def test_stopping_and_beginning_anew_cancel_the_goal():
-    rig = Rig().start()
-    told = rig.pursue(move((1.0, (1.0,))))
-    rig.run(100)
-    rig.controller.stopping()
-    assert told.outcomes == [GoalOutcome("canceled", text="the controller was stopped")]
-    told = rig.pursue(move((1.0, (1.0,))))
-    rig.run(300)
-    rig.joints["shoulder"].position = -0.5  # as a reset does it
-    rig.joints["shoulder"].velocity = 0.0
-    rig.now = 0
-    rig.start()
-    assert "began anew" in told.outcomes[0].text
-    rig.run(1000)
-    assert rig.joints["shoulder"].position == -0.5
-    told = rig.pursue(move((1.0, (0.0,)), stamp=rig.now + S // 2))
-    rig.run(1600)
-    assert told.outcomes == [GoalOutcome("succeeded")]
 
 
 def test_a_goal_without_points_holds_and_succeeds():

@@ -1,11 +1,9 @@
 """Trajectories in the physics world: an arm under gravity follows a quintic within its tolerances."""
 
-import numpy as np
 import pytest
 from support.robots.trajectory_rig import Listener
+from support.robots.worlds import add_robot, start
 
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.manager import STRICT, ControllerManager
 from bullet_gazebo.control.trajectory_goals import (
     GoalOutcome,
     GoalRequest,
@@ -13,11 +11,6 @@ from bullet_gazebo.control.trajectory_goals import (
     Trajectory,
     TrajectoryPoint,
 )
-from bullet_gazebo.control.transmissions import read_description
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 
 S = 1_000_000_000  # [ns]
@@ -59,22 +52,15 @@ def arm(interface):
 
 
 @pytest.fixture
-def sim(new_engine):
-    simulator = Simulator(World(new_engine()), lockstep=True)
-    yield simulator
-    simulator.world.close()
+def sim(make_world):
+    return Simulator(make_world(), lockstep=True)
 
 
-def start(sim, interface):
-    text = arm(interface)
-    model = sim.world.spawn("arm", parse_urdf(text), Pose())
-    hardware = RobotHardware(read_description(text))
-    robot = ControlledRobot(model, hardware, ControllerManager(hardware))
-    sim.add_robot(robot)
+def run_arm(sim, interface):
+    robot = add_robot(sim, "arm", arm(interface))
     kind = f"{interface.lower()}_controllers/JointTrajectoryController"
     params = {"type": kind, "joints": list(JOINTS), "constraints": {"goal_time": 0.5}}
-    robot.manager.load("arm", params | KINDS[interface])
-    robot.manager.switch(["arm"], [], STRICT)
+    start(robot, {"arm": params | KINDS[interface]})
     return robot, robot.manager.get("arm")
 
 
@@ -90,7 +76,7 @@ def pursue(controller, points, path):
     ("interface", "path"), [("Effort", 0.02), ("Position", 0.01), ("Velocity", 0.01)]
 )
 def test_a_quintic_is_followed_within_its_tolerances(sim, interface, path):
-    robot, controller = start(sim, interface)
+    robot, controller = run_arm(sim, interface)
     points = [
         TrajectoryPoint(S, (0.5, 0.4), (0.4, -0.2), (0.0, 0.3)),
         TrajectoryPoint(2 * S, (0.8, -0.6), (0.0, 0.0), (0.0, 0.0)),
@@ -103,31 +89,10 @@ def test_a_quintic_is_followed_within_its_tolerances(sim, interface, path):
     assert len(told.samples) == pytest.approx(40, abs=2)
     found = [robot.hardware.joints[name].position for name in JOINTS]
     assert found == pytest.approx([0.8, -0.6], abs=path)
-    # What was wanted on the way is the quintic through the two points, solved for once more.
-    times = np.array([min(2.0, (sample.stamp - S // 500) / S) for sample in told.samples])
-    wanted = np.array([sample.desired[0] for sample in told.samples])
-    for joint in range(2):
-        assert wanted[:, joint] == pytest.approx(_quintics(times, points, joint), abs=1e-6)
-
-
-def _quintics(times, points, joint):
-    """Positions at `times` [s] of the splines from rest at 0 through `points`, by linear equations."""
-    ends = [(0.0, 0.0, 0.0, 0.0)] + [
-        (p.time / S, p.positions[joint], p.velocities[joint], p.accelerations[joint])
-        for p in points
-    ]
-    found = np.full(len(times), np.nan)
-    for (t0, *first), (t1, *last) in zip(ends, ends[1:], strict=False):
-        rows = [np.polynomial.polynomial.polyder(np.eye(6), m, axis=0) for m in range(3)]
-        matrix = [np.polynomial.polynomial.polyval(t - t0, row) for t in (t0, t1) for row in rows]
-        spline = np.linalg.solve(matrix, [*first, *last])
-        inside = (times >= t0) & (times <= t1)
-        found[inside] = np.polynomial.polynomial.polyval(times[inside] - t0, spline)
-    return found
 
 
 def test_a_way_too_fast_for_the_motors_aborts_the_goal(sim):
-    _, controller = start(sim, "Effort")
+    _, controller = run_arm(sim, "Effort")
     with sim.lock:
         sim.advance(1)
         told = pursue(
@@ -140,7 +105,7 @@ def test_a_way_too_fast_for_the_motors_aborts_the_goal(sim):
 
 @pytest.mark.parametrize("interface", ["Effort", "Position", "Velocity"])
 def test_after_a_reset_the_arm_hangs_where_it_was_put(sim, interface):
-    robot, controller = start(sim, interface)
+    robot, controller = run_arm(sim, interface)
     with sim.lock:
         told = pursue(controller, [TrajectoryPoint(S, (1.0, -1.0))], 0.0)
         sim.advance(500)

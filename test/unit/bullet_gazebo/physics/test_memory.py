@@ -36,14 +36,6 @@ def often(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bullet, "MOST_WASTE", 200_000)
 
 
-@pytest.fixture
-def world(new_engine: Callable, often: None):
-    world = World(new_engine())
-    world.spawn("ground_plane", ground_plane(), Pose())
-    yield world
-    world.close()
-
-
 def model_of(shape: str, tmp_path: Path, number: int = 0):
     if shape == "links":
         return parse_urdf(chain())
@@ -70,6 +62,7 @@ def chain(count: int = 30) -> str:
     return f'<robot name="m">{links}{joints}</robot>'
 
 
+@pytest.mark.usefixtures("often")
 @pytest.mark.parametrize("shape", ["links", "cylinder", "mesh"])
 def test_models_that_come_and_go_leave_no_memory_behind(world, shape, tmp_path):
     def cycle(number: int) -> None:
@@ -80,6 +73,7 @@ def test_models_that_come_and_go_leave_no_memory_behind(world, shape, tmp_path):
     assert stays(cycle, CYCLES, WARM_UP, MOST_GROWTH)
 
 
+@pytest.mark.usefixtures("often")
 def test_inertias_that_change_leave_no_memory_behind(world):
     """Domain randomisation of lengths: the engine loads the model anew for each."""
     model = world.spawn("m", parse_urdf(chain()), Pose((0.0, 0.0, 3.0)))
@@ -93,28 +87,25 @@ def test_inertias_that_change_leave_no_memory_behind(world):
     assert stays(cycle, CYCLES, WARM_UP, MOST_GROWTH)
 
 
-def test_models_that_the_engine_refuses_leave_no_memory_behind(often, monkeypatch, tmp_path):
+def test_models_that_the_engine_refuses_leave_no_memory_behind(often, sim, monkeypatch, tmp_path):
     """Its shapes are made before the fault is found."""
 
     def refuse(*args: object) -> None:
         raise DescriptionError("no")
 
-    world = World(bullet.BulletEngine())
     monkeypatch.setattr(
         "bullet_gazebo.physics.engines.bullet_body.BulletBody._check_meshes", refuse
     )
 
     def cycle(number: int) -> None:
         with pytest.raises(DescriptionError):
-            world.spawn("m", model_of("cylinder", tmp_path), Pose())
+            sim.world.spawn("m", model_of("cylinder", tmp_path), Pose())
 
     assert stays(cycle, CYCLES, WARM_UP, MOST_GROWTH)
-    world.close()
 
 
-def stays_among_others(tmp_path, done: Callable = lambda: None) -> bool:
+def stays_among_others(world: World, tmp_path: Path, done: Callable = lambda: None) -> bool:
     """Whether a model was loaded anew while others came and went; it falls all the time."""
-    world = World(bullet.BulletEngine())
     model = world.spawn("stays", model_of("mesh", tmp_path), Pose((0.0, 0.0, 9.0)))
     body = model.body
     Path(tmp_path, "mesh.obj").unlink()
@@ -124,28 +115,25 @@ def stays_among_others(tmp_path, done: Callable = lambda: None) -> bool:
         world.delete("m")
     world.step()
     assert model.state()[1][0][2] < 0.0
-    world.close()
     return model.body is not body
 
 
-def test_a_model_whose_file_is_gone_goes_on_in_the_new_world(often, tmp_path):
-    assert stays_among_others(tmp_path)
+def test_a_model_whose_file_is_gone_goes_on_in_the_new_world(often, sim, tmp_path):
+    assert stays_among_others(sim.world, tmp_path)
 
 
-def test_without_room_for_its_files_a_model_keeps_the_old_world(often, monkeypatch, tmp_path):
-    def full(*args: object, **kwargs: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
+def full(*args: object, **kwargs: object) -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
 
+
+def test_without_room_for_its_files_a_model_keeps_the_old_world(often, sim, monkeypatch, tmp_path):
     writer = "bullet_gazebo.physics.engines.bullet_files.write_mesh"
-    assert not stays_among_others(tmp_path, lambda: monkeypatch.setattr(writer, full))
+    assert not stays_among_others(sim.world, tmp_path, lambda: monkeypatch.setattr(writer, full))
 
 
 @pytest.mark.parametrize("function", ["write_urdf", "_size", "TemporaryDirectory"])
-def test_a_full_disk_is_a_reason_and_leaves_the_world_as_it_was(monkeypatch, function):
-    def full(*args: object, **kwargs: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    world, model = World(bullet.BulletEngine()), parse_urdf(chain(2))
+def test_a_full_disk_is_a_reason_and_leaves_the_world_as_it_was(sim, monkeypatch, function):
+    world, model = sim.world, parse_urdf(chain(2))
     with monkeypatch.context() as disk:
         disk.setattr(f"bullet_gazebo.physics.engines.bullet_engine.{function}", full)
         with pytest.raises(DescriptionError, match="files can't be written: No space left"):
@@ -153,13 +141,12 @@ def test_a_full_disk_is_a_reason_and_leaves_the_world_as_it_was(monkeypatch, fun
     assert list(world.models) == []
     world.spawn("chain", model, Pose())
     world.step()
-    world.close()
 
 
-def test_in_a_new_world_of_the_engine_contacts_begin_anew_gently():
+def test_in_a_new_world_of_the_engine_contacts_begin_anew_gently(sim):
     """A box on the ground; docs/differences.md has the figure."""
-    engine = bullet.BulletEngine()
-    world, client = World(engine), engine._client
+    world, engine = sim.world, sim.world.engine
+    client = engine._client
     world.spawn("ground_plane", ground_plane(), Pose())
     shape = '<box size="1 1 1"/>'
     box = world.spawn("box", parse_urdf(BOX.format(shape, shape)), Pose((0.0, 0.0, 0.5)))
@@ -174,7 +161,6 @@ def test_in_a_new_world_of_the_engine_contacts_begin_anew_gently():
         speeds.append(math.hypot(*box.state()[1][0]))
     assert 1e-3 < max(speeds[500:]) < 0.02
     assert speeds[-1] < 1e-3
-    world.close()
 
 
 def history(monkeypatch: pytest.MonkeyPatch, most_waste: int) -> list:

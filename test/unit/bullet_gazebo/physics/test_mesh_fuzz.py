@@ -3,12 +3,12 @@
 import pytest
 from hypothesis import HealthCheck, given, settings
 from support.mutations.meshes import mesh_files
+from support.robots.worlds import run
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.meshes import read_mesh
 from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
 
 QUICK = settings(deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 SDF = """<sdf version="1.6"><model name="m"><static>{static}</static><link name="l"><collision name="c">
@@ -36,20 +36,16 @@ def test_what_is_read_is_whole(tmp_path_factory, file):
 @pytest.mark.slow
 @settings(QUICK, max_examples=60)
 @given(mesh_files())
-def test_no_mesh_ends_an_engine(new_engine, tmp_path_factory, file):
+def test_no_mesh_ends_an_engine(make_world, tmp_path_factory, file):
     """One that moves and one that stands; an engine that crashes ends this process."""
     path = tmp_path_factory.getbasetemp() / f"mesh{file[0]}"
     path.write_bytes(file[1])
     for static in (0, 1):
-        world = World(new_engine())
-        world.spawn("ground_plane", ground_plane(), Pose())
+        world = make_world(ground=True)
         try:
             world.spawn("m", parse_sdf(SDF.format(static=static, path=path)), Pose())
         except DescriptionError as error:
             assert str(path) in str(error) and "\n" not in str(error)
         else:
-            for _ in range(10):
-                world.step()
+            run(world, 10)
             world.delete("m")
-        finally:
-            world.close()

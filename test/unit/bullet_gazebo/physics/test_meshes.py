@@ -16,14 +16,14 @@ from support.mutations.mesh_files import (
     obj,
     polylist,
 )
+from support.robots.worlds import run
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
+from bullet_gazebo.physics.world import ground_plane
 
 SRC = os.pathsep.join(filter(None, sys.path))
 BALL = (
@@ -58,22 +58,20 @@ def urdf(mesh, scale="0.1 0.1 0.2", tag="collision"):
     )
 
 
-def rest_height(description, start=0.5):
-    world = World(BulletEngine())
-    world.spawn("ground_plane", ground_plane(), Pose())
+def rest_height(world, description, start=0.5):
     model = world.spawn("box", description, Pose((0.0, 0.0, start)))
-    for _ in range(1500):
-        world.step()
+    run(world, 1500)
     pose, (linear, _) = model.state()
-    world.close()
     assert linear == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
     return pose.position[2]
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_mesh_box_comes_to_rest_at_half_its_height(folder, name):
+def test_a_mesh_box_comes_to_rest_at_half_its_height(sim, folder, name):
     scale = "100 100 200" if name.startswith("milli") else "0.1 0.1 0.2"
-    assert rest_height(parse_urdf(urdf(folder / name, scale))) == pytest.approx(0.2, abs=0.01)
+    sim.world.spawn("ground_plane", ground_plane(), Pose())
+    box = parse_urdf(urdf(folder / name, scale))
+    assert rest_height(sim.world, box) == pytest.approx(0.2, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +92,7 @@ def test_meshes_are_found_by_every_uri(tmp_path, uri):
     assert model.links["b"].collisions[0].mesh == str(pack / "cube.stl")
 
 
-def test_a_static_mesh_is_hollow_where_it_is_hollow(tmp_path):
+def test_a_static_mesh_is_hollow_where_it_is_hollow(sim, tmp_path):
     """A trough of two slopes: its convex hull would be full."""
     (tmp_path / "trough.obj").write_text(
         "v -1 -1 1\nv -1 1 1\nv 0 -1 0\nv 0 1 0\nv 1 -1 1\nv 1 1 1\n"
@@ -105,58 +103,33 @@ def test_a_static_mesh_is_hollow_where_it_is_hollow(tmp_path):
         '<sdf version="1.6"><model name="t"><static>1</static><link name="l"><collision name="c">'
         f"<geometry>{mesh}</geometry></collision></link></model></sdf>"
     )
-    ball = parse_sdf(BALL.format(0.1))
-    world = World(BulletEngine())
-    world.spawn("t", trough, Pose())
-    model = world.spawn("b", ball, Pose((0.0, 0.0, 0.6)))
-    for _ in range(1500):
-        world.step()
-    assert model.state()[0].position[2] == pytest.approx(0.1 * 2**0.5, abs=0.03)
-    world.close()
+    sim.world.spawn("t", trough, Pose())
+    height = rest_height(sim.world, parse_sdf(BALL.format(0.1)), 0.6)
+    assert height == pytest.approx(0.1 * 2**0.5, abs=0.03)
 
 
-def test_a_pipe_is_no_mesh(tmp_path):
-    """Opening it would wait for a writer for ever."""
-    os.mkfifo(tmp_path / "pipe.stl")
-    with pytest.raises(DescriptionError, match="pipe.stl': it is not a file"):
-        parse_urdf(urdf(tmp_path / "pipe.stl"))
-
-
-def test_a_missing_visual_is_only_a_warning():
-    model = parse_urdf(urdf("package://gone/x.dae", tag="visual"))
-    assert model.links["b"].visuals == []
-    assert "link 'b', visual: 'package://gone/x.dae' is not found" in model.warnings[0]
-
-
-def test_a_mesh_has_the_shape_that_it_had_on_disk_when_it_was_spawned(new_engine, tmp_path):
+def test_a_mesh_has_the_shape_that_it_had_on_disk_when_it_was_spawned(world, tmp_path):
     path = tmp_path / "cube.stl"
-    world = World(new_engine())
-    world.spawn("ground_plane", ground_plane(), Pose())
     for size in (1.0, 0.5, 2.0):  # the engine has seen the name before
         path.write_bytes(binary_stl(size))
-        model = world.spawn("box", parse_urdf(urdf(path, "0.1 0.1 0.1")), Pose((0.0, 0.0, 0.3)))
-        for _ in range(1500):
-            world.step()
-        assert model.state()[0].position[2] == pytest.approx(0.1 * size, abs=0.005)
+        height = rest_height(world, parse_urdf(urdf(path, "0.1 0.1 0.1")), 0.3)
+        assert height == pytest.approx(0.1 * size, abs=0.005)
         world.delete("box")
-    world.close()
 
 
 @pytest.mark.parametrize("static", [False, True])
-def test_an_engine_opens_no_mesh_file(new_engine, tmp_path, static):
+def test_an_engine_opens_no_mesh_file(world, tmp_path, static):
     """All of it is read before the world has to wait."""
     path = tmp_path / "cube.stl"
     path.write_bytes(binary_stl())
     description = parse_urdf(urdf(path))
     description.static = static
     path.unlink()
-    world = World(new_engine())
     world.spawn("box", description, Pose())
     world.step()
-    world.close()
 
 
-def test_each_object_of_a_file_has_a_hull_of_its_own(tmp_path):
+def test_each_object_of_a_file_has_a_hull_of_its_own(sim, tmp_path):
     """A ball lies between two posts: one hull around both would carry it."""
     posts = [[(x + dx, y, z) for x, y, z in CORNERS] for dx in (-3.0, 3.0)]
     (tmp_path / "posts.obj").write_text(
@@ -167,15 +140,10 @@ def test_each_object_of_a_file_has_a_hull_of_its_own(tmp_path):
             for number, corners in enumerate(posts)
         )
     )
-    ball = parse_sdf(BALL.format(0.5))
-    world = World(BulletEngine())
+    world = sim.world
     world.spawn("ground_plane", ground_plane(), Pose())
     world.spawn("posts", parse_urdf(urdf(tmp_path / "posts.obj", "1 1 1")), Pose((0.0, 0.0, 1.01)))
-    model = world.spawn("ball", ball, Pose((0.0, 0.0, 3.0)))
-    for _ in range(1500):
-        world.step()
-    assert model.state()[0].position[2] == pytest.approx(0.5, abs=0.02)
-    world.close()
+    assert rest_height(world, parse_sdf(BALL.format(0.5)), 3.0) == pytest.approx(0.5, abs=0.02)
 
 
 def test_a_world_without_meshes_does_not_pay_for_them():

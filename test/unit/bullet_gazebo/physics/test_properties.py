@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.robots.bodies import BOX, UP, WHEEL, run
+from support.robots.bodies import BOX, UP, WHEEL
 from support.robots.cartpole import CartPole, cartpole_urdf
+from support.robots.worlds import run
 
 from bullet_gazebo.physics.description import Inertia
 from bullet_gazebo.physics.dynamics import effective_inertias
@@ -22,15 +23,7 @@ from bullet_gazebo.physics.properties import (
     set_link_friction,
     set_link_properties,
 )
-from bullet_gazebo.physics.world import SolverSettings, World, ground_plane
-
-
-@pytest.fixture
-def world(new_engine):
-    world = World(new_engine())
-    world.spawn("ground_plane", ground_plane(), Pose())
-    yield world
-    world.close()
+from bullet_gazebo.physics.world import SolverSettings
 
 
 @pytest.fixture
@@ -63,18 +56,6 @@ def test_no_speed_limit_on_a_single_body(world, box):
     box.place(UP, ((1e4, 0.0, 0.0), (0.0, 0.0, 0.0)))
     world.step()
     assert box.state()[1][0] == pytest.approx((1e4, 0.0, 0.0))
-
-
-def test_collisions_are_frames_but_no_links(world, box):
-    assert world.frame("box::body::hull_collision")[0].position == pytest.approx((0.0, 0.0, 51.0))
-    assert world.frame("hull_collision") == world.frame("box::body::hull_collision")
-    assert list(box.collisions("body")) == ["hull_collision", "body_collision_1"]
-    assert world.link("hull_collision") is None
-    assert world.link("body") == world.link("box::body") == (box, "body")
-    assert world.is_world_frame("map")
-    world.spawn("map", parse_urdf(BOX), UP)
-    assert not world.is_world_frame("map")
-    assert world.frame("map")[0].position == pytest.approx(UP.position)
 
 
 def test_a_force_at_the_centre_of_mass_gives_f_over_m(world, box):
@@ -167,16 +148,6 @@ def test_without_gravity_a_body_floats(world, box):
     set_link_properties(world, box, "body", moved, True)
     run(world, 1000)
     assert box.state()[0].position[2] == pytest.approx(50.0 - 4.9, abs=0.01)
-
-
-@pytest.mark.parametrize("change", [{"mass": 0.0}, {"mass": -1.0}, {"ixx": 0.0}, {"ixy": 9.0}])
-def test_an_impossible_inertia_is_refused(world, box, change):
-    before = link_inertia(box, "body")
-    values = {"mass": 2.0, "ixx": 0.1, "iyy": 0.1, "izz": 0.1} | change
-    with pytest.raises(PropertyError, match="body"):
-        set_link_properties(world, box, "body", Inertia(**values), False)
-    assert link_inertia(box, "body") == before
-    assert box.body.link_gravity("body")
 
 
 def test_a_static_link_keeps_its_properties_without_effect(world):
@@ -299,26 +270,11 @@ def test_a_motor_drives_the_joint(world, wheel):
     assert wheel.joint_state("axle")[1] == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(
-    "wanted", [JointProperties(damping=-1.0), JointProperties(motor_effort=-1.0)]
-)
-def test_what_would_drive_a_joint_for_ever_is_refused(world, wheel, wanted):
-    with pytest.raises(PropertyError, match="must be >= 0"):
-        set_joint_properties(wheel, "axle", wanted, world.time_step)
-
-
-def test_a_fixed_joint_is_there_and_takes_everything(world, cartpole):
-    assert cartpole.all_joints == ["grounding", "stand_cart", "cart_pole"]
-    assert world.joint("cartpole::grounding") == (cartpole, "grounding")
-    assert cartpole.joint_state("grounding") == (0.0, 0.0)
-    set_joint_properties(cartpole, "grounding", JointProperties(damping=1.0), world.time_step)
-
-
-def test_where_damping_is_cut_does_not_depend_on_where_the_joints_are(world, new_engine):
+def test_where_damping_is_cut_does_not_depend_on_where_the_joints_are(make_world):
     """The cart, with its pole upright or level, after a damping that is stiffer than a step."""
     rates = []
     for angle in (0.0, math.pi / 2):
-        other = World(new_engine())
+        other = make_world()
         model = other.spawn("cartpole", parse_urdf(cartpole_urdf()), Pose())
         model.set_joint_positions({"cart_pole": angle})
         set_joint_properties(model, "stand_cart", JointProperties(damping=1e5), other.time_step)
@@ -326,18 +282,7 @@ def test_where_damping_is_cut_does_not_depend_on_where_the_joints_are(world, new
         model.set_joint_velocities({"stand_cart": 1.0})
         run(other, 1)
         rates.append(model.joint_state("stand_cart")[1])
-        other.close()
     assert rates[0] == rates[1]
-
-
-def test_a_placed_pole_takes_the_nearest_joint_values(world, cartpole):
-    target = Pose((0.2, 0.0, 0.18), from_rpy(0.0, -0.7, 0.0))
-    place_link(cartpole, "pole", target, ((0.3, 0.0, 0.0), (0.0, -2.0, 0.0)))
-    assert cartpole.joint_state("stand_cart") == pytest.approx((0.2, 0.3), abs=1e-6)
-    assert cartpole.joint_state("cart_pole") == pytest.approx((0.7, 2.0), abs=1e-6)
-    pose, twist = cartpole.link_state("pole")
-    assert pose.position == pytest.approx(target.position, abs=1e-6)
-    assert twist[1] == pytest.approx((0.0, -2.0, 0.0), abs=1e-6)
 
 
 def test_what_the_joints_do_not_allow_is_left_out(world, cartpole):

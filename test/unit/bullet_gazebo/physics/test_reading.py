@@ -24,6 +24,11 @@ def write_model(folder, name, text):
     (folder / name / "model.sdf").write_text(text)
 
 
+def read_world(includes, folder):
+    text = f'<sdf version="1.6"><world name="w">{includes}</world></sdf>'
+    return parse_world(text, Resources(models=(folder,)))
+
+
 @pytest.fixture
 def bomb(tmp_path):
     """A folder of models: b0 includes b1 ten times, and so on; what is left of them is some links."""
@@ -50,11 +55,11 @@ def test_an_include_bomb_without_links_is_refused_by_the_number_of_models(bomb, 
 
 
 @pytest.mark.slow
-def test_a_world_with_a_bomb_is_refused_as_a_whole(bomb):
+def test_a_world_with_a_bomb_is_refused_as_a_whole(bomb, tmp_path):
     """Each of its models alone would be within all limits."""
     includes = "".join(INCLUDE.format(f"b{LEVELS}", f"m{i}") for i in range(6000))
     with pytest.raises(LimitExceeded, match=r"more than 5000 models \(MAX_MODELS\)"):
-        parse_world(f'<sdf version="1.6"><world name="w">{includes}</world></sdf>', bomb)
+        read_world(includes, tmp_path)
 
 
 def test_a_file_counts_each_time_that_it_is_included(tmp_path, monkeypatch):
@@ -62,31 +67,25 @@ def test_a_file_counts_each_time_that_it_is_included(tmp_path, monkeypatch):
     write_model(tmp_path, "big", MODEL.format("big", LINK + "<x/>" * 500))
     includes = "".join(INCLUDE.format("big", f"m{i}") for i in range(5))
     with pytest.raises(LimitExceeded, match=r"more than 2000 elements \(MAX_ELEMENTS\)"):
-        parse_world(f'<sdf version="1.6"><world name="w">{includes}</world></sdf>',
-                    Resources(models=(tmp_path,)))  # fmt: skip
+        read_world(includes, tmp_path)
 
 
 def test_so_many_files_and_bytes_are_read_and_no_more(tmp_path, monkeypatch):
     for name in "abcd":
         write_model(tmp_path, name, MODEL.format(name, LINK + " " * 1000))
-    includes = "".join(INCLUDE.format(name, name) for name in "abcdabcd")
-    text = (
-        f'<sdf version="1.6"><world name="w">{includes.replace("<name>", "<name>x")}</world></sdf>'
-    )
-    resources = Resources(models=(tmp_path,))
+    includes = "".join(INCLUDE.format(name, f"x{name}") for name in "abcdabcd")
     monkeypatch.setattr(limits, "MAX_FILES", 4)
-    assert (
-        len(parse_world(text, resources).models) == 4
-    )  # a file that is known already is none more
+    # A file that is known already is none more.
+    assert len(read_world(includes, tmp_path).models) == 4
     monkeypatch.setattr(limits, "MAX_FILES", 3)
     with pytest.raises(LimitExceeded) as raised:
-        parse_world(text, resources)
+        read_world(includes, tmp_path)
     assert f"{tmp_path}/d/model.sdf: more than 3 files" in str(raised.value)
     assert "(MAX_FILES)" in str(raised.value)
     monkeypatch.undo()
     monkeypatch.setattr(limits, "MAX_BYTES", 3000)
     with pytest.raises(LimitExceeded) as raised:
-        parse_world(text, resources)
+        read_world(includes, tmp_path)
     assert f"{tmp_path}/c/model.sdf: more than 3000 bytes" in str(raised.value)
 
 
@@ -105,8 +104,7 @@ def test_a_mesh_is_read_once_however_many_models_have_it(tmp_path, monkeypatch):
         return read_mesh(path, submesh)
 
     monkeypatch.setattr(limits, "read_mesh", counted)
-    world = parse_world(f'<sdf version="1.6"><world name="w">{includes}</world></sdf>',
-                        Resources(models=(tmp_path,)))  # fmt: skip
+    world = read_world(includes, tmp_path)
     assert read == [tmp_path / "chair.obj"]
     solids = [model.links["l"].collisions[0].solid for model in world.models.values()]
     assert len(solids) == 5

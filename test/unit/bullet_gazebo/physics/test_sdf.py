@@ -5,12 +5,12 @@ import math
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.robots.worlds import run
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.pose import Pose, from_rpy, rotate
-from bullet_gazebo.physics.world import World, ground_plane
 
 ORIGIN = Pose()
 BOX = '<collision name="c"><geometry><box><size>{size}</size></box></geometry></collision>'
@@ -34,32 +34,22 @@ def sdf(*parts, version="1.6", name="m"):
     return f'<sdf version="{version}"><model name="{name}">{"".join(parts)}</model></sdf>'
 
 
-def spawn(engine, text, pose=ORIGIN, gravity=(0.0, 0.0, 0.0)):
-    world = World(engine, gravity=gravity)
-    description = parse_sdf(text)
-    return world, world.spawn("m", description, pose)
+@pytest.fixture
+def spawn(make_world):
+    """Spawn a model that a text describes; returns its world, too."""
+
+    def spawn(text, pose=ORIGIN, gravity=(0.0, 0.0, 0.0)):
+        world = make_world(gravity=gravity)
+        return world, world.spawn("m", parse_sdf(text), pose)
+
+    return spawn
 
 
 COLLIDE = "<self_collide>{}</self_collide>"
 
 
-def test_a_box_comes_to_rest_on_the_ground(new_engine):
-    world = World(new_engine())
-    world.spawn("ground_plane", ground_plane(), Pose())
-    box = parse_sdf(sdf(link("b", more=BOX.format(size="0.2 0.2 0.2"))))
-    model = world.spawn("box", box, Pose((0.0, 0.0, 0.5)))
-    for _ in range(1500):
-        world.step()
-    pose, (linear, _) = model.state()
-    assert pose.position == pytest.approx((0.0, 0.0, 0.1), abs=0.002)
-    assert linear == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
-    assert list(model.collisions("b")) == ["c"]
-    world.close()
-
-
-def test_link_poses_are_the_models_and_survive_a_model_pose(new_engine):
+def test_link_poses_are_the_models_and_survive_a_model_pose(spawn):
     world, model = spawn(
-        new_engine(),
         sdf("<pose>5 0 0 0 0 0</pose>", link("a", "0 0 1 0 0 0.5"), link("b", "1 0 2 0.3 0 0"),
             joint("j", "revolute", "a", "b")),
         Pose((0.0, 1.0, 0.0)),
@@ -70,7 +60,6 @@ def test_link_poses_are_the_models_and_survive_a_model_pose(new_engine):
         pose, _ = model.link_state(name)
         assert pose.position == pytest.approx(position, abs=1e-6)
         assert pose.orientation == pytest.approx(from_rpy(*rpy), abs=1e-6)
-    world.close()
 
 
 numbers = st.floats(-2.0, 2.0).map(lambda value: round(value, 3))
@@ -87,15 +76,13 @@ def frame(values):
 
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
 @given(six, six, six, st.floats(-3.0, 3.0), st.sampled_from(["revolute", "prismatic"]))
-def test_a_joint_moves_its_child_about_its_own_frame(
-    new_engine, parent, child, anchor, position, kind
-):
+def test_a_joint_moves_its_child_about_its_own_frame(spawn, parent, child, anchor, position, kind):
     """For any place of links and joint the child goes where the transforms say."""
     text = sdf(
         link("a", words(parent)), link("b", words(child)),
         joint("j", kind, "a", "b", "0 0 1", f"<pose>{words(anchor)}</pose>"),
     )  # fmt: skip
-    world, model = spawn(new_engine(), text)
+    world, model = spawn(text)
     model.set_joint_positions({"j": position})
     axis = frame(child).compose(frame(anchor))
     step = (
@@ -108,12 +95,10 @@ def test_a_joint_moves_its_child_about_its_own_frame(
     assert pose.position == pytest.approx(expected.position, abs=1e-5)
     same = abs(sum(a * b for a, b in zip(pose.orientation, expected.orientation, strict=True)))
     assert same == pytest.approx(1.0, abs=1e-6)
-    world.close()
 
 
-def test_a_link_off_its_joint_has_the_velocity_of_its_own_origin(new_engine):
+def test_a_link_off_its_joint_has_the_velocity_of_its_own_origin(spawn):
     world, model = spawn(
-        new_engine(),
         sdf(link("a"), link("b", "2 0 0 0 0 0"), joint("w", "fixed", "world", "a"),
             joint("j", "revolute", "a", "b", pose="<pose>-2 0 0 0 0 0</pose>"))
     )  # fmt: skip
@@ -122,7 +107,6 @@ def test_a_link_off_its_joint_has_the_velocity_of_its_own_origin(new_engine):
     assert pose.position == pytest.approx((2.0, 0.0, 0.0), abs=1e-6)
     assert linear == pytest.approx((0.0, 6.0, 0.0), abs=1e-6)
     assert angular == pytest.approx((0.0, 0.0, 3.0), abs=1e-6)
-    world.close()
 
 
 @pytest.mark.parametrize(
@@ -182,9 +166,8 @@ def test_limits_dynamics_defaults_and_surfaces_are_read():
     assert (model.links["c"].collisions[0].mu, model.links["c"].gravity) == (0.3, False)
 
 
-def test_a_model_may_stand_on_the_world_by_a_movable_joint(new_engine):
+def test_a_model_may_stand_on_the_world_by_a_movable_joint(spawn):
     world, model = spawn(
-        new_engine(),
         sdf(link("cart", "0 0 1 0 0 0"), joint("slide", "prismatic", "world", "cart", "1 0 0")),
         gravity=(0.0, 0.0, -9.8),
     )
@@ -193,43 +176,36 @@ def test_a_model_may_stand_on_the_world_by_a_movable_joint(new_engine):
     assert model.joint_state("slide")[1] == pytest.approx(0.002)
     assert model.link_names == ["cart"]
     assert model.link_state("cart")[0].position[2] == pytest.approx(1.0, abs=1e-6)
-    world.close()
 
 
-def test_a_static_model_stands_whatever_its_links_are_joined_to(new_engine):
+def test_a_static_model_stands_whatever_its_links_are_joined_to(spawn):
     world, model = spawn(
-        new_engine(),
         sdf("<static>true</static>", link("a"), link("b", "0 0 3 0 0 0"), link("c", "1 0 0 0 0 0"),
             joint("j", "revolute", "b", "c")),
         gravity=(0.0, 0.0, -9.8),
     )  # fmt: skip
-    for _ in range(100):
-        world.step()
+    run(world, 100)
     assert model.link_state("b")[0].position == pytest.approx((0.0, 0.0, 3.0), abs=1e-6)
     assert model.link_state("c")[0].position == pytest.approx((1.0, 0.0, 0.0), abs=1e-6)
     assert model.link_names == ["a", "b", "c"]
     assert model.all_joints == ["j"]
     assert model.joint_state("j") == (0.0, 0.0)
-    world.close()
 
 
-def test_a_plane_faces_where_its_normal_says(new_engine):
+def test_a_plane_faces_where_its_normal_says(spawn):
     plane = (
         '<collision name="c"><geometry><plane><normal>1 0 0</normal></plane></geometry></collision>'
     )
     world, wall = spawn(
-        new_engine(),
         sdf("<static>true</static>", f'<link name="l">{plane}</link>'),
         Pose((-1.0, 0.0, 0.0)), (-9.8, 0.0, 0.0),
     )  # fmt: skip
     ball = parse_sdf(sdf(link("b", more=BOX.format(size="0.2 0.2 0.2"))))
     model = world.spawn("box", ball, Pose((-0.8, 0.0, 0.0)))
-    for _ in range(1500):
-        world.step()
+    run(world, 1500)
     assert model.state()[0].position[0] == pytest.approx(-0.9, abs=0.002)
     assert wall.state()[0].position == pytest.approx((-1.0, 0.0, 0.0), abs=1e-6)
     assert wall.state()[0].orientation == pytest.approx((0, 0, 0, 1), abs=1e-6)
-    world.close()
 
 
 def test_nested_models_melt_into_the_outer_one():
@@ -346,12 +322,9 @@ def pair(a="", b="", of_model=""):
         (COLLIDE.format(0), COLLIDE.format(0), COLLIDE.format("true"), False),
     ],
 )
-def test_two_links_of_a_model_meet_if_either_wants_it(new_engine, a, b, of_model, meet):
-    world = World(new_engine(), gravity=(0.0, 0.0, 0.0))
-    model = world.spawn("m", parse_sdf(pair(a, b, of_model)), Pose())
-    for _ in range(500):
-        world.step()
+def test_two_links_of_a_model_meet_if_either_wants_it(spawn, a, b, of_model, meet):
+    world, model = spawn(pair(a, b, of_model))
+    run(world, 500)
     apart = model.joint_state("jb")[0] - model.joint_state("ja")[0]
     assert (apart > 0.15) == meet
     assert apart > -1e-9
-    world.close()

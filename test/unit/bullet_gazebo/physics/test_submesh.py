@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from support.mutations.mesh_files import CORNERS, FACES, dae, obj
+from support.robots.worlds import run
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.meshes import Submesh, read_mesh
 from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
 
 MODEL = """<sdf version="1.6"><model name="m"><link name="l"><collision name="c"><geometry><mesh><uri>{}</uri>
 <submesh>{}</submesh><scale>0.1 0.1 0.1</scale></mesh></geometry></collision></link></model></sdf>"""
@@ -83,17 +83,13 @@ def test_without_a_name_the_whole_file_is_meant(file, name):
         ("<name>high</name><center>true</center>", 0.1),
     ],
 )
-def test_a_part_alone_is_what_collides(new_engine, file, part, height):
-    world = World(new_engine())
-    world.spawn("ground_plane", ground_plane(), Pose())
+def test_a_part_alone_is_what_collides(world, file, part, height):
     model = world.spawn("m", parse_sdf(MODEL.format(file, part)), Pose((0.0, 0.0, height + 0.05)))
-    for _ in range(1500):
-        world.step()
+    run(world, 1500)
     assert model.state()[0].position[2] == pytest.approx(height, abs=0.01)
-    world.close()
 
 
-def test_two_parts_of_a_file_are_two_shapes(new_engine, file):
+def test_two_parts_of_a_file_are_two_shapes(world, file):
     """Of one model, whose file is read once for each."""
     text = MODEL.format(file, "<name>low</name>")
     second = text[text.index("<collision") : text.index("</link>")].replace('"c"', '"d"')
@@ -101,7 +97,5 @@ def test_two_parts_of_a_file_are_two_shapes(new_engine, file):
     description = parse_sdf(both)
     one, other = description.links["l"].collisions
     assert one.solid != other.solid and one.mesh == other.mesh
-    world = World(new_engine())
     world.spawn("m", description, Pose())
     world.step()
-    world.close()

@@ -1,17 +1,15 @@
 """Reading URDF: faults named with their place, and fixed joints lumped as Gazebo does."""
 
-import math
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.robots.cartpole import cartpole_urdf
+from support.robots.worlds import run
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.engines.bullet_files import write_urdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, from_rpy, multiply, normalized, rotate, to_rpy
-from bullet_gazebo.physics.world import World, ground_plane
 
 INERTIAL = (
     '<inertial><origin xyz="{com}"/><mass value="{mass}"/>'
@@ -29,6 +27,12 @@ def joint(name, kind, parent, child, xyz="0 0 0", more=""):
         f'<child link="{child}"/><axis xyz="0 0 1"/>'
         f'<limit lower="-1" upper="1" effort="1" velocity="1"/>{more}</joint>'
     )
+
+
+@pytest.fixture
+def space(make_world):
+    """A world without gravity."""
+    return make_world(gravity=(0.0, 0.0, 0.0))
 
 
 def robot(*parts):
@@ -101,17 +105,15 @@ def test_links_without_mass_are_dropped_with_what_hangs_from_them():
     assert "ghost" in model.warnings[0]
 
 
-def test_a_robot_may_turn_on_the_world_itself(new_engine):
+def test_a_robot_may_turn_on_the_world_itself(space):
     model = parse_urdf(
         robot('<link name="world"/>', link("arm"), joint("j", "continuous", "world", "arm"))
     )
-    world = World(new_engine(), gravity=(0.0, 0.0, 0.0))
-    spawned = world.spawn("r", model, Pose())
+    spawned = space.spawn("r", model, Pose())
     assert spawned.link_names == ["arm"]
     spawned.body.apply_efforts((0.1,))
-    world.step()
+    space.step()
     assert spawned.joint_state("j")[1] == pytest.approx(0.001)
-    world.close()
 
 
 def test_a_floating_joint_to_the_world_is_a_free_base():
@@ -163,37 +165,24 @@ def test_a_fault_is_one_line_with_its_place(text, fault):
 
 def chain(count):
     links = [link(f"l{i}") for i in range(count + 1)]
-    joints = [joint(f"j{i}", "revolute", f"l{i}", f"l{i + 1}") for i in range(count)]
-    return parse_urdf(robot(*links, *joints))
+    return [*links, *(joint(f"j{i}", "revolute", f"l{i}", f"l{i + 1}") for i in range(count))]
 
 
-def test_a_long_chain_moves_to_its_last_joint(new_engine):
-    world = World(new_engine(), gravity=(0.0, 0.0, 0.0))
-    model = world.spawn("r", chain(121), Pose())
+def test_a_long_chain_moves_to_its_last_joint(space):
+    model = space.spawn("r", parse_urdf(robot(*chain(121))), Pose())
     model.body.apply_efforts([0.0] * 120 + [0.1])
-    world.step()
+    space.step()
     assert model.joint_state("j120")[1] > 0.0
-    world.close()
 
 
-def test_links_may_come_before_the_ones_that_carry_them(new_engine):
+def test_links_may_come_before_the_ones_that_carry_them(space):
     """PyBullet's process dies of it."""
     text = robot(link("c"), link("b"), link("a"), joint("k", "revolute", "b", "c", "0 0 1"),
                  joint("j", "revolute", "a", "b", "0 0 1"))  # fmt: skip
-    world = World(new_engine(), gravity=(0.0, 0.0, 0.0))
-    model = world.spawn("r", parse_urdf(text), Pose())
+    model = space.spawn("r", parse_urdf(text), Pose())
     assert model.link_names == ["c", "b", "a"]
     assert model.joint_names == ("k", "j")
     assert model.link_state("c")[0].position == pytest.approx((0.0, 0.0, 2.0), abs=1e-6)
-    world.close()
-
-
-def test_a_chain_too_long_for_the_engine_is_refused(new_engine):
-    world = World(new_engine())
-    with pytest.raises(DescriptionError, match="it has 122 joints"):
-        world.spawn("r", chain(122), Pose())
-    assert world.models == {}
-    world.close()
 
 
 DYNAMICS = '<dynamics damping="-1"/>'
@@ -203,6 +192,7 @@ HUGE = '<collision><geometry><sphere radius="1e30"/></geometry></collision>'
 @pytest.mark.parametrize(
     ("parts", "fault"),
     [
+        (chain(122), "it has 122 joints"),
         ((link("a", mass=1e300),), "link 'a': a mass of 1e+300 kg"),
         ((link("a", mass=1e-300),), "link 'a': a mass of 1e-300 kg"),
         ((link("a", inertia=1e30),), "link 'a': a moment of inertia of 1e+30"),
@@ -217,13 +207,11 @@ HUGE = '<collision><geometry><sphere radius="1e30"/></geometry></collision>'
         ),
     ],
 )
-def test_what_the_engine_would_crash_on_is_refused(new_engine, parts, fault):
-    world = World(new_engine())
+def test_what_the_engine_would_crash_on_is_refused(space, parts, fault):
     with pytest.raises(DescriptionError) as raised:
-        world.spawn("r", parse_urdf(robot(*parts)), Pose())
+        space.spawn("r", parse_urdf(robot(*parts)), Pose())
     assert fault in str(raised.value)
-    assert world.models == {}
-    world.close()
+    assert space.models == {}
 
 
 SPHERE = '<collision{name}><geometry><sphere radius="0.1"/></geometry></collision>'
@@ -244,7 +232,7 @@ def test_collisions_are_named_as_sdformat_names_them():
     ]  # fmt: skip
 
 
-def test_fixed_joints_are_kept_where_the_file_says(new_engine):
+def test_fixed_joints_are_kept_where_the_file_says(make_world):
     extra = (
         '<gazebo reference="a"><preserveFixedJoint>true</preserveFixedJoint></gazebo>'
         '<gazebo reference="b"><disableFixedJointLumping>true</disableFixedJointLumping></gazebo>'
@@ -255,14 +243,12 @@ def test_fixed_joints_are_kept_where_the_file_says(new_engine):
     )  # fmt: skip
     assert [(j.name, j.kind) for j in model.joints.values()] == [("a", "fixed"), ("b", "revolute")]
     assert (model.joints["b"].lower, model.joints["b"].upper) == (0.0, 0.0)
-    world = World(new_engine())
+    world = make_world()
     spawned = world.spawn("r", model, Pose())
     assert spawned.link_names == ["base", "x", "y"]
-    for _ in range(200):
-        world.step()
+    run(world, 200)
     base, end = spawned.link_state("base")[0], spawned.link_state("y")[0]
     assert end.relative_to(base).position == pytest.approx((2.0, 0.0, 0.0), abs=1e-4)
-    world.close()
 
 
 def test_gazebo_blocks_set_friction_and_gravity():
@@ -276,25 +262,7 @@ def test_gazebo_blocks_set_friction_and_gravity():
     assert model.warnings == ["<gazebo reference='nobody'> refers to no link or joint"]
 
 
-def test_friction_decides_whether_a_box_slides(new_engine):
-    """On a slope of 20 degrees, by gravity turned so, with a coefficient below and above its tangent."""
-    slope = (9.8 * math.sin(math.radians(20)), 0.0, -9.8 * math.cos(math.radians(20)))
-    shape = '<collision><geometry><box size="0.4 0.4 0.1"/></geometry></collision>'
-    ways = []
-    for mu in (0.2, 0.6):
-        world = World(new_engine(), gravity=slope)
-        world.spawn("ground_plane", ground_plane(), Pose())
-        text = robot(link("b", more=shape), f'<gazebo reference="b"><mu1>{mu}</mu1></gazebo>')
-        box = world.spawn("b", parse_urdf(text), Pose((0.0, 0.0, 0.05)))
-        for _ in range(1000):
-            world.step()
-        ways.append(box.state()[0].position[0])
-        world.close()
-    sliding = 0.5 * 9.8 * (math.sin(math.radians(20)) - 0.2 * math.cos(math.radians(20)))
-    assert ways == pytest.approx([sliding, 0.0], abs=0.05)
-
-
-def test_a_lumped_caster_keeps_its_own_friction(new_engine):
+def test_a_lumped_caster_keeps_its_own_friction(make_world):
     """A sledge that rests on two runners, one of them without friction: a push of g/4 meets mu N/2."""
     sphere = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
     plate = '<collision><geometry><box size="0.1 1 0.1"/></geometry></collision>'
@@ -307,8 +275,7 @@ def test_a_lumped_caster_keeps_its_own_friction(new_engine):
         '<gazebo reference="runner"><mu1>0.2</mu1></gazebo>'
         '<gazebo reference="caster"><mu1>0</mu1><mu2>0</mu2></gazebo>',
     )  # fmt: skip
-    world = World(new_engine(), gravity=(0.0, 2.45, -9.8))
-    world.spawn("ground_plane", ground_plane(), Pose())
+    world = make_world(ground=True, gravity=(0.0, 2.45, -9.8))
     model = world.spawn("r", parse_urdf(text), Pose((0.0, 0.0, 0.15)))
     assert model.link_names == ["base"]
     assert list(model.collisions("base")) == [
@@ -317,25 +284,20 @@ def test_a_lumped_caster_keeps_its_own_friction(new_engine):
     ]  # fmt: skip
     shapes = model.description.links["base"].collisions
     assert [shape.mu for shape in shapes] == [1.0, 0.0, 0.2]
-    for _ in range(200):
-        world.step()
+    run(world, 200)
     # The runner at one end brakes half the weight, so the centre of mass feels 2.45 - 0.2 * 9.8 / 2.
     assert model.state()[1][0][1] == pytest.approx(0.2 * (2.45 - 0.98), abs=0.06)
-    world.close()
 
 
-def test_a_wheel_stands_still_and_rolls(new_engine):
+def test_a_wheel_stands_still_and_rolls(world):
     """A roller that a torque of 0.5 N m on its axis would drive by T r / (m r² + J)."""
     shape = (
         '<collision><origin rpy="1.5707963267948966 0 0"/><geometry>'
         '<cylinder radius="0.1" length="0.5"/></geometry></collision>'
     )
-    world = World(new_engine())
-    world.spawn("ground_plane", ground_plane(), Pose())
     text = robot(link("a", mass=2.0, inertia=0.01, more=shape))
     model = world.spawn("r", parse_urdf(text), Pose((0.0, 0.0, 0.1)))
-    for _ in range(1000):
-        world.step()
+    run(world, 1000)
     assert model.state()[0].position == pytest.approx((0.0, 0.0, 0.1), abs=2e-3)
     for _ in range(1000):
         model.body.add_wrench("a", (0.0, 0.0, 0.0), (0.0, 0.5, 0.0))
@@ -343,7 +305,6 @@ def test_a_wheel_stands_still_and_rolls(new_engine):
     linear, angular = model.state()[1]
     assert linear[0] == pytest.approx(0.5 * 0.1 / (2.0 * 0.01 + 0.01), rel=0.1)
     assert angular[1] * 0.1 == pytest.approx(linear[0], rel=0.02)
-    world.close()
 
 
 def test_sensors_are_left_out_and_named():

@@ -3,12 +3,12 @@
 import os
 
 import pytest
+from support.robots.worlds import run
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World
 
 TENSOR = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
 INERTIAL = f'<inertial><mass value="1"/>{TENSOR}</inertial>'
@@ -60,7 +60,7 @@ LEFT_OUT = [  # a part of the link `body`; what its warning says
 
 
 @pytest.mark.parametrize(("part", "fault"), LEFT_OUT)
-def test_a_shape_that_cannot_be_read_is_left_out_and_the_robot_stands(new_engine, part, fault):
+def test_a_shape_that_cannot_be_read_is_left_out_and_the_robot_stands(world, part, fault):
     model = parse_urdf(robot(body=BALL + part + BALL))
     body = model.links["body"]
     assert ([each.kind for each in body.collisions], body.visuals) == (["sphere"] * 2, [])
@@ -68,9 +68,7 @@ def test_a_shape_that_cannot_be_read_is_left_out_and_the_robot_stands(new_engine
     assert fault in warning
     assert warning.startswith("link 'body', ")
     assert warning.endswith("; it is left out")
-    world = World(new_engine())
     assert world.spawn("r", model, Pose()).joint_names == ("hinge",)
-    world.close()
 
 
 @pytest.mark.parametrize(
@@ -118,23 +116,21 @@ def test_moments_that_are_missing_are_zero():
 @pytest.mark.parametrize(
     "moments", [(0, 0, 0), (0, 1, 1), (1e-40, 1, 0)], ids=["none", "one missing", "underflow"]
 )
-def test_moments_that_no_body_has_are_those_of_ode(new_engine, moments):
+def test_moments_that_no_body_has_are_those_of_ode(make_world, moments):
     """PyBullet would lose the world to the first step, MuJoCo refuse the model."""
     ixx, iyy, izz = moments
     tensor = f'<inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" ixz="0" iyz="0"/>'
     text = robot(arm=f'<inertial><mass value="1"/>{tensor}</inertial>', more="").replace(
         TENSOR, tensor
     )
-    world = World(new_engine())
+    world = make_world()
     description = parse_urdf(text)
     inertia = description.links["arm"].inertia
     assert (inertia.mass, inertia.ixx, inertia.iyy, inertia.izz) == (1.0, 1.0, 1.0, 1.0)
     assert [warning[:11] for warning in description.warnings] == ["link 'body'", "link 'arm':"]
     model = world.spawn("r", description, Pose())
-    for _ in range(10):
-        world.step()
+    run(world, 10)
     assert model.state()[0].position[2] == pytest.approx(-9.8 * 0.01**2 / 2, rel=0.2)
-    world.close()
 
 
 def test_a_colour_that_cannot_be_read_leaves_the_shape():
@@ -193,6 +189,8 @@ def test_crossed_limits_are_swapped():
         ('<axis xyz="0 0 0"/>' + LIMIT, "the axis has length 0"),
         ('<axis xyz="1e200 1e200 0"/>' + LIMIT, "the axis has length inf"),
         ('<dynamics damping="soft"/>' + LIMIT, "<dynamics damping>: 'soft' is not a number"),
+        ("<mimic/>" + LIMIT, "<mimic> needs the attribute 'joint'"),
+        ("<safety_controller/>" + LIMIT, "<safety_controller> needs the attribute 'k_velocity'"),
     ],
 )
 def test_a_joint_that_cannot_be_read_refuses_the_robot(joint, fault):
@@ -202,13 +200,14 @@ def test_a_joint_that_cannot_be_read_refuses_the_robot(joint, fault):
     assert fault in str(raised.value)
 
 
-def test_a_collision_whose_mesh_is_missing_refuses_the_robot():
-    mesh = shape("collision", '<mesh filename="package://gone/x.stl"/>')
-    with pytest.raises(DescriptionError, match=r"link 'body', collision: 'package://gone/x\.stl'"):
-        parse_urdf(robot(body=mesh))
-
-
-URIS = ["loop.stl", "file://{}/pipe.stl", "gz://fuel/x.stl", "x%00.stl", "~%00/x.stl"]
+URIS = [
+    "package://gone/x.stl",
+    "loop.stl",
+    "file://{}/pipe.stl",
+    "gz://fuel/x.stl",
+    "x%00.stl",
+    "~%00/x.stl",
+]
 
 
 @pytest.mark.parametrize("uri", URIS)
@@ -229,6 +228,11 @@ def test_an_extension_is_its_attribute_or_else_its_text(element):
     block = f'<gazebo reference="body">{element.format(0.3)}</gazebo>'
     model = parse_urdf(robot(body=BALL, more=block))
     assert model.links["body"].collisions[0].mu == 0.3
+
+
+def test_a_friction_that_is_no_number_is_refused_with_its_place():
+    with pytest.raises(DescriptionError, match="<gazebo reference='body'>, <mu1>: 'slippery'"):
+        parse_urdf(robot(more='<gazebo reference="body"><mu1 value="slippery"/></gazebo>'))
 
 
 def spelt(tag, word):
@@ -258,8 +262,3 @@ def test_truth_has_many_spellings(word, truth):
     for static, collide in zip(spelt("static", word), spelt("self_collide", word), strict=True):
         model = parse_urdf(robot(more=f"<gazebo>{static}{collide}</gazebo>"))
         assert (model.static, model.links["arm"].self_collide) == (True, True)
-
-
-def test_a_friction_that_is_no_number_is_refused_with_its_place():
-    with pytest.raises(DescriptionError, match="<gazebo reference='body'>, <mu1>: 'slippery'"):
-        parse_urdf(robot(more='<gazebo reference="body"><mu1 value="slippery"/></gazebo>'))

@@ -1,14 +1,10 @@
 """Velocity and position joints against contacts: a robot on wheels, and a gripper around a box."""
 
 import pytest
+from support.robots.worlds import add_robot, start
 
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.control.transmissions import read_description
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
-from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 
 
@@ -58,49 +54,42 @@ def gripper():
 class Bench:
     """A robot on the ground, its joints under one group controller."""
 
-    def __init__(self, engine, text, pose, kind, joints, gains=None):
-        self.sim = Simulator(World(engine), lockstep=True)
-        self.sim.world.spawn("ground_plane", ground_plane(), Pose())
-        self.model = self.sim.world.spawn("robot", parse_urdf(text), pose)
-        self.hardware = RobotHardware(read_description(text), gains)
-        manager = ControllerManager(self.hardware)
-        self.sim.add_robot(ControlledRobot(self.model, self.hardware, manager))
-        self.group = manager.load("group", {"type": kind, "joints": joints})
-        manager.switch(["group"], [], STRICT)
+    def __init__(self, world, text, pose, kind, joints, gains=None):
+        self.sim = Simulator(world, lockstep=True)
+        self.robot = add_robot(self.sim, "robot", text, pose, gains)
+        start(self.robot, {"group": {"type": kind, "joints": joints}})
 
     def advance(self, seconds, *commands):
-        self.group.command_all(commands)
+        self.robot.manager.get("group").command_all(commands)
         with self.sim.lock:
             self.sim.advance(round(1000 * seconds))
 
 
 @pytest.mark.parametrize(("left", "right"), [(5.0, 5.0), (2.0, -2.0)])
-def test_a_robot_drives_straight_and_turns_as_fast_as_its_wheels_say(new_engine, left, right):
+def test_a_robot_drives_straight_and_turns_as_fast_as_its_wheels_say(world, left, right):
     kind = "velocity_controllers/JointGroupVelocityController"
-    bench = Bench(new_engine(), cart(), Pose((0.0, 0.0, 0.1)), kind, ["left", "right"])
+    bench = Bench(world, cart(), Pose((0.0, 0.0, 0.1)), kind, ["left", "right"])
     bench.advance(0.5, 0.0, 0.0)
     bench.advance(0.5, left, right)
-    before = bench.model.state()[0].position
+    before = bench.robot.model.state()[0].position
     bench.advance(4.0, left, right)
-    (pose, (linear, angular)) = bench.model.state()
+    (pose, (linear, angular)) = bench.robot.model.state()
     assert pose.position[0] - before[0] == pytest.approx(4.0 * 0.1 * (left + right) / 2, abs=0.01)
     assert pose.position[1] == pytest.approx(0.0, abs=0.01)
     assert angular[2] == pytest.approx(0.1 * (right - left) / 0.4, rel=0.1, abs=0.01)
-    bench.sim.world.close()
 
 
-def test_a_gripper_with_gains_holds_a_box_and_lifts_it(new_engine):
+def test_a_gripper_with_gains_holds_a_box_and_lifts_it(world):
     kind = "position_controllers/JointGroupPositionController"
     gains = {name: {"p": 2000.0, "d": 40.0} for name in ("left", "right")}
-    bench = Bench(new_engine(), gripper(), Pose(), kind, ["left", "right", "lift"], gains)
+    bench = Bench(world, gripper(), Pose(), kind, ["left", "right", "lift"], gains)
     text = link("box", 0.5, '<box size="0.08 0.08 0.1"/>', 0.001)
-    box = bench.sim.world.spawn(
+    box = world.spawn(
         "box", parse_urdf(f'<robot name="box">{text}</robot>'), Pose((0.0, 0.0, 0.05))
     )
     bench.advance(0.3, 0.0, 0.0, 0.0)
     bench.advance(2.0, 0.06, 0.06, 0.0)
-    fingers = [bench.hardware.joints[name].position for name in ("left", "right")]
+    fingers = [bench.robot.hardware.joints[name].position for name in ("left", "right")]
     assert fingers == pytest.approx([0.05, 0.05], abs=0.003)
     bench.advance(2.0, 0.06, 0.06, 0.3)
     assert box.state()[0].position == pytest.approx((0.0, 0.0, 0.35), abs=0.01)
-    bench.sim.world.close()

@@ -7,9 +7,7 @@ import pytest
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.world_file import empty_world, load_world, parse_world
-from bullet_gazebo.physics.world import World
 from bullet_gazebo.ros.services.spawn_services import fill_world, find_world, read_world
-from bullet_gazebo.simulator import Simulator
 
 EMPTY = Path(__file__).resolve().parents[4] / "companions/gazebo_ros/worlds/empty.world"
 BOX = (
@@ -63,16 +61,6 @@ def test_an_include_overrides_name_pose_and_static(tmp_path):
     assert found.models["crate"].initial_pose.position == (0.0, 0.0, 0.5)
     assert found.models["c2"].initial_pose.position == (1.0, 0.0, 0.0)
     assert (found.models["crate"].static, found.models["c2"].static) == (False, True)
-
-
-def test_physics_and_gravity():
-    found = world(
-        "<gravity>0 0 -1.6</gravity><physics type='ode'><max_step_size>0.002</max_step_size>"
-        "<real_time_update_rate>500</real_time_update_rate><ode><solver><iters>20</iters></solver></ode>"
-        "</physics>"
-    )
-    assert found.gravity == (0.0, 0.0, -1.6)
-    assert (found.time_step, found.update_rate, found.iterations) == (0.002, 500.0, 20)
 
 
 def test_lights_keep_what_the_file_says():
@@ -149,15 +137,11 @@ def test_without_a_usable_file_the_world_is_empty_and_the_log_says_why(tmp_path,
     assert "empty but for a ground plane" in line
 
 
-def test_a_world_is_not_read_or_filled_to_the_end_once_that_is_interrupted(
-    tmp_path, caplog, new_engine
-):
+def test_a_world_is_not_read_or_filled_to_the_end_once_that_is_interrupted(tmp_path, caplog, sim):
     path = tmp_path / "my.world"
     path.write_text(f'<sdf version="1.6"><world name="w">{box("a")}{box("b")}</world></sdf>')
     assert list(read_world(str(path), lambda: True).models) == ["ground_plane"]
     assert "reading was interrupted" in caplog.messages[0]
-    sim = Simulator(World(new_engine()))
     answers = iter([False, True])
     fill_world(sim, read_world(str(path), lambda: False), lambda: next(answers))
     assert list(sim.world.models) == ["a"]
-    sim.world.close()

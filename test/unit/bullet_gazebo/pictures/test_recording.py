@@ -24,11 +24,10 @@ BALL = """<robot name="ball"><link name="base">
 
 
 @pytest.fixture
-def sim():
-    made = Simulator(World(make_engine()), lockstep=True)
-    made.world.spawn("ground_plane", ground_plane(), Pose())
-    yield made
-    made.world.close()
+def sim(sim: Simulator) -> Simulator:
+    """With ground, which is drawn."""
+    sim.world.spawn("ground_plane", ground_plane(), Pose())
+    return sim
 
 
 def frames(path: Path) -> list[np.ndarray]:

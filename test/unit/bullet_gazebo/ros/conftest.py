@@ -8,18 +8,13 @@ import pytest
 import xacro
 import yaml
 from bullet_gazebo_msgs.srv import PreparedStepRequest, PrepareStepRequest, StepWorldRequest
+from support.robots.worlds import add_robot, start
 
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.control.transmissions import read_description
-from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
-from bullet_gazebo.robot import ControlledRobot
+from bullet_gazebo.physics.world import ground_plane
 from bullet_gazebo.ros.services import step_service
 from bullet_gazebo.ros.services.step_service import StepService
-from bullet_gazebo.simulator import Simulator
 
 BOX = """<robot name="crate"><link name="crate">
 <inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
@@ -34,20 +29,15 @@ def slides(root):
 class Slides:
     """A world in lock-step with robots of six carriages, and its step service without ROS."""
 
-    def __init__(self, root):
-        self.sim = Simulator(World(make_engine()), lockstep=True)
+    def __init__(self, sim, root):
+        self.sim = sim
         self._urdf = slides(root)
         self._params = yaml.safe_load((root / "test/data/robots/slides.yaml").read_text())
         self.service = StepService(self.sim, contextlib.nullcontext(), threading.Lock())
 
     def add(self, name, *controllers):
-        model = self.sim.world.spawn(name, parse_urdf(self._urdf), Pose())
-        hardware = RobotHardware(read_description(self._urdf))
-        robot = ControlledRobot(model, hardware, ControllerManager(hardware), namespace=f"/{name}")
-        self.sim.add_robot(robot)
-        for controller in controllers:
-            robot.manager.load(controller, self._params[controller])
-        robot.manager.switch(list(controllers), [], STRICT)
+        robot = add_robot(self.sim, name, self._urdf, namespace=f"/{name}")
+        start(robot, {each: self._params[each] for each in controllers})
 
     def call(self, ticks=0, **fields):
         return self.service._step(StepWorldRequest(ticks=ticks, **fields))
@@ -65,21 +55,14 @@ class Slides:
         answer = self.call(ticks, **fields)
         assert answer.success, answer.status_message
         states = answer.joint_states
-        return dict(
-            zip(
-                states.name,
-                zip(states.position, states.velocity, states.effort, strict=True),
-                strict=True,
-            )
-        )
+        found = zip(states.position, states.velocity, states.effort, strict=True)
+        return dict(zip(states.name, found, strict=True))
 
 
 @pytest.fixture
-def world(root, monkeypatch):
+def world(sim, root, monkeypatch):
     monkeypatch.setattr(step_service.rospy, "Service", lambda *args: None)
-    made = Slides(root)
-    yield made
-    made.sim.world.close()
+    return Slides(sim, root)
 
 
 @pytest.fixture

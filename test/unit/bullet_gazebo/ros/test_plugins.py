@@ -9,10 +9,8 @@ from pathlib import Path
 import pytest
 import rospy
 
-from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.simulator import Simulator
 
@@ -52,7 +50,7 @@ class Good:
 class Setting:
     """A simulator in lock-step with plugins of a user's."""
 
-    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, sim: Simulator, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         self._folder = folder
         monkeypatch.syspath_prepend(folder)
         self.places: object = {}
@@ -60,7 +58,7 @@ class Setting:
         monkeypatch.setattr(rospy, "get_param", lambda name, default: self.places)
         for level in ("logerr", "logwarn"):
             monkeypatch.setattr(rospy, level, lambda text, *args: self.errors.append(text % args))
-        self.sim = Simulator(World(make_engine()), lockstep=True)
+        self.sim = sim
         self.plugins = PluginRegistry(self.sim, None)
         self.modules: list[str] = []
 
@@ -85,10 +83,9 @@ class Setting:
 
 
 @pytest.fixture
-def setting(tmp_path, monkeypatch):
-    made = Setting(tmp_path, monkeypatch)
+def setting(sim, tmp_path, monkeypatch):
+    made = Setting(sim, tmp_path, monkeypatch)
     yield made
-    made.sim.world.close()
     for name in made.modules:
         sys.modules.pop(name, None)
 

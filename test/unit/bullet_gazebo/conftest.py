@@ -1,0 +1,38 @@
+"""Worlds on each physics engine, closed after the test."""
+
+import pytest
+
+from bullet_gazebo.physics.engines import make_engine
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.world import World, ground_plane
+from bullet_gazebo.simulator import Simulator
+
+
+@pytest.fixture
+def make_world(new_engine):
+    """Make a world, with or without ground; other options are World's."""
+    made = []
+
+    def make(ground=False, **options):
+        made.append(World(new_engine(), **options))
+        if ground:
+            made[-1].spawn("ground_plane", ground_plane(), Pose())
+        return made[-1]
+
+    yield make
+    for world in made:
+        world.close()
+
+
+@pytest.fixture
+def world(make_world):
+    """A world with ground."""
+    return make_world(ground=True)
+
+
+@pytest.fixture
+def sim():
+    """An empty world in lock-step."""
+    simulator = Simulator(World(make_engine()), lockstep=True)
+    yield simulator
+    simulator.world.close()
