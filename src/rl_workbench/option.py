@@ -181,16 +181,9 @@ def plain_value(value: Any) -> Any:
     if not isinstance(value, str):
         return value
     try:
-        value = yaml.safe_load(value)
+        return _number_too(yaml.safe_load(value))
     except yaml.YAMLError:
         raise ValueError("a YAML value") from None
-    if not isinstance(value, str):
-        return value
-    try:
-        number = float(value)
-    except ValueError:
-        return value
-    return int(number) if number.is_integer() and abs(number) >= 1 else number
 
 
 def _converted(kind: Any, value: Any) -> Any:
@@ -224,13 +217,11 @@ def _number(value: Any) -> float:
 def _whole(value: Any) -> int:
     """Also reads 5e4 and 50_000, the way people write large numbers."""
     try:
-        if isinstance(value, str) and value.strip().lstrip("+-").replace("_", "").isdigit():
-            return int(value)  # exact, however large
         number = _number(value)
         if not number.is_integer():
             raise ValueError
         return value if isinstance(value, int) else int(number)
-    except (ValueError, OverflowError):
+    except ValueError:
         raise ValueError("a whole number") from None
 
 
@@ -266,7 +257,10 @@ def _number_too(value: Any) -> Any:
         return {name: _number_too(each) for name, each in value.items()}
     if isinstance(value, list):
         return [_number_too(each) for each in value]
+    if not isinstance(value, str) or not value[-1:].isdigit():
+        return value
     try:
-        return float(value) if isinstance(value, str) and value[-1:].isdigit() else value
+        number = float(value)
     except ValueError:
         return value
+    return int(number) if number.is_integer() and abs(number) >= 1 else number

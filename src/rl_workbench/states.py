@@ -14,13 +14,23 @@ def array(value: Any, dtype: torch.dtype, shape: tuple[int | None, ...]) -> np.n
         ValueError: If it has another type or shape, or numbers that aren't finite.
     """
     if not isinstance(value, torch.Tensor) or value.dtype != dtype or value.is_sparse:
-        raise ValueError(f"a tensor of {dtype} is expected, not {_short(value)}")
+        raise ValueError(f"a tensor of {dtype} is expected, not {getattr(value, 'dtype', value)}")
     fits = len(value.shape) == len(shape)
     if not fits or any(n is not None and n != m for n, m in zip(shape, value.shape, strict=True)):
         raise ValueError(f"a tensor of shape {shape} is expected, not {tuple(value.shape)}")
     if not torch.isfinite(value).all():
         raise ValueError("finite numbers are expected in a tensor")
     return value.detach().cpu().numpy().copy()
+
+
+def as_text(state: Any) -> str:
+    """Returns a generator's state, which may hold arrays, as JSON."""
+    return json.dumps(state, default=np.ndarray.tolist)
+
+
+def generator_state(generator: np.random.Generator) -> str:
+    """Returns what `set_generator` needs to bring a generator back to here."""
+    return as_text(generator.bit_generator.state)
 
 
 def set_generator(generator: np.random.Generator, text: Any) -> None:
@@ -42,8 +52,3 @@ def check_optimizer(optimizer: torch.optim.Optimizer, state: Any) -> None:
         for name, value in moments.items():
             if name != "step" and value is not None:
                 array(value, like.dtype, tuple(like.shape))
-
-
-def _short(value: Any) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -29,7 +29,11 @@ def write_atomically(path: Path, write: Writer) -> None:
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
-    _sync_folder(path.parent)
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)  # so that the new name survives a power cut
+    finally:
+        os.close(folder)
 
 
 def write_file(path: Path, write: Writer, told: Path | None = None) -> None:
@@ -89,15 +93,6 @@ def save_tensors(path: Path, content: dict[str, Any]) -> None:
     memory = io.BytesIO()
     torch.save(content, memory)
     write_atomically(path, lambda stream: stream.write(memory.getbuffer()))
-
-
-def _sync_folder(folder: Path) -> None:
-    """Makes a rename survive a power cut."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 CONFIG_RECORD = "config.json"

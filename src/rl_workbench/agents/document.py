@@ -5,7 +5,6 @@ network's estimate before the update. The policy's loss is the sum, not the mean
 value's loss is the mean squared error to the returns.
 """
 
-import json
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
@@ -18,7 +17,7 @@ from torch import nn
 from rl_workbench.agents.greedy import SingleChoice
 from rl_workbench.agents.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import array, load_optimizer, set_generator
+from rl_workbench.states import array, generator_state, load_optimizer, set_generator
 
 
 class PolicyNetwork(nn.Module):
@@ -161,7 +160,7 @@ class TwoNetworks(ABC):
             "value": self.value.state_dict(),
             "policy_optimizer": self.policy_optimizer.state_dict(),
             "value_optimizer": self.value_optimizer.state_dict(),
-            "generator": json.dumps(self.generator.bit_generator.state),
+            "generator": generator_state(self.generator),
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:

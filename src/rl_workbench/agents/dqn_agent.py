@@ -1,6 +1,5 @@
 """The DQN agent: acts, stores transitions, learns. It knows neither environments nor files."""
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -14,7 +13,7 @@ from rl_workbench.agents.normalisation import Normaliser
 from rl_workbench.agents.replay import Batch, NStepReturns, ReplayBuffer
 from rl_workbench.agents.settings import DQNSettings
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import load_optimizer, set_generator
+from rl_workbench.states import generator_state, load_optimizer, set_generator
 
 
 class Learned(NamedTuple):
@@ -226,7 +225,7 @@ class DQNAgent:
             "optimizer": self._optimizer.state_dict(),
             "replay": self.buffer.state_dict(),
             "window": self._returns.state_dict(),
-            "generators": [_written(self._explore), _written(self._draw)],
+            "generators": [generator_state(self._explore), generator_state(self._draw)],
             "steps": self.steps,
             "gradient_steps": self.gradient_steps,
         }
@@ -245,10 +244,6 @@ class DQNAgent:
 def _copied(network: nn.Module) -> dict[str, torch.Tensor]:
     """Clones the state_dict, since the parameters are views of one vector."""
     return {name: tensor.detach().cpu().clone() for name, tensor in network.state_dict().items()}
-
-
-def _written(generator: np.random.Generator) -> str:
-    return json.dumps(generator.bit_generator.state)
 
 
 def _hidden(sizes: Sequence[int]) -> list[nn.Module]:
@@ -293,9 +288,10 @@ def fast_values(network: nn.Module) -> Callable[[np.ndarray], np.ndarray]:
     It reads the network's own memory, so it follows every change of the weights. Its results (A,) rank
     actions as the Q-values do; for a dueling network they lack V - mean(A).
     """
-    body = network.feature if isinstance(network, DuelingQNetwork) else network.net
-    head = [network.advantage] if isinstance(network, DuelingQNetwork) else []
-    linear = [layer for layer in [*_layers(body), *head] if isinstance(layer, nn.Linear)]
+    layers = list(network.modules())
+    if isinstance(network, DuelingQNetwork):
+        layers.remove(network.value)
+    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
     pairs = [(layer.weight.detach().numpy(), layer.bias.detach().numpy()) for layer in linear]
     *hidden, (weight, bias) = pairs
 
@@ -309,10 +305,6 @@ def fast_values(network: nn.Module) -> Callable[[np.ndarray], np.ndarray]:
         return result
 
     return values
-
-
-def _layers(body: object) -> list[nn.Module]:
-    return list(body) if isinstance(body, nn.Sequential) else []
 
 
 class FlatParameters:

@@ -31,13 +31,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         policy.env.close()
     write_file(arguments.out, lambda stream: stream.write(content))
     open_exported(arguments.out)  # checks that the file on disk is readable
-    rest = ""
-    if agreement.equal < agreement.observations:
-        rest = ", as good as tied in the others"
-        if agreement.largest_difference:
-            rest = (
-                f", within {agreement.largest_difference:.1g} of the bounds' distance in the others"
-            )
+    rest = ", the others differ by rounding" if agreement.equal < agreement.observations else ""
     tell(
         f"{arguments.out}: the policy of {policy.checkpoint}, {policy.steps} steps; the same action "
         f"in {agreement.equal} of {agreement.observations} observations{rest}"

@@ -235,10 +235,7 @@ def _failure(job: Job, ending: Ending) -> str:
 
 def _written(folder: Path) -> list[JobEntry]:
     """Returns the jobs of earlier commands; none if jobs.json can't be read."""
-    try:
-        return [JobEntry(**each) for each in read_leniently(folder / NAME).get("jobs", [])]
-    except TypeError:
-        return []
+    return [JobEntry(**each) for each in read_leniently(folder / NAME).get("jobs", [])]
 
 
 @dataclass(frozen=True)
@@ -283,17 +280,12 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
 
 def read_jobs(folder: Path) -> list[JobStatus]:
     """Returns the progress of a folder's jobs."""
-    content = read_json(folder / NAME)
-    if content is None:
+    if not (folder / NAME).exists():
         raise WorkbenchError(
             f"{folder} has no jobs: {NAME} is in the folder of a benchmark or a sweep"
         )
-    try:
-        entries = [JobEntry(**each) for each in content["jobs"]]
-    except (TypeError, KeyError) as error:
-        raise WorkbenchError(f"{folder / NAME} isn't a list of jobs: {error}") from error
     is_alive = is_held(folder)
-    return [_status(folder, entry, is_alive) for entry in entries]
+    return [_status(folder, entry, is_alive) for entry in _written(folder)]
 
 
 def _status(folder: Path, entry: JobEntry, is_alive: bool) -> JobStatus:

@@ -9,16 +9,9 @@ from typing import TYPE_CHECKING
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import write_figure
-from rl_workbench.tools.runs import (
-    Curve,
-    Run,
-    evaluation_curve,
-    find_runs,
-    success_curve,
-    summary_of,
-    training_curve,
-)
+from rl_workbench.tools.runs import Curve, Run, curve_of, find_runs, summary_of, training_curve
 from rl_workbench.training.progress import tell, warn
+from rl_workbench.training.scalar_log import EVALUATION, SUCCESS
 
 if TYPE_CHECKING:
     from rl_workbench.plotting import Panel, SeedCurve
@@ -63,7 +56,7 @@ def run_panels(runs: Sequence[Run], over: str) -> "list[Panel]":
         return SeedCurve(found.steps if over == "steps" else episodes, found.values)
 
     def success(run: Run) -> "SeedCurve | None":
-        found = success_curve(run)
+        found = curve_of(run, SUCCESS)
         episodes = np.searchsorted(training_curve(run).steps, found.steps, side="right")
         steps = found.steps if over == "steps" else episodes.astype(float)
         return SeedCurve(steps, found.values) if len(found.values) else None
@@ -86,7 +79,8 @@ def seed_panels(runs: Sequence[Run]) -> "list[Panel]":
     panels = _panels(runs, lambda run: run.experiment, of(training_curve))
     if not panels:
         raise WorkbenchError("no episode has ended yet in any of these runs")
-    return [*panels, *_success_panels(runs, lambda run: run.experiment, of(success_curve))]
+    successes = of(lambda run: curve_of(run, SUCCESS))
+    return [*panels, *_success_panels(runs, lambda run: run.experiment, successes)]
 
 
 def variant_panels(runs: Sequence[Run]) -> "list[Panel]":
@@ -94,7 +88,7 @@ def variant_panels(runs: Sequence[Run]) -> "list[Panel]":
     panels = _panels(
         runs,
         lambda run: run.experiment,
-        lambda run: _seed_curve(run, evaluation_curve(run)),
+        lambda run: _seed_curve(run, curve_of(run, EVALUATION)),
         apart=True,
     )
     if not panels:

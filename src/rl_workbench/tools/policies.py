@@ -55,8 +55,13 @@ def load_any(
     if which != RANDOM:
         return load_learned(run, which, env_options)
     env = environment_of(run, env_options)
+    return RandomPolicy(random_actions(env, seed), env)
+
+
+def random_actions(env: gymnasium.Env[Any, Any], seed: int) -> Act:
+    """Returns a policy of random actions with that seed."""
     env.action_space.seed(seed)
-    return RandomPolicy(lambda _: env.action_space.sample(), env)
+    return lambda _: env.action_space.sample()
 
 
 def load_learned(

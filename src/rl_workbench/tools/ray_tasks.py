@@ -28,7 +28,7 @@ from rl_workbench.tools.job import (
     is_hopeless,
     run_attempt,
 )
-from rl_workbench.training.folder import LIBRARIES, versions
+from rl_workbench.training.folder import library_versions
 
 TOKEN = ".seen_by_nodes"
 LOCAL = "local"
@@ -90,11 +90,6 @@ def train(
     return ending
 
 
-def library_versions() -> dict[str, str]:
-    """Returns the library versions on which a training's exact results depend."""
-    return {name: each for name, each in versions().items() if name in LIBRARIES}
-
-
 class RayJobs:
     """Runs jobs on a joined cluster."""
 
@@ -141,13 +136,11 @@ class RayJobs:
             return ending
         except errors.TaskCancelledError:
             return Ending()
-        except errors.RayTaskError as error:
-            cause = error.cause
+        except errors.RayError as error:
+            cause = getattr(error, "cause", None)  # the task's own error
             if isinstance(cause, NodeUnusable | WorkbenchError):
                 raise WorkbenchError(str(cause)) from error
             return Ending(lost=_in_a_line(cause or error))
-        except errors.RayError as error:
-            return Ending(lost=_in_a_line(error))
 
 
 def _in_a_line(error: Exception) -> str:

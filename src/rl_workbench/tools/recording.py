@@ -25,6 +25,7 @@ from rl_workbench.tools.policies import (
     environment_of,
     episode_steps,
     load_learned,
+    random_actions,
 )
 from rl_workbench.tools.runs import Run, open_run
 from rl_workbench.training import checkpoints
@@ -322,9 +323,8 @@ class EpisodeRecorder:
 
     def _policy(self, run: Run, episode: RecordedEpisode, env: gymnasium.Env[Any, Any]) -> Act:
         if episode.which == RANDOM:
-            env.action_space.seed(episode.seed)
             episode.policy = RANDOM
-            return lambda _: env.action_space.sample()
+            return random_actions(env, episode.seed)
         skipped: list[str] = []
         learned = load_learned(run, episode.which, say=skipped.append, env=env)
         episode.policy = f"{episode.which}, of step {learned.steps}"

@@ -12,7 +12,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.plotting import WINDOW
 from rl_workbench.statistics import Statistics, describe
 from rl_workbench.tools.policies import load_learned, play
-from rl_workbench.tools.runs import Run, cost_of, evaluation_curve, summary_of, training_curve
+from rl_workbench.tools.runs import Run, cost_of, curve_of, summary_of, training_curve
 from rl_workbench.training.evaluator import Evaluation
 from rl_workbench.training.history import LAST
 from rl_workbench.training.scalar_log import CONFIRMED, EVALUATION
@@ -105,7 +105,7 @@ def _greedy(run: Run, episodes: int, which: str, warn: Callable[[str], None]) ->
 
 
 def _mean_evaluation(run: Run) -> float | None:
-    values = evaluation_curve(run).values
+    values = curve_of(run, EVALUATION).values
     return float(values.mean()) if len(values) else None
 
 
@@ -118,9 +118,9 @@ def _largest_mean(returns: np.ndarray) -> float | None:
 def _solved(run: Run) -> tuple[int, float | None] | None:
     """Returns step and seconds of the first (if possible confirmed) evaluation at the threshold, or None."""
     line = threshold(run.env_id)
-    curve = evaluation_curve(run, CONFIRMED)
+    curve = curve_of(run, CONFIRMED)
     if not len(curve.values):
-        curve = evaluation_curve(run, EVALUATION)
+        curve = curve_of(run, EVALUATION)
     above = np.flatnonzero(curve.values >= (math.inf if line is None else line))
     if not len(above):
         return None

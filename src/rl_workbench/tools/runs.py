@@ -12,7 +12,7 @@ import numpy as np
 from file_access.content import open_text
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.storage import CONFIG_RECORD, read_json, read_record
-from rl_workbench.training.scalar_log import EVALUATION, RETURN, SUCCESS
+from rl_workbench.training.scalar_log import RETURN
 from web_viewer.table import NAME as SCALARS
 
 SUMMARY = "summary.json"
@@ -119,30 +119,17 @@ def _matching(pattern: str, warn: Callable[[str], None]) -> list[Run]:
 
 def training_curve(run: Run) -> Curve:
     """Returns the return of each finished training episode."""
-    curve = _scalars(run, RETURN)
+    curve = curve_of(run, RETURN)
     if not len(curve.values):
         raise WorkbenchError(f"{run.folder}: no episode has ended yet")
     return curve
 
 
-def success_curve(run: Run) -> Curve:
-    """Returns the success rate of the last 100 training episodes, at each one's end; may be empty."""
-    return evaluation_curve(run, SUCCESS)
-
-
-def evaluation_curve(run: Run, tag: str = EVALUATION) -> Curve:
-    """Returns the mean returns of the evaluations; may be empty.
-
-    Args:
-        tag: EVALUATION for all, CONFIRMED for those that chose the best policy.
-    """
-    if not (run.folder / SCALARS).exists():
-        return Curve(*np.empty((3, 0)))
-    return _scalars(run, tag)
-
-
-def _scalars(run: Run, tag: str) -> Curve:
+def curve_of(run: Run, tag: str) -> Curve:
+    """Returns the values of a tag; may be empty."""
     path = run.folder / SCALARS
+    if not path.exists():
+        return Curve(*np.empty((3, 0)))
     try:
         with open_text(path) as file:
             points = [

@@ -25,7 +25,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.policies import TEST_SEED, LearnedPolicy
 from rl_workbench.tools.runs import Run
 from rl_workbench.training.environments import as_float32
-from rl_workbench.training.folder import LIBRARIES, versions
+from rl_workbench.training.folder import library_versions
 
 FORMAT = "rl_workbench policy 1"  # changes when older files can't be read any more
 METADATA = "metadata.json"  # its name within the file
@@ -191,7 +191,7 @@ def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement
         "flattened_from": None if original == space else described(original),
         "action_space": described(policy.env.action_space),
         "agreement": agreement._asdict(),
-        "versions": {name: each for name, each in versions().items() if name in LIBRARIES},
+        "versions": library_versions(),
     }
     return written(module, metadata), agreement
 

@@ -1,7 +1,6 @@
 """Callbacks for the events of a training, among them the scalar log and the learning curve's picture."""
 
-import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -149,31 +148,16 @@ class CallbackList:
     """
 
     def __init__(self, own: Sequence[Callback], users: Sequence[Callback]) -> None:
-        self._own, self._users = list(own), list(users)
-        # Only callbacks that override on_step, since it is called at every step.
-        self._steppers = [
-            each for each in [*own, *users] if type(each).on_step is not Callback.on_step
-        ]
-
-    def step(self, training: Any) -> None:
-        """Calls `on_step`."""
-        for each in self._steppers:
-            with self._named(each, "on_step"):
-                each.on_step(training)
+        self._own, self._users = own, users
 
     def call(self, event: str, training: Any, *arguments: Any) -> None:
-        """Calls the method of another event."""
-        for each in [*self._own, *self._users]:
-            with self._named(each, event):
+        """Calls the method of an event."""
+        for each in self._own:
+            getattr(each, event)(training, *arguments)
+        for each in self._users:
+            try:
                 getattr(each, event)(training, *arguments)
-
-    @contextlib.contextmanager
-    def _named(self, callback: Callback, event: str) -> Iterator[None]:
-        try:
-            yield
-        except Exception as error:
-            if not any(callback is each for each in self._users):
-                raise
-            name = type(callback).__name__
-            text = f"the callback {name} failed in {event}(): {error_line(error)}"
-            raise EnvironmentFailure(text) from error
+            except Exception as error:
+                name = type(each).__name__
+                text = f"the callback {name} failed in {event}(): {error_line(error)}"
+                raise EnvironmentFailure(text) from error

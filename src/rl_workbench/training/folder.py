@@ -12,7 +12,13 @@ from typing import Any
 from file_access.locks import is_locked, locked_folder
 from rl_workbench.env_ids import as_file_name
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.storage import CONFIG_RECORD, as_json, read_record, write_atomically
+from rl_workbench.storage import (
+    CONFIG_RECORD,
+    as_json,
+    check_writable,
+    read_record,
+    write_atomically,
+)
 
 EXTRA = "stable_baselines3"
 LIBRARIES = ("python", "numpy", "torch", "gymnasium", EXTRA)  # a training's bits depend on them
@@ -36,32 +42,18 @@ def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]
             folder, number = folder.with_name(f"{name}_{number}"), number + 1
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise _no_place(folder, error) from error
+        raise WorkbenchError(f"can't write to the run folder {folder}: {error.strerror}") from error
     with held(folder):
         try:
-            _check_empty(folder)
+            if any(folder.iterdir()):
+                raise WorkbenchError(
+                    f"the run folder {folder} isn't empty; name another one or remove its contents"
+                )
+            check_writable(folder / CONFIG_RECORD)
             yield folder.resolve()
         finally:
             with contextlib.suppress(OSError):  # it isn't empty: all is well
                 folder.rmdir()
-
-
-def _check_empty(folder: Path) -> None:
-    try:
-        taken = any(folder.iterdir())
-        if not taken:
-            write_atomically(folder / ".probe", lambda stream: None)
-            (folder / ".probe").unlink()
-    except OSError as error:
-        raise _no_place(folder, error) from error
-    if taken:
-        raise WorkbenchError(
-            f"the run folder {folder} isn't empty; name another one or remove its contents"
-        )
-
-
-def _no_place(folder: Path, error: OSError) -> WorkbenchError:
-    return WorkbenchError(f"can't write to the run folder {folder}: {error.strerror}")
 
 
 @contextlib.contextmanager
@@ -100,13 +92,18 @@ def versions() -> dict[str, str]:
     }
 
 
+def library_versions() -> dict[str, str]:
+    """Returns the versions on which a training's bits depend."""
+    return {name: each for name, each in versions().items() if name in LIBRARIES}
+
+
 def other_versions(before: dict[str, str]) -> str:
     """Returns how the versions of now differ from those at a training's start; empty if they don't.
 
     Args:
         before: What `versions` returned then.
     """
-    now = versions()
+    now = library_versions()
     names = [name for name in LIBRARIES if name in before and before[name] != now.get(name)]
     return ", ".join(f"{name} {before[name]} is now {now.get(name)}" for name in names)
 

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import torch
 
+from rl_workbench.states import as_text
+
 
 def seed_all(seed: int) -> None:
     """Seeds Python's, NumPy's and torch's generators."""
@@ -35,7 +37,7 @@ def random_states() -> dict[str, Any]:
     """Returns the states of all three, as texts and a tensor."""
     return {
         "python": json.dumps(random.getstate()),
-        "numpy": _as_text(np.random.get_state(legacy=False)),
+        "numpy": as_text(np.random.get_state(legacy=False)),
         "torch": torch.get_rng_state(),
     }
 
@@ -46,12 +48,3 @@ def restore_random_states(states: dict[str, Any]) -> None:
     random.setstate((version, tuple(internal), gauss))
     np.random.set_state(json.loads(states["numpy"]))
     torch.set_rng_state(states["torch"].cpu())
-
-
-def generator_state(generator: np.random.Generator) -> str:
-    """Returns a generator's state as JSON."""
-    return _as_text(generator.bit_generator.state)
-
-
-def _as_text(state: Any) -> str:
-    return json.dumps(state, default=lambda array: array.tolist())

@@ -4,7 +4,6 @@ No environment can be saved in the middle of an episode. But the same start and 
 same place, so those are saved.
 """
 
-import json
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -12,9 +11,8 @@ import numpy as np
 import torch
 from gymnasium import spaces
 
-from rl_workbench.states import array
+from rl_workbench.states import array, generator_state, set_generator
 from rl_workbench.training.environments import as_vector
-from rl_workbench.training.generators import generator_state
 
 
 class EpisodeMark(NamedTuple):
@@ -53,7 +51,7 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     @generator.setter
     def generator(self, text: str) -> None:
-        self.env.unwrapped.np_random.bit_generator.state = json.loads(text)
+        set_generator(self.env.unwrapped.np_random, text)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from rl_workbench import starting
 from rl_workbench.errors import WorkbenchError
@@ -189,7 +189,10 @@ def choose_training(
     if named is None and resumed:
         return choose(recorded_kind(Path(resumed)), rest, parameters, prog, env_id, parents)
     if named is None and default is None:
-        _refuse_without_algorithm(parser, rest)
+        if "-h" in rest or "--help" in rest:
+            parser.print_help()
+            parser.exit()
+        parser.error(f"--algo is missing, one of {', '.join(ALGORITHMS)}")
     try:
         kind: AlgorithmKind = algorithm(named or str(default))
     except WorkbenchError as error:
@@ -212,13 +215,6 @@ def algorithm_parser(prog: str) -> argparse.ArgumentParser:
     names = ", ".join(ALGORITHMS)
     result.add_argument("--algo", metavar="NAME", help=f"one of {names}; each has flags of its own")
     return result
-
-
-def _refuse_without_algorithm(parser: argparse.ArgumentParser, rest: list[str]) -> NoReturn:
-    if "-h" in rest or "--help" in rest:
-        parser.print_help()
-        parser.exit()
-    parser.error(f"--algo is missing, one of {', '.join(ALGORITHMS)}")
 
 
 def choose(

@@ -239,7 +239,7 @@ class Training:
 
     def step_done(self) -> None:
         """Evaluates and saves what is due. The training must be able to continue from here."""
-        self._callbacks.step(self)
+        self._callbacks.call("on_step", self)
         self._evaluate_if_due()
         if self._is_due(self._run.checkpoint_frequency):
             self._save()

@@ -180,15 +180,11 @@ def test_a_page_holds_all_that_it_shows(tmp_path: Path):
 # In 3-D. That a browser plays the file: test_record_played.py.
 
 
-def record_short(run: Path, out: Path, *words: str) -> int:
-    return cli.main(["record", str(run), "--out", str(out), "--max-steps", "12", *words])
-
-
 def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(
     robot_run: Path, tmp_path: Path, capsys
 ):
     out = tmp_path / "a.html"
-    assert record_short(robot_run, out) == 0
+    assert record(robot_run, out) == 0
     steps = int(capsys.readouterr().out.split(" steps")[0].split()[-1])
     text = out.read_text()
     assert len(text) < 1_000_000
@@ -206,9 +202,7 @@ def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(
 
 def test_several_are_seen_beside_each_other(robot_run: Path, tmp_path: Path, capsys):
     out = tmp_path / "a.html"
-    assert (
-        record_short(robot_run, out, "--checkpoint", "best", "last", "random", "--fps", "10") == 0
-    )
+    assert record(robot_run, out, "--checkpoint", "best", "last", "random", "--fps", "10") == 0
     told = capsys.readouterr().out.splitlines()
     assert [line.split(":")[0] for line in told] == ["best", "last", "random", str(out)]
     nodes = viser_recording.of_page(out.read_text()).at()
@@ -217,5 +211,5 @@ def test_several_are_seen_beside_each_other(robot_run: Path, tmp_path: Path, cap
 
 
 def test_a_size_is_refused_where_it_has_none(robot_run: Path, tmp_path: Path, capsys):
-    assert record_short(robot_run, tmp_path / "a.html", "--size", "64x48") == 1
+    assert record(robot_run, tmp_path / "a.html", "--size", "64x48") == 1
     assert "as large as the browser's window" in capsys.readouterr().err

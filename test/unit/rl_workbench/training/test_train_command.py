@@ -124,20 +124,6 @@ def test_wrong_words(capsys, arguments: list[str], words: str) -> None:
     assert code == 2 and words in told and "Traceback" not in told
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--gamma=5"], "gamma must be between 0 and 1, not 5.0"),
-        (["--params", "gamma=5"], "gamma must be between 0 and 1, not 5.0"),
-        (["--params", "gama=1"], "unknown option 'gama'; did you mean gamma?"),
-        (["--config=none.yaml"], "can't read none.yaml: No such file"),
-        (["--env-id="], "env_id must name an environment"),
-    ],
-)
-def test_wrong_values(capsys, arguments: list[str], words: str) -> None:
-    assert words in refused(capsys, "--algo=reinforce", *arguments)
-
-
 @pytest.mark.slow
 def test_a_reader_that_goes_away_before_the_help(tmp_path: Path) -> None:
     reading, writing = os.pipe()

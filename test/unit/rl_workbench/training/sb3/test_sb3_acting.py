@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.training.training_runs import options_of, record
+from support.training.training_runs import options_of
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithm import load_policy
@@ -36,7 +36,3 @@ def test_a_policy_needs_no_environment_of_its_training(
 def test_numbers_that_no_record_can_hold(value: float) -> None:
     with pytest.raises(WorkbenchError, match="^target_kl has a value that JSON can't hold: "):
         options_of("ppo", {"target_kl": value})
-
-
-def test_all_defaults_can_be_held(whole: Callable[[str], Path]) -> None:
-    assert record(whole("sac"))["hyperparameters"]["target_entropy"] == "auto"
