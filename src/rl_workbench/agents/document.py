@@ -17,7 +17,7 @@ from torch import nn
 from rl_workbench.agents.greedy import SingleChoice
 from rl_workbench.agents.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import array, generator_state, load_optimizer, set_generator
+from rl_workbench.states import generator_state, load_optimizer, set_generator
 
 
 class PolicyNetwork(nn.Module):
@@ -84,21 +84,12 @@ class Episode:
         }
 
     @classmethod
-    def from_state(cls, state: dict[str, Any], size: int, kind: int | tuple[int, ...]) -> "Episode":
-        """Rebuilds an episode from what `state_dict` returned.
-
-        Args:
-            state: the return value of `state_dict`.
-            size: D of the observations.
-            kind: the number of discrete actions, or the shape of continuous ones.
-        """
-        *observations, final = array(state["observations"], torch.float32, (None, size))
-        length = len(observations)
-        if isinstance(kind, tuple):
-            actions = list(array(state["actions"], torch.float32, (length, *kind)))
-        else:
-            actions = array(state["actions"], torch.int64, (length,)).tolist()
-        rewards = array(state["rewards"], torch.float64, (length,)).tolist()
+    def from_state(cls, state: dict[str, Any]) -> "Episode":
+        """Rebuilds an episode from what `state_dict` returned."""
+        *observations, final = state["observations"].numpy()
+        is_discrete = state["actions"].ndim == 1
+        actions = state["actions"].tolist() if is_discrete else list(state["actions"].numpy())
+        rewards = state["rewards"].tolist()
         return cls(observations, actions, rewards, final, bool(state["terminated"]))
 
 

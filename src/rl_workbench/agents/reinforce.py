@@ -225,10 +225,7 @@ class ReinforceAgent(TwoNetworks):
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Loads what `state_dict` returned."""
-        size = len(self._factors)
-        bounds = self._actions
-        kind = bounds if isinstance(bounds, int) else (bounds.low.size,)
-        self._batch = [Episode.from_state(each, size, kind) for each in state["batch"]]
+        self._batch = [Episode.from_state(each) for each in state["batch"]]
         if self._normaliser is not None:
             self._normaliser.load_state_dict(state["normaliser"])
         super().load_state_dict(state)

@@ -7,7 +7,6 @@ import numpy as np
 import torch
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import array
 
 
 class Transition(NamedTuple):
@@ -95,8 +94,7 @@ class ReplayBuffer:
         if size > self.capacity or not (following < size if is_full else following == size):
             raise WorkbenchError(f"a buffer of {self.capacity} can't hold {size} transitions")
         for name, column in self._columns._asdict().items():
-            dtype, shape = torch.from_numpy(column[:0]).dtype, (size, *column.shape[1:])
-            column[:size] = array(state[name], dtype, shape)
+            column[:size] = state[name].numpy()
         self._size, self._next = size, following
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+from contextlib import closing
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
@@ -33,9 +34,8 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     run, options = open_run(arguments.run), env_options(arguments)
     on_page = arguments.gui
     if not on_page:
-        env = environment_of(run, options)
-        on_page = draws_itself(env)
-        env.close()
+        with closing(environment_of(run, options)) as env:
+            on_page = draws_itself(env)
     if on_page:
         show_run(run.folder, (arguments.checkpoint,), arguments.seed, arguments.episodes, options,
                  host=LOOPBACK, port=None, browser=True, interrupt=interrupt)  # fmt: skip
@@ -46,7 +46,5 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
             f"browser instead, record {arguments.run} --out episode.gif writes a file"
         )
     policy = load_learned(run, arguments.checkpoint, {**options, "render_mode": "human"})
-    try:
+    with closing(policy.env):
         tell(episode_lines(play(policy, arguments.episodes, arguments.seed)))
-    finally:
-        policy.env.close()

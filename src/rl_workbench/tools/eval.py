@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,10 +35,8 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     if arguments.json and not to_stdout:
         check_writable(arguments.json)
     policy = load_any(run, arguments.checkpoint, env_options(arguments), arguments.seed)
-    try:
+    with closing(policy.env):
         result = play(policy, arguments.episodes, arguments.seed)
-    finally:
-        policy.env.close()
     line = threshold(run.env_id)
     checkpoint = str(getattr(policy, "checkpoint", RANDOM))
     found = {"run": str(run.folder), "checkpoint": checkpoint, **statistics(result, line)}

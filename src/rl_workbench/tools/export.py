@@ -1,6 +1,7 @@
 """`export`: a run's policy as a file that needs only torch."""
 
 import argparse
+from contextlib import closing
 from pathlib import Path
 
 from rl_workbench.starting import Interrupt
@@ -25,10 +26,8 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     run = open_run(arguments.run)
     check_writable(arguments.out)
     policy = load_learned(run, arguments.checkpoint, env_options(arguments))
-    try:
+    with closing(policy.env):
         content, agreement = export(run, policy, arguments.seed)
-    finally:
-        policy.env.close()
     write_file(arguments.out, lambda stream: stream.write(content))
     open_exported(arguments.out)  # checks that the file on disk is readable
     rest = ", the others differ by rounding" if agreement.equal < agreement.observations else ""

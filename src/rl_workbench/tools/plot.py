@@ -3,15 +3,16 @@
 import argparse
 from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import write_figure
-from rl_workbench.tools.runs import Curve, Run, curve_of, find_runs, summary_of, training_curve
+from rl_workbench.tools.runs import Run, curve_of, find_runs, summary_of, training_curve
 from rl_workbench.training.progress import tell, warn
-from rl_workbench.training.scalar_log import EVALUATION, SUCCESS
+from rl_workbench.training.scalar_log import EVALUATION, RETURN, SUCCESS
 
 if TYPE_CHECKING:
     from rl_workbench.plotting import Panel, SeedCurve
@@ -66,42 +67,33 @@ def run_panels(runs: Sequence[Run], over: str) -> "list[Panel]":
 
 def seed_panels(runs: Sequence[Run]) -> "list[Panel]":
     """Makes panels of the training returns of experiments over their seeds, one for each environment."""
-
-    def of(curve: Callable[[Run], Curve]) -> CurveOf:
-        def seed_curve(run: Run) -> "SeedCurve | None":
-            try:
-                return _seed_curve(run, curve(run))
-            except WorkbenchError:
-                return None  # the table of results names the run
-
-        return seed_curve
-
-    panels = _panels(runs, lambda run: run.experiment, of(training_curve))
+    panels = _panels(runs, _experiment, partial(_seed_curve, tag=RETURN))
     if not panels:
         raise WorkbenchError("no episode has ended yet in any of these runs")
-    successes = of(lambda run: curve_of(run, SUCCESS))
-    return [*panels, *_success_panels(runs, lambda run: run.experiment, successes)]
+    return [*panels, *_success_panels(runs, _experiment, partial(_seed_curve, tag=SUCCESS))]
 
 
 def variant_panels(runs: Sequence[Run]) -> "list[Panel]":
     """Makes panels of the evaluations of experiments over their seeds, one for each experiment."""
-    panels = _panels(
-        runs,
-        lambda run: run.experiment,
-        lambda run: _seed_curve(run, curve_of(run, EVALUATION)),
-        apart=True,
-    )
+    panels = _panels(runs, _experiment, partial(_seed_curve, tag=EVALUATION), apart=True)
     if not panels:
         raise WorkbenchError("none of these runs was evaluated")
     return panels
 
 
-def _seed_curve(run: Run, curve: Curve) -> "SeedCurve | None":
+def _experiment(run: Run) -> str:
+    return run.experiment
+
+
+def _seed_curve(run: Run, tag: str) -> "SeedCurve | None":
+    """Returns None if there is nothing that can be read: the table of results says why."""
     from rl_workbench.plotting import SeedCurve
 
-    if not len(curve.values):
+    try:
+        curve, is_complete = curve_of(run, tag), bool(summary_of(run).get("complete"))
+    except WorkbenchError:
         return None
-    return SeedCurve(curve.steps, curve.values, bool(summary_of(run).get("complete")))
+    return SeedCurve(curve.steps, curve.values, is_complete) if len(curve.values) else None
 
 
 def _success_panels(

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -98,10 +99,8 @@ def _trained_so_far(run: Run) -> tuple[np.ndarray, int]:
 
 def _greedy(run: Run, episodes: int, which: str, warn: Callable[[str], None]) -> Evaluation:
     policy = load_learned(run, which, say=warn)
-    try:
+    with closing(policy.env):
         return play(policy, episodes, run.seed)
-    finally:
-        policy.env.close()
 
 
 def _mean_evaluation(run: Run) -> float | None:

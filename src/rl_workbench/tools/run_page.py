@@ -24,7 +24,7 @@ from rl_workbench.tools.recording import (
 )
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training.progress import tell, warn
-from web_viewer.address import Address, PortInUse, find_address
+from web_viewer.address import PortInUse, find_address
 from web_viewer.curves import Curves
 from web_viewer.server import open_browser, serve, stop
 
@@ -71,7 +71,11 @@ def show_run(
     torch.set_num_threads(1)  # networks this small are slower on more
     interrupt.defer()
     is_over = _end(interrupt, beside_training)
-    address, server = _served(host, port, folder.name)
+    try:
+        address = find_address(host, port)
+        server = serve(address, folder.name, CAMERA, LOOK_AT)
+    except PortInUse as error:
+        raise WorkbenchError(str(error)) from error
     with contextlib.ExitStack() as stack:
         stack.callback(stop, server)
         recorder = EpisodeRecorder(folder, server, env_options)
@@ -91,14 +95,6 @@ def show_run(
         curves = Curves(server.gui, server.gui.add_folder("Training"))
         curves.follow(folder)
         _play(server, playback, curves, is_over)
-
-
-def _served(host: str, port: int | None, title: str) -> tuple[Address, viser.ViserServer]:
-    try:
-        address = find_address(host, port)
-        return address, serve(address, title, CAMERA, LOOK_AT)
-    except PortInUse as error:
-        raise WorkbenchError(str(error)) from error
 
 
 def _end(interrupt: Interrupt, beside_training: bool) -> Callable[[], bool]:

@@ -122,8 +122,12 @@ def described(space: spaces.Space[Any]) -> dict[str, Any]:
         case spaces.Dict():
             return {"kind": kind, "spaces": {name: described(each) for name, each in space.items()}}
         case spaces.Box():
-            bounds = {"low": _finite(space.low), "high": _finite(space.high)}
-            return {"kind": kind, "shape": list(space.shape), "dtype": str(space.dtype), **bounds}
+            nothing: Any = None
+            low, high = (
+                np.where(np.isfinite(end), end, nothing) for end in (space.low, space.high)
+            )
+            about = {"shape": list(space.shape), "dtype": str(space.dtype)}
+            return {"kind": kind, **about, "low": low.tolist(), "high": high.tolist()}
         case spaces.Discrete():
             return {"kind": kind, "n": int(space.n), "start": int(space.start)}
         case spaces.MultiDiscrete():
@@ -131,12 +135,6 @@ def described(space: spaces.Space[Any]) -> dict[str, Any]:
         case spaces.MultiBinary():
             return {"kind": kind, "shape": list(space.shape)}
     return {"kind": kind}
-
-
-def _finite(bounds: Any) -> Any:
-    if isinstance(bounds, np.ndarray):
-        return [_finite(each) for each in bounds]
-    return bounds.item() if np.isfinite(bounds) else None
 
 
 class OfVectors(nn.Module):

@@ -9,10 +9,14 @@ import numpy as np
 
 from rl_workbench.agents.document import Episode, PolicyGradientAgent
 from rl_workbench.agents.reinforce import ReinforceAgent
-from rl_workbench.states import generator_state, set_generator
+from rl_workbench.states import (
+    generator_state,
+    mark_random_states,
+    rewind_random_states,
+    set_generator,
+)
 from rl_workbench.training.checked import BEGIN_STEP
 from rl_workbench.training.environments import as_vector, succeeded
-from rl_workbench.training.generators import mark_random_states, rewind_random_states
 
 Agent = PolicyGradientAgent | ReinforceAgent
 

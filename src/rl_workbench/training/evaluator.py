@@ -9,9 +9,9 @@ import gymnasium
 import numpy as np
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import random_states, restore_random_states
 from rl_workbench.training.algorithm import Algorithm, Say
 from rl_workbench.training.environments import as_float32, environment_for, shares_robot, succeeded
-from rl_workbench.training.generators import random_states, restore_random_states
 from rl_workbench.training.options import TrainingOptions
 
 EVALUATION_SEED = 1_000_000  # added to the training's: other episodes than those learned from

@@ -12,7 +12,6 @@ import torch
 
 from rl_workbench import errors
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError
-from rl_workbench.states import array
 from rl_workbench.storage import as_json, write_atomically
 from rl_workbench.training.checkpoints import candidates
 from rl_workbench.training.evaluator import Evaluation
@@ -83,9 +82,9 @@ class History:
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Loads what `state_dict` returned."""
-        self.returns = array(state["returns"], torch.float64, (None,)).tolist()
-        self.lengths = array(state["lengths"], torch.int64, (len(self.returns),)).tolist()
-        self.successes = array(state["successes"], torch.bool, (None,)).tolist()
+        self.returns = state["returns"].tolist()
+        self.lengths = state["lengths"].tolist()
+        self.successes = state["successes"].tolist()
         self.evaluations = [evaluation_of(each) for each in state["evaluations"]]
         self.best = None if state["best"] is None else evaluation_of(state["best"])
         self.seconds = float(state["seconds"])

@@ -12,6 +12,7 @@ import torch
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
+from rl_workbench.states import random_states, restore_random_states, seed_all
 from rl_workbench.storage import read_record
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithm import Algorithm
@@ -30,7 +31,6 @@ from rl_workbench.training.environments import (
     training_environments,
 )
 from rl_workbench.training.evaluator import Evaluation, Evaluator
-from rl_workbench.training.generators import random_states, restore_random_states, seed_all
 from rl_workbench.training.history import History, Outcome, evaluation_of
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.progress import Progress, tell

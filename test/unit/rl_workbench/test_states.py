@@ -21,5 +21,5 @@ def test_moments_of_another_size_are_refused(optimizer: Any) -> None:
     check_optimizer(new, new.state_dict())
     check_optimizer(new, made(4).state_dict())
     if optimizer is not torch.optim.SGD:  # which has no moments
-        with pytest.raises(ValueError, match=r"of shape \(4,\) is expected, not \(3,\)"):
+        with pytest.raises(ValueError, match=r"of shape \(4,\), not \(3,\)"):
             check_optimizer(new, made(3).state_dict())

@@ -10,8 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 
-from rl_workbench.states import generator_state, set_generator
-from rl_workbench.training.generators import mark_random_states, rewind_random_states
+from rl_workbench.states import (
+    generator_state,
+    mark_random_states,
+    rewind_random_states,
+    set_generator,
+)
 from rl_workbench.training.repeatable import EpisodeMark, RepeatableEnvironment
 
 ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts",

@@ -130,7 +130,7 @@ def test_replay_from_its_state(count: int) -> None:
 def test_replay_refuses_what_does_not_fit() -> None:
     with pytest.raises(WorkbenchError, match="can't hold"):
         ReplayBuffer(2, 2).load_state_dict(filled(5, 5).state_dict())
-    with pytest.raises(ValueError, match=r"of shape \(5, 3\) is expected, not \(5, 2\)"):
+    with pytest.raises(ValueError, match=r"from shape \(5,2\) into shape \(5,3\)"):
         ReplayBuffer(5, 3).load_state_dict(filled(5, 5).state_dict())
 
 

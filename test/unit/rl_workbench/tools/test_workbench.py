@@ -284,13 +284,10 @@ def test_an_unknown_command(name: str, capsys) -> None:
     assert "unknown command" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["video.avi", "video"])
-def test_a_video_of_another_format(runs: Path, tmp_path: Path, name: str, capsys) -> None:
-    line = refused(capsys, "record", runs / "dqn_0", "--out", tmp_path / name)
-    assert ".gif, .mp4, .html" in line
-
-
-def test_a_picture_of_another_format(runs: Path, tmp_path: Path, capsys) -> None:
+def test_a_picture_or_a_video_of_another_format(runs: Path, tmp_path: Path, capsys) -> None:
+    for name in ("video.avi", "video"):
+        line = refused(capsys, "record", runs / "dqn_0", "--out", tmp_path / name)
+        assert ".gif, .mp4, .html" in line
     assert "PNG" in refused(capsys, "plot", runs / "dqn_0", "--out", tmp_path / "a.jpg")
 
 

@@ -70,11 +70,6 @@ def test_a_file_that_would_run_code_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "ran").exists()
 
 
-def test_one_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(WorkbenchError, match=r"can't read .*last.pt: No such file"):
-        read(tmp_path / "last.pt")
-
-
 def test_one_damaged_anywhere_is_told(tmp_path: Path) -> None:
     path, draw = tmp_path / "last.pt", random.Random(0)
     save_tensors(path, {"format": checkpoints.FORMAT, "tensor": torch.zeros(50)})

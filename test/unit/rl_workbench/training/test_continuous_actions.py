@@ -10,7 +10,6 @@ from support.training.learning_fakes import register_with
 from support.training.training_runs import (
     InterruptAfter,
     assert_same_run,
-    checkpoint,
     resume,
     rows,
     summary,
@@ -32,18 +31,6 @@ def test_resumed_it_comes_to_the_same_bits(tmp_path: Path, asked: int) -> None:
     broken = train(tmp_path / "broken", "reinforce", InterruptAfter(asked), **BOX)
     assert rows(broken) != rows(whole), "interrupted"
     assert_same_run(whole, resume(broken))
-
-
-def test_an_episode_of_other_actions_is_refused(tmp_path: Path) -> None:
-    folder = train(tmp_path, "reinforce", **BOX)
-    (episode,) = checkpoint(folder)["agent"]["batch"]
-    assert episode["actions"].shape == (20, 2)
-    from rl_workbench.agents.document import Episode
-
-    assert Episode.from_state(episode, 6, (2,)).length == 20
-    for kind in ((3,), 2):
-        with pytest.raises(ValueError, match="a tensor of"):
-            Episode.from_state(episode, 6, kind)
 
 
 def test_its_policy_acts(tmp_path: Path) -> None:

@@ -82,13 +82,6 @@ def test_a_record_that_somebody_changed_is_refused(
     assert f"config.json says {words}; a resumed training keeps" in refusal(stopped)
 
 
-def test_what_may_be_changed_may_be_changed_in_the_record_too(stopped: Path) -> None:
-    """DQN's own options have the length, too, for the share of exploration; it is written down once."""
-    assert "total_timesteps" not in record(stopped)["hyperparameters"]
-    change_record(stopped, "run", "total_timesteps", 90)
-    assert summary(resume(stopped))["steps"] == 90
-
-
 def test_other_versions_are_told(stopped: Path, capsys) -> None:
     change_record(stopped, "versions", "torch", "1.0")
     resume(stopped)

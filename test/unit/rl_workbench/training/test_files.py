@@ -23,17 +23,6 @@ def test_a_write_that_fails_keeps_the_old_file(tmp_path: Path) -> None:
     assert [each.name for each in tmp_path.iterdir()] == ["weights.pth"]
 
 
-def test_the_name_appears_only_with_the_whole_content(tmp_path: Path) -> None:
-    path = tmp_path / "weights.pth"
-
-    def look(stream: BinaryIO) -> None:
-        stream.write(b"x" * 100000)
-        assert not path.exists()
-
-    write_atomically(path, look)
-    assert path.stat().st_size == 100000
-
-
 def test_a_written_file_follows_the_umask(tmp_path: Path) -> None:
     old = os.umask(0o027)
     try:

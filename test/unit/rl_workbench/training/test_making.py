@@ -57,24 +57,6 @@ def test_options_that_an_environment_refuses(env_id: str, options: dict, words: 
     assert "\n" not in str(raised.value)
 
 
-@pytest.mark.parametrize(
-    ("env_id", "words"),
-    [
-        ("CartPol-v1", "^can't make CartPol-v1: .*Did you mean: `CartPole`?"),
-        ("CartPole-v7", "It provides versioned environments: "),
-        ("zzz", "^can't make zzz: .* One of your own is named with its module"),
-        (
-            "my_module:Env-v0",
-            "can't make my_module:Env-v0: there is no module 'my_module'; its folder",
-        ),
-    ],
-)
-def test_an_environment_that_is_none(env_id: str, words: str, monkeypatch) -> None:
-    monkeypatch.setattr(errors, "hints", errors.Hints())
-    with pytest.raises(WorkbenchError, match=words):
-        make_environment(env_id)
-
-
 def test_one_whose_package_is_missing(monkeypatch) -> None:
     def missing(*arguments: object, **options: object) -> None:
         raise gymnasium.error.DependencyNotInstalled("MuJoCo is not installed")

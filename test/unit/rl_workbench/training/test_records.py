@@ -21,14 +21,6 @@ def test_a_record_comes_back(name: str) -> None:
     assert recorded_options(json.loads(json.dumps(content)), "here") == options
 
 
-def test_a_record_of_something_else() -> None:
-    content = small("dqn").record()
-    with pytest.raises(WorkbenchError, match="here: unknown option 'wheels'"):
-        recorded_options(content | {"hyperparameters": {"wheels": 4}}, "here")
-    with pytest.raises(WorkbenchError, match="unknown algorithm 'pg'"):
-        recorded_options(content | {"algorithm": "pg"}, "here")
-
-
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return train(tmp_path_factory.mktemp("done"), "reinforce", episodes=3)

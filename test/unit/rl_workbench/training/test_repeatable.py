@@ -76,13 +76,3 @@ def test_one_that_goes_another_way_is_told(monkeypatch) -> None:
             other = made()
         assert other.load_state_dict(state) is None
         assert json.loads(other.generator) == json.loads(before)
-
-
-@pytest.mark.parametrize("spoilt", [7, 0.5])
-def test_actions_that_are_none(spoilt: float) -> None:
-    place = made()
-    place.step(1)
-    state = place.state_dict()
-    state["actions"] = state["actions"] * spoilt
-    with pytest.raises(ValueError, match="other actions|a tensor of torch.int64"):
-        place.load_state_dict(state)

@@ -9,7 +9,7 @@ import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from rl_workbench.training import scalar_log
-from rl_workbench.training.scalar_log import EventFile, ScalarLog
+from rl_workbench.training.scalar_log import ScalarLog
 
 LARGEST = 50_000  # [bytes]
 
@@ -52,8 +52,3 @@ def test_points_are_shown_before_the_file_is_full(tmp_path: Path, monkeypatch) -
     shown.Reload()
     assert [(point.step, point.value) for point in shown.Scalars("a")] == [(3, 1.5)]
     log.close()
-
-
-def test_a_disk_that_takes_nothing(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="No such file"):
-        EventFile(tmp_path / "none")

@@ -88,13 +88,6 @@ def test_single_actions_do_not_fit_a_pendulum() -> None:
         model("dqn-sb3", "--env-id=Pendulum-v1")
 
 
-def test_where_the_library_is_missing_it_is_said_how_to_get_it(monkeypatch) -> None:
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    words = "the algorithm ppo needs Stable-Baselines3, an extra: .* installs it"
-    with pytest.raises(WorkbenchError, match=words):
-        chosen("ppo")
-
-
 @pytest.mark.parametrize("algorithm", ["ppo", "a2c", "sac", "td3", "ddpg", "dqn-sb3"])
 def test_options_and_defaults_are_the_librarys(algorithm: str) -> None:
     """They are written out, since importing the library takes seconds of every --help."""
