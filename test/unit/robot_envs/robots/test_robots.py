@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
+import robot_envs.robots  # noqa: F401 - registers the environments
 from robot_envs.making import named
 from robot_envs.testing import check_robot_env, rollout
 
