@@ -57,8 +57,7 @@ class StabilityWatch:
     def review(self, period: float) -> None:
         """Warns of gains that are too high, and damps joints that a P gain alone drives.
 
-        Args:
-            period: of the controllers [s]; 0 if they are updated on each step.
+        `period` is the controllers' [s]; 0 if they are updated on each step.
         """
         dt = max(period, self._model.time_step)
         acting = self._acting()

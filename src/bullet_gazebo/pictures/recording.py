@@ -14,7 +14,6 @@ import subprocess
 import sys
 import threading
 from array import array
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,7 +32,6 @@ if TYPE_CHECKING:  # only the other process draws
     from bullet_gazebo.pictures.renderer import Renderer
 
 MAIN = "import sys; from bullet_gazebo.pictures.recording import main; sys.exit(main(sys.argv[1:]))"
-MOST_WAITING = 100_000_000  # [bytes] for the other process; beyond it frames are dropped
 LEAST_SIZE, LARGEST_SIZE, FASTEST = 16, 4096, 240.0
 NUMBERS = 7  # of a pose
 ROOM = 1.25  # factor on the camera's distance: things move
@@ -100,10 +98,8 @@ class SimulationRecorder:
         self._period = round(NANOSECONDS / options.rate)
         self._due, self._last = 0, -1  # [ns]
         self._models: list[Model] = []
-        self._waiting: deque[bytes] = deque()
-        self._size = 0  # [bytes] in `_waiting`
-        self._dropped = 0
-        self._news, self._ending = threading.Condition(), False
+        self._waiting: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._ending = False
         self._process = _start(options)
         self._thread = threading.Thread(target=self._feed, name="recording", daemon=True)
         self._thread.start()
@@ -121,48 +117,31 @@ class SimulationRecorder:
         if models != self._models:
             self._models = models
             recorded = [_recorded(model) for model in models]
-        elif self._size > MOST_WAITING:
-            self._dropped += 1
-            return
         poses = array("d")
         for model in models:
             for position, orientation in model.link_poses():
                 poses.extend((*position, *orientation))
-        data = pickle.dumps((recorded, poses))
-        with self._news:
-            self._waiting.append(data)
-            self._size += len(data)
-            self._news.notify()
+        self._waiting.put(pickle.dumps((recorded, poses)))
 
     def _feed(self) -> None:
         """Sends queued messages until `close`, or until the other process ends."""
         pipe: Any = self._process.stdin
         try:
-            while True:
-                with self._news:
-                    self._news.wait_for(lambda: bool(self._waiting) or self._ending)
-                    if not self._waiting:
-                        break
-                    data = self._waiting.popleft()
-                    self._size -= len(data)
+            while (data := self._waiting.get()) is not None:
                 pipe.write(data)
                 pipe.flush()
             pipe.close()
         except OSError:  # the other process has printed why
             self._ending = True
             logger.warning("the recording has ended before the simulation")
-        if self._dropped:
-            logger.warning("%d frames of the recording were dropped", self._dropped)
 
     def close(self, patience: float) -> None:
-        """Ends the recording; the other process may outlive this one to draw the last frames.
+        """Ends the recording, after up to `patience` [s] for what is queued.
 
-        Args:
-            patience: time to send what is queued [s].
+        The other process may outlive this one to draw the last frames.
         """
-        with self._news:
-            self._ending = True
-            self._news.notify()
+        self._ending = True
+        self._waiting.put(None)
         self._thread.join(patience)
 
 

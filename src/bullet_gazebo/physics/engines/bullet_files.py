@@ -25,8 +25,6 @@ def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
     from an OBJ file is written as one.
 
     Args:
-        mesh: the mesh.
-        folder: the folder.
         concave: whether to write its triangles instead of its hulls.
         objects: whether it came from an OBJ file.
     """

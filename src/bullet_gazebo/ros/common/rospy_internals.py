@@ -202,11 +202,7 @@ def witness() -> tuple[str, str]:
 def register_again(timeout: float) -> None:
     """Registers all topics and services of this node at the master, the witness last.
 
-    Args:
-        timeout: of each call [s].
-
-    Raises:
-        NoAnswer: the master has gone again.
+    Each call takes up to `timeout` [s]. NoAnswer: the master has gone again.
     """
     topics = rospy.impl.registration.get_topic_manager()
     with topics.lock:
