@@ -290,10 +290,6 @@ class StateReader:
     """Answers a query, again and again."""
 
     def __init__(self, world: World, query: StateQuery) -> None:
-        """
-        Raises:
-            UnknownName: if the world has no entity of a name, or several.
-        """
         self.query = query
         self._world = world
         self._resolve()

@@ -31,7 +31,7 @@ from bullet_gazebo.simulator import NANOSECONDS, Simulator
 if TYPE_CHECKING:  # only the other process draws
     from bullet_gazebo.pictures.renderer import Renderer
 
-MAIN = "import sys; from bullet_gazebo.pictures.recording import main; sys.exit(main(sys.argv[1:]))"
+MAIN = "import sys; from bullet_gazebo.pictures.recording import main; sys.exit(main())"
 LEAST_SIZE, LARGEST_SIZE, FASTEST = 16, 4096, 240.0
 NUMBERS = 7  # of a pose
 ROOM = 1.25  # factor on the camera's distance: things move
@@ -62,11 +62,7 @@ class RecordingOptions:
     model: str = ""
 
     def check(self) -> None:
-        """Checks the options.
-
-        Raises:
-            RecordingError: one of them is invalid.
-        """
+        """Raises RecordingError if one of the options is invalid."""
         if self.path.suffix.lower() != ".mp4":
             raise RecordingError(f"a recording's name ends in .mp4: not '{self.path}'")
         if self.path.is_dir() or not os.access(self.path.parent, os.W_OK):
@@ -99,8 +95,9 @@ class SimulationRecorder:
         self._due, self._last = 0, -1  # [ns]
         self._models: list[Model] = []
         self._waiting: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._waiting.put(pickle.dumps(options))
         self._ending = False
-        self._process = _start(options)
+        self._process = _start()
         self._thread = threading.Thread(target=self._feed, name="recording", daemon=True)
         self._thread.start()
         sim.listeners.append(self._on_tick)
@@ -151,13 +148,10 @@ def _recorded(model: Model) -> RecordedModel:
     return RecordedModel(model.name, made.root, made.static, model.link_names, shapes)
 
 
-def _start(options: RecordingOptions) -> subprocess.Popen[bytes]:
-    words = [
-        str(options.path), f"{options.rate!r}", str(options.width), str(options.height), options.model
-    ]  # fmt: skip
+def _start() -> subprocess.Popen[bytes]:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     return subprocess.Popen(
-        [sys.executable, "-P", "-c", MAIN, *words], stdin=subprocess.PIPE, env=environment,
+        [sys.executable, "-P", "-c", MAIN], stdin=subprocess.PIPE, env=environment,
         start_new_session=True,
     )  # fmt: skip
 
@@ -210,20 +204,19 @@ class FrameDrawer:
         return Camera(camera.target, ROOM * camera.distance, camera.yaw, camera.pitch, camera.view)
 
 
-def main(arguments: Sequence[str]) -> int:
+def main() -> int:
     """Draws until standard input ends; SIGTERM drops the frames that aren't drawn yet."""
     from web_viewer.video import EncoderFailed
 
     logging.basicConfig(format="recording: %(message)s")
-    path, rate, width, height, model = arguments
-    options = RecordingOptions(Path(path), float(rate), int(width), int(height), model)
+    options: RecordingOptions = pickle.load(sys.stdin.buffer)
     try:
         count = _draw(options)
     except EncoderFailed as error:
-        print(f"recording: {path}: {error}", file=sys.stderr, flush=True)
+        print(f"recording: {options.path}: {error}", file=sys.stderr, flush=True)
         return 1
     length = f"{count} frames, {count / options.rate:.1f} s" if count else "no time has passed"
-    print(f"recording: {path}: {length}", flush=True)
+    print(f"recording: {options.path}: {length}", flush=True)
     return 0
 
 

@@ -117,11 +117,7 @@ def _require_master() -> None:
 
 
 def _require_manager() -> None:
-    """Waits for the manager in the program's namespace.
-
-    Raises:
-        CommandFailed: it doesn't come up in time.
-    """
+    """Waits for the manager in the program's namespace."""
     _require_master()
     name = str(rospy.resolve_name(LAST))
     if service_comes_up(name, NOTICE):

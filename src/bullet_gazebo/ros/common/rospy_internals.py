@@ -54,7 +54,6 @@ def wait_until_sent(publisher: rospy.Publisher, bound: float = 1.0) -> None:
     """Waits until rospy's threads have written all messages, so that closing the topic loses none.
 
     Args:
-        publisher: of the topic.
         bound: of the wait [s of wall time], for a client that doesn't read.
     """
     deadline = time.monotonic() + bound
