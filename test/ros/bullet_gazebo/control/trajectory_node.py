@@ -11,10 +11,10 @@ import rostest
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 from control_msgs.msg import JointTolerance
 from control_msgs.srv import QueryTrajectoryState
-from controller_client import STRICT, Manager
 from gazebo_msgs.srv import GetJointProperties
 from std_srvs.srv import Empty
 from support.ros.calls import BOUND, call, delete_model, spawn_model, wait_until
+from support.ros.manager import STRICT, Manager
 from trajectory_client import Arm, trajectory
 
 EFFORT = ["effort_a", "effort_b"]

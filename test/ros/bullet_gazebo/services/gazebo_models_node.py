@@ -118,9 +118,8 @@ class ModelsTest(GazeboTest):
             ModelState("box", self.box().pose, Twist(linear=Vector3(5, 0, 0)), ""),
         )
         for name in ("frame", "frame::body", "frame::body::body_collision"):
-            found = self.box(
-                name
-            )  # 2 m before it along the world's x, its y; no ω × r in the twist
+            found = self.box(name)
+            # 2 m before it along the world's x, its y; no ω × r in the twist
             self.close([(found.pose.position.x, 0.0), (found.pose.position.y, -2.0),
                         (found.pose.orientation.z, -math.sqrt(0.5)), (found.twist.linear.x, -1.0),
                         (found.twist.linear.y, -5.0), (found.twist.angular.z, -2.0)])  # fmt: skip
