@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import rospy
 import rostest
-from gazebo_msgs.msg import LinkStates, ModelStates
+from gazebo_msgs.msg import ModelStates
 from gazebo_msgs.srv import (
     DeleteModel,
     GetJointProperties,
@@ -193,33 +193,6 @@ class StandInTest(unittest.TestCase):
         gaps = [b - a for a, b in pairwise(stamps)]
         self.assertEqual(min(gaps), 1_000_000)
         self.assertGreater(gaps.count(1_000_000), len(gaps) / 2)
-
-    def test_link_states(self):
-        links = self.listen("/gazebo/link_states", LinkStates)
-        call("/gazebo/unpause_physics", Empty)
-        self.assertTrue(links.wait_for(len))
-        self.assertEqual(
-            links.messages[0].name,
-            ["ground_plane::link", "cartpole::stand", "cartpole::cart", "cartpole::pole"],
-        )
-
-    def test_reset_simulation_returns_time_and_joints_to_zero_and_states_keep_coming(self):
-        self.start_controllers()
-        states = self.listen("/joint_states", JointState)
-        place(0.0, 0.1)
-        call("/gazebo/unpause_physics", Empty)
-        self.assertTrue(states.wait_for(lambda m: m[-1].position[0] > 0.2))
-        call("/gazebo/reset_simulation", Empty)
-        # Those that were on their way may come first.
-        first = states.wait_for(
-            lambda m: next(
-                (i + 1 for i, (a, b) in enumerate(pairwise(m)) if b.header.stamp < a.header.stamp),
-                0,
-            )
-        )
-        self.assertLess(states.messages[first].header.stamp.to_sec(), 1.0)
-        self.assertTrue(states.wait_for(lambda m: len(m) >= first + 24))
-        self.assertEqual({m.position for m in states.messages[first:]}, {(0.0, 0.0)})
 
     # control
 

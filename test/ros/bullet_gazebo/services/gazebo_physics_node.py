@@ -146,9 +146,8 @@ class PhysicsTest(GazeboTest):
         for level in ("debug", "warn", "info"):
             call("set_logger_level", "rosout", level, kind=SetLoggerLevel)
             loggers = call("get_loggers", kind=GetLoggers).loggers
-            self.assertEqual(
-                {each.name: each.level for each in loggers}["rosout"].lower()[:4], level[:4]
-            )
+            levels = {each.name: each.level for each in loggers}
+            self.assertEqual(levels["rosout"].lower()[:4], level[:4])
 
 
 if __name__ == "__main__":
