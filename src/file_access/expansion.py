@@ -4,8 +4,6 @@ A xacro file is a program: it may include itself, compute without end or ask for
 a child process, with the xacro that the caller would import.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -4,8 +4,6 @@ A mesh or xacro file can make its reader compute without end, ask for all memory
 Read here, it ends a child process, and the caller gets one line that says why.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 import resource

@@ -5,8 +5,6 @@ threads (timers, callbacks, threads with a rospy.Rate) one at a time when they a
 one of them computes, so the order of events doesn't depend on the machine's speed.
 """
 
-from __future__ import annotations
-
 import math
 import threading
 from collections.abc import Callable, Collection, Sequence
@@ -121,10 +119,6 @@ class Clock:
             return self._drive(span, until, topics)
         finally:
             self.driving = False
-
-    def step(self, ticks: int) -> None:
-        """Lets `ticks` physics steps pass; only for the main thread."""
-        self.wait(ticks * self.world.step / NANOSECONDS)
 
     def exchange(self) -> None:
         """Sends the script's messages and delivers those received; no time passes."""

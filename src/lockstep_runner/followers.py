@@ -4,8 +4,6 @@ Nodes that follow the clock rest while the script computes and wake when they ar
 passes until the processes that the script has started are at rest.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import os
@@ -105,10 +103,6 @@ class _Node:
     seen: Seen = field(init=False)
 
     def __post_init__(self) -> None:
-        self.look_anew()
-
-    def look_anew(self) -> None:
-        """Starts counting idle checks anew."""
         self.seen = Seen(Path("/proc", str(self.pid)))
 
 
@@ -208,7 +202,7 @@ class Followers(Others):
                     node.began = self.passed()
                     node.wake = math.inf if rest is None else node.began + rest
                     node.rests = node.covered = True
-                    node.look_anew()
+                    node.seen = Seen(node.seen.place)
                     self._guard.notify_all()
         except (LineEnded, KeyError, TypeError, ValueError):
             line.close()

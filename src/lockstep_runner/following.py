@@ -1,7 +1,5 @@
 """A node under the clock of the script that started it (or started what started it)."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import socket

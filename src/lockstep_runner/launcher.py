@@ -1,7 +1,5 @@
 """Command line: runs a script in lock-step (docs/lockstep.md)."""
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import os

@@ -1,7 +1,5 @@
 """The transport between the script's process and a node that follows its clock: one JSON object per line."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import socket
@@ -29,11 +27,7 @@ class Line:
             raise LineEnded from fault
 
     def receive(self) -> dict[str, Any]:
-        """Waits for the next object and returns it.
-
-        Raises:
-            LineEnded: the other side has gone, or sent no JSON object.
-        """
+        """Waits for the next object; raises LineEnded if the other side has gone, or sent something else."""
         try:
             line = self._reader.readline()
             content = json.loads(line) if line.endswith("\n") else None

@@ -1,7 +1,5 @@
 """Observes processes and threads through /proc: whether they compute or wait."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from lockstep_runner import originals
@@ -16,7 +14,7 @@ class Seen:
 
     def __init__(self, place: Path, quiet: int = QUIET) -> None:
         """`place` is its folder in /proc; it counts as quiet after `quiet` idle checks in a row."""
-        self._place = place
+        self.place = place
         self._looks = quiet
         self._used = -1  # [ticks] of processor time
         self._quiet = 0  # idle checks in a row
@@ -26,7 +24,7 @@ class Seen:
         """Returns whether the last few checks found it idle; checks at most once per LOOK."""
         if originals.monotonic() >= self._next:
             self._next = originals.monotonic() + LOOK
-            look = look_at(self._place)
+            look = look_at(self.place)
             works = look is not None and (look[0] in WORKING or look[1] != self._used)
             self._quiet = 0 if works else self._quiet + 1
             self._used = look[1] if look else -1

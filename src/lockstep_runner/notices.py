@@ -1,7 +1,5 @@
 """Notices to the user on stderr."""
 
-from __future__ import annotations
-
 import sys
 
 _told: set[str] = set()  # what there was a notice about

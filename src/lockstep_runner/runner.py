@@ -1,7 +1,5 @@
 """The state that the replaced functions share: world, clock, and when time passes without a wait."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import math
@@ -42,7 +40,7 @@ def _ends_with_the_world(instead: bool | None) -> Callable[[Method], Method]:
 
     def decorate(method: Method) -> Method:
         @functools.wraps(method)
-        def guarded(self: ScriptRunner, *args: Any, **kwds: Any) -> Any:
+        def guarded(self: "ScriptRunner", *args: Any, **kwds: Any) -> Any:
             try:
                 return method(self, *args, **kwds)
             except WorldGone as gone:
@@ -135,11 +133,6 @@ class ScriptRunner:
         self._settle()
         self.clock.exchange()
         return self._looks * seconds < OTHERS
-
-    def post(self, topic: str, data: bytes) -> bool:
-        """Keeps a message for the simulator until the next call."""
-        self.world.post(topic, data)
-        return True
 
     @_ends_with_the_world(None)
     def before_publishing(self, topic: str) -> None:

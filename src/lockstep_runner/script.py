@@ -1,7 +1,5 @@
 """Compiles and runs the script as if started directly, seeds it, and tells its code from libraries'."""
 
-from __future__ import annotations
-
 import ast
 import builtins
 import importlib.abc
@@ -24,11 +22,7 @@ class NoScript(Exception):
 
 
 def compiled(path: str) -> types.CodeType:
-    """Returns a script's code.
-
-    Raises:
-        NoScript: the file can't be read, or isn't Python 3.
-    """
+    """Returns a script's code; raises NoScript if the file can't be read, or isn't Python 3."""
     try:
         with tokenize.open(path) as file:
             source = file.read()
@@ -118,46 +112,12 @@ class AfterImport(importlib.abc.MetaPathFinder):
 STANDARD = sysconfig.get_path("stdlib") + "/"
 # They wait for their own processes, sockets, files and threads: such waits stay wall time.
 LIBRARIES = frozenset(
-    # fmt: off
-    [
-        "bullet_gazebo",
-        "catkin_pkg",
-        "genpy",
-        "joblib",
-        "lockstep_runner",
-        "matplotlib",
-        "multiprocess",
-        "numpy",
-        "optuna",
-        "psutil",
-        "pybullet",
-        "ray",
-        "rl_workbench",
-        "robot_envs",
-        "ros_calls",
-        "ros_utils",
-        "rosgraph",
-        "roslaunch",
-        "roslib",
-        "rosmaster",
-        "rosnode",
-        "rosparam",
-        "rospkg",
-        "rospy",
-        "rosservice",
-        "rostopic",
-        "scipy",
-        "tensorboard",
-        "tensorboardX",
-        "tensorflow",
-        "torch",
-        "tqdm",
-        "wandb",
-        "xacro",
-        "xmlrpc",
-    ]
-    # fmt: on
-)
+    ["bullet_gazebo", "catkin_pkg", "genpy", "joblib", "lockstep_runner", "matplotlib",
+     "multiprocess", "numpy", "optuna", "psutil", "pybullet", "ray", "rl_workbench",
+     "robot_envs", "ros_calls", "ros_utils", "rosgraph", "roslaunch", "roslib", "rosmaster",
+     "rosnode", "rosparam", "rospkg", "rospy", "rosservice", "rostopic", "scipy",
+     "tensorboard", "tensorboardX", "tensorflow", "torch", "tqdm", "wandb", "xacro", "xmlrpc"]
+)  # fmt: skip
 
 
 # A wait in these counts as their caller's.

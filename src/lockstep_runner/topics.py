@@ -3,8 +3,6 @@
 The simulator's messages reach the script's callbacks in order, in a worker thread as with rospy.
 """
 
-from __future__ import annotations
-
 import threading
 from collections import defaultdict, deque
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -75,7 +73,7 @@ class Callbacks:
         self._began(worker)
         worker.go.release()
 
-    def _work(self, worker: _Worker) -> None:
+    def _work(self, worker: "_Worker") -> None:
         while True:
             with self._guard:
                 if not self._waiting:
@@ -116,7 +114,7 @@ class Callbacks:
 class _Worker(threading.Thread):
     """A thread that runs callbacks each time `go` is released."""
 
-    def __init__(self, work: Callable[[_Worker], None]) -> None:
+    def __init__(self, work: Callable[["_Worker"], None]) -> None:
         super().__init__(name="callbacks", daemon=True)
         self.go = threading.Lock()
         self.go.acquire()

@@ -1,7 +1,5 @@
 """Decides when time passes without a wait: once per round of commands, or at topics the user names."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection
 

@@ -1,7 +1,5 @@
 """The simulator of a script in lock-step: time on request, and the messages that come with it."""
 
-from __future__ import annotations
-
 import math
 import sys
 import threading
@@ -148,7 +146,7 @@ class ScriptWorld:
             if raised is not None:
                 raise raised  # noqa: B904 - as if nobody had taken it for the connection's
             self.forget()
-            if isinstance(fault, ServiceGone) and not _is_registered():
+            if isinstance(fault, ServiceGone) and not _is_registered(SERVICE):
                 raise WorldGone("the simulator has been ended") from fault
             raise WorldFailed(f"the simulator has died, or hangs: {fault}") from fault
 
@@ -232,35 +230,21 @@ def _raised_in(fault: BaseException) -> str:
 
 
 def is_running() -> bool:
-    """Returns whether a simulator in lock-step answers under the master.
-
-    Raises:
-        RunsByItself: a simulator answers, but isn't in lock-step.
-    """
-    try:
-        master.call("lookupService", SERVICE)
-    except master.Refused:
-        pass
-    except master.NoAnswer:
-        return False
-    else:
+    """Returns whether a simulator in lock-step answers; raises RunsByItself if one in real time does."""
+    if _is_registered(SERVICE):
         return _lives()
-    try:
-        master.call("lookupService", f"{NODE}/pause_physics")
-    except (master.Refused, master.NoAnswer):
-        return False
-    if not _lives():
-        return False
-    raise RunsByItself(
-        f"the simulator under {master.uri()} runs in real time: end it, so that the script starts its own,"
-        " or start it with lockstep:=true"
-    )
+    if _is_registered(f"{NODE}/pause_physics") and _lives():
+        raise RunsByItself(
+            f"the simulator under {master.uri()} runs in real time: end it, so that the script starts its"
+            " own, or start it with lockstep:=true"
+        )
+    return False
 
 
-def _is_registered() -> bool:
-    """Returns whether the service is still registered; a simulator that ended properly isn't."""
+def _is_registered(service: str) -> bool:
+    """Returns whether a service is registered; those of a simulator that ended properly aren't."""
     try:
-        master.call("lookupService", SERVICE)
+        master.call("lookupService", service)
     except (master.Refused, master.NoAnswer):
         return False
     return True

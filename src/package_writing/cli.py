@@ -19,9 +19,11 @@ VALID = re.compile(r"[a-z][a-z0-9_]*")
 def check_name(name: str) -> None:
     """Raises CannotWrite unless a name is free and valid for catkin and Python."""
     if not VALID.fullmatch(name) or keyword.iskeyword(name):
+        words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+        near = re.sub(r"[^a-z0-9]+", "_", words).strip("_").removeprefix("my_") or "robot"
         raise CannotWrite(
             "a package's name has small letters, digits and _, begins with a letter, and is no keyword of "
-            f"Python: '{name}' isn't one"
+            f"Python: '{name}' isn't one, 'my_{near}' would be"
         )
     if importlib.util.find_spec(name) is not None or _is_package(name):
         raise CannotWrite(f"the name '{name}' is taken; choose another one, such as 'my_{name}'")
@@ -77,6 +79,12 @@ def _parser() -> argparse.ArgumentParser:
         "--to", type=Path, metavar="FOLDER",
         help=f"folder in which the package is created (default: {package.PARENT})",
     )  # fmt: skip
+    _add_robot_options(parser)
+    return parser
+
+
+def _add_robot_options(parser: argparse.ArgumentParser) -> None:
+    """Adds the options for what the robot's file doesn't say."""
     parser.add_argument(
         "--base", choices=("fixed", "free"),
         help="fix a robot to the world that its file doesn't fix (an arm), or let it stand or fall",
@@ -96,7 +104,6 @@ def _parser() -> argparse.ArgumentParser:
         "--passive", action="append", default=[], metavar="JOINT",
         help="a joint without a motor, if the file has no transmissions; may be repeated",
     )  # fmt: skip
-    return parser
 
 
 def _write(args: argparse.Namespace, parent: Path) -> list[str]:

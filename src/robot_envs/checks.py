@@ -133,11 +133,11 @@ def checked_steps(most: Any) -> int | None:
     return None if most is None else int(most)
 
 
-def made_space(task: Task, method: str) -> gymnasium.Space[Any]:
-    """Calls a method that makes a space; raises TaskError if it doesn't."""
+def made_space(task: Task, method: str, kind: type = gymnasium.Space) -> Any:
+    """Calls a method that makes a space; raises TaskError unless the space is of that kind."""
     made = getattr(task, method)()
-    if not isinstance(made, gymnasium.Space):
-        raise _wrong(task, method, made, "a gymnasium.Space")
+    if not isinstance(made, kind):
+        raise _wrong(task, method, made, f"a gymnasium.spaces.{kind.__name__}")
     return made
 
 
@@ -179,9 +179,7 @@ def _wrong(task: Task, method: str, given: Any, wanted: str) -> TaskError:
 
 def goal_space(task: GoalTask, observations: gymnasium.Space[Any]) -> gymnasium.spaces.Dict:
     """Returns the observation space of a goal environment; raises TaskError unless the goals are a Box."""
-    achieved, desired = made_space(task, "goals"), made_space(task, "goals")
-    if not isinstance(achieved, gymnasium.spaces.Box):
-        raise _wrong(task, "goals", achieved, "a gymnasium.spaces.Box")
+    achieved, desired = (made_space(task, "goals", gymnasium.spaces.Box) for _ in range(2))
     return gymnasium.spaces.Dict(
         {"observation": observations, "achieved_goal": achieved, "desired_goal": desired}
     )

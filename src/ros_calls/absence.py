@@ -1,7 +1,5 @@
 """Explains why nobody offers a service, and names what to start."""
 
-from __future__ import annotations
-
 from ros_calls import master
 from ros_calls.master import NoAnswer, Refused
 

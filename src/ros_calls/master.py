@@ -4,8 +4,6 @@ rospy's own XML-RPC proxies have none: on a dead network they block for minutes.
 per process; here each thread can switch to another one for a while.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import http.client
@@ -163,7 +161,7 @@ def is_up_or_startable() -> bool:
     try:
         require()
     except MasterDown as down:
-        if not is_local():
+        if not host_is_local(host_and_port()[0]):
             raise
         if not down.port_is_free:
             raise MasterDown(
@@ -184,11 +182,7 @@ def is_up() -> bool:
 
 
 def host_and_port() -> tuple[str, int]:
-    """Returns host and port of the master.
-
-    Raises:
-        MasterDown: ROS_MASTER_URI isn't an address.
-    """
+    """Returns host and port of the master; raises MasterDown if ROS_MASTER_URI isn't an address."""
     try:
         parts = urlsplit(uri())
         host, port = parts.hostname, parts.port
@@ -199,11 +193,6 @@ def host_and_port() -> tuple[str, int]:
             f"ROS_MASTER_URI is {uri()!r}: expected something like http://localhost:11311"
         )
     return host, port
-
-
-def is_local() -> bool:
-    """Returns True if the master's host is this machine."""
-    return host_is_local(host_and_port()[0])
 
 
 @functools.cache  # the look-up may ask a name server

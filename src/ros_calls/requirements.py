@@ -4,8 +4,6 @@ Programs call it before any other import: in a user's own catkin workspace, rosd
 install packages that only pip has.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import shlex
 import sys

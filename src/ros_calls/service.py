@@ -4,8 +4,6 @@ rospy's proxies have no time limit, keep a dead connection, and ask the process'
 know the address.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import select
@@ -158,7 +156,7 @@ class ServiceClient:
                 pass
         return self(*request)
 
-    def _connected(self) -> Connection:
+    def _connected(self) -> "Connection":
         if self._connection is None:
             self._connection = Connection(self._address(), self.name, self._kind, self.timeout)
         return self._connection
@@ -325,11 +323,7 @@ class Connection:
 
 
 def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
-    """Returns the request message, given as such or by its fields in order.
-
-    Raises:
-        CallFailed: the fields don't fit the request.
-    """
+    """Returns the request, given as a message or by its fields; raises CallFailed if they don't fit."""
     if len(request) == 1 and isinstance(request[0], kind._request_class):
         return request[0]
     try:

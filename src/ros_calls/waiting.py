@@ -1,7 +1,5 @@
 """Bounded waits in wall time, because simulated time may stand still, run fast or go back."""
 
-from __future__ import annotations
-
 import socket
 import time
 from collections.abc import Callable

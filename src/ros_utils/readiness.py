@@ -4,8 +4,6 @@ ready = Ready(models=["arm"], controllers=["joint_state_controller", "arm_contro
 ros_launch.ros_launch_from_pkg("my_arm", "arm.launch", ready=ready, timeout=120.0)
 """
 
-from __future__ import annotations
-
 import difflib
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence

@@ -6,8 +6,6 @@ nothing). Every function takes the keyword `service_timeout`: the limit for a se
 again for its answer [s]. Failures are logged, never raised.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -52,7 +50,7 @@ class ListResult(int):
 
     failed: list[str]
 
-    def __new__(cls, failed: Sequence[str]) -> ListResult:
+    def __new__(cls, failed: Sequence[str]) -> "ListResult":
         self = super().__new__(cls, not failed)
         self.failed = list(failed)
         return self

@@ -1,7 +1,5 @@
 """Starts and ends launch files."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 

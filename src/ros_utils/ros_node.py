@@ -1,7 +1,5 @@
 """Starts and ends nodes and the master."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Mapping, Sequence
 
@@ -175,11 +173,7 @@ def _executable(package: str, name: str) -> str:
 
 
 def _arguments(args: str | Sequence[str] | None) -> list[str]:
-    """Returns the node's own arguments as a list.
-
-    Raises:
-        ValueError: a quote isn't closed.
-    """
+    """Returns the node's own arguments as a list; raises ValueError if a quote isn't closed."""
     try:
         return shlex.split(args) if isinstance(args, str) else [str(arg) for arg in args or []]
     except ValueError as fault:

@@ -1,7 +1,5 @@
 """Loads YAML files into the parameter server."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

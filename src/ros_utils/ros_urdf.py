@@ -1,7 +1,5 @@
 """Expands robot descriptions (xacro) and puts them on the parameter server."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ros_calls import master as _master

@@ -11,8 +11,6 @@ rospy knows one master per process, so this process's publishers and subscribers
 within `active`, the functions of this package use the simulation's master.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import socket
@@ -111,7 +109,7 @@ class Simulation:
             self._closed = not anything or ros_node.ros_kill_all_processes()
         return self._closed
 
-    def __enter__(self) -> Simulation:
+    def __enter__(self) -> "Simulation":
         return self
 
     def __exit__(self, *_: object) -> None:

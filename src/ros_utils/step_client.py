@@ -6,8 +6,6 @@ state = client.step(8, {"stand_cart_position_controller": 0.02}, links=["pole"],
 state.joint_states.position, state.sim_time, state.link_poses[0].position.z, state.contacts
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral
 from typing import Any, NamedTuple

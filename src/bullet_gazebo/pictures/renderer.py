@@ -198,18 +198,22 @@ class Renderer:
         self, camera: Camera, width: int, height: int, region: Region, bodies: bool = False
     ) -> Layer:
         """Draws a region; numbers of `bodies` only on request, because they take time."""
-        left, top, right, bottom = (FINER * edge for edge in region)
-        size = (right - left, bottom - top)
+        left, top, right, bottom = region
+        size = (FINER * (right - left), FINER * (bottom - top))
+        pixel = 2.0 * camera.slope * camera.near / height  # [m] on the near clipping plane
         colours, depths, numbers = pybullet.getCameraImage(
             *size,
-            viewMatrix=camera.view_matrix().T.ravel().tolist(),
-            projectionMatrix=camera.projection_matrix(width, height, region).T.ravel().tolist(),
+            viewMatrix=pybullet.computeViewMatrix(camera.eye, camera.target, camera.axes[1]),
+            projectionMatrix=pybullet.computeProjectionMatrix(
+                pixel * (left - width / 2), pixel * (right - width / 2),
+                pixel * (height / 2 - bottom), pixel * (height / 2 - top), camera.near, camera.far,
+            ),
             lightDirection=LIGHT,
             shadow=0,
             flags=0 if bodies else pybullet.ER_NO_SEGMENTATION_MASK,
             renderer=pybullet.ER_TINY_RENDERER,
             physicsClientId=self._client,
-        )[2:5]
+        )[2:5]  # fmt: skip
         pixels = np.reshape(colours, (*size[::-1], 4))[..., :3].astype(np.uint8)
         shape = size[::-1]
         found = np.reshape(numbers, shape) if bodies else np.zeros((0, 0), int)

@@ -1,7 +1,5 @@
 """What replaces the functions that docs/lockstep.md lists, in this process."""
 
-from __future__ import annotations
-
 import argparse
 import os
 
@@ -25,7 +23,7 @@ def install(args: argparse.Namespace, world: ScriptWorld | None = None) -> Scrip
     """
     triggers = None
     if args.step_on is not None:
-        triggers = [_global(name) for name in args.step_on if name != "none"]
+        triggers = [f"/{name.removeprefix('/')}" for name in args.step_on if name != "none"]
     runner = ScriptRunner(args.dt, triggers, world or ScriptWorld(args.seed))
     if world is None:
         followers = Followers()
@@ -43,7 +41,3 @@ def install(args: argparse.Namespace, world: ScriptWorld | None = None) -> Scrip
     os.register_at_fork(after_in_child=runner.world.leave)
     rospy.core.add_shutdown_hook(lambda reason: runner.clock.release_all())
     return runner
-
-
-def _global(name: str) -> str:
-    return name if name.startswith("/") else f"/{name}"

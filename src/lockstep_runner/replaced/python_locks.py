@@ -3,8 +3,6 @@
 Otherwise a callback blocked on a lock would seem to compute, and the lock's holder would wait for it.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import threading

@@ -4,8 +4,6 @@ Event.wait, Condition.wait, Thread.start and join; through them queue, threading
 time.sleep; with --virtual-wall-clock also time.time, monotonic and perf_counter.
 """
 
-from __future__ import annotations
-
 import concurrent.futures._base as futures
 import contextlib
 import math
@@ -116,11 +114,7 @@ def _replace_start(runner: ScriptRunner) -> None:
 
 
 def wait_for_notice(runner: ScriptRunner, condition: Any, timeout: float | None) -> bool:
-    """As Condition.wait in simulated time: releases the lock while it waits.
-
-    Raises:
-        RuntimeError: the caller doesn't hold the lock.
-    """
+    """As Condition.wait, in simulated time."""
     if not condition._is_owned():
         raise RuntimeError("cannot wait on un-acquired lock")
     waiter = threading.Lock()

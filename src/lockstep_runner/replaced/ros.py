@@ -3,8 +3,6 @@
 Messages to and from the simulator travel with its time; connections to services are kept.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import select
@@ -64,7 +62,7 @@ def _divert(runner: ScriptRunner) -> None:
 
     def adding(topic: _TopicImpl, connection: Any) -> bool:
         if isinstance(topic, _PublisherImpl) and connection.endpoint_id == NODE:
-            connection.write_data = partial(runner.post, topic.resolved_name)
+            connection.write_data = partial(runner.world.post, topic.resolved_name)
         return bool(add_connection(topic, connection))
 
     _TopicImpl.add_connection = adding

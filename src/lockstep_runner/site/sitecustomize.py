@@ -20,7 +20,7 @@ def _go_on() -> None:
 _go_on()
 try:
     from lockstep_runner.following import watch_for_rospy
-except ImportError:  # another Python, without ROS
+except (ImportError, TypeError):  # another Python: without ROS, or older
     pass
 else:
     watch_for_rospy()

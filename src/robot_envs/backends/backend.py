@@ -63,11 +63,7 @@ class RobotBackend(Protocol):
 
 
 def ticks_per_action(control_period: float, physics_step: float) -> int:
-    """Returns how many physics steps make one control period, both in [s].
-
-    Raises:
-        ValueError: if the period isn't a whole number of steps.
-    """
+    """Returns the physics steps [s] in a control period [s]; raises ValueError for a fraction of a step."""
     ratio = control_period / physics_step
     ticks = round(ratio) if 0.0 < ratio < 1e6 else 0  # also for NaN
     if ticks < 1 or abs(ticks * physics_step - control_period) > 1e-9:

@@ -3,7 +3,6 @@
 import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from operator import attrgetter
 from typing import Any
 
@@ -11,8 +10,8 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.manager import STRICT
+from bullet_gazebo.control.pid import Gains
 from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription
-from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.model import Model
@@ -29,7 +28,7 @@ from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 from bullet_gazebo.state import NOTHING, StateReader, UnknownName, find_link, find_model
-from robot_envs.backends.backend import PHYSICS_STEP, ticks_per_action
+from robot_envs.backends.backend import PHYSICS_STEP, RobotBackend, ticks_per_action
 from robot_envs.backends.world_files import fill, spawn
 from robot_envs.controllers import Loaded, load
 from robot_envs.errors import RobotEnvError, SimulatorError
@@ -37,7 +36,7 @@ from robot_envs.files import resources
 from robot_envs.robot import DRIVES, Robot
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
-from robot_envs.variation.applying import Applier, JointFriction, PidGains
+from robot_envs.variation.applying import Applier
 from robot_envs.variation.parts import RobotPart
 from robot_envs.world_state import (
     Commands,
@@ -56,7 +55,7 @@ _numbers = attrgetter("position", "velocity", "effort")
 _make = tuple.__new__  # what a NamedTuple's constructor does, twice as fast
 
 
-class InProcessWorld:
+class InProcessWorld(RobotBackend):
     """A scene's robots and their controllers, in a world of their own.
 
     No other thread knows this world, so its lock is never taken.
@@ -88,8 +87,15 @@ class InProcessWorld:
         except BaseException:
             self.close()
             raise
-        self._joints = self._found_joints()
-        self._receivers = self._found_receivers()
+        self._joints: list[tuple[str, JointHandle]] = [
+            (scene.joint(robot, name), joint)
+            for robot in scene.robots
+            for name, joint in self._robots[robot.model][1].joints.items()
+        ]
+        self._receivers: dict[str, Callable[[Any], None]] = {
+            name: self._robots[robot.model][2][port.name].inputs[0].receive
+            for name, (robot, port) in scene.ports.items()
+        }
         self._apply = Applier(scene, InProcessChanges(self._sim))
         self._reader = StateReader(world, NOTHING)
         self._links: list[str] = []
@@ -116,21 +122,7 @@ class InProcessWorld:
             ) from error
         return model, hardware, loaded
 
-    def _found_joints(self) -> list[tuple[str, JointHandle]]:
-        return [
-            (self.scene.joint(robot, name), joint)
-            for robot in self.scene.robots
-            for name, joint in self._robots[robot.model][1].joints.items()
-        ]
-
-    def _found_receivers(self) -> dict[str, Callable[[Any], None]]:
-        return {
-            name: self._robots[robot.model][2][port.name].inputs[0].receive
-            for name, (robot, port) in self.scene.ports.items()
-        }
-
     def look(self, query: StateQuery) -> None:
-        """See `RobotBackend.look`."""
         links = link_keys(query)
         try:
             self._reader = StateReader(self._sim.world, query)
@@ -168,7 +160,6 @@ class InProcessWorld:
         """See `RobotBackend.begin`; does nothing."""
 
     def act(self, commands: Commands) -> WorldState:
-        """See `RobotBackend.act`."""
         receivers = self._receivers
         for name, command in commands.items():
             receivers[name](command)
@@ -192,17 +183,15 @@ class InProcessWorld:
             passed / NANOSECONDS,
             joints,
             self._held,
-            Links(zip(self._links, map(_motion, answer.links), strict=True)),
-            Models((name, _motion(state)) for name, state in answer.models.items()),
+            Links(zip(self._links, map(Motion._make, answer.links), strict=True)),
+            Models((name, Motion._make(state)) for name, state in answer.models.items()),
             answer.contacts,
         )
 
     def vary(self, variation: Variation) -> None:
-        """See `RobotBackend.vary`."""
         self._apply(variation)
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
-        """See `RobotBackend.poses`."""
         try:
             found = [find_link(self._sim.world, name) for name in links]
         except UnknownName as error:
@@ -214,10 +203,6 @@ class InProcessWorld:
         if not self._closed:
             self._closed = True
             self._sim.world.close()
-
-
-def _motion(state: tuple[Pose, Twist]) -> Motion:
-    return Motion(*state)
 
 
 def control_tick(description: ModelDescription) -> float:
@@ -250,8 +235,8 @@ class InProcessChanges:
         except (PropertyError, DescriptionError) as error:
             raise SimulatorError(f"link {link.name} can't be changed: {error}") from error
 
-    def set_joint(self, joint: RobotPart, friction: JointFriction) -> None:
-        wanted = JointProperties(damping=friction.damping, motor_effort=friction.friction)
+    def set_joint(self, joint: RobotPart, damping: float | None, friction: float | None) -> None:
+        wanted = JointProperties(damping=damping, motor_effort=friction)
         step = self._sim.world.time_step
         try:
             set_joint_properties(self._model(joint), joint.name, wanted, step)
@@ -266,14 +251,13 @@ class InProcessChanges:
                 f"surfaces of link {link.name} can't be changed: {error}"
             ) from error
 
-    def pids(self, controller: RobotPart) -> Mapping[str, PidGains]:
+    def pids(self, controller: RobotPart) -> Mapping[str, Gains]:
         pids = self._robots[controller.robot.model].manager.get(controller.name).pids.items()
-        return {place: PidGains(pid.gains.p, pid.gains.i, pid.gains.d) for place, pid in pids}
+        return {place: pid.gains for place, pid in pids}
 
-    def set_pid(self, controller: RobotPart, place: str, gains: PidGains) -> None:
+    def set_pid(self, controller: RobotPart, place: str, gains: Gains) -> None:
         manager = self._robots[controller.robot.model].manager
-        pid = manager.get(controller.name).pids[place]
-        pid.gains = replace(pid.gains, **gains._asdict())
+        manager.get(controller.name).pids[place].gains = gains
         manager.loops_changed()
 
     def gravity(self) -> Vector:

@@ -77,11 +77,7 @@ def object_model(thing: Object) -> ModelDescription:
 
 
 def spawn(world: World, thing: Object) -> None:
-    """Spawns an object.
-
-    Raises:
-        RobotEnvError: if its file can't be read or simulated, or the world has a model of that name.
-    """
+    """Spawns an object; raises RobotEnvError if its file can't be simulated, or its name is taken."""
     model = object_model(thing)
     try:
         world.spawn(thing.name, model, thing.pose.compose(model.initial_pose))

@@ -15,7 +15,7 @@ from bullet_gazebo.state import SCOPE
 from file_access.text import did_you_mean
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
-from robot_envs.world_state import JointState, LinkQuery, Motion, StateQuery, link_keys
+from robot_envs.world_state import JointState, Motion, StateQuery, link_keys
 
 INSTANT = 1e-5  # [s] either way, over which poses are differentiated
 AT_REST = Motion(Pose())  # the world
@@ -44,7 +44,9 @@ class LinkView:
         except ValueError as error:
             raise RobotEnvError(str(error)) from error
         places = [_of_link(robot, each.link) for each in query.links]
-        frames = [_of_frame(robot, each) for each in query.links]
+        frames = [
+            None if each.frame in _WORLD else _of_link(robot, each.frame) for each in query.links
+        ]
         self._wanted = list(zip(keys, places, frames, strict=True))
 
     def __call__(self, joints: Mapping[str, JointState]) -> dict[str, Motion]:
@@ -96,10 +98,6 @@ def _check(robot: Robot, query: StateQuery) -> None:
             f"the task asks for links, and '{robot.model}' isn't fixed to the world: its joints "
             "don't determine where it is"
         )
-
-
-def _of_frame(robot: Robot, query: LinkQuery) -> tuple[str, Pose] | None:
-    return None if query.frame in _WORLD else _of_link(robot, query.frame)
 
 
 def _of_link(robot: Robot, name: str) -> tuple[str, Pose]:

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from bullet_gazebo.control.joint import JointLimits
-from robot_envs.checks import action_reader, checked_goal, observation_reader, with_goals
+from robot_envs.checks import action_reader, checked_goal, observation_reader, set_goal, with_goals
 from robot_envs.controllers import CommandPort
 from robot_envs.deployment.kinematics import LinkView
 from robot_envs.errors import RobotEnvError
@@ -15,13 +15,6 @@ from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import Command, JointState, WorldState
-
-
-class Limited(NamedTuple):
-    """A command within its limits."""
-
-    command: Command
-    exceeded: tuple[str, ...]  # joints whose command was beyond the URDF's bounds
 
 
 class CommandLimits:
@@ -50,8 +43,8 @@ class CommandLimits:
             each.velocity * way * period if moves and each.velocity else math.inf for each in limits
         ]
 
-    def __call__(self, command: Command, held: Command) -> Limited:
-        """Returns the nearest command that is allowed after the present one."""
+    def __call__(self, command: Command, held: Command) -> tuple[Command, list[str]]:
+        """Returns the nearest command that is allowed after the present one, and the joints out of bounds."""
         exceeded, numbers = [], []
         wanted, before = self._numbers(command), self._numbers(held)
         for joint, value, start, (lower, upper), way in zip(
@@ -61,7 +54,7 @@ class CommandLimits:
             if bounded != value:
                 exceeded.append(joint)
             numbers.append(min(max(bounded, start - way), start + way))
-        return Limited(numbers[0] if self._port.single else tuple(numbers), tuple(exceeded))
+        return numbers[0] if self._port.single else tuple(numbers), exceeded
 
     def _numbers(self, command: Command) -> list[float]:
         return [command] if self._port.single else list(command)  # type: ignore[list-item, arg-type]
@@ -139,8 +132,7 @@ class Pilot:
         self.go_on(joints)
         task = self._task
         if isinstance(task, GoalTask):
-            drawn = task.goal(self._generator, self._state(0.0, joints))
-            task.desired = checked_goal(task, drawn if self._goal is None else self._goal)
+            set_goal(task, self._state(0.0, joints), self._generator, self._goal)
 
     def aim(self, goal: Any) -> None:
         """Gives a `GoalTask` a goal for all episodes; raises ValueError if it isn't one of its goals."""

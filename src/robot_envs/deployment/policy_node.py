@@ -92,11 +92,6 @@ PATIENCE = 2.0  # [s] of wall time, until what is missing is logged
 SENDING = 1.0  # [s] of wall time, for each of the last commands to be sent
 
 
-def late_by_default(period: float) -> float:
-    """Returns how long joint states may be missing before a stop [s], for a control period [s]."""
-    return max(LATE_PERIODS * period, LATE_AT_LEAST)
-
-
 class PolicyNode:
     """Runs a policy on a robot, as soon as its joint states come and its controllers listen.
 
@@ -112,8 +107,8 @@ class PolicyNode:
         task: what the policy has learned.
         act: the policy: the action for an observation.
         period: of control [s].
-        late: how long the robot may be without a joint state before it is stopped [s]; None:
-            `late_by_default`.
+        late: how long the robot may be without a joint state before it is stopped [s]; None: 5 control
+            periods, and at least 0.1 s.
         seed: see `Pilot`.
         goal: see `Pilot`.
         way: see `CommandLimits`.
@@ -133,7 +128,8 @@ class PolicyNode:
         goal: Any = None,
         way: float = 1.0,
     ) -> None:
-        self._period, self._late = period, late_by_default(period) if late is None else late
+        self._period = period
+        self._late = max(LATE_PERIODS * period, LATE_AT_LEAST) if late is None else late
         try:
             self._pilot = Pilot(robot, task, act, period, seed, goal, way, rospy.logwarn)
         except ValueError as error:

@@ -40,6 +40,7 @@ class RobotPicture:
 
     Raises:
         ValueError: for an impossible size.
+        RobotEnvError: later, if the robot's file can't be read.
     """
 
     def __init__(
@@ -61,11 +62,7 @@ class RobotPicture:
         self._loaded: tuple[Placement, Camera, Renderer] | None = None
 
     def __call__(self, positions: Mapping[str, float]) -> np.ndarray:
-        """Draws the robot with its joints at these positions [rad, m], by name: (height, width, 3) of uint8.
-
-        Raises:
-            RobotEnvError: if the robot's file can't be read.
-        """
+        """Draws the robot with its joints at positions [rad, m], by name: (height, width, 3) of uint8."""
         placement, camera, renderer = self._loaded = self._loaded or self._load()
         base = placement.base()
         for name, poses in placement.poses(positions, base).items():
@@ -85,11 +82,7 @@ class RobotPicture:
     def draw_on(
         self, server: "ViserServer", positions: Callable[[], Mapping[str, float]], beside: int = 0
     ) -> "RobotOnPage":
-        """Draws the robot on a viser page, where `positions` puts it; see `RobotEnv.draw_on`.
-
-        Raises:
-            RobotEnvError: if the robot's file can't be read.
-        """
+        """Draws the robot on a viser page, where `positions` puts it; see `RobotEnv.draw_on`."""
         from robot_envs.pictures.page import RobotOnPage
 
         return RobotOnPage(server, self._place(), positions, self._camera, self._size, beside)

@@ -48,7 +48,7 @@ class RobotOnPage:
         beside: how many robots of its kind are on the page already.
 
     Raises:
-        SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
+        SimulatorError: here and later, if the backend has to be asked where the robot is, and doesn't answer.
     """
 
     def __init__(
@@ -92,18 +92,11 @@ class RobotOnPage:
 
         Args:
             caption: a line of text below it; empty: the present one stays.
-
-        Raises:
-            SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
         """
         self.show(self.look(), caption)
 
     def look(self) -> Placed:
-        """Where it is now, to be shown later; doesn't change the page.
-
-        Raises:
-            SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
-        """
+        """Where it is now, to be shown later; doesn't change the page."""
         positions, base = self._positions(), self._placement.base()
         found = self._placement.poses(positions, base)
         poses = [found[model.name][link.name] for model in self._seen for link in model.links]

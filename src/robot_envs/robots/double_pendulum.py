@@ -7,7 +7,7 @@ import numpy as np
 
 from robot_envs.files import own_file
 from robot_envs.robot import Robot
-from robot_envs.robots import spaces
+from robot_envs.robots import actions, numbers
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, WorldState
 
@@ -61,10 +61,10 @@ class Balance(Task):
         self.noise = noise
 
     def action_space(self) -> gymnasium.spaces.Box:
-        return spaces.actions(1)
+        return actions(1)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        return spaces.numbers(6)
+        return numbers(6)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         names = ("cart_joint", "lower_joint", "upper_joint")

@@ -9,7 +9,7 @@ import numpy as np
 
 from robot_envs.files import own_file
 from robot_envs.robot import Robot
-from robot_envs.robots import spaces
+from robot_envs.robots import actions, numbers
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, WorldState
 
@@ -62,10 +62,10 @@ class SwingUp(Task):
         self._last = 0.0
 
     def action_space(self) -> gymnasium.spaces.Box:
-        return spaces.actions(1)
+        return actions(1)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        return spaces.numbers(5)
+        return numbers(5)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         arm, arm_speed, rod, rod_speed = (float(each) for each in rng.uniform(-0.1, 0.1, 4))

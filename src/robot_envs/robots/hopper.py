@@ -9,7 +9,7 @@ import numpy as np
 
 from robot_envs.files import own_file
 from robot_envs.robot import Robot
-from robot_envs.robots import spaces
+from robot_envs.robots import actions, numbers
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, StateQuery, WorldState
 
@@ -66,10 +66,10 @@ class HopForward(Task):
     query = StateQuery(contacts_of=("foot",))
 
     def action_space(self) -> gymnasium.spaces.Box:
-        return spaces.actions(3)
+        return actions(3)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        return spaces.numbers(12)
+        return numbers(12)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         off = rng.uniform(-0.02, 0.02, 4).tolist()

@@ -9,7 +9,7 @@ import numpy as np
 
 from robot_envs.files import own_file
 from robot_envs.robot import Robot
-from robot_envs.robots import spaces
+from robot_envs.robots import actions, numbers
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
@@ -69,10 +69,10 @@ class ReachInSpace(Task):
         self.target = CENTRE
 
     def action_space(self) -> gymnasium.spaces.Box:
-        return spaces.actions(6)
+        return actions(6)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        return spaces.numbers(15)
+        return numbers(15)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         """Draws a pose, and the target."""

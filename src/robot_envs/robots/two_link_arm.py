@@ -9,7 +9,7 @@ import numpy as np
 
 from robot_envs.files import own_file
 from robot_envs.robot import Robot
-from robot_envs.robots import spaces
+from robot_envs.robots import actions, numbers
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
@@ -70,10 +70,10 @@ class Reach(Task):
         self.target = (FURTHEST, 0.0)
 
     def action_space(self) -> gymnasium.spaces.Box:
-        return spaces.actions(2)
+        return actions(2)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        return spaces.numbers(12)
+        return numbers(12)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         """Draws a pose, and the target."""
@@ -135,10 +135,10 @@ class ReachGoal(GoalTask):
     query = StateQuery(links=(LinkQuery("tip"),))
 
     def action_space(self) -> gymnasium.spaces.Box:
-        return spaces.actions(2)
+        return actions(2)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        return spaces.numbers(6)
+        return numbers(6)
 
     def goals(self) -> gymnasium.spaces.Box:
         """Returns points of the plane (x, y) [0.1 m]."""

@@ -2,7 +2,6 @@
 
 import copy
 import pickle
-from collections.abc import Iterator
 from typing import Any
 
 import gymnasium
@@ -53,7 +52,8 @@ def two_phases(subject: Subject) -> None:
         expect_error(
             lambda: env.begin_step(action), "begin_step() once more before step()", ValueError
         )
-        other = next((each for each in _samples(env) if not same(each, action)), None)
+        samples = (env.action_space.sample() for _ in range(TRIES))
+        other = next((each for each in samples if not same(each, action)), None)
         if other is not None:
             expect_error(
                 lambda: env.step(other), "step() with another action than was begun", ValueError
@@ -62,10 +62,6 @@ def two_phases(subject: Subject) -> None:
         env.begin_step(action)  # dropped by close()
         difference = differences(first, again) if env.backend.deterministic else ""
         assert not difference, f"steps that are begun first give other bits: {difference}"
-
-
-def _samples(env: gymnasium.Env[Any, Any]) -> Iterator[Any]:
-    return (env.action_space.sample() for _ in range(TRIES))
 
 
 def backends(subject: Subject, other: Subject) -> None:

@@ -138,24 +138,18 @@ def outside(space: gymnasium.Space[Any], value: Any) -> str:
     if space.contains(value):
         return ""
     if isinstance(space, gymnasium.spaces.Dict) and isinstance(value, Mapping):
-        return _outside_parts(space, value)
+        if value.keys() != space.keys():
+            return f"it has {', '.join(value)}, and the space {', '.join(space.keys())}"
+        found = ((key, outside(part, value[key])) for key, part in space.items())
+        return next(f"{key}: {why}" for key, why in found if why)
     if not isinstance(space, gymnasium.spaces.Box) or not isinstance(value, np.ndarray):
         return f"{value!r} isn't of {space}"
-    if value.shape != space.shape:
-        return f"its shape is {value.shape}, and that of the space {space.shape}"
-    if not np.can_cast(value.dtype, space.dtype):
-        return f"it is of {value.dtype}, and the space of {space.dtype}"
+    if value.shape != space.shape or not np.can_cast(value.dtype, space.dtype):
+        return f"it is {value.dtype} of the shape {value.shape}, and not of {space}"
     wrong = ~((space.low <= value) & (value <= space.high))
     place = tuple(np.argwhere(wrong)[0].tolist())
     low, high = space.low[place], space.high[place]
     return f"entry {place[0] if len(place) == 1 else place} is {value[place]}, and not in [{low}, {high}]"
-
-
-def _outside_parts(space: gymnasium.spaces.Dict, value: Mapping[str, Any]) -> str:
-    if value.keys() != space.keys():
-        return f"it has {', '.join(value)}, and the space {', '.join(space.keys())}"
-    found = ((key, outside(part, value[key])) for key, part in space.items())
-    return next(f"{key}: {why}" for key, why in found if why)
 
 
 def numbers(value: Any) -> Iterator[np.ndarray]:

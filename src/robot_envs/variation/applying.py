@@ -1,28 +1,15 @@
 """Applies variations to robots, in one order on all backends, and restores the robots afterwards."""
 
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from dataclasses import replace
+from typing import Protocol
 
+from bullet_gazebo.control.pid import Gains
 from bullet_gazebo.physics.description import Inertia
 from bullet_gazebo.physics.pose import Vector, scale
 from robot_envs.scene import Scene
 from robot_envs.variation.parts import Parts, RobotPart
 from robot_envs.variation.variation import Variation, scaled
-
-
-class JointFriction(NamedTuple):
-    """Viscous [N s/m, N m s/rad] and dry [N, N m] friction of a joint; None: unchanged."""
-
-    damping: float | None = None
-    friction: float | None = None
-
-
-class PidGains(NamedTuple):
-    """Gains of a PID: p, i, d [command per error, per error s, s per error]."""
-
-    p: float
-    i: float
-    d: float
 
 
 class Changeable(Protocol):
@@ -36,20 +23,20 @@ class Changeable(Protocol):
         """Changes a link's inertia; its axes stay."""
         ...
 
-    def set_joint(self, joint: RobotPart, friction: JointFriction) -> None:
-        """Changes a joint's friction."""
+    def set_joint(self, joint: RobotPart, damping: float | None, friction: float | None) -> None:
+        """Changes a joint's viscous [N s/m, N m s/rad] and dry [N, N m] friction; None: unchanged."""
         ...
 
     def set_surface(self, link: RobotPart, factor: float) -> None:
         """Multiplies the friction of a link's surfaces, as its file has it."""
         ...
 
-    def pids(self, controller: RobotPart) -> Mapping[str, PidGains]:
+    def pids(self, controller: RobotPart) -> Mapping[str, Gains]:
         """Returns the present gains of a controller's PIDs, by their place below the controller."""
         ...
 
-    def set_pid(self, controller: RobotPart, place: str, gains: PidGains) -> None:
-        """Changes a PID's gains."""
+    def set_pid(self, controller: RobotPart, place: str, gains: Gains) -> None:
+        """Changes p, i and d of a PID."""
         ...
 
     def gravity(self) -> Vector:
@@ -76,7 +63,7 @@ class Applier:
         self._parts: Parts | None = None  # None: nothing was varied yet
         self._last = Variation()
         self._links: dict[str, Inertia] = {}  # as they were found, like the following
-        self._pids: dict[str, Mapping[str, PidGains]] = {}
+        self._pids: dict[str, Mapping[str, Gains]] = {}
         self._gravity: Vector | None = None
 
     def __call__(self, variation: Variation) -> None:
@@ -88,9 +75,11 @@ class Applier:
         if self._parts is None and variation.is_nominal:
             return
         parts = self._parts = self._parts or Parts(self._scene)
-        links = {name: parts.link(name) for name in (*variation.links, *variation.surfaces)}
-        joints = {name: parts.joint(name) for name in (*variation.damping, *variation.friction)}
-        controllers = {name: parts.controller(name) for name in variation.gains}
+        links = {name: parts.find("link", name) for name in (*variation.links, *variation.surfaces)}
+        joints = {
+            name: parts.find("joint", name) for name in (*variation.damping, *variation.friction)
+        }
+        controllers = {name: parts.find("controller", name) for name in variation.gains}
         self._last = variation  # all names are known: from here on there is something to undo
         for name, difference in variation.links.items():
             if name not in self._links:
@@ -110,24 +99,21 @@ class Applier:
     def _set_friction(self, name: str, joint: RobotPart, variation: Variation) -> None:
         own = joint.robot.links.joints[joint.name]  # Gazebo's services don't report it
         damping, friction = variation.damping.get(name), variation.friction.get(name)
-        wanted = JointFriction(
+        self._world.set_joint(
+            joint,
             None if damping is None else own.damping + damping,
             None if friction is None else own.friction + friction,
         )
-        self._world.set_joint(joint, wanted)
 
     def _scale_gains(self, name: str, controller: RobotPart, factor: float) -> None:
         if name not in self._pids:
             self._pids[name] = self._world.pids(controller)
-        for place, gains in self._pids[name].items():
-            self._world.set_pid(controller, place, PidGains(*(factor * gain for gain in gains)))
+        for place, now in self._pids[name].items():
+            wanted = replace(now, p=factor * now.p, i=factor * now.i, d=factor * now.d)
+            self._world.set_pid(controller, place, wanted)
 
     def undo(self) -> None:
-        """Restores the robots as they were found, if they were varied.
-
-        Raises:
-            SimulatorError: if the world refuses.
-        """
+        """Restores the robots as they were found; raises SimulatorError if the world refuses."""
         last = self._last
         if last != Variation():
             try:

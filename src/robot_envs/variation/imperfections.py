@@ -63,7 +63,6 @@ def steps(option: str, given: Any, most: int) -> int:
 
 Noise = float | tuple[float, float] | Mapping[str, Any]
 MOST_DELAY: Final = 1000  # [control steps]
-LEAST_STEP: Final = 1e-9  # [rad, m]; of an encoder
 
 
 class Encoder(NamedTuple):
@@ -117,7 +116,7 @@ class Sensor:
         found = by_name("sensor_noise", noise, joints, "joint")
         sizes = {name: _pair("sensor_noise", size) for name, size in found.items()}
         found = by_name("encoder_step", encoder_step, joints, "joint")
-        notches = {name: _step(size) for name, size in found.items()}
+        notches = {name: at_least_zero("encoder_step", size) for name, size in found.items()}
         self._encoders = {
             name: Encoder(*sizes.get(name, (0.0, 0.0)), notches.get(name, 0.0))
             for name in dict.fromkeys([*sizes, *joints])
@@ -177,13 +176,6 @@ def _pair(option: str, given: Any) -> tuple[float, float]:
         raise ValueError(f"{option} is a number or a pair (position, velocity), not {given!r}")
     position, velocity = (at_least_zero(option, each) for each in numbers)
     return position, velocity
-
-
-def _step(given: Any) -> float:
-    size = at_least_zero("encoder_step", given)
-    if 0.0 < size < LEAST_STEP:
-        raise ValueError(f"encoder_step must be 0 or at least {LEAST_STEP:g}, not {given!r}")
-    return size
 
 
 Commands = dict[str, Any]

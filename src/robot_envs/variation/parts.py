@@ -71,29 +71,18 @@ class Parts:
             for plain in robot.run:
                 self.controllers[scene.controller(robot, plain)] = RobotPart(robot, plain)
 
-    def link(self, name: str) -> RobotPart:
-        """Returns the link of that name; raises SimulatorError if there is none."""
-        return _found("link", self.links, name)
-
-    def joint(self, name: str) -> RobotPart:
-        """Returns the movable joint of that name; raises SimulatorError if there is none."""
-        return _found("joint", self.joints, name)
-
-    def controller(self, name: str) -> RobotPart:
-        """Returns the running controller of that name; raises SimulatorError if there is none."""
-        return _found("controller", self.controllers, name)
+    def find(self, kind: str, name: str) -> RobotPart:
+        """Returns a "link", "joint" or "controller" by name; raises SimulatorError if there is none."""
+        parts = {"link": self.links, "joint": self.joints, "controller": self.controllers}[kind]
+        if name not in parts:
+            hint = did_you_mean(name, parts) or f"; there are {', '.join(parts) or 'none'}"
+            raise SimulatorError(f"there is no {kind} '{name}' to vary{hint}")
+        return parts[name]
 
     def pids(self) -> dict[str, dict[str, Gains]]:
         """The gains of all PIDs, by controller and place below it; only controllers that have PIDs."""
         found = {name: gains_of(part) for name, part in self.controllers.items()}
         return {name: gains for name, gains in found.items() if gains}
-
-
-def _found(kind: str, parts: Mapping[str, RobotPart], name: str) -> RobotPart:
-    if name not in parts:
-        hint = did_you_mean(name, parts) or f"; there are {', '.join(parts) or 'none'}"
-        raise SimulatorError(f"there is no {kind} '{name}' to vary{hint}")
-    return parts[name]
 
 
 def gains_of(controller: RobotPart) -> dict[str, Gains]:

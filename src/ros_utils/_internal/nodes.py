@@ -1,7 +1,5 @@
 """Queries and shuts down the nodes of a ROS master; every call has a time limit."""
 
-from __future__ import annotations
-
 import contextlib
 import time
 from urllib.parse import urlsplit

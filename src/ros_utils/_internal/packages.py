@@ -1,7 +1,5 @@
 """Finds packages and the files in them; expands robot descriptions (xacro)."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Sequence
@@ -17,11 +15,7 @@ class NotFound(Exception):
 
 
 def folder(package: str) -> str:
-    """Returns the folder of a ROS package.
-
-    Raises:
-        NotFound: no such package.
-    """
+    """Returns the folder of a ROS package; raises NotFound if there is none."""
     try:
         return str(rospkg.RosPack().get_path(package))
     except rospkg.ResourceNotFound as fault:
@@ -31,20 +25,12 @@ def folder(package: str) -> str:
 
 
 def file(package: str, subfolder: str, name: str) -> str:
-    """Returns the path of a file in a package's subfolder.
-
-    Raises:
-        NotFound: no such package, or no such file in it.
-    """
+    """Returns the path of a file in a package's subfolder; raises NotFound if there is none."""
     return existing(os.path.join(folder(package), subfolder.strip("/"), name))
 
 
 def existing(path: str) -> str:
-    """Returns the path itself if it is a file.
-
-    Raises:
-        NotFound: no such file.
-    """
+    """Returns the path itself; raises NotFound if it is no file."""
     if not os.path.isfile(path):
         raise NotFound(f"{path}: no such file")
     return path

@@ -3,8 +3,6 @@
 rospy's own functions know one master per process.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import rosgraph
@@ -32,11 +30,7 @@ def get(name: str) -> Any:
 
 
 def put(name: str, value: Any) -> None:
-    """Sets a parameter; a mapping sets each of its entries.
-
-    Raises:
-        MasterDown: no master, or it refuses.
-    """
+    """Sets a parameter, or each entry of a mapping; raises MasterDown without a master, or if it refuses."""
     _master.require()
     resolved = rospy.resolve_name(name)
     values = value.items() if isinstance(value, dict) and value else [("", value)]

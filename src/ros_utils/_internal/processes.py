@@ -4,8 +4,6 @@ All descendants of a start carry its description in an environment variable. So 
 parent was killed, and there is no list that could be out of date.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -5,8 +5,6 @@ programs in order. If the caller is killed outright, the kernel sends them SIGTE
 util-linux, and a start from the main thread). The next `ros_kill_all_processes` ends any survivors.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import os
@@ -33,7 +31,7 @@ COLLECTED = 5.0  # [s] longest time from the end of a process's main thread to i
 # A caller in a shell's background ignores SIGINT, and its children would inherit that.
 LISTENING = ("env", "--default-signal=INT")
 
-_handles: list[Handle] = []
+_handles: "list[Handle]" = []
 _owner = os.getpid()
 _lock = threading.Lock()
 
@@ -98,7 +96,7 @@ class Started(int):
     _handle: Handle | None
     master_uri: str
 
-    def __new__(cls, handle: Handle | None = None) -> Started:
+    def __new__(cls, handle: Handle | None = None) -> "Started":
         """Without a handle the program ran before, and `close` doesn't end it."""
         self = super().__new__(cls, 1)
         self._handle = handle
@@ -135,7 +133,7 @@ class Started(int):
         with _master.using(self.master_uri):
             return self._handle.end()
 
-    def __enter__(self) -> Started:
+    def __enter__(self) -> "Started":
         return self
 
     def __exit__(self, *_: object) -> None:

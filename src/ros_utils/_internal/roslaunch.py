@@ -1,7 +1,5 @@
 """Starts roslaunch, and asks it about its processes. Part of `ros_launch` and `ros_gazebo`."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
 

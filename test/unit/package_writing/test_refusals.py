@@ -57,10 +57,13 @@ def test_a_robot_that_can_not_be_used_is_one_line(tmp_path, capsys, text, argume
     assert [path.name for path in tmp_path.iterdir()] == ["robot.urdf"], "nothing is left behind"
 
 
-@pytest.mark.parametrize("name", ["My-Arm", "3dof arm", "class", "рука", ""])
-def test_a_name_that_can_not_be_is_refused(tmp_path, capsys, name):
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [("MyArm", "my_arm"), ("3dof arm", "my_3dof_arm"), ("class", "my_class"), ("рука", "my_robot")],
+)
+def test_a_name_that_can_not_be_is_refused_with_one_that_can(tmp_path, capsys, name, near):
     assert main([name, "--to", str(tmp_path)]) == 1
-    assert f"'{name}' isn't one" in capsys.readouterr().err
+    assert f"'{name}' isn't one, '{near}' would be" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

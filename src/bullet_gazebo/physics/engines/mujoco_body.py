@@ -1,6 +1,6 @@
 """A model in MuJoCo, and the state that all models of a world share."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import hypot
 from typing import NamedTuple
@@ -197,7 +197,11 @@ class MujocoBody(Body):
         """Finds its indices in a newly compiled model, and applies its settings."""
         model, data = self._state.model, self._state.data
         self._ids = {name: body.id for name, body in elements.bodies.items()}
-        self.touching = dict(self._geoms())
+        self.touching = {}  # links and collisions by MuJoCo's shape: a link's follow one another in order
+        for link, index in self._ids.items():
+            first = int(model.body_geomadr[index])
+            for place, shape in enumerate(self.description.links[link].collisions):
+                self.touching[first + place] = (link, (shape.name,))
         self._indices = [elements.joints[name].id for name in self.joint_names]
         self._q = model.jnt_qposadr[self._indices].tolist()
         self._v = model.jnt_dofadr[self._indices].tolist()
@@ -216,13 +220,6 @@ class MujocoBody(Body):
             self.set_damping(index, joint.damping)
             self.set_limits(index, joint.lower, joint.upper)
             self.set_motor(index, joint.speed, joint.effort)
-
-    def _geoms(self) -> Iterator[tuple[int, tuple[str, tuple[str, ...]]]]:
-        """Yields MuJoCo's shapes by number: those of a link follow one another in their order."""
-        for link, index in self._ids.items():
-            first = int(self._state.model.body_geomadr[index])
-            for place, shape in enumerate(self.description.links[link].collisions):
-                yield first + place, (link, (shape.name,))
 
     def motion(self) -> BodyArrays:
         """Returns a copy of its state, with the base last."""

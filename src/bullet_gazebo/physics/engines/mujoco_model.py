@@ -49,11 +49,7 @@ class ModelWriter:
     _elements: Elements = field(default_factory=Elements)
 
     def write(self, pose: Pose) -> Elements:
-        """Adds the model with its root link's frame at `pose`.
-
-        Raises:
-            DescriptionError: for a mesh that can't be read.
-        """
+        """Adds the model with its root link's frame at `pose`."""
         model = self._model
         base = self._add_link(self._spec.worldbody, model.root, pose)
         if not model.fixed_base:
@@ -81,7 +77,9 @@ class ModelWriter:
         axes, moments = principal(inertia)
         body.mass, body.ipos, body.iquat = inertia.mass, inertia.com.position, wxyz(axes)
         body.inertia = moments
-        if not is_real(moments):  # MuJoCo refuses them, ODE doesn't: they are set after compiling
+        # No real body has one above the sum of the others. MuJoCo refuses it, ODE doesn't: it is set after
+        # compiling.
+        if not max(moments) <= sum(moments) - max(moments):
             body.inertia = (max(moments),) * 3
             self._elements.moments[link] = moments
         for shape in self._model.links[link].collisions:
@@ -156,11 +154,6 @@ def principal(inertia: Inertia) -> tuple[Quaternion, Vector]:
     return xyzw(quat), (float(moments[0]), float(moments[1]), float(moments[2]))
 
 
-def is_real(moments: Vector) -> bool:
-    """Returns whether a body can have these moments: none exceeds the sum of the others."""
-    return max(moments) <= sum(moments) - max(moments)
-
-
 def wxyz(q: Quaternion) -> Quaternion:
     """Returns a quaternion in MuJoCo's order."""
     return (q[3], q[0], q[1], q[2])
@@ -177,11 +170,7 @@ def priority(mu: float) -> int:
 
 
 def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Returns the model.
-
-    Raises:
-        DescriptionError: if MuJoCo refuses it, with its text.
-    """
+    """Returns the model."""
     try:
         return spec.compile()
     except ValueError as error:

@@ -9,10 +9,10 @@ from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import DescriptionError, LimitExceeded, Mesh
-from bullet_gazebo.physics.files.elements import files_named_by_a_model, parse_xml, place, shown
+from bullet_gazebo.physics.files.elements import files_named_by_a_model, place, shown
 from bullet_gazebo.physics.files.meshes import Submesh, check_mesh, read_mesh
 from file_access.content import MAX_BYTES, FileError, TooLarge, read_file
-from file_access.xml_text import MAX_ELEMENTS
+from file_access.xml_text import MAX_ELEMENTS, parse
 
 MeshFile = tuple[str, Mesh | None]
 """A file's path, and its mesh if it was read."""
@@ -104,7 +104,12 @@ class Reading:
         self._bytes += len(text)
         if self._bytes > MAX_BYTES:
             raise LimitExceeded(f"more than {MAX_BYTES} bytes of XML (MAX_BYTES)")
-        return parse_xml(text, self._count)
+        try:
+            return parse(text, self._count)
+        except TooLarge as error:
+            raise LimitExceeded(str(error)) from error
+        except FileError as error:
+            raise DescriptionError(str(error)) from error
 
     def open(self, path: Path) -> Element:
         """Returns the root element of a file. It is the same object each time: don't change it."""

@@ -116,11 +116,7 @@ def _describe(robot: Robot, names: Sequence[str]) -> None:
 
 
 def _controller_states(robot: Robot) -> dict[str, str]:
-    """Name and state of each loaded controller.
-
-    Raises:
-        SimulatorError: if the robot has no controller manager.
-    """
+    """Returns each loaded controller's state, by name; raises SimulatorError without a controller manager."""
     service = full_name(robot, "controller_manager/list_controllers")
     if not wait_until(lambda: node.service_is_registered(service), READY_TIMEOUT, service):
         raise SimulatorError(
@@ -140,7 +136,11 @@ def spawn_command(robot: Robot, argv: list[str]) -> int:
     try:
         name = node.full_name(argv, "spawn_robot")
         rospy.init_node(os.path.basename(name), argv=["", *argv], disable_signals=True)
-        _wait_for_simulator()
+        if not wait_until(gazebo.simulator_answers, SIMULATOR_TIMEOUT, "a simulator"):
+            raise RobotEnvError(
+                f"no simulator offered {WORLD_SERVICE} within {SIMULATOR_TIMEOUT:g} s; "
+                "start one with roslaunch gazebo_ros empty_world.launch"
+            )
         bring_up(Scene([robot]), rospy.loginfo)
         return 0
     except RobotEnvError as error:
@@ -151,11 +151,3 @@ def spawn_command(robot: Robot, argv: list[str]) -> int:
     finally:
         with contextlib.suppress(Exception):
             rospy.signal_shutdown("done")
-
-
-def _wait_for_simulator() -> None:
-    if not wait_until(gazebo.simulator_answers, SIMULATOR_TIMEOUT, "a simulator"):
-        raise RobotEnvError(
-            f"no simulator offered {WORLD_SERVICE} within {SIMULATOR_TIMEOUT:g} s; "
-            "start one with roslaunch gazebo_ros empty_world.launch"
-        )

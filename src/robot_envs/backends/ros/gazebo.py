@@ -3,6 +3,7 @@
 import contextlib
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 from weakref import WeakSet
 
@@ -104,11 +105,7 @@ def _registered_address() -> str | None:
 
 
 def simulator_answers() -> bool:
-    """Returns whether a living simulator offers Gazebo's services.
-
-    Raises:
-        SimulatorHangs: if there is one that doesn't answer.
-    """
+    """Returns whether a living simulator offers Gazebo's services; raises SimulatorHangs if it hangs."""
     if not node.service_is_registered(WORLD_SERVICE):
         return False
     try:
@@ -131,24 +128,24 @@ def lockstep_hint() -> str:
     return ""
 
 
-def world_path(source: Source | None, write: Callable[[str], str]) -> str | None:
+def world_path(source: Source | None, folder: Path) -> str | None:
     """Returns the world file for a simulator to be started; None: its default, a ground plane.
 
     Args:
         source: the robot's world.
-        write: writes a world that was given as text to a file, and returns its path.
+        folder: gets the file of a world that was given as text.
     """
     if source is None or source == EMPTY:
         return None
-    return write(str(source)) if is_text(source) else str(locate(source))
+    if not is_text(source):
+        return str(locate(source))
+    path = folder / "given.world"
+    path.write_text(str(source), encoding="utf-8")
+    return str(path)
 
 
 def physics_step() -> float:
-    """Returns the simulator's physics step [s].
-
-    Raises:
-        RobotEnvError: if it doesn't answer.
-    """
+    """Returns the simulator's physics step [s]; raises RobotEnvError if it doesn't answer."""
     step = ros_gazebo.gazebo_get_time_step()
     if not step > 0.0:
         raise RobotEnvError("the simulator doesn't tell its time step; see the messages above")
@@ -167,11 +164,7 @@ def check_world(robot: Robot) -> None:
 
 
 def models() -> list[str]:
-    """Returns the names of the models in the world.
-
-    Raises:
-        SimulatorError: if the simulator doesn't answer.
-    """
+    """Returns the names of the world's models; raises SimulatorError if the simulator doesn't answer."""
     return SimulatorService(WORLD_SERVICE, GetWorldProperties)().model_names
 
 
@@ -188,14 +181,12 @@ def spawn(name: str, text: str, pose: Pose, namespace: str = "") -> Undo:
         What deletes it.
 
     Raises:
-        RobotEnvError: if the simulator refuses it, or doesn't answer.
+        SimulatorError: if the simulator refuses it, or doesn't answer.
     """
     kind = "urdf" if "<robot" in text else "sdf"
     at = PoseMsg(Point(*pose.position), Quaternion(*pose.orientation))
     call = SimulatorService(f"/gazebo/spawn_{kind}_model", SpawnModel)
-    answer = call(name, text, namespace, at, "world")
-    if not answer.success:
-        raise RobotEnvError(f"'{name}' can't be spawned: {answer.status_message}")
+    check_success(call(name, text, namespace, at, "world"), f"'{name}' can't be spawned")
     return lambda: ros_gazebo.gazebo_delete_model(name)
 
 
@@ -353,9 +344,3 @@ class JointStateReader:
                 f"the joint state lacks {' and '.join(missing)}; it has: {list(names)}"
             )
         return places
-
-
-def pose_of(message: PoseMsg) -> Pose:
-    """Reads a pose."""
-    place, turn = message.position, message.orientation
-    return Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))

@@ -1,7 +1,7 @@
 """Robots in a simulator over ROS that moves in lock-step."""
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
@@ -10,6 +10,7 @@ from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
 
 from bullet_gazebo.physics.pose import Pose, Vector
+from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.ros.bringup import full_name, ready
 from robot_envs.backends.ros.gazebo import (
     STEP_SERVICE,
@@ -38,7 +39,7 @@ from ros_calls.service import TIMEOUT
 from ros_utils.step_client import MOTION, PreparedSteps, StepAnswer, StepNames, StepRefused, time_of
 
 
-class LockstepWorld:
+class LockstepWorld(RobotBackend):
     """One service call for each action: command, advance, read; time stands still between.
 
     `begin` sends the request, `act` takes the answer; so several simulators move at the same time.
@@ -70,13 +71,12 @@ class LockstepWorld:
         self._names = StepNames()  # of the query, without controllers
         self._begun = 0  # simulated time at the reset [ns]
         self._held: dict[str, Any] = {}
-        self._pending: Commands | None = None  # of a step that was begun
+        self._is_pending = False  # whether a step was begun
         self._answer: StepAnswer | None = None  # to it, if it was taken before `act`
         self._variation = RosVariation(scene, timeout)
         world.join(self)
 
     def look(self, query: StateQuery) -> None:
-        """See `RobotBackend.look`."""
         link_keys(query)
         with self._simulator:
             its_turn = self._world.claim_if_free(self)
@@ -93,7 +93,11 @@ class LockstepWorld:
         request = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=self._moved)
         request.positions = [position for position, _ in joints]
         request.velocities = [velocity for _, velocity in joints]
-        _fill_models(request, self.scene.placed_models(initial))
+        placed = self.scene.placed_models(initial)
+        request.models = list(placed)
+        for (place, turn), (line, spin) in placed.values():
+            request.poses.append(PoseMsg(Point(*place), Quaternion(*turn)))
+            request.twists.append(Twist(Vector3(*line), Vector3(*spin)))
         with self._simulator:
             self._world.claim(self)
         answer = self._call(self._reset, request)
@@ -106,11 +110,6 @@ class LockstepWorld:
         return state._replace(commands=self._held)
 
     def begin(self, commands: Commands) -> None:
-        """See `RobotBackend.begin`."""
-        if self._pending is not None:
-            raise ValueError(
-                "a step was begun and not taken: act() with the same commands comes next"
-            )
         self._world.check_holder(self)
         numbers: list[float] = []
         for command in commands.values():
@@ -120,16 +119,13 @@ class LockstepWorld:
                 numbers += command
         names = self._names._replace(controllers=tuple([self._full[name] for name in commands]))
         self._send(names, self._ticks, numbers)
-        self._pending = commands
+        self._is_pending = True
 
     def act(self, commands: Commands) -> WorldState:
-        """See `RobotBackend.act`."""
-        if self._pending is None:
+        if not self._is_pending:
             self.begin(commands)
-        elif self._pending != commands:
-            raise ValueError("the step was begun with other commands")
         answer = self._answer or self._receive()
-        self._pending = self._answer = None
+        self._is_pending, self._answer = False, None
         self._held = {**self._held, **commands}
         return self._state(answer)
 
@@ -159,9 +155,9 @@ class LockstepWorld:
         self._call(self._steps.begin, names, ticks, commands)
 
     def _receive(self) -> StepAnswer:
-        begun, self._pending = self._pending, None  # nothing is under way after a failure
+        begun, self._is_pending = self._is_pending, False  # nothing is under way after a failure
         answer: StepAnswer = self._call(self._steps.end)
-        self._pending = begun
+        self._is_pending = begun
         return answer
 
     def _call(self, call: Callable[..., Any], *arguments: Any) -> Any:
@@ -186,17 +182,16 @@ class LockstepWorld:
 
     def _take(self) -> None:
         """Takes the answer to a step that was begun, so that others can be sent; `act` finds it."""
-        if self._pending is not None and self._answer is None:
+        if self._is_pending and self._answer is None:
             self._answer = self._receive()
 
     def _drop(self) -> None:
         """Takes the answer to a step that was begun, and forgets it."""
         with contextlib.suppress(SimulatorError):
             self._take()
-        self._pending = self._answer = None
+        self._is_pending, self._answer = False, None
 
     def vary(self, variation: Variation) -> None:
-        """See `RobotBackend.vary`."""
         self._drop()
         with self._simulator:
             self._world.claim(self)  # undoes what others have varied, before this one varies
@@ -240,14 +235,6 @@ def _names(query: StateQuery) -> StepNames:
     )
 
 
-def _fill_models(request: StepWorldRequest, placed: Mapping[str, Motion]) -> None:
-    """Makes a request place models."""
-    request.models = list(placed)
-    motions = placed.values()
-    request.poses = [PoseMsg(Point(*at.position), Quaternion(*at.orientation)) for at, _ in motions]
-    request.twists = [Twist(Vector3(*line), Vector3(*turn)) for _, (line, turn) in motions]
-
-
 def _motions_of(numbers: Sequence[float]) -> Iterator[Motion]:
     """Reads links and models from the numbers of a prepared step."""
     for i in range(0, len(numbers), MOTION):
@@ -260,15 +247,11 @@ def _contact_of(state: ContactState) -> ContactPair:
     return ContactPair(
         state.collision1_name,
         state.collision2_name,
-        _vectors(state.contact_positions),
-        _vectors(state.contact_normals),
+        [_vector(each) for each in state.contact_positions],
+        [_vector(each) for each in state.contact_normals],
         [(_vector(each.force), _vector(each.torque)) for each in state.wrenches],
         list(state.depths),
     )
-
-
-def _vectors(messages: Iterable[Vector3]) -> list[Vector]:
-    return [_vector(each) for each in messages]
 
 
 def _vector(message: Vector3) -> Vector:

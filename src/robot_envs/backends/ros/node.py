@@ -37,11 +37,7 @@ def master_is_up() -> bool:
 
 
 def service_is_registered(name: str) -> bool:
-    """Returns whether a node has registered the service.
-
-    Raises:
-        RobotEnvError: if the master doesn't answer.
-    """
+    """Returns whether a node has registered the service; raises RobotEnvError if the master is silent."""
     return _ask_master("lookupService", name) is not None
 
 
@@ -66,11 +62,7 @@ def _ask_master(method: str, name: str) -> Any:
 
 
 def command_line_parameters(argv: list[str]) -> dict[str, Any]:
-    """Returns the private parameters among a node's arguments, as in `_seed:=3`.
-
-    Raises:
-        RobotEnvError: if a value isn't YAML.
-    """
+    """Returns the private parameters among arguments, as in `_seed:=3`; raises RobotEnvError for bad YAML."""
     try:
         found: dict[str, Any] = rospy.client.load_command_line_node_params(argv)
     except rospy.ROSInitException as error:

@@ -70,13 +70,8 @@ class OwnSimulator:
         arguments = ["-u", "--lockstep", "--seed", str(seed), "__name:=gazebo",
                      f"__log:={folder / 'node.log'}", "_pub_clock_frequency:=100"]  # fmt: skip
 
-        def write(text: str) -> str:
-            file = folder / "given.world"
-            file.write_text(text, encoding="utf-8")
-            return str(file)
-
         try:
-            path = world_path(world, write)
+            path = world_path(world, folder)
             self._process, self._report = _start([*arguments, *filter(None, [path])], self.log)
         except OSError as error:
             raise RobotEnvError(f"{slot} can't be started: {error.strerror}") from error
@@ -104,11 +99,7 @@ class OwnSimulator:
         return not self.is_alive
 
     def wait(self) -> None:
-        """Returns once the simulator answers.
-
-        Raises:
-            SimulatorFault: if it ends instead, or doesn't answer in time.
-        """
+        """Returns once it answers; raises SimulatorFault if it ends instead, or doesn't answer in time."""
         patience = STARTING + ONE_MORE * (self.slot.of - 1)
         deadline = self._started + patience
         if not self.uri:

@@ -11,7 +11,7 @@ import rospy
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.simulator import NANOSECONDS
 from robot_envs.backends import backend
-from robot_envs.backends.backend import ticks_per_action
+from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.ros.bringup import bring_up
 from robot_envs.backends.ros.gazebo import SharedWorld, physics_step
 from robot_envs.backends.ros.lockstep import LockstepWorld
@@ -83,7 +83,7 @@ def checked(state: WorldState, expected: int) -> WorldState:
     return state
 
 
-class OwnWorld:
+class OwnWorld(RobotBackend):
     """A `LockstepWorld` with a simulator of its own, which survives one failure of it at a time.
 
     When the simulator dies, doesn't answer in time or answers nonsense, another one with the same seed takes
@@ -137,7 +137,6 @@ class OwnWorld:
         self._perform(lambda world: None)
 
     def look(self, query: StateQuery) -> None:
-        """See `RobotBackend.look`."""
         before, self._query = self._query, query
         if self._world is None and not self._failed:  # it is still starting, and `connect` asks
             return
@@ -148,7 +147,6 @@ class OwnWorld:
             raise
 
     def vary(self, variation: Variation) -> None:
-        """See `RobotBackend.vary`."""
         self._journal.forget_episode()  # a reset follows
         self._perform(lambda world: world.vary(variation))
         self._journal.variation = self._journal.variation.merged(variation)
@@ -168,7 +166,6 @@ class OwnWorld:
                 self._world.begin(commands)
 
     def act(self, commands: Commands) -> WorldState:
-        """See `RobotBackend.act`."""
         self._need_episode()
         journal = self._journal
         then = (len(journal.commands) + 1) * self._step
@@ -177,7 +174,6 @@ class OwnWorld:
         return journal.last
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
-        """See `RobotBackend.poses`."""
         return self._perform(lambda world: world.poses(links))
 
     def _need_episode(self) -> None:
@@ -212,7 +208,9 @@ class OwnWorld:
                     self._journal.forget_episode()
                     raise SimulatorError("; before that ".join(reversed(failures))) from error
             self.restarts += 1
-            _warn(f"{failures[0]}; another one takes its place")
+            # A node's rospy has taken over Python's logging.
+            warn = rospy.logwarn if rospy.core.is_initialized() else logger.warning
+            warn("%s; another one takes its place", failures[0])
 
     def _connect(self) -> LockstepWorld:
         """Waits for the simulator, starting another one if it has failed, and replays the journal."""
@@ -251,10 +249,3 @@ class OwnWorld:
         self._journal.forget_episode()
         self.simulator.terminate()
         backend.join_in_turn(self.simulator.join)
-
-
-def _warn(text: str) -> None:
-    if rospy.core.is_initialized():  # then rospy has taken over Python's logging
-        rospy.logwarn("%s", text)
-    else:
-        logger.warning("%s", text)

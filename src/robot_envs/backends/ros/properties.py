@@ -30,7 +30,7 @@ from robot_envs.backends.ros.gazebo import SimulatorService, check_success
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
-from robot_envs.variation.applying import Applier, JointFriction, PidGains
+from robot_envs.variation.applying import Applier
 from robot_envs.variation.parts import RobotPart, gains_of
 from ros_calls import master
 from ros_calls.master import NoAnswer, Refused
@@ -101,11 +101,11 @@ class RosVariation:
         answer = self._call("/gazebo/set_link_properties", SetLinkProperties, request)
         check_success(answer, f"link {name} can't be changed")
 
-    def set_joint(self, joint: RobotPart, friction: JointFriction) -> None:
+    def set_joint(self, joint: RobotPart, damping: float | None, friction: float | None) -> None:
         # ODE models dry friction as a motor of speed 0 with the largest effort `fmax`. Empty lists change
         # nothing.
-        damping, fmax = ([] if each is None else [each] for each in friction)
-        wanted = ODEJointProperties(damping=damping, fmax=fmax)
+        viscous, fmax = ([] if each is None else [each] for each in (damping, friction))
+        wanted = ODEJointProperties(damping=viscous, fmax=fmax)
         answer = self._call(
             "/gazebo/set_joint_properties", SetJointProperties, _scoped(joint), wanted
         )
@@ -116,14 +116,14 @@ class RosVariation:
         answer = self._call("/gazebo/set_link_friction", SetLinkFriction, _scoped(link), factor)
         check_success(answer, f"surfaces of link {link.name} can't be changed")
 
-    def pids(self, controller: RobotPart) -> Mapping[str, PidGains]:
+    def pids(self, controller: RobotPart) -> Mapping[str, Gains]:
         # Read from the parameters, to which ros_control writes gains that were changed.
         name = full_name(*controller)
         return {place: _gains(f"{name}/{place}") for place in gains_of(controller)}
 
-    def set_pid(self, controller: RobotPart, place: str, gains: PidGains) -> None:
+    def set_pid(self, controller: RobotPart, place: str, gains: Gains) -> None:
         name = f"{full_name(*controller)}/{place}/set_parameters"
-        wanted = [DoubleParameter(key, value) for key, value in gains._asdict().items()]
+        wanted = [DoubleParameter(key, getattr(gains, key)) for key in ("p", "i", "d")]
         answer = self._call(name, Reconfigure, Config(doubles=wanted))
         now = {each.name: each.value for each in answer.config.doubles}
         if any(now.get(each.name) != each.value for each in wanted):
@@ -149,9 +149,8 @@ def _scoped(part: RobotPart) -> str:
     return f"{part.robot.model}::{part.name}"
 
 
-def _gains(namespace: str) -> PidGains:
+def _gains(namespace: str) -> Gains:
     try:
-        gains = Gains.from_params(master.call("getParam", namespace), namespace)
+        return Gains.from_params(master.call("getParam", namespace), namespace)
     except (NoAnswer, Refused, ControlError) as error:
         raise SimulatorError(f"the gains {namespace} can't be read: {error}") from error
-    return PidGains(gains.p, gains.i, gains.d)

@@ -16,6 +16,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Empty
 
 from bullet_gazebo.physics.pose import Pose
+from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.ros.bringup import full_name, ready
 from robot_envs.backends.ros.gazebo import (
     JointStateReader,
@@ -23,7 +24,6 @@ from robot_envs.backends.ros.gazebo import (
     SharedWorld,
     SimulatorService,
     check_success,
-    pose_of,
 )
 from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.errors import RobotEnvError, SimulatorError
@@ -37,6 +37,7 @@ from robot_envs.world_state import (
     StateQuery,
     WorldState,
 )
+from ros_calls.waiting import wait_until
 
 STATE_TIMEOUT = 5.0  # [s] of wall time without a joint state
 RESET_WAIT = 0.5  # [s] of wall time for the joint state that a reset publishes
@@ -154,30 +155,20 @@ class CommandTopic:
         Raises:
             SimulatorError: if the controller doesn't listen in time.
         """
-        if self._is_linked(STATE_TIMEOUT / 2):
+        topic = self._publisher.resolved_name
+        if wait_until(self._publisher.get_num_connections, STATE_TIMEOUT / 2, topic):
             return
         self._publisher.unregister()
         self._publisher = self._advertise()
-        if not self._is_linked(STATE_TIMEOUT / 2):
-            raise SimulatorError(
-                f"nobody listens on {self._publisher.resolved_name}: {ready(self._scene).missing()}"
-            )
-
-    def _is_linked(self, bound: float) -> bool:
-        """Returns whether somebody subscribes within a time [s]."""
-        deadline = time.monotonic() + bound
-        while self._publisher.get_num_connections() == 0:
-            if time.monotonic() > deadline:
-                return False
-            time.sleep(0.01)
-        return True
+        if not wait_until(self._publisher.get_num_connections, STATE_TIMEOUT / 2, topic):
+            raise SimulatorError(f"nobody listens on {topic}: {ready(self._scene).missing()}")
 
     def close(self) -> None:
         """Leaves the topic."""
         self._publisher.unregister()
 
 
-class RealtimeWorld:
+class RealtimeWorld(RobotBackend):
     """Moves a robot as the existing script does, with nothing but Gazebo's services and topics.
 
     An action unpauses the world, publishes the commands, and takes the newest joint state. How much simulated
@@ -260,7 +251,6 @@ class RealtimeWorld:
         """See `RobotBackend.begin`; does nothing."""
 
     def act(self, commands: Commands) -> WorldState:
-        """See `RobotBackend.act`."""
         self._world.check_holder(self)
         with self._simulator:
             self._unpause()
@@ -273,12 +263,10 @@ class RealtimeWorld:
         return WorldState(max(0.0, now - self._begin), joints, self._held)
 
     def look(self, query: StateQuery) -> None:
-        """See `RobotBackend.look`."""
         if query != StateQuery():
             raise RobotEnvError(f"{_ONLY_JOINTS}: it has no links, models and contacts")
 
     def vary(self, variation: Variation) -> None:
-        """See `RobotBackend.vary`."""
         with self._simulator:
             self._world.claim(self)  # undoes what others have varied
         self._variation(variation)
@@ -294,7 +282,9 @@ class RealtimeWorld:
             for link in links:
                 answer = self._get_link(link, "world")
                 check_success(answer, f"the pose of '{link}' isn't known")
-                found.append(pose_of(answer.link_state.pose))
+                at = answer.link_state.pose
+                place, turn = at.position, at.orientation
+                found.append(Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)))
         return found
 
     def close(self) -> None:

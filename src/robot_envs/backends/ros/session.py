@@ -5,9 +5,8 @@ import contextlib
 import os
 import re
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from tempfile import TemporaryDirectory
 
 import rospy
 
@@ -22,6 +21,8 @@ from ros_calls.service import TIMEOUT
 from ros_utils import ros_gazebo
 
 START_TIMEOUT = 60.0  # [s] for the simulator to come up
+
+_sessions: "list[RosSession]" = []  # of this process, oldest first
 
 
 class RosSession:
@@ -80,7 +81,7 @@ class RosSession:
             )
         if self._rviz:
             windows.check_rviz(robot)
-        self._started_simulator = not _simulator_runs()
+        self._started_simulator = not (node.master_is_up() and gazebo.simulator_answers())
         if self._started_simulator:
             say("starting the simulator")
             self._start_simulator()
@@ -99,21 +100,15 @@ class RosSession:
         if self._rviz:
             say("opening RViz")
             self._undo.callback(windows.open_rviz(robot))
-        _sessions().append(self)
-        self._undo.callback(_sessions().remove, self)
+        _sessions.append(self)
+        self._undo.callback(_sessions.remove, self)
 
     def _start_simulator(self) -> None:
         """Starts the simulator, and the master if there is none."""
-
-        def write(text: str) -> str:
-            with NamedTemporaryFile("w", suffix=".world", delete=False) as file:
-                file.write(text)
-            self._undo.callback(os.unlink, file.name)
-            return file.name
-
+        folder = self._undo.enter_context(TemporaryDirectory())
         started = ros_gazebo.launch_Gazebo(
             paused=True, gui=self._gui, output="log", launch_new_term=False,
-            custom_world_path=gazebo.world_path(self._scene.robots[0].world, write),
+            custom_world_path=gazebo.world_path(self._scene.robots[0].world, Path(folder)),
             lockstep=not self._realtime, seed=self._seed, timeout=START_TIMEOUT,
         )  # fmt: skip
         if isinstance(started, bool):
@@ -159,14 +154,6 @@ class RosSession:
             self._undo.callback(windows.open_window(say))
             windows.report_opening(say, registered=True)
 
-    def serves(self, scene: Scene, realtime: bool) -> bool:
-        """Returns whether it has these robots, and moves as asked."""
-        return self.moves(scene.robots) and self._realtime == realtime
-
-    def moves(self, robots: Sequence[Robot]) -> bool:
-        """Returns whether it has these robots."""
-        return self._scene.robots == tuple(robots)
-
     def connect(
         self, scene: Scene, control_period: float, deadline: float | None = None
     ) -> RobotBackend:
@@ -192,11 +179,7 @@ class RosSession:
         return LockstepWorld(scene, ticks, self._world, deadline or TIMEOUT)
 
     def make_room(self) -> None:
-        """Ends what `start` started, except the node, for another world.
-
-        Raises:
-            RobotEnvError: if an environment still uses it.
-        """
+        """Ends what `start` started, except the node; raises RobotEnvError while an environment uses it."""
         if self._world.is_used:
             raise RobotEnvError(
                 "over ROS a process moves one world at a time, and an environment of "
@@ -222,13 +205,13 @@ def running_session(scene: Scene, realtime: bool) -> RosSession:
         RobotEnvError: if something can't be started, what runs doesn't fit, or an environment of other robots
             is open.
     """
-    for session in reversed(_sessions()[:]):
-        answers = gazebo.simulator_answers()
-        if session.serves(scene, realtime):
+    for session in reversed(_sessions[:]):
+        answers, has_them = gazebo.simulator_answers(), session._scene.robots == scene.robots
+        if has_them and session._realtime == realtime:
             if answers:
                 return session
             break
-        if answers and not session.moves(scene.robots):
+        if answers and not has_them:
             session.make_room()
     model = re.sub(r"\W", "_", scene.robots[0].model, flags=re.ASCII).strip("_") or "robot"
     name = f"/{model}_env_{os.getpid()}"
@@ -242,18 +225,8 @@ def running_session(scene: Scene, realtime: bool) -> RosSession:
     return session
 
 
-def _simulator_runs() -> bool:
-    return node.master_is_up() and gazebo.simulator_answers()
-
-
 def _undo_if_running(running: RunningSimulator, undo: Undo) -> None:
     """Undoes a change, unless the simulator has died meanwhile or was replaced."""
     with contextlib.suppress(RobotEnvError, rospy.ServiceException, rospy.ROSException, OSError):
         if running.is_registered() and gazebo.simulator_answers():
             undo()
-
-
-@lru_cache(maxsize=1)
-def _sessions() -> list[RosSession]:
-    """Returns the process's sessions, oldest first."""
-    return []

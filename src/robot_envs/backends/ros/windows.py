@@ -105,11 +105,7 @@ def check_rviz(robot: Robot) -> None:
 
 
 def open_rviz(robot: Robot) -> Callable[[], object]:
-    """Opens RViz; returns what closes it.
-
-    Raises:
-        RobotEnvError: if its launch file can't be started.
-    """
+    """Opens RViz, and returns what closes it; raises RobotEnvError if that fails."""
     assert robot.rviz is not None
     started = ros_launch.ros_launch_from_pkg(*robot.rviz, launch_new_term=False)
     if isinstance(started, bool):

@@ -1,12 +1,10 @@
 """Calls the simulator's services, and defines results with several values. Part of `ros_gazebo`."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 
 import std_srvs.srv
-from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
+from geometry_msgs.msg import Point, Pose, Quaternion, Twist
 from std_msgs.msg import Header
 
 from ros_calls import waiting
@@ -111,11 +109,6 @@ def make_pose(x: float, y: float, z: float, qx: float, qy: float, qz: float, qw:
     if not any((qx, qy, qz, qw)):
         qw = 1.0
     return Pose(position=Point(x, y, z), orientation=Quaternion(qx, qy, qz, qw))
-
-
-def make_twist(linear: tuple[float, float, float], angular: tuple[float, float, float]) -> Twist:
-    """Returns a twist [m/s, rad/s]."""
-    return Twist(Vector3(*linear), Vector3(*angular))
 
 
 def not_finite(what: str, *numbers: float) -> str:

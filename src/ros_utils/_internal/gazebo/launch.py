@@ -1,7 +1,5 @@
 """Starts and ends the simulator. Part of `ros_gazebo`."""
 
-from __future__ import annotations
-
 import functools
 import os
 import time
@@ -116,7 +114,6 @@ def launch_Gazebo(
     asked = {"lockstep": lockstep, "seed": seed, "extra_gazebo_args": extra_gazebo_args}
     switches |= {name: value for name, value in asked.items() if value not in (None, False, "")}
     world = (custom_world_path, custom_world_pkg, custom_world_name)
-    screen = output == "screen" and not launch_new_term
     service = f"{gazebo_ns.rstrip('/')}/{READY}"
     answers = functools.partial(service_answers, service)
     with _master.using(master_uri):
@@ -125,10 +122,9 @@ def launch_Gazebo(
                 f"{LABEL} runs already under {_master.uri()}: using it (ros_kill_all_processes ends it)"
             )
             return wait_for_world(Started(), ready, time.monotonic() + timeout, timeout)
-        handle = _start(switches, world, launch_new_term, screen, log_file, env)
-        absent = f"service {service} doesn't answer"
+        handle = _start(switches, world, launch_new_term, log_file, env)
         return handle is not None and await_start(
-            handle, answers, absent, timeout, ready, may_end=False
+            handle, answers, f"service {service} doesn't answer", timeout, ready, may_end=False
         )
 
 
@@ -136,7 +132,6 @@ def _start(
     switches: dict[str, object],
     world: tuple[str | None, str | None, str | None],
     window: bool,
-    screen: bool,
     log_file: str | None,
     env: Mapping[str, str] | None,
 ) -> Handle | None:
@@ -148,6 +143,7 @@ def _start(
         _packages.file("gazebo_ros", "launch", "empty_world.launch")
         arguments = [f"{name}:={value}" for name, value in switches.items()]
         command = ["gazebo_ros", "empty_world.launch", *arguments]
+        screen = switches["output"] == "screen" and not window
         return _roslaunch.start(command, LABEL, window, screen, log_file, env)
     except (_packages.NotFound, CannotStart, _master.MasterDown) as fault:
         _log.error(f"launch_Gazebo: {fault}")
@@ -175,11 +171,7 @@ def close_Gazebo(*, master_uri: str | None = None) -> bool:
 
 
 def _world(path: str | None, package: str | None, name: str | None) -> str | None:
-    """Returns the world file to load, or None for the launch file's own.
-
-    Raises:
-        NotFound: no such package or file.
-    """
+    """Returns the world file, or None for the launch file's own; raises NotFound if there is no such file."""
     if path:
         # The simulator may find a relative path on its own resource path.
         return (

@@ -1,7 +1,5 @@
 """Reads and sets physics properties; pauses, steps and resets. Part of `ros_gazebo`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

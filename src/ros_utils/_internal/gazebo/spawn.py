@@ -1,7 +1,5 @@
 """Spawns models from URDF and SDF, and deletes them. Part of `ros_gazebo`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Reads and sets the states of models, links and joints. Part of `ros_gazebo`."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -10,7 +8,7 @@ from gazebo_msgs import srv
 from gazebo_msgs.msg import LinkState, ModelState
 from genpy import Duration
 from genpy import Time as RosTime
-from geometry_msgs.msg import Pose, Twist
+from geometry_msgs.msg import Pose, Twist, Vector3
 from std_msgs.msg import Header
 
 from ros_utils._internal import log as _log
@@ -23,7 +21,6 @@ from ros_utils._internal.gazebo.calls import (
     WorldPropertiesResult,
     call,
     make_pose,
-    make_twist,
     not_finite,
     pose_numbers,
     succeeded,
@@ -105,7 +102,8 @@ def gazebo_set_model_state(
     """
     pose = make_pose(pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     linear, angular = (lin_vel_x, lin_vel_y, lin_vel_z), (ang_vel_x, ang_vel_y, ang_vel_z)
-    state = ModelState(model_name, pose, make_twist(linear, angular), ref_frame)
+    twist = Twist(Vector3(*linear), Vector3(*angular))
+    state = ModelState(model_name, pose, twist, ref_frame)
     numbers = (*pose_numbers(pose), *linear, *angular)
     done = _set("set_model_state", srv.SetModelState, state, numbers, timeout, gazebo_ns)
     time.sleep(max(0.0, sleep_time))
