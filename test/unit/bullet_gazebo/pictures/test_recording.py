@@ -1,6 +1,7 @@
 """A simulation recorded while it runs: pictures at simulated times, of who comes and goes."""
 
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -102,15 +103,9 @@ while not recorder._waiting.empty():
     pass
 os.kill(os.getpid(), signal.SIGKILL)
 """
-    import subprocess
-
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        stdout=subprocess.PIPE,
-        text=True,
-        timeout=LIMIT,
-        check=False,
-    )  # returns once nobody has its standard output any more: the other process neither
+    # This returns once nobody has its standard output any more: the other process neither.
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=LIMIT, check=False)
     assert done.returncode == -signal.SIGKILL and " frames, " in done.stdout
     assert 9 <= len(frames(tmp_path / "a.mp4")) <= 11
 
