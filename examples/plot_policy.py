@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
+from rl_workbench.agents.greedy import Choice
 from rl_workbench.plotting import as_png, new_figure
 from rl_workbench.tools.policies import TEST_SEED, episode_steps, load_learned
 from rl_workbench.tools.runs import open_run
@@ -57,7 +58,8 @@ PLANES = {
 def preference(network: torch.nn.Module, observations: np.ndarray) -> np.ndarray:
     """Returns the action, or how much the score of the last one is above that of the first: (N,)."""
     seen = torch.from_numpy(observations)
-    if not hasattr(network, "scores"):
+    seen = torch.from_numpy(observations)
+    if not isinstance(network, Choice):
         return network(seen)[:, 0].numpy()
     scores = network.scores(seen)
     return (scores[:, -1] - scores[:, 0]).numpy()

@@ -46,9 +46,6 @@ def need(module: str, package: str, what: str) -> None:
         module: What would be imported.
         package: Its name for the user.
         what: What needs it.
-
-    Raises:
-        WorkbenchError: If it isn't installed.
     """
     if not importlib.util.find_spec(module):
         command = hints.installing(package)

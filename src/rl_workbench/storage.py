@@ -54,11 +54,7 @@ def write_file(path: Path, write: Writer, told: Path | None = None) -> None:
 
 
 def check_writable(path: Path) -> None:
-    """Checks that a file can be written, before hours are spent on its content.
-
-    Raises:
-        WorkbenchError: If it can't.
-    """
+    """Checks that a file can be written, before hours are spent on its content."""
     if path.is_dir():
         raise WorkbenchError(f"can't write {path}: it is a folder")
     probe = path.with_name(f".{path.name}.probe")

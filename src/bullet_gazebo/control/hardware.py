@@ -149,9 +149,6 @@ class RobotHardware:
         Args:
             description: joints and transmissions.
             gains: the parameters `<ns>/gazebo_ros_control/pid_gains`: joints by name.
-
-        Raises:
-            ControlError: if a transmission's joint isn't in the description, or gains are wrong.
         """
         self.interfaces: dict[str, dict[str, JointHandle]] = {}
         for transmission in description.transmissions:
@@ -183,11 +180,7 @@ class RobotHardware:
         ]
 
     def joint(self, interface: str, name: str) -> JointHandle:
-        """Returns joint `name` of `interface`.
-
-        Raises:
-            ControlError: if the robot has no such interface, or the joint isn't in it.
-        """
+        """Returns joint `name` of `interface`."""
         joints = self.interfaces.get(interface)
         if joints is None:
             raise ControlError(f"the robot has no hardware_interface::{interface}")

@@ -13,7 +13,6 @@ from bullet_gazebo.control.trajectory import NANOSECONDS, Axis, Waypoint
 
 SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS = 0, -1, -2  # control_msgs/FollowJointTrajectoryResult
 PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = -4, -5
-MOST_NAMED = 10  # joints in an error text
 LARGEST = (
     1e12  # of a position and its derivatives: the coefficients of a spline would overflow beyond it
 )
@@ -61,21 +60,15 @@ def check_joints(names: Sequence[str], joints: Sequence[str], partial: bool) -> 
     missing = [joint for joint in joints if joint not in names]
     fault = ""
     if unknown:
-        fault = f"the controller has no joint {_shortened(unknown)}; it has {list(joints)}"
+        fault = f"the controller has no joint {unknown}; it has {list(joints)}"
     elif len(set(names)) < len(names):
-        fault = f"a joint is named twice: {_shortened(names)}"
+        fault = f"a joint is named twice: {list(names)}"
     elif not names:
         fault = "it names no joint"
     elif missing and not partial:
         fault = f"it lacks {missing}, and allow_partial_joints_goal is not set"
     if fault:
         raise TrajectoryRefused(INVALID_JOINTS, f"The trajectory's joints don't match: {fault}")
-
-
-def _shortened(names: Sequence[str]) -> str:
-    """Returns a list of names, cut to a length for the log and the client."""
-    rest = len(names) - MOST_NAMED
-    return str(list(names[:MOST_NAMED])) + (f" and {rest} more" if rest > 0 else "")
 
 
 def check_points(trajectory: Trajectory) -> None:

@@ -69,34 +69,6 @@ class Camera:
         """Half the height of its view at a distance of 1."""
         return math.tan(math.radians(self.view) / 2.0)
 
-    def view_matrix(self) -> np.ndarray:
-        """Returns the transform from the world to the camera's axes, as in OpenGL: (4, 4)."""
-        right, up, forward = self.axes
-        matrix = np.eye(4)
-        matrix[:3, :3] = right, up, -forward
-        matrix[:3, 3] = -matrix[:3, :3] @ self.eye
-        return matrix
-
-    def projection_matrix(
-        self, width: int, height: int, region: tuple[int, int, int, int] | None = None
-    ) -> np.ndarray:
-        """Returns the projection from the camera's axes to OpenGL's cube: (4, 4).
-
-        Args:
-            width: of the picture [pixels].
-            height: of the picture [pixels].
-            region: left, top, right and bottom of the part to draw [pixels]; default: all.
-        """
-        near, far = self.near, self.far
-        left, top, right, bottom = region or (0, 0, width, height)
-        matrix, scale = np.zeros((4, 4)), height / self.slope
-        matrix[0, 0], matrix[1, 1] = scale / (right - left), scale / (bottom - top)
-        matrix[0, 2] = (left + right - width) / (right - left)
-        matrix[1, 2] = (height - top - bottom) / (bottom - top)
-        matrix[2, 2], matrix[2, 3] = (far + near) / (near - far), 2.0 * far * near / (near - far)
-        matrix[3, 2] = -1.0
-        return matrix
-
 
 def overview(points: np.ndarray, aspect: float, looking: Camera | None = None) -> Camera:
     """Returns a camera that sees all of `points` [m] (n, 3), in the direction of `looking`."""

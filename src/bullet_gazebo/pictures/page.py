@@ -70,7 +70,6 @@ class Picture:
             self._remove(set(self.models))
         self.models = {}
         self._last = np.zeros((0, NUMBERS))
-        self._shapes.clear()
 
     def _remove(self, numbers: set[int]) -> None:
         if numbers:

@@ -32,7 +32,6 @@ AXES = 0.15  # [m] of a joint's frame
 AXIS_COLOR = (250, 200, 0)
 OWN_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 AXES_COLORS = ((225, 0, 0), (0, 190, 0), (0, 0, 225))
-MOST_NAMES = 200  # of joints; each is a node of its own
 MOST_FILES = 32
 
 
@@ -56,7 +55,6 @@ class ShapeMaker:
         self._scene, self._batches, self._singles = scene, batches, singles
         self._warn = warn
         self._complained: set[str] = set()
-        self._names = 0
         # One object for each file, so that its shapes are in the same batch.
         self._geometry_of = lru_cache(MOST_FILES)(
             lambda look: _geometry(look.mesh.vertices, look.mesh.faces, side="double")
@@ -86,20 +84,14 @@ class ShapeMaker:
 
     def add_joint(self, where: Where, joint: Joint) -> None:
         """Adds a joint's frame, axis and name; `where` is the link that it moves."""
-        self._names += 1
         corner, turn = joint.anchor
         for own, color in zip(OWN_AXES, AXES_COLORS, strict=True):
             self._add_rod(where, corner, rotate(turn, own), (0.0, AXES), AXES / 25, color)
         axis = rotate(turn, joint.axis)
         self._add_rod(where, corner, axis, (-AXES, 2.0 * AXES), AXES / 20, AXIS_COLOR)
-        if self._names <= MOST_NAMES:
-            end = np.array(corner) + 2.0 * AXES * np.array(axis)
-            label = self._scene.add_label(self._singles.name(), shown(joint.name))
-            self._singles.add(where, np.array([*end, 0.0, 0.0, 0.0, 1.0]), label)
-
-    def clear(self) -> None:
-        """Counts names from 0 again, after everything was removed."""
-        self._names = 0
+        end = np.array(corner) + 2.0 * AXES * np.array(axis)
+        label = self._scene.add_label(self._singles.name(), shown(joint.name))
+        self._singles.add(where, np.array([*end, 0.0, 0.0, 0.0, 1.0]), label)
 
     def _add_part(
         self,

@@ -28,7 +28,6 @@ from geometry_msgs.msg import Vector3
 from std_msgs.msg import ColorRGBA
 
 from bullet_gazebo.physics.description import Color, Joint, Light, Link, Shape
-from bullet_gazebo.physics.engine import Contact
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.pictures.visuals import VisibleModel, visible_model
 from bullet_gazebo.ros.common.messages import from_pose_msg, to_pose_msg, to_time, to_vector
@@ -36,7 +35,6 @@ from bullet_gazebo.ros.common.publishing import SubscriberCount
 from bullet_gazebo.simulator import Simulator
 
 PERIOD = 1.0 / 30.0  # [s of wall time] between two messages of a topic
-PATIENCE = PERIOD / 4  # [s] to wait for a tick, before a resting world is copied without one
 STOP_TIMEOUT = 1.0  # [s]
 REPEAT = 1.0  # [s] between two logs of the same complaint
 NO_STOP = (1.0, 0.0)  # limits of a joint without any: the lower one above the upper one
@@ -48,72 +46,59 @@ class SceneOffer:
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self._one_at_a_time = threading.Lock()
-        self._opened: tuple[object, ...] = ()
+        self._opened: SceneServer | None = None
 
     def show(self) -> None:
         """Offers the scene, if it isn't offered yet."""
         with self._one_at_a_time:
-            if not self._opened:
-                # A window may outlive its simulator: the next one counts from another number.
-                first = secrets.randbits(31)
-                self._opened = (SceneTopics(self._sim, first), SceneService(self._sim, first))
+            if self._opened is None:
+                self._opened = SceneServer(self._sim)
 
 
-def _number(first: int, number: int) -> int:
-    """Returns the world's version or a model's number as clients see it."""
-    return (first + number) % 2**32
+class SceneServer:
+    """Models and lights that a window doesn't know yet (~get_scene), ~scene_poses and ~scene_contacts.
 
+    While somebody subscribes, the topics come thirty times a second of wall time: a thread of its own copies
+    the world between two ticks, and publishes the copies.
+    """
 
-class SceneService:
-    """~get_scene: all models and lights that a window doesn't know yet."""
-
-    def __init__(self, sim: Simulator, first: int) -> None:
+    def __init__(self, sim: Simulator) -> None:
         self._sim = sim
-        self._first = first
+        # A window may outlive its simulator: the next one counts from another number.
+        self._first = secrets.randbits(31)
+        self._news = threading.Event()  # a subscriber comes or goes, or the end
+        self._ending = threading.Event()
+        self._poses = self._advertise("~scene_poses", ScenePoses)
+        self._contacts = self._advertise("~scene_contacts", SceneContacts)
         self._service = rospy.Service("~get_scene", GetScene, self._get)
+        self._thread = threading.Thread(target=self._run, name="scene", daemon=True)
+        self._thread.start()
+        rospy.on_shutdown(self._stop)
 
     def _get(self, request: GetSceneRequest) -> GetSceneResponse:
         world, known = self._sim.world, frozenset(request.known)
         with self._sim.lock:  # converting a large model takes long, and is done without it
-            version = _number(self._first, world.version)
+            version = self._number(world.version)
             models = list(world.models.values())
             lights = [copy(light) for light in world.lights.values()]
         found = []
         for model in models:
-            number = _number(self._first, model.number)
+            number = self._number(model.number)
             if number in known:
                 found.append(SceneModel(number=number, name=model.name, known=True))
             else:
                 found.append(to_model(model, number, request.collisions))
         return GetSceneResponse(version, found, [to_light(light) for light in lights])
 
-
-class SceneTopics:
-    """~scene_poses and ~scene_contacts, thirty times a second of wall time, while somebody subscribes.
-
-    A thread of its own publishes them. The world is copied within a tick, so that the thread neither waits
-    for the end of a long request in lock-step nor delays ticks.
-    """
-
-    def __init__(self, sim: Simulator, first: int) -> None:
-        self._sim = sim
-        self._first = first
-        self._news = threading.Event()  # a subscriber comes or goes, or the end
-        self._ending = threading.Event()
-        self._due = False  # whether the next tick copies; cleared under the world's lock
-        self._copied = threading.Event()
-        self._copies: list[Callable[[], None]] = []
-        self._poses = self._advertise("~scene_poses", ScenePoses)
-        self._contacts = self._advertise("~scene_contacts", SceneContacts)
-        self._thread = threading.Thread(target=self._run, name="scene", daemon=True)
-        self._thread.start()
-        rospy.on_shutdown(self._stop)
-
     def _advertise(self, name: str, kind: type) -> tuple[rospy.Publisher, SubscriberCount]:
         count = SubscriberCount(self._news.set)
         # A slow subscriber misses some: with a queue, a thread of rospy's sends.
         publisher = rospy.Publisher(name, kind, subscriber_listener=count, queue_size=1)
         return publisher, count
+
+    def _number(self, number: int) -> int:
+        """Returns the world's version or a model's number as clients see it."""
+        return (self._first + number) % 2**32
 
     @property
     def _watched(self) -> bool:
@@ -123,50 +108,39 @@ class SceneTopics:
         while not self._ending.is_set():
             self._news.wait()
             self._news.clear()
-            if self._watched and not self._ending.is_set():
-                with self._sim.lock:
-                    self._sim.listeners.append(self._on_tick)
-                try:
-                    self._publish_until_unwatched()
-                finally:
-                    with self._sim.lock:
-                        self._sim.listeners.remove(self._on_tick)
+            self._publish_until_unwatched()
 
     def _publish_until_unwatched(self) -> None:
         due = time.monotonic()
         while self._watched and not self._ending.wait(max(0.0, due - time.monotonic())):
             try:
-                self._copied.clear()
-                self._due = True
-                if not self._copied.wait(PATIENCE):
-                    with self._sim.lock:
-                        self._on_tick(self._sim.now)
-                for publish in self._copies:
+                with self._sim.lock:
+                    copies = self._copy()
+                for publish in copies:
                     publish()
             except Exception:  # noqa: BLE001 - the simulation goes on, and the next message comes
                 if not rospy.is_shutdown():
                     rospy.logerr_throttle(REPEAT, f"a scene is lost:\n{traceback.format_exc()}")
             due = max(due + PERIOD, time.monotonic())  # missed messages aren't made up for
 
-    def _on_tick(self, now: int) -> None:
+    def _copy(self) -> list[Callable[[], None]]:
         """Copies what is to be published; the caller holds the lock."""
-        if not self._due:
-            return
-        self._due = False
         copies: list[Callable[[], None]] = []
         if self._poses[1].size:
-            copies.append(self._copy_poses(now))
+            copies.append(self._copy_poses())
         if self._contacts[1].size:
             contacts = self._sim.world.engine.contacts()
-            copies.append(partial(self._publish_contacts, contacts))
-        self._copies = copies
-        self._copied.set()
+            points = _singles(each.point for each in contacts)
+            forces = _singles(each.force for each in contacts)
+            copies.append(partial(self._contacts[0].publish, SceneContacts(points, forces)))
+        return copies
 
-    def _copy_poses(self, now: int) -> Callable[[], None]:
+    def _copy_poses(self) -> Callable[[], None]:
         models = self._sim.world.models.values()
         poses = [pose for model in models for pose in model.link_poses()]
         joints = [model.joint_states() for model in models if model.joint_names]
-        version, paused = _number(self._first, self._sim.world.version), self._sim.paused
+        now, paused = self._sim.now, self._sim.paused
+        version = self._number(self._sim.world.version)
 
         def publish() -> None:
             message = ScenePoses(
@@ -180,11 +154,6 @@ class SceneTopics:
             self._poses[0].publish(message)
 
         return publish
-
-    def _publish_contacts(self, contacts: list[Contact]) -> None:
-        points = _singles(each.point for each in contacts)
-        forces = _singles(each.force for each in contacts)
-        self._contacts[0].publish(SceneContacts(points, forces))
 
     def _stop(self) -> None:
         self._ending.set()

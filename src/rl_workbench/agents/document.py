@@ -18,7 +18,7 @@ from torch import nn
 from rl_workbench.agents.greedy import SingleChoice
 from rl_workbench.agents.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import array, load_optimizer, set_generator, switch
+from rl_workbench.states import array, load_optimizer, set_generator
 
 
 class PolicyNetwork(nn.Module):
@@ -71,21 +71,12 @@ class Episode:
         return float(sum(self.rewards))
 
     def states(self) -> list[np.ndarray]:
-        """Returns all T + 1 observations, the final one included.
-
-        Raises:
-            ValueError: if the episode isn't over.
-        """
-        if self.final_observation is None:
-            raise ValueError("the episode isn't over")
+        """Returns all T + 1 observations of an episode that is over, the final one included."""
+        assert self.final_observation is not None
         return [*self.observations, self.final_observation]
 
     def state_dict(self) -> dict[str, Any]:
-        """Returns the episode as tensors and plain values, for a checkpoint.
-
-        Raises:
-            ValueError: if the episode isn't over.
-        """
+        """Returns an episode that is over as tensors and plain values, for a checkpoint."""
         return {
             "observations": torch.from_numpy(np.stack(self.states())),
             "actions": as_tensor(self.actions),
@@ -104,16 +95,12 @@ class Episode:
         """
         *observations, final = array(state["observations"], torch.float32, (None, size))
         length = len(observations)
-        if not length:
-            raise ValueError("an episode without a step")
         if isinstance(kind, tuple):
             actions = list(array(state["actions"], torch.float32, (length, *kind)))
         else:
             actions = array(state["actions"], torch.int64, (length,)).tolist()
-            if not 0 <= min(actions) <= max(actions) < kind:
-                raise ValueError(f"an episode with other actions than 0 to {kind - 1}")
         rewards = array(state["rewards"], torch.float64, (length,)).tolist()
-        return cls(observations, actions, rewards, final, switch(state["terminated"]))
+        return cls(observations, actions, rewards, final, bool(state["terminated"]))
 
 
 def as_tensor(actions: list[Any]) -> torch.Tensor:
@@ -167,18 +154,13 @@ class TwoNetworks(ABC):
     def sync(self) -> None:
         """Copies the policy's weights to where acting reads them."""
 
-    def _parts(self) -> dict[str, Any]:
-        return {
-            "policy": self.policy,
-            "value": self.value,
-            "policy_optimizer": self.policy_optimizer,
-            "value_optimizer": self.value_optimizer,
-        }
-
     def state_dict(self) -> dict[str, Any]:
         """Returns all that a bit-identical continuation needs, as tensors, numbers and strings."""
         return {
-            **{name: part.state_dict() for name, part in self._parts().items()},
+            "policy": self.policy.state_dict(),
+            "value": self.value.state_dict(),
+            "policy_optimizer": self.policy_optimizer.state_dict(),
+            "value_optimizer": self.value_optimizer.state_dict(),
             "generator": json.dumps(self.generator.bit_generator.state),
         }
 
@@ -234,10 +216,6 @@ class PolicyGradientAgent(TwoNetworks):
     def draw(self, observation: np.ndarray, generator: np.random.Generator) -> int:
         """Draws an action from the policy with the given generator."""
         return 0 if generator.random() < self.probability_of_zero(observation) else 1
-
-    def act(self, observation: np.ndarray) -> int:
-        """Draws an action from the policy with the agent's own generator."""
-        return self.draw(observation, self.generator)
 
     def limited(self, action: int) -> int:
         """Returns a drawn action in the form that the environment takes; here it is the same."""

@@ -14,7 +14,7 @@ from rl_workbench.agents.normalisation import Normaliser
 from rl_workbench.agents.replay import Batch, NStepReturns, ReplayBuffer
 from rl_workbench.agents.settings import DQNSettings
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import load_optimizer, number, sequence, set_generator, whole
+from rl_workbench.states import load_optimizer, set_generator
 
 
 class Learned(NamedTuple):
@@ -212,7 +212,7 @@ class DQNAgent:
         """Loads what `policy_state` returned; a file of the DQN tutorial's has no normaliser."""
         self.q_net.load_state_dict(state["q_net"])
         self.target_net.load_state_dict(state["target_net"])
-        self._epsilon.value = number(state["epsilon"])
+        self._epsilon.value = float(state["epsilon"])
         if self.normaliser is not None:
             self.normaliser.load_state_dict(state["normaliser"])
 
@@ -235,13 +235,11 @@ class DQNAgent:
         """Loads what `state_dict` returned."""
         self.load_policy_state(state)
         load_optimizer(self._optimizer, state["optimizer"])
-        self.buffer.load_state_dict(state["replay"], self.actions)
-        self._returns.load_state_dict(state["window"], self.observation_size, self.actions)
-        for generator, text in zip(
-            (self._explore, self._draw), sequence(state["generators"], 2), strict=True
-        ):
+        self.buffer.load_state_dict(state["replay"])
+        self._returns.load_state_dict(state["window"])
+        for generator, text in zip((self._explore, self._draw), state["generators"], strict=True):
             set_generator(generator, text)
-        self.steps, self.gradient_steps = whole(state["steps"]), whole(state["gradient_steps"])
+        self.steps, self.gradient_steps = int(state["steps"]), int(state["gradient_steps"])
 
 
 def _copied(network: nn.Module) -> dict[str, torch.Tensor]:

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 
 from rl_workbench.agents.greedy import Scaling
-from rl_workbench.states import array, whole
+from rl_workbench.states import array
 
 CLIP = 10.0  # [standard deviations]
 SMALLEST = 1e-8  # added to the variance, so that a constant quantity gives 0
@@ -54,9 +54,7 @@ class Normaliser:
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Loads what `state_dict` returned."""
         size = self._mean.shape
-        self._count = whole(state["count"])
+        self._count = int(state["count"])
         self._mean = array(state["mean"], torch.float64, size)
         self._squares = array(state["squares"], torch.float64, size)
-        if (self._squares < 0).any():
-            raise ValueError("squared deviations are negative")
         self._update_scale()

@@ -35,7 +35,6 @@ from rl_workbench.agents.policy_networks import (
     SoftmaxNetwork,
 )
 from rl_workbench.agents.settings import ReinforceSettings
-from rl_workbench.states import sequence
 
 SMALLEST_SPREAD = 1e-8  # added to the advantages' deviation, so that equal ones stay 0
 
@@ -117,10 +116,6 @@ class ReinforceAgent(TwoNetworks):
     def draw(self, observation: np.ndarray, generator: np.random.Generator) -> Any:
         """Draws an action to learn from; pass it through `limited` for the environment."""
         return self._actor.draw(observation, generator)
-
-    def act(self, observation: np.ndarray) -> Any:
-        """Draws an action to learn from with the agent's own generator."""
-        return self.draw(observation, self.generator)
 
     def limited(self, action: Any) -> Any:
         """Returns a drawn action in the form that the environment takes, within its bounds."""
@@ -231,10 +226,9 @@ class ReinforceAgent(TwoNetworks):
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Loads what `state_dict` returned."""
         size = len(self._factors)
-        batch = sequence(state["batch"])
         bounds = self._actions
         kind = bounds if isinstance(bounds, int) else (bounds.low.size,)
-        self._batch = [Episode.from_state(each, size, kind) for each in batch]
+        self._batch = [Episode.from_state(each, size, kind) for each in state["batch"]]
         if self._normaliser is not None:
             self._normaliser.load_state_dict(state["normaliser"])
         super().load_state_dict(state)

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import array, number, sequence, whole
+from rl_workbench.states import array
 
 
 class Transition(NamedTuple):
@@ -42,11 +42,13 @@ class ReplayBuffer:
     def __init__(self, capacity: int, observation_size: int) -> None:
         shape = (capacity, observation_size)
         try:
-            self._observations = np.zeros(shape, np.float32)
-            self._next_observations = np.zeros(shape, np.float32)
-            self._actions = np.zeros(capacity, np.int64)
-            self._rewards = np.zeros(capacity, np.float32)
-            self._discounts = np.zeros(capacity, np.float32)
+            self._columns = Batch(
+                np.zeros(shape, np.float32),
+                np.zeros(capacity, np.int64),
+                np.zeros(capacity, np.float32),
+                np.zeros(shape, np.float32),
+                np.zeros(capacity, np.float32),
+            )
         except MemoryError as error:
             raise WorkbenchError(
                 f"no memory for {capacity} transitions; take a smaller buffer_size"
@@ -61,11 +63,8 @@ class ReplayBuffer:
     def push(self, transition: Transition) -> None:
         """Adds a transition; in a full buffer it replaces the oldest."""
         index = self._next
-        self._observations[index] = transition.observation
-        self._actions[index] = transition.action
-        self._rewards[index] = transition.reward
-        self._next_observations[index] = transition.next_observation
-        self._discounts[index] = transition.discount
+        for column, value in zip(self._columns, transition, strict=True):
+            column[index] = value
         self._next = (index + 1) % self.capacity
         self._size = max(self._size, index + 1)
 
@@ -81,45 +80,24 @@ class ReplayBuffer:
             indices = np.empty((rounds, count), np.int64)
             for row in indices:
                 row[:] = rng.choice(self._size, count, replace=False, shuffle=False)
-        return Batch(
-            self._observations[indices],
-            self._actions[indices],
-            self._rewards[indices],
-            self._next_observations[indices],
-            self._discounts[indices],
-        )
+        return Batch(*(column[indices] for column in self._columns))
 
     def state_dict(self) -> dict[str, Any]:
         """Returns the filled part as tensors that share its memory, and the next position."""
-        arrays = {name: torch.from_numpy(array[: self._size]) for name, array in self._columns()}
+        columns = self._columns._asdict().items()
+        arrays = {name: torch.from_numpy(column[: self._size]) for name, column in columns}
         return {**arrays, "next": self._next}
 
-    def load_state_dict(self, state: dict[str, Any], actions: int) -> None:
-        """Loads what `state_dict` returned.
-
-        Raises:
-            WorkbenchError: if it doesn't fit into this buffer.
-            TypeError, ValueError, LookupError: if it is malformed.
-        """
-        size, following = len(state["actions"]), whole(state["next"])
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Loads what `state_dict` returned."""
+        size, following = len(state["actions"]), int(state["next"])
         is_full = size == self.capacity
         if size > self.capacity or not (following < size if is_full else following == size):
             raise WorkbenchError(f"a buffer of {self.capacity} can't hold {size} transitions")
-        for name, column in self._columns():
+        for name, column in self._columns._asdict().items():
             dtype, shape = torch.from_numpy(column[:0]).dtype, (size, *column.shape[1:])
             column[:size] = array(state[name], dtype, shape)
-        if size and not 0 <= self._actions[:size].min() <= self._actions[:size].max() < actions:
-            raise WorkbenchError(f"the transitions have other actions than 0 to {actions - 1}")
         self._size, self._next = size, following
-
-    def _columns(self) -> list[tuple[str, np.ndarray]]:
-        return [
-            ("observations", self._observations),
-            ("actions", self._actions),
-            ("rewards", self._rewards),
-            ("next_observations", self._next_observations),
-            ("discounts", self._discounts),
-        ]
 
 
 class NStepReturns:
@@ -174,15 +152,7 @@ class NStepReturns:
             "rewards": [step[2] for step in self._window],
         }
 
-    def load_state_dict(self, state: dict[str, Any], size: int, actions: int) -> None:
+    def load_state_dict(self, state: dict[str, Any]) -> None:
         """Loads what `state_dict` returned."""
-        observations = [
-            array(each, torch.float32, (size,)) for each in sequence(state["observations"])
-        ]
-        chosen = [whole(each) for each in sequence(state["actions"], len(observations))]
-        if max(chosen, default=0) >= actions:
-            raise ValueError(f"action {max(chosen)} of {actions}")
-        rewards = [number(each) for each in sequence(state["rewards"], len(observations))]
-        if len(observations) >= max(self._steps, 1):
-            raise ValueError(f"{len(observations)} steps wait for {self._steps}-step returns")
-        self._window = deque(zip(observations, chosen, rewards, strict=True))
+        observations = [each.numpy().copy() for each in state["observations"]]
+        self._window = deque(zip(observations, state["actions"], state["rewards"], strict=True))

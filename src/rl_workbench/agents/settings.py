@@ -8,11 +8,7 @@ from rl_workbench.option import check_options, option
 
 @dataclass(frozen=True)
 class DQNSettings:
-    """The options of DQN. Steps are environment steps, unless called gradient steps.
-
-    Raises:
-        WorkbenchError: if a value is outside its limits; the text names the option and the limits.
-    """
+    """The options of DQN. Steps are environment steps, unless called gradient steps."""
 
     total_timesteps: int = option(
         50_000, "the training's length [steps]; schedules are fractions of it", 1, 2**53
@@ -63,11 +59,7 @@ class DQNSettings:
 
 @dataclass(frozen=True)
 class ReinforceSettings:
-    """The options of REINFORCE.
-
-    Raises:
-        WorkbenchError: if a value is outside its limits; the text names the option and the limits.
-    """
+    """The options of REINFORCE."""
 
     gamma: float = option(0.99, "discount of rewards, for each step that they come later", 0, 1)
     gae_lambda: float = option(
@@ -107,11 +99,7 @@ class ReinforceSettings:
 
 @dataclass(frozen=True)
 class DocumentSettings:
-    """The options of the policy-gradient document's algorithm, which are constants in its script.
-
-    Raises:
-        WorkbenchError: if a value is outside its limits; the text names the option and the limits.
-    """
+    """The options of the policy-gradient document's algorithm, which are constants in its script."""
 
     gamma: float = option(0.99, "discount of rewards, for each step that they come later", 0, 1)
     policy_learning_rate: float = option(0.01, "of the policy's Adam", 0, 10)

@@ -183,11 +183,7 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
 
 
 def check_package(variant: Variant) -> None:
-    """Checks that the package of the variant's algorithm is installed and knows the options.
-
-    Raises:
-        WorkbenchError: if not.
-    """
+    """Checks that the package of the variant's algorithm is installed and knows the options."""
     kind = algorithm(variant.algorithm)
     if kind.package:
         choose(kind, training_flags(variant, 0)[2:])

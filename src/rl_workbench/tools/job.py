@@ -13,7 +13,7 @@ import signal
 import socket
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -203,35 +203,27 @@ def _finish(process: subprocess.Popen[bytes], stop_within: StopWithin) -> tuple[
 
 def last_words(log: Path) -> str:
     """Returns the last line of a training's output; empty if there is none."""
+    lines = [line.strip() for line in _tail(log).replace("\r", "\n").split("\n")]
+    return next((line for line in reversed(lines) if line), "")
+
+
+def _tail(path: Path) -> str:
     try:
-        with log.open("rb") as file:
+        with path.open("rb") as file:
             file.seek(max(0, file.seek(0, 2) - TAIL))
-            text = file.read().decode(errors="replace")
+            return file.read().decode(errors="replace")
     except OSError:
         return ""
-    lines = [line.strip() for line in text.replace("\r", "\n").split("\n")]
-    return next((line for line in reversed(lines) if line), "")
 
 
 def steps_of(folder: Path) -> tuple[int, int]:
     """Returns the last step of a run and the steps of the whole training; 0 for unknown ones."""
-    run = read_leniently(folder / CONFIG_RECORD).get("run")
-    length = run.get("total_timesteps") if isinstance(run, dict) else 0
-    return next(_last_steps(folder / SCALARS), 0), length if isinstance(length, int) else 0
-
-
-def _last_steps(path: Path) -> Iterator[int]:
-    """Yields the steps of a table's last complete rows, the last one first."""
-    try:
-        with path.open("rb") as file:
-            file.seek(max(0, file.seek(0, 2) - TAIL))
-            rows = file.read().split(b"\n")[:-1]
-    except OSError:
-        return
-    for row in reversed(rows):
-        step, tag, *_ = *row.split(b","), b""
-        if step.isdigit() and b"/" in tag:  # tags without a slash count episodes
-            yield int(step)
+    length = read_leniently(folder / CONFIG_RECORD).get("run", {}).get("total_timesteps", 0)
+    for row in reversed(_tail(folder / SCALARS).split("\n")[:-1]):  # the last one may be incomplete
+        step, tag, *_ = *row.split(","), ""
+        if step.isdigit() and "/" in tag:  # tags without a slash count episodes
+            return int(step), length
+    return 0, length
 
 
 def outcome(summary: dict[str, Any]) -> str:

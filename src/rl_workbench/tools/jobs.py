@@ -77,9 +77,6 @@ def claim(folder: Path, name: str, wanted: Any, refusal: str) -> None:
         name: of the file.
         wanted: the settings as plain values.
         refusal: the error's text, after the folder's name, if the file has other settings.
-
-        Raises:
-            WorkbenchError: if it has, or it can't be read or written.
     """
     found = read_json(folder / name)
     if found is None:

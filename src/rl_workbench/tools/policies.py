@@ -10,7 +10,6 @@ import gymnasium
 from torch import nn
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import whole
 from rl_workbench.storage import CONFIG_RECORD
 from rl_workbench.tools.flags import RANDOM
 from rl_workbench.tools.runs import Run
@@ -109,7 +108,7 @@ def _learned(
     except WorkbenchError as error:
         raise WorkbenchError(f"{path} isn't a checkpoint of {run.folder}") from error
     with checkpoints.fitting("number of steps"):
-        steps = whole(content["steps"])
+        steps = int(content["steps"])
     return LearnedPolicy(*load_policy(options, content, env, str(path)), env, path, steps)
 
 

@@ -43,15 +43,6 @@ QUIET = {
     "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
     "RAY_DEDUP_LOGS_SKIP_REGEX": ".",  # nothing printed about workers and nodes that die
 }
-# Ray's own messages are pages long.
-REASONS = {
-    "NodeDiedError": "its node died",
-    "WorkerCrashedError": "its worker died",
-    "LocalRayletDiedError": "the raylet of its node died",
-    "OutOfMemoryError": "its node had no memory left",
-    "OwnerDiedError": "its node died",
-    "ObjectLostError": "its node died",
-}
 
 
 class TrainingLost(Exception):
@@ -160,11 +151,9 @@ class RayJobs:
 
 
 def _in_a_line(error: Exception) -> str:
-    for kind in type(error).__mro__:
-        if kind.__name__ in REASONS:
-            return REASONS[kind.__name__]
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return lines[-1] if lines else type(error).__name__
+    """Returns the end of an error, since Ray's own messages are pages long."""
+    lines = str(error).split("\n")
+    return next((line.strip() for line in reversed(lines) if line.strip()), type(error).__name__)
 
 
 @contextlib.contextmanager

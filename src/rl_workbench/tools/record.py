@@ -107,16 +107,13 @@ def _policy(
     arguments: argparse.Namespace, run: "Run", which: str
 ) -> "LearnedPolicy | RandomPolicy":
     from rl_workbench.tools.policies import load_any
-    from rl_workbench.tools.recording import size_options
 
     options = {**env_options(arguments), "render_mode": "rgb_array"}
-    sized = size_options(run.env_id, arguments.size)
-    try:
-        return load_any(run, which, {**options, **sized}, arguments.seed)
-    except WorkbenchError:
-        if not sized:
-            raise
-    return load_any(run, which, options, arguments.seed)  # pictures are scaled later
+    if arguments.size:
+        sized = dict(zip(("width", "height"), arguments.size, strict=True))
+        with contextlib.suppress(WorkbenchError):  # without such options pictures are scaled later
+            return load_any(run, which, {**options, **sized}, arguments.seed)
+    return load_any(run, which, options, arguments.seed)
 
 
 def _record(arguments: argparse.Namespace, which: str, policy: Any, view: Any, rate: float) -> Film:

@@ -5,7 +5,6 @@ environments have to stay in one thread.
 """
 
 import contextlib
-import inspect
 import os
 import threading
 from collections.abc import Iterator
@@ -16,10 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium
 import numpy as np
-from gymnasium.envs.registration import load_env_creator
 from PIL import Image
 
-from rl_workbench.env_ids import spec_of
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.flags import RANDOM
 from rl_workbench.tools.policies import (
@@ -202,21 +199,6 @@ def draw_without_display() -> None:
         os.environ.setdefault("MUJOCO_GL", "egl")
 
 
-def size_options(env_id: str, size: Size | None) -> dict[str, int]:
-    """Returns the environment's options for pictures of that size; empty if it has no such options."""
-    if size is None:
-        return {}
-    spec = spec_of(env_id)
-    entry_point = None if spec is None else spec.entry_point
-    maker = load_env_creator(entry_point) if isinstance(entry_point, str) else entry_point
-    if maker is None:
-        return {}
-    known = inspect.signature(maker).parameters
-    given = {"width": size[0], "height": size[1]}
-    takes_all = any(each.kind is each.VAR_KEYWORD for each in known.values())
-    return given if takes_all or given.keys() <= known.keys() else {}
-
-
 @dataclass
 class RecordedEpisode:
     """An episode, whose frames grow while it is played."""
@@ -233,10 +215,6 @@ class RecordedEpisode:
     def length(self) -> int:
         """The number of steps so far."""
         return max(0, len(self.frames) - 1)
-
-
-class Superseded(Exception):
-    """Raised in the recording thread when another episode was requested."""
 
 
 class EpisodeRecorder:
@@ -297,8 +275,6 @@ class EpisodeRecorder:
                         return
                 try:
                     self._play(episode)
-                except Superseded:
-                    continue
                 except (WorkbenchError, gymnasium.error.Error) as error:
                     episode.note = str(error) or type(error).__name__
                     self._close_environment()
@@ -336,8 +312,8 @@ class EpisodeRecorder:
         size = 0
         seed = TEST_SEED + episode.seed
         for frame in record_episode(env, act, view, seed, max_steps=MAX_STEPS):
-            if self._wanted is not None or self._is_closed:
-                raise Superseded
+            if self._wanted is not None or self._is_closed:  # another episode was requested
+                return
             episode.frames.append(frame)
             size += len(frame.seen) if isinstance(frame.seen, bytes) else 0
             if frame.step == MAX_STEPS or size > MAX_BYTES:
@@ -362,9 +338,6 @@ def check_robot_is_free(run: Run, options: dict[str, Any]) -> None:
     Args:
         run: the run, whose record has the options that name a shared robot.
         options: of the episode's environment.
-
-    Raises:
-        WorkbenchError: if it would.
     """
     shared = run.config.get("shared_robot")
     if (

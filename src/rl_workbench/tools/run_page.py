@@ -1,6 +1,7 @@
 """The page of a run: recorded episodes of its policies, and the curves of its training."""
 
 import contextlib
+import select
 import sys
 import threading
 import time
@@ -102,16 +103,13 @@ def _served(host: str, port: int | None, title: str) -> tuple[Address, viser.Vis
 
 def _end(interrupt: Interrupt, beside_training: bool) -> Callable[[], bool]:
     """Returns what says whether the serving is over."""
-    training_ended = threading.Event()
-    if beside_training:
-        threading.Thread(target=_await_end, args=(training_ended,), daemon=True).start()
-    return lambda: training_ended.is_set() or interrupt.requested()
 
+    def is_over() -> bool:
+        # Standard input closes with the training, even if that is killed.
+        has_ended = beside_training and bool(select.select([sys.stdin], [], [], 0)[0])
+        return has_ended or interrupt.requested()
 
-def _await_end(ended: threading.Event) -> None:
-    """Waits for the end of standard input, which closes with the training even if that is killed."""
-    sys.stdin.buffer.read()
-    ended.set()
+    return is_over
 
 
 def _play(

@@ -51,9 +51,6 @@ class Algorithm(ABC):
 
         Args:
             frame: The `training.Training`.
-
-        Raises:
-            WorkbenchError: If the environment or the arithmetic fails.
         """
 
     @abstractmethod
@@ -61,11 +58,7 @@ class Algorithm(ABC):
         """Returns the best action for an observation (D,)."""
 
     def check_weights(self) -> None:
-        """Checks the weights for NaN, if learning doesn't.
-
-        Raises:
-            WorkbenchError: If a weight isn't finite.
-        """
+        """Checks the weights for NaN, if learning doesn't."""
         return
 
     @abstractmethod
@@ -74,11 +67,7 @@ class Algorithm(ABC):
 
     @abstractmethod
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Loads what `state_dict` returned, from a checkpoint that may hold more.
-
-        Raises:
-            WorkbenchError: If the state doesn't fit.
-        """
+        """Loads what `state_dict` returned, from a checkpoint that may hold more."""
 
     @abstractmethod
     def environment_state(self) -> Any:
@@ -131,9 +120,6 @@ def load_policy(
         content: Of the checkpoint.
         env: An environment like the one that it learned in.
         origin: The checkpoint's file, for errors.
-
-    Raises:
-        WorkbenchError: If the checkpoint doesn't fit the options or the environment.
     """
     try:
         made: Policy = import_module(options.kind.implementation).load_policy(options, content, env)

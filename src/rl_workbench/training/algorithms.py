@@ -49,11 +49,7 @@ class AlgorithmKind:
         return getattr(import_module(module), name)
 
     def check_installed(self) -> None:
-        """Makes sure that the package it needs is installed.
-
-        Raises:
-            WorkbenchError: If it isn't. The text says how to install it.
-        """
+        """Makes sure that the package it needs is installed."""
         if self.package:
             need(*self.package, f"the algorithm {self.name}")
 

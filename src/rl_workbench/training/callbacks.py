@@ -119,9 +119,6 @@ def load_callbacks(names: str) -> list[Callback]:
 
     Args:
         names: module:Class, several with commas.
-
-    Raises:
-        WorkbenchError: If a class doesn't exist, is no Callback, or can't be made.
     """
     return [_load(name.strip()) for name in names.split(",") if name.strip()]
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from rl_workbench.agents.dqn_agent import DQNAgent, Learned
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import number, sequence
 from rl_workbench.training.algorithm import Algorithm, Policy, Say
 from rl_workbench.training.checkpoints import fitting
 from rl_workbench.training.environments import as_vector, discrete_actions, succeeded
@@ -115,12 +114,12 @@ class DQNTraining(Algorithm):
     def restore_environment(self, state: dict[str, Any], say: Say) -> None:
         """Repeats the episode under way; says so if it goes another way."""
         last = state["last"]
-        self._last = None if last is None else Learned(*map(number, sequence(last, 2)))
+        self._last = None if last is None else Learned(*map(float, last))
         self._repeatable.generator = state["generator"]
         if state["episode"] is None:
             return
         self._observation = self._repeatable.load_state_dict(state["episode"])
-        self._reward = number(state["reward"])
+        self._reward = float(state["reward"])
         if self._observation is None:
             say("the environment doesn't repeat itself: the episode under way is given up")
             self._reward = 0.0

@@ -19,7 +19,6 @@ from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
 from rl_workbench.training.checked import CheckedEnvironment
 from rl_workbench.training.options import TrainingOptions
 
-FLAT = (spaces.Box, spaces.Discrete, spaces.MultiBinary, spaces.MultiDiscrete)
 # What constructors raise for options that they reject.
 _REFUSED = (gymnasium.error.Error, ImportError, TypeError, ValueError, LookupError, AssertionError)
 
@@ -62,11 +61,11 @@ def make_environment(
     if (
         keep_dict
         and isinstance(space, spaces.Dict)
-        and all(_is_box(part) for part in space.values())
+        and all(isinstance(part, spaces.Box) for part in space.values())
     ):
         return CheckedEnvironment(env, env_id, which)
-    if not (_is_box(space) and len(space.shape or ()) == 1):
-        if not _is_numbers(space):
+    if not (isinstance(space, spaces.Box) and len(space.shape) == 1):
+        if not space.is_np_flattenable:
             env.close()
             raise WorkbenchError(
                 f"{env_id} observes {space}; agents learn only from vectors of numbers"
@@ -155,17 +154,6 @@ def _attribute(env: gymnasium.Env[Any, Any], name: str) -> Any:
 
 
 # --- spaces -------------------------------------------------------------------------------------
-
-
-def _is_box(space: gymnasium.Space[Any]) -> TypeGuard[spaces.Box]:
-    return isinstance(space, spaces.Box)
-
-
-def _is_numbers(space: gymnasium.Space[Any]) -> bool:
-    if isinstance(space, spaces.Dict | spaces.Tuple):
-        parts = space.values() if isinstance(space, spaces.Dict) else space
-        return all(map(_is_numbers, parts))
-    return isinstance(space, FLAT)
 
 
 def has_goal(space: gymnasium.Space[Any]) -> bool:

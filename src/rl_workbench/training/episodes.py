@@ -9,7 +9,7 @@ import numpy as np
 
 from rl_workbench.agents.document import Episode, PolicyGradientAgent
 from rl_workbench.agents.reinforce import ReinforceAgent
-from rl_workbench.states import sequence, set_generator
+from rl_workbench.states import set_generator
 from rl_workbench.training.checked import BEGIN_STEP
 from rl_workbench.training.environments import as_vector, succeeded
 from rl_workbench.training.generators import (
@@ -145,9 +145,7 @@ class EpisodeSource:
     def load_state(self, state: Any) -> None:
         """Loads what `state` returned."""
         count = len(self._envs)
-        texts = [state]
-        if count > 1:
-            texts = sequence(state["environments"], count) + sequence(state["actions"], count - 1)
+        texts = [state] if count == 1 else [*state["environments"], *state["actions"]]
         generators = self._generators()
         del generators[count]  # the agent's own
         for generator, text in zip(generators, texts, strict=True):

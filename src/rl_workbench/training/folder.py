@@ -100,14 +100,12 @@ def versions() -> dict[str, str]:
     }
 
 
-def other_versions(before: Any) -> str:
+def other_versions(before: dict[str, str]) -> str:
     """Returns how the versions of now differ from those at a training's start; empty if they don't.
 
     Args:
-        before: What `versions` returned then. It may be damaged, since no training depends on it.
+        before: What `versions` returned then.
     """
-    if not isinstance(before, dict):
-        return ""
     now = versions()
     names = [name for name in LIBRARIES if name in before and before[name] != now.get(name)]
     return ", ".join(f"{name} {before[name]} is now {now.get(name)}" for name in names)

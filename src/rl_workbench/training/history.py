@@ -12,7 +12,7 @@ import torch
 
 from rl_workbench import errors
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError
-from rl_workbench.states import array, number, sequence, whole
+from rl_workbench.states import array
 from rl_workbench.storage import as_json, write_atomically
 from rl_workbench.training.checkpoints import candidates
 from rl_workbench.training.evaluator import Evaluation
@@ -84,24 +84,17 @@ class History:
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Loads what `state_dict` returned."""
         self.returns = array(state["returns"], torch.float64, (None,)).tolist()
-        lengths = array(state["lengths"], torch.int64, (len(self.returns),))
-        self.lengths = [whole(each) for each in lengths.tolist()]
+        self.lengths = array(state["lengths"], torch.int64, (len(self.returns),)).tolist()
         self.successes = array(state["successes"], torch.bool, (None,)).tolist()
-        self.evaluations = [evaluation_of(each) for each in sequence(state["evaluations"])]
+        self.evaluations = [evaluation_of(each) for each in state["evaluations"]]
         self.best = None if state["best"] is None else evaluation_of(state["best"])
-        self.seconds = number(state["seconds"])
-        if self.seconds < 0:
-            raise ValueError(f"{self.seconds} s of wall time")
+        self.seconds = float(state["seconds"])
 
 
 def evaluation_of(state: Any) -> tuple[int, float]:
-    """Returns step and mean return from a checkpoint.
-
-    Raises:
-        ValueError: If it holds something else.
-    """
-    step, mean = sequence(state, 2)
-    return whole(step), number(mean)
+    """Returns step and mean return from a checkpoint."""
+    step, mean = state
+    return int(step), float(mean)
 
 
 class Outcome(NamedTuple):

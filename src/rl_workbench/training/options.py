@@ -111,11 +111,7 @@ class TrainingOptions(NamedTuple):
         return {"algorithm": self.kind.name, "run": run, "hyperparameters": hyperparameters}
 
     def check_same(self, content: Any, origin: str) -> None:
-        """Compares these options with those in a checkpoint.
-
-        Raises:
-            WorkbenchError: If one differs that a resumed training can't change.
-        """
+        """Refuses a checkpoint's options that differ where a resumed training can't change them."""
         before, now = _flat(content, origin), _flat(self.record(), origin)
         for name, value in before.items():
             if name not in EXTENDING and now.get(name) != value:

@@ -11,7 +11,6 @@ from rl_workbench.agents.policy_networks import Bounds
 from rl_workbench.agents.reinforce import ReinforceAgent
 from rl_workbench.agents.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import whole
 from rl_workbench.storage import save_tensors
 from rl_workbench.training.algorithm import Algorithm, Policy, Say
 from rl_workbench.training.checkpoints import fitting
@@ -135,8 +134,8 @@ class PolicyGradientTraining(Algorithm):
     def load_state_dict(self, state: dict[str, Any]) -> None:
         with fitting("agent"):
             self._agent.load_state_dict(state["agent"])
-            self._episodes, self._stride = whole(state["episodes"]), whole(state["stride"])
-            self._steps = whole(state["steps"])
+            self._episodes, self._stride = int(state["episodes"]), int(state["stride"])
+            self._steps = int(state["steps"])
 
     def environment_state(self) -> Any:
         """Returns the states of the environments' generators. No episode is under way."""

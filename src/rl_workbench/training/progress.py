@@ -4,13 +4,11 @@ import contextlib
 import io
 import os
 import sys
-import time
 from typing import Any, TextIO
 
 from rl_workbench.training.callbacks import Callback, EpisodeResult
 
 LINE_EVERY = 20  # [episodes]
-REFRESH = 0.1  # [s]
 WIDTH = 100  # [columns] of the bar on a terminal that doesn't report its size
 
 
@@ -44,8 +42,6 @@ class Progress(Callback):
     def __init__(self, total: int, unit: str, done: int, stream: TextIO | None = None) -> None:
         self._stream = stream or sys.stderr or io.StringIO()  # it may have been closed by 2>&-
         self._counts_steps = unit == "step"
-        self._done = self._shown = done
-        self._time = time.monotonic()
         self._bar: Any = None
         if self._stream.isatty():
             from tqdm import tqdm
@@ -78,13 +74,8 @@ class Progress(Callback):
             )
 
     def _advance(self, done: int) -> None:
-        self._done = done
-        if self._bar is not None and time.monotonic() - self._time > REFRESH:
-            self._move()
-
-    def _move(self) -> None:
-        self._bar.update(self._done - self._shown)
-        self._shown, self._time = self._done, time.monotonic()
+        if self._bar is not None:
+            self._bar.update(done - self._bar.n)
 
     def say(self, text: str) -> None:
         """Prints a line above the bar."""
@@ -96,7 +87,6 @@ class Progress(Callback):
     def close(self) -> None:
         """Closes the bar at its present position."""
         if self._bar is not None:
-            self._move()
             self._bar.close()
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from gymnasium import spaces
 
-from rl_workbench.states import array, whole
+from rl_workbench.states import array
 from rl_workbench.training.environments import as_vector
 from rl_workbench.training.generators import generator_state
 
@@ -109,7 +109,7 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         if state["start"]:
             self.generator = state["start"]
         seed = state.get("seed")
-        self.reset(seed=None if seed is None else whole(seed))
+        self.reset(seed=None if seed is None else int(seed))
         wanted = array(state["observation"], torch.float32, self._last.shape)
         actions = self._read_actions(state["actions"])
         for action in actions:

@@ -4,7 +4,7 @@ The CSV is the record. When a training is resumed, the CSV is truncated to where
 and TensorBoard's file is rewritten from it. So neither has duplicate rows.
 """
 
-import contextlib
+import csv
 import os
 import socket
 import time
@@ -137,34 +137,22 @@ class EventFile:
 
 
 def _truncated(path: Path, length: int, say: Callable[[str], None]) -> list[Point]:
-    """Truncates the CSV to a length [bytes], or to its last complete row before; returns its points."""
-    content = b""
-    with contextlib.suppress(FileNotFoundError), open_file(path) as file:
-        content = file.read(length)
-    header, *rows = content.splitlines(keepends=True) or [b""]
-    points, complete = [], len(header)
-    for row in rows:
-        point = _point(row)
-        if point is None:
-            break
-        points.append(point)
-        complete += len(row)
-    if header != HEADER:
-        points, complete = [], 0
-    if complete < length:
-        say(f"{path} lacks rows that it had at the checkpoint; going on without them")
-    if content:
-        os.truncate(path, complete)
-    return points
-
-
-def _point(row: bytes) -> Point | None:
-    """Returns a row of the CSV; None if it isn't a complete one."""
+    """Truncates the CSV to a length [bytes] and returns its points; none if it isn't as it was then."""
     try:
-        step, tag, value, wall_time = row.decode().split(",")
-        return (tag, float(value), int(step), float(wall_time)) if row.endswith(b"\n") else None
-    except ValueError:  # also for bytes that aren't text
-        return None
+        with open_file(path) as file:
+            content = file.read(length)
+        if len(content) < length:
+            raise EOFError
+        rows = csv.DictReader(content.decode().splitlines())
+        points = [
+            (row["tag"], float(row["value"]), int(row["step"]), float(row["wall_time"]))
+            for row in rows
+        ]
+    except (FileNotFoundError, EOFError, ValueError, KeyError):
+        say(f"{path} lacks rows that it had at the checkpoint; going on without them")
+        return []
+    os.truncate(path, length)
+    return points
 
 
 def _utf8(text: str) -> str:

@@ -12,7 +12,6 @@ import torch
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
-from rl_workbench.states import whole
 from rl_workbench.storage import read_record
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithm import Algorithm
@@ -109,7 +108,7 @@ class Training:
         self._algorithm.load_state_dict(content)
         with fitting("history"):
             self.history.load_state_dict(content["history"])
-            self._log_bytes = whole(content["log_bytes"])
+            self._log_bytes = int(content["log_bytes"])
         with fitting("state of the random generators"):
             restore_random_states(content["random"])
 
@@ -163,7 +162,7 @@ class Training:
             self._callbacks.call("on_training_start", self)
             self._save()  # so that there is something to resume from, whatever happens
             return
-        others = run_folder.other_versions(read_record(self.folder).get("versions"))
+        others = run_folder.other_versions(read_record(self.folder)["versions"])
         if others:
             tell(f"{others}: from here on the bits may differ")
         with fitting("state of the environment"):

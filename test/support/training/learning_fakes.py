@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar
 
 import gymnasium
@@ -18,12 +19,12 @@ DT = 0.008  # [s]
 
 def run_episode(
     env: gymnasium.Env,
-    act: Callable[[np.ndarray], Any],
-    should_stop: Callable[[], bool],
-    limited: Callable[[Any], Any] = lambda action: action,
+    agent: PolicyGradientAgent | ReinforceAgent,
+    should_stop: Callable[[], bool] = lambda: False,
 ) -> Episode | None:
     """Plays one episode alone."""
-    episodes = play_all([play(env, act, limited)], should_stop)
+    draw = partial(agent.draw, generator=agent.generator)
+    episodes = play_all([play(env, draw, agent.limited)], should_stop)
     return episodes[0] if episodes else None
 
 
@@ -166,7 +167,7 @@ def learned_lengths(agent: PolicyGradientAgent | ReinforceAgent, episodes: int) 
     """Lets a policy gradient learn to hold the pole; returns how long it did, episode by episode."""
     env, lengths = gymnasium.make(POLE), []
     for _ in range(episodes):
-        episode = run_episode(env, agent.act, lambda: False)
+        episode = run_episode(env, agent)
         agent.learn(episode)
         lengths.append(episode.length)
     return lengths

@@ -76,11 +76,7 @@ class MujocoEngine(Engine):
         self._state.replace(compile_spec(mujoco.MjSpec()))
 
     def _compile(self, fresh: dict[str, MujocoBody] | None = None) -> None:
-        """Recompiles the model with `fresh` bodies added; the state stays.
-
-        Raises:
-            DescriptionError: if MuJoCo refuses it; nothing changes then.
-        """
+        """Recompiles the model with `fresh` bodies added; the state stays."""
         bodies = self._bodies | (fresh or {})
         spec = mujoco.MjSpec()
         spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE

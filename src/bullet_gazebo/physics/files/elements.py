@@ -1,31 +1,14 @@
 """Numbers and names in XML model files; errors name the place."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from xml.etree.ElementTree import Element
 
-from bullet_gazebo.physics.description import DescriptionError, LimitExceeded, Plugin
+from bullet_gazebo.physics.description import DescriptionError, Plugin
 from bullet_gazebo.physics.pose import Vector
-from file_access.content import FileError, TooLarge
-from file_access.xml_text import parse
 
 SHOWN = 80  # characters of a faulty value that an error quotes
-
-
-def parse_xml(text: str | bytes, count: Callable[[int], None] | None = None) -> Element:
-    """Returns the root element of a text, or of the content of a file.
-
-    Args:
-        text: the text or content.
-        count: called now and then with the number of further elements; it may raise.
-    """
-    try:
-        return parse(text) if count is None else parse(text, count)
-    except TooLarge as error:
-        raise LimitExceeded(str(error)) from error
-    except FileError as error:
-        raise DescriptionError(str(error)) from error
 
 
 @contextmanager

@@ -11,7 +11,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.files.elements import finite, parse_xml
+from bullet_gazebo.physics.files.elements import finite
+from file_access.xml_text import parse
 
 if TYPE_CHECKING:
     import trimesh
@@ -71,7 +72,7 @@ def _scene(path: Path) -> "trimesh.Scene | None":
         return None
     if path.suffix.lower() == ".dae":
         axes = np.eye(4)
-        root = parse_xml(path.read_bytes())
+        root = parse(path.read_bytes())
         for element in root.iter():
             element.tag = element.tag.rpartition("}")[2]
         axes[:3, :3] = axes_of(root)

@@ -9,10 +9,10 @@ from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import DescriptionError, LimitExceeded, Mesh
-from bullet_gazebo.physics.files.elements import files_named_by_a_model, parse_xml, place, shown
+from bullet_gazebo.physics.files.elements import files_named_by_a_model, place, shown
 from bullet_gazebo.physics.files.meshes import Submesh, check_mesh, read_mesh
 from file_access.content import MAX_BYTES, FileError, TooLarge, read_file
-from file_access.xml_text import MAX_ELEMENTS
+from file_access.xml_text import MAX_ELEMENTS, parse
 
 MeshFile = tuple[str, Mesh | None]
 """A file's path, and its mesh if it was read."""
@@ -55,20 +55,15 @@ class Resources:
 
     def _candidates(self, uri: str, folder: Path | None) -> Iterable[Path]:
         scheme, colon, rest = uri.partition("://")
-        if not colon:
-            path = Path(os.path.expanduser(uri))
-            return [path] if path.is_absolute() else [f / path for f in self._relative(folder)]
+        if not colon or scheme == "file":
+            path = Path(rest if colon else os.path.expanduser(uri))
+            folders = [*([] if folder is None else [folder]), *self.media]
+            return [path] if path.is_absolute() else [each / path for each in folders]
         if scheme == "package":
             return self._in_package(rest)
         if scheme == "model":
             return [*(models / rest for models in self.models), *self._in_package(rest)]
-        if scheme == "file":
-            path = Path(rest)
-            return [path] if path.is_absolute() else [f / path for f in self._relative(folder)]
         raise DescriptionError(f"'{uri[:200]}': {scheme[:20]}:// is not supported")
-
-    def _relative(self, folder: Path | None) -> list[Path]:
-        return [*([] if folder is None else [folder]), *self.media]
 
     def _in_package(self, rest: str) -> list[Path]:
         """Looks a URI up in ROS packages: sdformat turns a URDF's package:// into model://."""
@@ -104,7 +99,12 @@ class Reading:
         self._bytes += len(text)
         if self._bytes > MAX_BYTES:
             raise LimitExceeded(f"more than {MAX_BYTES} bytes of XML (MAX_BYTES)")
-        return parse_xml(text, self._count)
+        try:
+            return parse(text, self._count)
+        except TooLarge as error:
+            raise LimitExceeded(str(error)) from error
+        except FileError as error:
+            raise DescriptionError(str(error)) from error
 
     def open(self, path: Path) -> Element:
         """Returns the root element of a file. It is the same object each time: don't change it."""

@@ -4,6 +4,7 @@ import logging
 import threading
 import time
 import traceback
+from contextlib import ExitStack
 from http.client import HTTPException
 
 import rosgraph
@@ -34,10 +35,7 @@ class ControlPlugin:
         self._parameter = context.text("robotParam", "robot_description")
         self._gone = threading.Event()
         self._lock = threading.Lock()
-        self._robot: ControlledRobot | None = None
-        self._services: ControllerServices | None = None
-        self._pids: list[PidTopics] = []
-        self._emergency_stop: rospy.Subscriber | None = None
+        self._started = ExitStack()  # what shutdown() ends, the last one first
         if not self._try_start():
             threading.Thread(
                 target=self._wait_and_start, name="robot_description", daemon=True
@@ -46,19 +44,7 @@ class ControlPlugin:
     def shutdown(self) -> None:
         self._gone.set()
         with self._lock:
-            self._close()
-
-    def _close(self) -> None:
-        """Takes away whatever has been started."""
-        if self._services is not None:
-            self._services.shutdown()
-        if self._emergency_stop is not None:
-            self._emergency_stop.unregister()
-        for pid in self._pids:
-            pid.shutdown()
-        if self._robot is not None:
-            with self._sim.lock:
-                self._sim.remove_robot(self._robot)
+            self._started.close()
 
     def _wait_and_start(self) -> None:
         """Waits for the robot description. Gazebo blocks the world meanwhile; here only this model waits."""
@@ -84,7 +70,7 @@ class ControlPlugin:
                 try:
                     self._start(str(text))
                 except Exception as error:  # noqa: BLE001 - this robot has no control, all others go on
-                    self._close()
+                    self._started.close()
                     known = isinstance(error, ControlError)
                     rospy.logfatal(
                         "gazebo_ros_control of model '%s' can't start: %s",
@@ -113,15 +99,20 @@ class ControlPlugin:
                 _log,
             )
         thinner = self._context.thinner
-        self._services = self._offer(manager)
+        self._started.callback(self._offer(manager).shutdown)
         for place, pid in hardware.pids.items():
             full = rospy.names.ns_join(self._namespace, place)
-            self._pids.append(PidTopics(self._sim, thinner, pid, full, manager.loops_changed))
+            topics = PidTopics(self._sim, thinner, pid, full, manager.loops_changed)
+            self._started.callback(topics.shutdown)
         with self._sim.lock:
             self._sim.add_robot(robot)
-        self._robot = robot  # shutdown() waits for us, and takes it away before the model goes
+        self._started.callback(self._remove, robot)
         self._listen_to_emergency_stop(robot)
         rospy.loginfo("Loaded gazebo_ros_control for model '%s'.", self._context.model.name)
+
+    def _remove(self, robot: ControlledRobot) -> None:
+        with self._sim.lock:
+            self._sim.remove_robot(robot)
 
     def _control_period(self) -> float:
         """Returns `<controlPeriod>` [s]; 0, which is each step, if there is none."""
@@ -150,7 +141,7 @@ class ControlPlugin:
                 robot.emergency_stop(message.data)
 
         full = rospy.names.ns_join(self._namespace, topic)
-        self._emergency_stop = rospy.Subscriber(full, Bool, receive, queue_size=1)
+        self._started.callback(rospy.Subscriber(full, Bool, receive, queue_size=1).unregister)
 
     def _offer(self, manager: ControllerManager) -> ControllerServices:
         try:

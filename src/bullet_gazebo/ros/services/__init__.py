@@ -13,21 +13,26 @@ class ServiceRefused(Exception):
     """A request can't be carried out, and nothing has changed; the text says why."""
 
 
-def offer(name: str, kind: type, act: Callable[[Any], str]) -> rospy.Service:
+def offer(name: str, kind: type, act: Callable[[Any], str | genpy.Message]) -> rospy.Service:
     """Offers a service whose answer has `success` and `status_message`.
 
     Args:
         name: of the service.
         kind: its type; the name of the type begins the text of a refusal.
-        act: carries out a request and returns the answer's text, or raises ServiceRefused.
+        act: carries out a request and returns the answer, or the text of one that has only that; or raises
+            ServiceRefused.
     """
     answer: Any = kind
 
     def handle(request: genpy.Message) -> genpy.Message:
         try:
-            return answer._response_class(True, act(request))
+            done = act(request)
         except ServiceRefused as refusal:
-            return answer._response_class(False, f"{kind.__name__}: {refusal}")
+            text = f"{kind.__name__}: {refusal}"
+            return answer._response_class(success=False, status_message=text)
+        if isinstance(done, str):
+            return answer._response_class(success=True, status_message=done)
+        return done
 
     return rospy.Service(name, kind, handle)
 

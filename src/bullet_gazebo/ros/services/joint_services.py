@@ -7,14 +7,13 @@ import rospy
 from gazebo_msgs import srv
 
 from bullet_gazebo.applied_forces import ActingTime, AppliedEffort, AppliedWrench, in_world
+from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.properties import JointProperties, PropertyError, set_joint_properties
 from bullet_gazebo.ros.common.messages import to_vector
 from bullet_gazebo.ros.services import ServiceRefused, check_message, offer
 from bullet_gazebo.simulator import Simulator
 
-LONGEST_NAME = 80  # of a joint in the log
-MOST_NAMES = 10  # in a line of the log
 INFINITE = 1.7e308  # ODE's users write 1e16 and beyond for a joint without stops
 
 
@@ -24,7 +23,7 @@ class JointServices:
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self._services = [
-            rospy.Service("~get_joint_properties", srv.GetJointProperties, self._get_properties),
+            offer("~get_joint_properties", srv.GetJointProperties, self._get_properties),
             offer("~set_joint_properties", srv.SetJointProperties, self._set_properties),
             offer("~set_model_configuration", srv.SetModelConfiguration, self._set_configuration),
         ]
@@ -33,12 +32,7 @@ class JointServices:
         self, request: srv.GetJointPropertiesRequest
     ) -> srv.GetJointPropertiesResponse:
         with self._sim.lock:
-            found = self._sim.world.joint(request.joint_name)
-            if found is None:
-                return srv.GetJointPropertiesResponse(
-                    status_message="GetJointProperties: joint not found"
-                )
-            model, name = found
+            model, name = _find_joint(self._sim, request.joint_name)
             position, rate = model.joint_state(name)
         # Gazebo answers REVOLUTE and no damping whatever the joint is.
         return srv.GetJointPropertiesResponse(
@@ -82,10 +76,8 @@ class JointServices:
             self._sim.set_joint_positions(model, dict(zip(plain, positions, strict=True)))
         unknown = sorted(set(plain) - set(model.joint_names))
         if unknown:  # Gazebo ignores them silently
-            some = [name[:LONGEST_NAME] for name in unknown[:MOST_NAMES]]
-            more = f" and {len(unknown) - MOST_NAMES} more" if len(unknown) > MOST_NAMES else ""
-            text = "SetModelConfiguration: model '%s' has no joint %s%s"
-            rospy.logwarn(text, model.name, some, more)
+            names = shown(", ".join(unknown))
+            rospy.logwarn("SetModelConfiguration: model '%s' has no joint %s", model.name, names)
         return "SetModelConfiguration: success"
 
 

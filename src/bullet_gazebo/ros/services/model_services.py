@@ -45,7 +45,7 @@ class ModelServices:
         self._calls: Counter[str] = Counter()  # header.seq counts the calls for each name
         self._services = [
             rospy.Service("~get_model_state", srv.GetModelState, self._get_state),
-            rospy.Service("~get_model_properties", srv.GetModelProperties, self._get_properties),
+            offer("~get_model_properties", srv.GetModelProperties, self._get_properties),
             offer("~set_model_state", srv.SetModelState, self._set_state),
         ]
         self._topic = rospy.Subscriber("~set_model_state", ModelState, self._hear, queue_size=QUEUE)
@@ -56,9 +56,7 @@ class ModelServices:
         with self._sim.lock:
             model = self._sim.world.model(request.model_name)
             if model is None:
-                return srv.GetModelPropertiesResponse(
-                    status_message="GetModelProperties: model does not exist"
-                )
+                raise ServiceRefused("model does not exist")
             # All names are unscoped, and canonical_body_name is never filled.
             return srv.GetModelPropertiesResponse(
                 body_names=model.link_names,
@@ -125,9 +123,9 @@ class LinkServices:
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self._services = [
-            rospy.Service("~get_link_properties", srv.GetLinkProperties, self._get_properties),
+            offer("~get_link_properties", srv.GetLinkProperties, self._get_properties),
             offer("~set_link_properties", srv.SetLinkProperties, self._set_properties),
-            rospy.Service("~get_link_state", srv.GetLinkState, self._get_state),
+            offer("~get_link_state", srv.GetLinkState, self._get_state),
             offer("~set_link_state", srv.SetLinkState, self._set_state),
         ]
         self._topic = rospy.Subscriber("~set_link_state", LinkState, self._hear, queue_size=QUEUE)
@@ -138,9 +136,7 @@ class LinkServices:
         with self._sim.lock:
             found = self._sim.world.link(request.link_name)
             if found is None:
-                return srv.GetLinkPropertiesResponse(
-                    status_message=f"GetLinkProperties: link not found, {SCOPE}"
-                )
+                raise ServiceRefused(f"link not found, {SCOPE}")
             inertia, gravity = link_inertia(*found), found[0].body.link_gravity(found[1])
         return srv.GetLinkPropertiesResponse(
             com=to_pose_msg(Pose(inertia.com.position)),  # never its orientation
@@ -175,14 +171,10 @@ class LinkServices:
             world = self._sim.world
             found = world.link(request.link_name)
             if found is None:
-                return srv.GetLinkStateResponse(
-                    status_message=f"GetLinkState: link not found, {SCOPE}"
-                )
+                raise ServiceRefused(f"link not found, {SCOPE}")
             frame = world.frame(request.reference_frame)
             if frame is None:
-                return srv.GetLinkStateResponse(
-                    status_message=f"GetLinkState: reference reference_frame not found, {SCOPE}"
-                )
+                raise ServiceRefused(f"reference reference_frame not found, {SCOPE}")
             pose, twist = seen_from(found[0].link_state(found[1]), frame)
         state = LinkState(
             request.link_name, to_pose_msg(pose), to_twist_msg(twist), request.reference_frame

@@ -11,7 +11,7 @@ from typing import Any
 import rosgraph
 import rospy
 from bullet_gazebo_msgs.msg import SceneContacts, ScenePoses
-from bullet_gazebo_msgs.srv import GetScene, GetSceneResponse, StepWorld, StepWorldRequest
+from bullet_gazebo_msgs.srv import GetScene, StepWorld, StepWorldRequest
 from gazebo_msgs import srv
 from std_srvs.srv import Empty
 
@@ -32,7 +32,8 @@ class RemoteScene:
 
     def __init__(self) -> None:
         self.node = str(rospy.resolve_name(SIMULATOR))
-        self._get = ServiceClient(f"{self.node}/get_scene", GetScene)
+        # Takes the numbers of the models that are known, and whether collision shapes are wanted.
+        self.get = ServiceClient(f"{self.node}/get_scene", GetScene)
         self._news = threading.Condition()
         self._subscribers: dict[str, rospy.Subscriber] = {}
         self._poses: ScenePoses | None = None
@@ -98,10 +99,6 @@ class RemoteScene:
             (wall, now), (last_wall, last) = self._times[0], self._times[-1]
         return (last - now) / max(last_wall - wall, 1e-6)
 
-    def get(self, known: list[int], collisions: bool) -> GetSceneResponse:
-        """Returns the scene without the models whose numbers are `known`."""
-        return self._get(known, collisions)
-
     def world(self) -> RemoteWorld:
         """Returns the client of `gz world`."""
         return RemoteWorld(self.node, rosgraph.get_master_uri())
@@ -127,17 +124,11 @@ class Commands:
         """Resets the simulation, or only the world."""
         self._call("reset_simulation" if everything else "reset_world", Empty)
 
-    @property
-    def in_lockstep(self) -> bool:
-        """Whether time moves only by requests."""
-        try:
-            return bool(master.call("lookupService", f"{self._node}/step_world"))
-        except (Refused, NoAnswer):
-            return False
-
     def step(self, ticks: int) -> None:
         """Moves a paused world, or one in lock-step, by `ticks` physics steps."""
-        if not self.in_lockstep:
+        try:
+            master.call("lookupService", f"{self._node}/step_world")
+        except (Refused, NoAnswer):  # not in lock-step
             RemoteWorld(self._node, rosgraph.get_master_uri()).step(ticks)
             return
         while ticks > 0:

@@ -6,7 +6,7 @@ It is evaluated and saved between two rollouts, and continues from there bit-ide
 import math
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import torch
@@ -14,7 +14,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import array, check_optimizer, number, whole
+from rl_workbench.states import check_optimizer
 from rl_workbench.storage import write_atomically
 from rl_workbench.training.algorithm import Algorithm, Say
 from rl_workbench.training.checkpoints import fitting
@@ -118,25 +118,18 @@ class SB3Training(Algorithm):
     def load_state_dict(self, state: dict[str, Any]) -> None:
         model = self._model
         with fitting("model"):
-            new = self.state_dict()
-            for part in ("optimizers", "counters"):
-                if not isinstance(state[part], dict) or set(state[part]) != set(new[part]):
-                    raise ValueError(f"{part} are {state[part]!r}")
             for name, optimizer in state["optimizers"].items():
                 check_optimizer(attrgetter(name)(model), optimizer)
             model.set_parameters({"policy": state["policy"], **state["optimizers"]})
-            if new["entropy"] is not None:
-                entropy = array(state["entropy"], new["entropy"].dtype, tuple(new["entropy"].shape))
-                getattr(model, ENTROPY).data.copy_(torch.from_numpy(entropy))
-            if state["counters"]["num_timesteps"] != whole(state["steps"]):
+            if state["entropy"] is not None:
+                getattr(model, ENTROPY).data.copy_(state["entropy"])
+            if state["counters"]["num_timesteps"] != state["steps"]:
                 raise ValueError(f"{state['counters']['num_timesteps']} steps of {state['steps']}")
             for name, value in state["counters"].items():
-                setattr(model, name, whole(value))
-            if not isinstance(state["losses"], dict) or not set(state["losses"]) <= set(LOSSES):
-                raise ValueError(f"losses are {state['losses']!r}")
+                setattr(model, name, int(value))
             for name, value in state["losses"].items():
-                model.logger.record(name, number(value))
-            if new["buffer"] is not None:
+                model.logger.record(name, float(value))
+            if state["buffer"] is not None:
                 restore_buffer(model.replay_buffer, state["buffer"])
         if model.num_timesteps:  # schedules depend on the progress
             model._update_current_progress_remaining(model.num_timesteps, self._run.total_timesteps)
@@ -177,15 +170,6 @@ def _pending_losses(model: Any) -> dict[str, float]:
     return {name: float(recorded[name]) for name in LOSSES if name in recorded}
 
 
-class EndedEpisode(NamedTuple):
-    """An episode that ended within a rollout."""
-
-    step: int
-    total_reward: float
-    length: int  # [steps]
-    success: bool | None  # None if the environment doesn't say
-
-
 class FrameCallback(BaseCallback):
     """Lets the frame evaluate and save between two rollouts, and stops when the frame says so.
 
@@ -196,7 +180,7 @@ class FrameCallback(BaseCallback):
     def __init__(self, frame: Training, positions: Positions, log_frequency: int) -> None:
         super().__init__()
         self._frame, self._positions, self._log_frequency = frame, positions, log_frequency
-        self._ended: list[EndedEpisode] = []  # not reported yet
+        self._ended: list[tuple[int, dict[str, Any]]] = []  # step and info, not reported yet
         self._episodes = 0
         self._held: int | None = None  # learning_starts, while hindsight has no whole episode
         self._mark: ModelMark | None = None
@@ -247,10 +231,7 @@ class FrameCallback(BaseCallback):
     def _on_step(self) -> bool:
         for info in self.locals["infos"]:
             if "episode" in info:  # Monitor's figures
-                found, success = info["episode"], succeeded(info)
-                self._ended.append(
-                    EndedEpisode(self.model.num_timesteps, float(found["r"]), int(found["l"]), success)
-                )  # fmt: skip
+                self._ended.append((self.model.num_timesteps, info))
         if self._is_on_policy:
             return not self._frame.is_interrupted()
         self._can_go_back = False
@@ -264,10 +245,11 @@ class FrameCallback(BaseCallback):
         self._report()
 
     def _report(self) -> None:
-        for episode in self._ended:
+        for step, info in self._ended:
             self._episodes += 1
-            _check_finite(f"the return of episode {self._episodes}", episode.total_reward)
-            step, total_reward, length, success = episode
+            total_reward, length = float(info["episode"]["r"]), int(info["episode"]["l"])
+            _check_finite(f"the return of episode {self._episodes}", total_reward)
+            success = succeeded(info)
             self._frame.episode_done(total_reward, length, {}, success=success, step=step)
         self._ended = []
 

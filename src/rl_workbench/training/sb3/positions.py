@@ -7,11 +7,10 @@ it can't save the episodes under way.
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import gymnasium
 import numpy as np
 import torch
 
-from rl_workbench.states import array, sequence, set_generator, switch, whole
+from rl_workbench.states import set_generator
 from rl_workbench.training.generators import (
     generator_state,
     mark_random_states,
@@ -94,13 +93,11 @@ class Positions:
         Returns:
             The numbers of those whose episode was cut off.
         """
-        model, count = self._model, len(self._envs)
-        episodes = sequence(state["episodes"], count)
-        generators = sequence(state["generators"], count)
-        model._last_obs = _read(state["observations"], model.observation_space, count)
-        model._last_episode_starts = array(state["begins"], torch.bool, (count,))
+        model = self._model
+        model._last_obs = _apply(torch.Tensor.numpy, state["observations"])
+        model._last_episode_starts = state["begins"].numpy()
         set_generator(model.action_space.np_random, state["actions"])
-        left = zip(range(count), episodes, generators, strict=True)
+        left = zip(range(len(self._envs)), state["episodes"], state["generators"], strict=True)
         return [each[0] for each in list(left) if not self.bring_back(each)]
 
     def leave(self, index: int) -> tuple[int, Any, str]:
@@ -139,14 +136,6 @@ def _apply(function: Callable[[Any], Any], observation: Any) -> Any:
     return function(observation)
 
 
-def _read(value: Any, space: gymnasium.Space[Any], count: int) -> Any:
-    """Checks the observations of all environments, (count, ...)."""
-    if isinstance(space, gymnasium.spaces.Dict):
-        return {name: _read(value[name], part, count) for name, part in space.items()}
-    dtype = torch.from_numpy(np.empty(0, space.dtype)).dtype
-    return array(value, dtype, (count, *(space.shape or ())))
-
-
 def _cut_off(buffer: Any, index: int) -> None:
     """Ends an environment's episode with the last step in the buffer, as at a time limit."""
     if buffer is None or not buffer.size() or buffer.dones[buffer.pos - 1, index]:
@@ -173,21 +162,11 @@ def buffer_state(buffer: Any) -> dict[str, Any] | None:
 
 def restore_buffer(buffer: Any, state: dict[str, Any]) -> None:
     """Fills a new buffer with what `buffer_state` returned."""
-    position, is_full = whole(state["position"]), switch(state["full"])
-    count = buffer.buffer_size if is_full else position
-    if position >= buffer.buffer_size:
-        raise ValueError(f"place {position} in a buffer of {buffer.buffer_size}")
+    buffer.pos, buffer.full = int(state["position"]), bool(state["full"])
     for name, own in _arrays(buffer).items():
-        own[:count] = _like(own, state["arrays"][name], (count, *own.shape[1:]))
-    buffer.pos, buffer.full = position, is_full
-    if not hasattr(buffer, EPISODES):
-        return
-    own = getattr(buffer, EPISODES)
-    own[:] = _like(own, state["episodes"], own.shape)
-    for name in ("ep_start", "ep_length", EPISODES):  # the buffer uses them as indices
-        own = getattr(buffer, name)
-        if own.min() < 0 or own.max() > buffer.buffer_size:
-            raise ValueError(f"{name} beyond a buffer of {buffer.buffer_size}")
+        own[: buffer.size()] = state["arrays"][name].numpy()
+    if hasattr(buffer, EPISODES):
+        getattr(buffer, EPISODES)[:] = state["episodes"].numpy()
 
 
 def _arrays(buffer: Any) -> dict[str, np.ndarray]:
@@ -200,7 +179,3 @@ def _arrays(buffer: Any) -> dict[str, np.ndarray]:
         elif isinstance(own, np.ndarray):
             found[name] = own
     return found
-
-
-def _like(own: np.ndarray, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    return array(value, torch.from_numpy(own[:0]).dtype, shape)

@@ -41,7 +41,7 @@ def test_who_acts_draws_what_the_network_says(hidden: int) -> None:
         parameter.data = 0.5 * torch.randn_like(parameter)
     made.sync()
     observation = np.array([0.3, -0.8], np.float32)
-    drawn = np.array([made.act(observation) for _ in range(4000)])
+    drawn = np.array([made.draw(observation, made.generator) for _ in range(4000)])
     (mean,) = made.policy(torch.tensor([[0.3, -0.4]])).detach().numpy()
     deviation = np.exp(made.policy.log_std.detach().numpy())
     half, middle = np.array([1.0, 3.0, 1.0]), np.array([0.0, 3.0, 0.0])
@@ -59,7 +59,7 @@ def test_who_acts_draws_what_the_network_says(hidden: int) -> None:
 def test_actions_are_in_the_space_whatever_is_drawn(space: gymnasium.spaces.Box) -> None:
     made = agent(Bounds(space.low, space.high), log_std_init=2.0)
     for _ in range(50):
-        drawn = made.act(np.zeros(2, np.float32))
+        drawn = made.draw(np.zeros(2, np.float32), made.generator)
         assert drawn.shape == (space.low.size,) and drawn.dtype == np.float32
         assert space.contains(made.limited(drawn))
     assert space.contains(made.act_greedily(np.zeros(2, np.float32)))
@@ -69,7 +69,7 @@ def test_its_deviation_has_an_end() -> None:
     made = agent()
     made.policy.log_std.data.fill_(-9.0)
     made.sync()
-    drawn = np.array([made.act(np.zeros(2, np.float32)) for _ in range(500)])
+    drawn = np.array([made.draw(np.zeros(2, np.float32), made.generator) for _ in range(500)])
     assert (drawn.std(0) > 0.01).all()
 
 
@@ -82,7 +82,7 @@ def test_it_learns() -> None:
     env.reset(seed=5)
     returns = []
     for _ in range(300):
-        episode = run_episode(env, made.act, lambda: False, made.limited)
+        episode = run_episode(env, made)
         returns.append(episode.total_reward)
         made.learn(episode)
     assert np.mean(returns[-40:]) > 0.5 * np.mean(returns[:40])

@@ -103,7 +103,7 @@ def test_acting_uses_the_policys_probabilities() -> None:
 def test_actions_follow_the_probability() -> None:
     agent = PolicyGradientAgent(5, RANDOM)
     observation = np.array([0.3, -1.0, 0.2, 0.5], np.float32)
-    share = np.mean([agent.act(observation) == 0 for _ in range(20000)])
+    share = np.mean([agent.draw(observation, agent.generator) == 0 for _ in range(20000)])
     assert share == pytest.approx(agent.probability_of_zero(observation), abs=0.015)
     greedy = agent.act_greedily(observation)
     assert greedy == (0 if agent.probability_of_zero(observation) >= 0.5 else 1)

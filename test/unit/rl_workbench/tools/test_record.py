@@ -15,7 +15,7 @@ import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.record import Film, SideBySide, write_video
-from rl_workbench.tools.recording import EpisodeFrame, PictureView, record_episode, size_options
+from rl_workbench.tools.recording import EpisodeFrame, PictureView, record_episode
 
 pytestmark = pytest.mark.usefixtures("signals")
 RATE = 40.0  # [Hz]
@@ -118,12 +118,6 @@ def test_a_gifs_frames_last_as_long_as_they_should_on_average(tmp_path: Path):
             video.seek(index)
             total += video.info["duration"]
     assert total == 3000  # [ms]
-
-
-def test_sizes_go_to_environments_that_know_them():
-    assert size_options("cartpole/Classic-v0", (64, 48)) == {"width": 64, "height": 48}
-    assert size_options("CartPole-v1", (64, 48)) == {}
-    assert size_options("cartpole/Classic-v0", None) == {}
 
 
 def test_an_environment_that_draws_nothing_is_refused():

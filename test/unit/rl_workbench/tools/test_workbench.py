@@ -1,7 +1,10 @@
 """The commands of rl-workbench on small trainings: what they print, write and refuse."""
 
 import json
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -298,3 +301,13 @@ def test_an_extra_that_is_missing(runs: Path, tmp_path: Path, monkeypatch, capsy
     with pytest.raises(SystemExit):
         work("train", "--algo", "ppo")
     assert "installs it" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_reader_that_goes_away_costs_no_file(runs: Path, tmp_path: Path) -> None:
+    out, (reading, writing) = tmp_path / "x.json", os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "rl_workbench", "eval", runs / "dqn_0", "--json", out]
+    subprocess.run(command, stdout=writing, check=True)
+    os.close(writing)
+    assert json.loads(out.read_text())["episodes"] == 100

@@ -76,24 +76,6 @@ def test_episodes_do_not_prolong_what_schedules_depend_on(empty: str) -> None:
     assert (run.total_timesteps, run.episodes) == (50_000, 9)
 
 
-def test_every_option_of_dqn_is_a_flag(empty: str) -> None:
-    text = """--env-id Acrobot-v1 --seed 3 --total-timesteps 2e4 --learning-rate 0.01
-        --buffer-size 9 --gamma 0.9 --batch-size 8 --target-network-frequency 7 --tau 0.5
-        --start-e 0.9 --end-e 0.1 --exploration-fraction 0.3 --learning-starts 6
-        --train-frequency 5 --gradient-steps 4 --no-double --dueling --hidden-sizes 8,9
-        --exp-name mine --run-dir out --eval-frequency 0 --checkpoint-frequency 2"""
-    _, run, dqn, resume, *_ = choose(DQN, [empty, *text.split()])
-    assert (run.env_id, run.seed, run.exp_name, run.run_dir) == ("Acrobot-v1", 3, "mine", "out")
-    assert (run.eval_frequency, run.checkpoint_frequency, resume) == (0, 2, None)
-    assert run.total_timesteps == 20_000
-    assert dqn == DQNSettings(
-        total_timesteps=20_000, learning_rate=0.01, buffer_size=9, gamma=0.9, batch_size=8,
-        target_network_frequency=7, tau=0.5, start_e=0.9, end_e=0.1, exploration_fraction=0.3,
-        learning_starts=6, train_frequency=5, gradient_steps=4, double=False, dueling=True,
-        hidden_sizes=(8, 9),
-    )  # fmt: skip
-
-
 def test_file_params_rosparams_flags_in_this_order(tmp_path: Path) -> None:
     """And all of them over the algorithm's own defaults, which win over the common ones."""
     section = "{eval_frequency: 1, seed: 1, eval_episodes: 1, keep_checkpoints: 1}"

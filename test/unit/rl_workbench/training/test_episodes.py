@@ -15,21 +15,17 @@ def pole(**options: object) -> gymnasium.Env:
     return gymnasium.make(POLE, **options)
 
 
-def never() -> bool:
-    return False
-
-
 def test_it_tells_how_the_episode_ended() -> None:
-    episode = run_episode(pole(), ReinforceAgent(0).act, never)
+    episode = run_episode(pole(), ReinforceAgent(0))
     assert episode.terminated and episode.length == len(episode.states()) - 1
     assert episode.final_observation.shape == (4,)
-    short = run_episode(pole(max_episode_steps=3), ReinforceAgent(0).act, never)
+    short = run_episode(pole(max_episode_steps=3), ReinforceAgent(0))
     assert not short.terminated and short.length == 3
 
 
 def test_one_that_is_broken_off_is_dropped() -> None:
     asked = iter([False, False, True])
-    assert run_episode(pole(), ReinforceAgent(0).act, lambda: next(asked)) is None
+    assert run_episode(pole(), ReinforceAgent(0), lambda: next(asked)) is None
 
 
 def test_observations_are_kept_that_an_environment_writes_over() -> None:
@@ -39,9 +35,7 @@ def test_observations_are_kept_that_an_environment_writes_over() -> None:
             self.array[:] = observation
             return self.array
 
-    plain, written = (
-        run_episode(each, ReinforceAgent(0).act, never) for each in (pole(), Writing(pole()))
-    )
+    plain, written = (run_episode(each, ReinforceAgent(0)) for each in (pole(), Writing(pole())))
     assert np.array_equal(plain.states(), written.states())
 
 

@@ -5,9 +5,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+import torch
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import whole
+from rl_workbench.states import array
 from rl_workbench.training.checked import CheckedEnvironment
 
 
@@ -51,7 +52,7 @@ def test_a_lost_connection_is_the_environments_and_not_the_disks(error: OSError)
 def test_the_place_is_in_the_users_code_where_a_library_refuses_what_that_asks_for() -> None:
     class Asking(Device):
         def _answer(self) -> Any:
-            return whole("what")  # of this project's, which tasks may call as they call Gymnasium
+            return array("what", torch.float32, ())  # of this project's, which tasks may call
 
     words = r"^Device-v0 failed in step\(\): ValueError: .* \(\S*test_failing.py:\d+\)$"
     with pytest.raises(WorkbenchError, match=words):

@@ -1,6 +1,5 @@
 """REINFORCE in several environments: rounds, the bits of each, the way back, and which one fails."""
 
-from functools import partial
 from pathlib import Path
 
 import gymnasium
@@ -55,11 +54,12 @@ def test_each_plays_what_it_would_play_alone() -> None:
     source.seed()
     rounds = [source.collect(lambda: False) for _ in range(2)]
     for index, env in enumerate(environments()):
-        generator = np.random.default_rng((7, index)) if index else ReinforceAgent(7).generator
+        agent.generator = (
+            np.random.default_rng((7, index)) if index else ReinforceAgent(7).generator
+        )
         env.reset(seed=7 + index)
         for episodes in rounds:
-            act = partial(agent.draw, generator=generator)
-            alone = run_episode(env, act, lambda: False)
+            alone = run_episode(env, agent)
             assert_same(alone.state_dict(), episodes[index].state_dict())
     lengths = [[episode.length for episode in episodes] for episodes in rounds]
     assert len({length for each in lengths for length in each}) > 3, "they differ"
