@@ -107,12 +107,7 @@ class ControlledRobot:
         self._read_ahead = True
 
     def update(self, now: int, dt: float) -> None:
-        """Reads the state, and updates the controllers if they are due.
-
-        Args:
-            now: simulated time [ns].
-            dt: the step [s].
-        """
+        """Reads the state, and updates the controllers if they are due; `now` [ns], `dt` [s]."""
         if not self._read_ahead or self.model.body.moved:
             self.read()
         self._read_ahead = False
@@ -177,11 +172,9 @@ class ControlledRobot:
                 self.model.body.set_motor(index, speed, min(most, STRONGEST))
 
     def joints_moved(self, now: int, relatch: bool) -> None:
-        """Reads a state that something other than time has changed.
+        """Reads a state that something other than time has changed; `now` [ns].
 
-        Args:
-            now: simulated time [ns].
-            relatch: whether controllers begin anew, as an episode should.
+        With `relatch`, controllers begin anew, as an episode should.
         """
         self.read()
         self._waited = None

@@ -172,12 +172,7 @@ class Simulator:
         """Pauses the world and moves it by `ticks` physics steps, as fast as they can be computed.
 
         The lock is taken for each tick, so services are answered in between.
-
-        Raises:
-            ValueError: for less than one tick.
         """
-        if ticks < 1:
-            raise ValueError(f"ticks is {ticks}: at least 1 is needed")
         self.pause()
         for _ in range(ticks):
             if self._stopping.is_set():

@@ -57,8 +57,7 @@ class StabilityWatch:
     def review(self, period: float) -> None:
         """Warns of gains that are too high, and damps joints that a P gain alone drives.
 
-        Args:
-            period: of the controllers [s]; 0 if they are updated on each step.
+        `period` is the controllers' [s]; 0 if they are updated on each step.
         """
         dt = max(period, self._model.time_step)
         acting = self._acting()
@@ -159,11 +158,7 @@ def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[tuple[Owne
 
 
 def p_only_damping(model: Model) -> float:
-    """Returns `<pOnlyDamping>` of the model's control plugin: a share of critical damping.
-
-    Raises:
-        ControlError: if it isn't a number from 0 to 1.
-    """
+    """Returns `<pOnlyDamping>` of the model's control plugin: a share of critical damping."""
     for plugin in model.description.plugins:
         text = plugin.element.findtext(P_ONLY_TAG)
         if text is None or not plugin.filename.endswith(CONTROL_PLUGIN):

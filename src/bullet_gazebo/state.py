@@ -94,9 +94,7 @@ def find_model(world: World, name: str) -> Model:
 def find_link(world: World, name: str) -> tuple[Model, str]:
     """Returns model and plain name of a link, also of one that was lumped into another one.
 
-    Args:
-        world: all models.
-        name: of the link; model::link where several models have such a link.
+    `name` is plain, or model::link where several models have such a link.
     """
     scope, _, plain = name.rpartition(SCOPE)
     if plain == WORLD:
@@ -150,12 +148,9 @@ class ContactPair:
 
 
 def find_collisions(world: World, names: Iterable[str]) -> set[Collision]:
-    """Returns all collisions that names refer to.
+    """Returns all collisions that names of models, links and collisions refer to.
 
-    Args:
-        world: all models.
-        names: of models, links and collisions: plain, or scoped as model::link and
-            model::link::collision where several models have such a name.
+    They are plain, or model::link and model::link::collision where several models have such a name.
     """
     found: set[Collision] = set()
     for name in names:
@@ -209,9 +204,7 @@ def _why_none(world: World, name: str) -> str:
 def contact_pairs(world: World, wanted: set[Collision] | None) -> list[ContactPair]:
     """Returns what touched in the last physics step, in the engine's order.
 
-    Args:
-        world: all models.
-        wanted: only pairs with one of these collisions, which then is the first one; None: all pairs.
+    Only pairs with one of the `wanted` collisions, which then is the first one; None: all pairs.
     """
     models = {id(model.body): model for model in world.models.values()}
     pairs: dict[tuple[Collision, Collision], ContactPair] = {}
@@ -297,10 +290,6 @@ class StateReader:
     """Answers a query, again and again."""
 
     def __init__(self, world: World, query: StateQuery) -> None:
-        """
-        Raises:
-            UnknownName: if the world has no entity of a name, or several.
-        """
         self.query = query
         self._world = world
         self._resolve()

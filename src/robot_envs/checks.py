@@ -13,6 +13,13 @@ from robot_envs.errors import TaskError
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import LinkQuery, StateQuery, WorldState
 
+FLAGS = (bool, np.bool_)
+WANTED: dict[Any, str] = {
+    FLAGS: "True or False",
+    dict: "a dict",
+    gymnasium.Space: "a gymnasium.Space",
+    gymnasium.spaces.Box: "a gymnasium.spaces.Box",
+}
 FEW = 64  # numbers; fewer are checked faster one by one than by NumPy
 
 
@@ -135,10 +142,14 @@ def checked_steps(most: Any) -> int | None:
 
 def made_space(task: Task, method: str, kind: type = gymnasium.Space) -> Any:
     """Calls a method that makes a space; raises TaskError unless the space is of that kind."""
-    made = getattr(task, method)()
-    if not isinstance(made, kind):
-        raise _wrong(task, method, made, f"a gymnasium.spaces.{kind.__name__}")
-    return made
+    return checked(task, method, getattr(task, method)(), kind)
+
+
+def checked(task: Task, method: str, given: Any, kind: type | tuple[type, ...]) -> Any:
+    """Returns what a method has returned; raises TaskError unless it is of that type, or one of them."""
+    if not isinstance(given, kind):
+        raise _wrong(task, method, given, WANTED[kind])
+    return given
 
 
 def checked_number(task: Task, method: str, given: Any) -> float:
@@ -150,20 +161,6 @@ def checked_number(task: Task, method: str, given: Any) -> float:
     if not math.isfinite(found):
         raise _wrong(task, method, given, "a finite number")
     return found
-
-
-def checked_flag(task: Task, method: str, given: Any) -> bool:
-    """Returns the bool that a method has returned; raises TaskError for anything else."""
-    if not isinstance(given, (bool, np.bool_)):
-        raise _wrong(task, method, given, "True or False")
-    return bool(given)
-
-
-def checked_info(task: Task, given: Any) -> dict[str, Any]:
-    """Returns the dict that `info` has returned; raises TaskError for anything else."""
-    if not isinstance(given, dict):
-        raise _wrong(task, "info", given, "a dict")
-    return given
 
 
 def short(given: Any) -> str:

@@ -16,19 +16,12 @@ Loaded = dict[str, Controller]
 
 
 class CommandPort(NamedTuple):
-    """How a controller is commanded.
+    """How a controller is commanded."""
 
-    Args:
-        name: of the controller.
-        joints: one number for each, in this order.
-        single: whether it takes one number instead of a list.
-        quantity: what the numbers are: "position", "velocity" or "effort".
-    """
-
-    name: str
-    joints: tuple[str, ...]
-    single: bool
-    quantity: str
+    name: str  # of the controller
+    joints: tuple[str, ...]  # one number for each, in this order
+    single: bool  # whether it takes one number instead of a list
+    quantity: str  # what the numbers are: "position", "velocity" or "effort"
 
     @property
     def holds(self) -> bool:

@@ -26,19 +26,12 @@ RESET_OPTIONS = ("initial_state", "goal")
 
 
 class _Step(NamedTuple):
-    """A step that is under way.
+    """A step that is under way."""
 
-    Args:
-        number: of the episode's steps, from 1.
-        action: checked.
-        arriving: the commands that reach the controllers.
-        sent: the commands that the state reports, where fewer arrive; None: the same.
-    """
-
-    number: int
-    action: Any
-    arriving: Commands
-    sent: Commands | None
+    number: int  # of the episode's steps, from 1
+    action: Any  # checked
+    arriving: Commands  # that reach the controllers
+    sent: Commands | None  # that the state reports, where fewer arrive; None: the same
 
 
 def _control_period(scene: Scene, given: Any) -> float:
@@ -237,7 +230,10 @@ class RobotEnv(DrawnEnv):
         self._steps = 0
         if self.render_mode == "human":
             self._show()
-        return observation, {**checks.checked_info(self.task, self.task.info(state)), **info}
+        return observation, {
+            **checks.checked(self.task, "info", self.task.info(state), dict),
+            **info,
+        }
 
     def _checked_options(self, options: dict[str, Any]) -> dict[str, Any]:
         for name in options:
@@ -314,7 +310,7 @@ class RobotEnv(DrawnEnv):
         self._state, self._steps = state, number
         terminated: Any = task.is_terminal(state)
         if type(terminated) is not bool:
-            terminated = checks.checked_flag(task, "is_terminal", terminated)
+            terminated = bool(checks.checked(task, "is_terminal", terminated, checks.FLAGS))
         truncated = not terminated and number == self.max_steps
         if terminated or truncated:
             self._steps = None
@@ -327,7 +323,7 @@ class RobotEnv(DrawnEnv):
         observation = self._observe(measured)
         info: Any = task.info(state)
         if type(info) is not dict:
-            info = checks.checked_info(task, info)
+            info = checks.checked(task, "info", info, dict)
         return observation, reward, terminated, truncated, info
 
     def close(self) -> None:

@@ -116,10 +116,14 @@ class Robot:
         """Limits of each joint's position [rad, m], speed [rad/s, m/s], effort [N m, N]; None: no limit."""
         return {name: joint.limits for name, joint in self.control.joints.items()}
 
+    @property
+    def _pid_gains(self) -> Any:
+        described = self.parameters.get("gazebo_ros_control")
+        return described.get("pid_gains") if isinstance(described, Mapping) else None
+
     def hardware(self) -> RobotHardware:
         """Makes the joints as controllers see them; raises ControlError if something about them is wrong."""
-        gains = self.parameters.get("gazebo_ros_control")
-        pids = gains.get("pid_gains") if isinstance(gains, Mapping) else None
+        pids = self._pid_gains
         description = read_description(self.xml).limited_by(self.parameters.get("joint_limits"))
         return RobotHardware(description, pids if isinstance(pids, Mapping) else None)
 
@@ -192,12 +196,8 @@ class Robot:
 
     def _warn_of_unknown_joints(self) -> None:
         """Warns only: a file of parameters may be for several robots."""
-        gains = self.parameters.get("gazebo_ros_control")
-        pids = gains.get("pid_gains") if isinstance(gains, Mapping) else None
-        for what, named in (
-            ("pid_gains", pids),
-            ("joint_limits", self.parameters.get("joint_limits")),
-        ):
+        limits = self.parameters.get("joint_limits")
+        for what, named in (("pid_gains", self._pid_gains), ("joint_limits", limits)):
             for name in named if isinstance(named, Mapping) else ():
                 if name not in self.control.joints:
                     near = did_you_mean(str(name), self.control.joints)

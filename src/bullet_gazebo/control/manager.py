@@ -62,11 +62,7 @@ class ControllerManager:
         return list(self._controllers.values())
 
     def get(self, name: str) -> Controller:
-        """Returns controller `name`.
-
-        Raises:
-            ControlError: if it isn't loaded.
-        """
+        """Returns controller `name`."""
         if name not in self._controllers:
             raise ControlError(f"No controller named '{name}' is loaded.")
         return self._controllers[name]

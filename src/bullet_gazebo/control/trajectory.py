@@ -111,10 +111,7 @@ class JointSpline:
     __slots__ = ("_segments", "_starts", "end")
 
     def __init__(self, segments: Sequence[Segment]) -> None:
-        """
-        Args:
-            segments: at least one.
-        """
+        """`segments`: at least one."""
         self._segments = segments
         self._starts = [segment.start for segment in segments]
         self.end = segments[-1].end

@@ -55,7 +55,13 @@ def _check_link(link: Link, static: bool) -> None:
         if not abs(length) <= FURTHEST:
             raise DescriptionError(f"link '{link.name}': {length} m is beyond {FURTHEST:g} m")
     for shape in link.collisions:
-        _check_mesh(link, shape)
+        if shape.solid is None:
+            continue
+        reach = float((np.abs(shape.solid.vertices).max(axis=0) * np.abs(shape.size)).max())
+        if not reach <= FURTHEST:
+            raise DescriptionError(
+                f"link '{link.name}': mesh '{shape.mesh}' reaches to {reach:g} m, beyond {FURTHEST:g} m"
+            )
     inertia = link.inertia
     if inertia is None or static:
         return
@@ -69,16 +75,6 @@ def _check_link(link: Link, static: bool) -> None:
     if not largest <= LARGEST_MOMENT:
         raise DescriptionError(
             f"link '{link.name}': a moment of inertia of {largest} kg m² is beyond {LARGEST_MOMENT:g}"
-        )
-
-
-def _check_mesh(link: Link, shape: Shape) -> None:
-    if shape.solid is None:
-        return
-    reach = float((np.abs(shape.solid.vertices).max(axis=0) * np.abs(shape.size)).max())
-    if not reach <= FURTHEST:
-        raise DescriptionError(
-            f"link '{link.name}': mesh '{shape.mesh}' reaches to {reach:g} m, beyond {FURTHEST:g} m"
         )
 
 

@@ -49,11 +49,7 @@ class Model:
         return anchors + others
 
     def joint_index(self, name: str) -> int:
-        """Returns the index of a movable joint in the body.
-
-        Raises:
-            KeyError: if there is no such joint.
-        """
+        """Returns the index of a movable joint in the body."""
         return self._joints[name]
 
     def collisions(self, link: str) -> dict[str, Shape]:

@@ -95,11 +95,7 @@ class World:
         return model
 
     def delete(self, name: str) -> None:
-        """Takes model `name` out of the world.
-
-        Raises:
-            KeyError: if there is none.
-        """
+        """Takes model `name` out of the world."""
         self.engine.remove(self.models.pop(name).body)
         self._entities, self._joints = {}, {}
         self._index(*self.models.values())

@@ -14,7 +14,6 @@ import subprocess
 import sys
 import threading
 from array import array
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,8 +31,7 @@ from bullet_gazebo.simulator import NANOSECONDS, Simulator
 if TYPE_CHECKING:  # only the other process draws
     from bullet_gazebo.pictures.renderer import Renderer
 
-MAIN = "import sys; from bullet_gazebo.pictures.recording import main; sys.exit(main(sys.argv[1:]))"
-MOST_WAITING = 100_000_000  # [bytes] for the other process; beyond it frames are dropped
+MAIN = "import sys; from bullet_gazebo.pictures.recording import main; sys.exit(main())"
 LEAST_SIZE, LARGEST_SIZE, FASTEST = 16, 4096, 240.0
 NUMBERS = 7  # of a pose
 ROOM = 1.25  # factor on the camera's distance: things move
@@ -64,11 +62,7 @@ class RecordingOptions:
     model: str = ""
 
     def check(self) -> None:
-        """Checks the options.
-
-        Raises:
-            RecordingError: one of them is invalid.
-        """
+        """Raises RecordingError if one of the options is invalid."""
         if self.path.suffix.lower() != ".mp4":
             raise RecordingError(f"a recording's name ends in .mp4: not '{self.path}'")
         if self.path.is_dir() or not os.access(self.path.parent, os.W_OK):
@@ -100,11 +94,10 @@ class SimulationRecorder:
         self._period = round(NANOSECONDS / options.rate)
         self._due, self._last = 0, -1  # [ns]
         self._models: list[Model] = []
-        self._waiting: deque[bytes] = deque()
-        self._size = 0  # [bytes] in `_waiting`
-        self._dropped = 0
-        self._news, self._ending = threading.Condition(), False
-        self._process = _start(options)
+        self._waiting: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._waiting.put(pickle.dumps(options))
+        self._ending = False
+        self._process = _start()
         self._thread = threading.Thread(target=self._feed, name="recording", daemon=True)
         self._thread.start()
         sim.listeners.append(self._on_tick)
@@ -121,48 +114,31 @@ class SimulationRecorder:
         if models != self._models:
             self._models = models
             recorded = [_recorded(model) for model in models]
-        elif self._size > MOST_WAITING:
-            self._dropped += 1
-            return
         poses = array("d")
         for model in models:
             for position, orientation in model.link_poses():
                 poses.extend((*position, *orientation))
-        data = pickle.dumps((recorded, poses))
-        with self._news:
-            self._waiting.append(data)
-            self._size += len(data)
-            self._news.notify()
+        self._waiting.put(pickle.dumps((recorded, poses)))
 
     def _feed(self) -> None:
         """Sends queued messages until `close`, or until the other process ends."""
         pipe: Any = self._process.stdin
         try:
-            while True:
-                with self._news:
-                    self._news.wait_for(lambda: bool(self._waiting) or self._ending)
-                    if not self._waiting:
-                        break
-                    data = self._waiting.popleft()
-                    self._size -= len(data)
+            while (data := self._waiting.get()) is not None:
                 pipe.write(data)
                 pipe.flush()
             pipe.close()
         except OSError:  # the other process has printed why
             self._ending = True
             logger.warning("the recording has ended before the simulation")
-        if self._dropped:
-            logger.warning("%d frames of the recording were dropped", self._dropped)
 
     def close(self, patience: float) -> None:
-        """Ends the recording; the other process may outlive this one to draw the last frames.
+        """Ends the recording, after up to `patience` [s] for what is queued.
 
-        Args:
-            patience: time to send what is queued [s].
+        The other process may outlive this one to draw the last frames.
         """
-        with self._news:
-            self._ending = True
-            self._news.notify()
+        self._ending = True
+        self._waiting.put(None)
         self._thread.join(patience)
 
 
@@ -172,13 +148,10 @@ def _recorded(model: Model) -> RecordedModel:
     return RecordedModel(model.name, made.root, made.static, model.link_names, shapes)
 
 
-def _start(options: RecordingOptions) -> subprocess.Popen[bytes]:
-    words = [
-        str(options.path), f"{options.rate!r}", str(options.width), str(options.height), options.model
-    ]  # fmt: skip
+def _start() -> subprocess.Popen[bytes]:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     return subprocess.Popen(
-        [sys.executable, "-P", "-c", MAIN, *words], stdin=subprocess.PIPE, env=environment,
+        [sys.executable, "-P", "-c", MAIN], stdin=subprocess.PIPE, env=environment,
         start_new_session=True,
     )  # fmt: skip
 
@@ -231,20 +204,19 @@ class FrameDrawer:
         return Camera(camera.target, ROOM * camera.distance, camera.yaw, camera.pitch, camera.view)
 
 
-def main(arguments: Sequence[str]) -> int:
+def main() -> int:
     """Draws until standard input ends; SIGTERM drops the frames that aren't drawn yet."""
     from web_viewer.video import EncoderFailed
 
     logging.basicConfig(format="recording: %(message)s")
-    path, rate, width, height, model = arguments
-    options = RecordingOptions(Path(path), float(rate), int(width), int(height), model)
+    options: RecordingOptions = pickle.load(sys.stdin.buffer)
     try:
         count = _draw(options)
     except EncoderFailed as error:
-        print(f"recording: {path}: {error}", file=sys.stderr, flush=True)
+        print(f"recording: {options.path}: {error}", file=sys.stderr, flush=True)
         return 1
     length = f"{count} frames, {count / options.rate:.1f} s" if count else "no time has passed"
-    print(f"recording: {path}: {length}", flush=True)
+    print(f"recording: {options.path}: {length}", flush=True)
     return 0
 
 

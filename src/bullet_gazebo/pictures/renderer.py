@@ -33,32 +33,13 @@ Region = tuple[int, int, int, int]
 logger = logging.getLogger(__name__)
 
 
-class Textures:
-    """Images in PyBullet, each loaded once, because PyBullet keeps it until the end."""
-
-    def __init__(self, client: int) -> None:
-        self._client = client
-        self._numbers: dict[bytes, int] = {}
-
-    def number(self, image: np.ndarray) -> int:
-        """Returns PyBullet's number of an RGB image (h, w, 3) of uint8."""
-        digest = hashlib.sha256(repr(image.shape).encode() + image.tobytes()).digest()
-        if digest not in self._numbers:
-            with TemporaryDirectory() as folder:
-                path = Path(folder, "texture.png")
-                Image.fromarray(image).save(path, compress_level=1)
-                self._numbers[digest] = pybullet.loadTexture(
-                    str(path), physicsClientId=self._client
-                )
-        return self._numbers[digest]
-
-
 class DrawnPart:
     """Some triangles of one shape of a link."""
 
     def __init__(
-        self, client: int, link: str, shape: Shape, piece: Piece, textures: Textures
+        self, client: int, link: str, shape: Shape, piece: Piece, texture: int | None
     ) -> None:
+        """`texture` is PyBullet's number of the piece's texture."""
         self.link, self.alpha = link, piece.rgba[3]
         self._client, self._pose = client, shape.pose
         self._box = box_around(piece.solid)
@@ -73,12 +54,9 @@ class DrawnPart:
             **looks,
         )
         self.body: int = pybullet.createMultiBody(0.0, -1, visual, physicsClientId=client)
-        if piece.texture is not None:
+        if texture is not None:
             pybullet.changeVisualShape(
-                self.body,
-                -1,
-                textureUniqueId=textures.number(piece.texture),
-                physicsClientId=client,
+                self.body, -1, textureUniqueId=texture, physicsClientId=client
             )
         self.place(Pose())
 
@@ -131,7 +109,7 @@ class Renderer:
         self._client = pybullet.connect(pybullet.DIRECT)
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self._client)
         self._models: dict[str, list[DrawnPart]] = {}
-        self._textures = Textures(self._client)
+        self._textures: dict[bytes, int] = {}  # PyBullet keeps them until the end
         self._background = lru_cache(maxsize=2)(background)
 
     def add(self, name: str, shapes: Iterable[tuple[str, Shape]]) -> None:
@@ -144,9 +122,20 @@ class Renderer:
         for link, shape in shapes:
             try:
                 for piece in (small for whole in pieces_of(shape) for small in _small(whole)):
-                    parts.append(DrawnPart(self._client, link, shape, piece, self._textures))
+                    texture = None if piece.texture is None else self._load(piece.texture)
+                    parts.append(DrawnPart(self._client, link, shape, piece, texture))
             except DescriptionError as error:
                 logger.warning("model '%s', link '%s' isn't drawn whole: %s", name, link, error)
+
+    def _load(self, image: np.ndarray) -> int:
+        """Returns PyBullet's number of an RGB image (h, w, 3) of uint8, which is loaded once."""
+        digest = hashlib.sha256(repr(image.shape).encode() + image.tobytes()).digest()
+        if digest not in self._textures:
+            with TemporaryDirectory() as folder:
+                path = str(Path(folder, "texture.png"))
+                Image.fromarray(image).save(path, compress_level=1)
+                self._textures[digest] = pybullet.loadTexture(path, physicsClientId=self._client)
+        return self._textures[digest]
 
     def remove(self, name: str) -> None:
         """Takes a model out, if there is one of that name."""
@@ -248,14 +237,7 @@ class Renderer:
 def _through(
     colours: np.ndarray, limit: np.ndarray, layer: Layer, clear: Sequence[DrawnPart]
 ) -> np.ndarray:
-    """Draws the nearest transparent parts over colours (h, w, 3).
-
-    Args:
-        colours: of everything else.
-        limit: depths of everything else (h, w).
-        layer: all bodies.
-        clear: the transparent parts.
-    """
+    """Draws the nearest of the `clear` parts over colours (h, w, 3) and depths (h, w) of everything else."""
     alphas = np.ones(layer.bodies.max() + 2)  # the last one stands for no body
     for part in clear:
         if part.body < len(alphas):

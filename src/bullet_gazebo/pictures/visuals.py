@@ -94,11 +94,7 @@ def visible_shapes(model: ModelDescription) -> list[tuple[str, Shape]]:
 
 
 def solid_of(shape: Shape) -> Solid:
-    """Returns the triangles of a shape, in its own frame.
-
-    Raises:
-        DescriptionError: a mesh file can't be read.
-    """
+    """Returns the triangles of a shape, in its own frame."""
     if shape.kind == "mesh":
         mesh = shape.solid or read_look(shape.mesh).mesh
         return _flat(_scaled(mesh.vertices[mesh.faces], shape.size))

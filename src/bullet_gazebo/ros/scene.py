@@ -46,68 +46,59 @@ class SceneOffer:
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self._one_at_a_time = threading.Lock()
-        self._opened: tuple[object, ...] = ()
+        self._opened: SceneServer | None = None
 
     def show(self) -> None:
         """Offers the scene, if it isn't offered yet."""
         with self._one_at_a_time:
-            if not self._opened:
-                # A window may outlive its simulator: the next one counts from another number.
-                first = secrets.randbits(31)
-                self._opened = (SceneTopics(self._sim, first), SceneService(self._sim, first))
+            if self._opened is None:
+                self._opened = SceneServer(self._sim)
 
 
-def _number(first: int, number: int) -> int:
-    """Returns the world's version or a model's number as clients see it."""
-    return (first + number) % 2**32
+class SceneServer:
+    """Models and lights that a window doesn't know yet (~get_scene), ~scene_poses and ~scene_contacts.
 
+    While somebody subscribes, the topics come thirty times a second of wall time: a thread of its own copies
+    the world between two ticks, and publishes the copies.
+    """
 
-class SceneService:
-    """~get_scene: all models and lights that a window doesn't know yet."""
-
-    def __init__(self, sim: Simulator, first: int) -> None:
+    def __init__(self, sim: Simulator) -> None:
         self._sim = sim
-        self._first = first
+        # A window may outlive its simulator: the next one counts from another number.
+        self._first = secrets.randbits(31)
+        self._news = threading.Event()  # a subscriber comes or goes, or the end
+        self._ending = threading.Event()
+        self._poses = self._advertise("~scene_poses", ScenePoses)
+        self._contacts = self._advertise("~scene_contacts", SceneContacts)
         self._service = rospy.Service("~get_scene", GetScene, self._get)
+        self._thread = threading.Thread(target=self._run, name="scene", daemon=True)
+        self._thread.start()
+        rospy.on_shutdown(self._stop)
 
     def _get(self, request: GetSceneRequest) -> GetSceneResponse:
         world, known = self._sim.world, frozenset(request.known)
         with self._sim.lock:  # converting a large model takes long, and is done without it
-            version = _number(self._first, world.version)
+            version = self._number(world.version)
             models = list(world.models.values())
             lights = [copy(light) for light in world.lights.values()]
         found = []
         for model in models:
-            number = _number(self._first, model.number)
+            number = self._number(model.number)
             if number in known:
                 found.append(SceneModel(number=number, name=model.name, known=True))
             else:
                 found.append(to_model(model, number, request.collisions))
         return GetSceneResponse(version, found, [to_light(light) for light in lights])
 
-
-class SceneTopics:
-    """~scene_poses and ~scene_contacts, thirty times a second of wall time, while somebody subscribes.
-
-    A thread of its own copies the world between two ticks, and publishes the copies.
-    """
-
-    def __init__(self, sim: Simulator, first: int) -> None:
-        self._sim = sim
-        self._first = first
-        self._news = threading.Event()  # a subscriber comes or goes, or the end
-        self._ending = threading.Event()
-        self._poses = self._advertise("~scene_poses", ScenePoses)
-        self._contacts = self._advertise("~scene_contacts", SceneContacts)
-        self._thread = threading.Thread(target=self._run, name="scene", daemon=True)
-        self._thread.start()
-        rospy.on_shutdown(self._stop)
-
     def _advertise(self, name: str, kind: type) -> tuple[rospy.Publisher, SubscriberCount]:
         count = SubscriberCount(self._news.set)
         # A slow subscriber misses some: with a queue, a thread of rospy's sends.
         publisher = rospy.Publisher(name, kind, subscriber_listener=count, queue_size=1)
         return publisher, count
+
+    def _number(self, number: int) -> int:
+        """Returns the world's version or a model's number as clients see it."""
+        return (self._first + number) % 2**32
 
     @property
     def _watched(self) -> bool:
@@ -149,7 +140,7 @@ class SceneTopics:
         poses = [pose for model in models for pose in model.link_poses()]
         joints = [model.joint_states() for model in models if model.joint_names]
         now, paused = self._sim.now, self._sim.paused
-        version = _number(self._first, self._sim.world.version)
+        version = self._number(self._sim.world.version)
 
         def publish() -> None:
             message = ScenePoses(

@@ -50,11 +50,7 @@ class LinkView:
         self._wanted = list(zip(keys, places, frames, strict=True))
 
     def __call__(self, joints: Mapping[str, JointState]) -> dict[str, Motion]:
-        """Returns the links, each in the frame asked for, by the names of the query.
-
-        Args:
-            joints: at least those that move the links.
-        """
+        """Returns the links that these joints move, each in the frame asked for, by the query's names."""
         if not self._wanted:
             return {}
         now, before, after = (self._poses(joints, time) for time in (0.0, -INSTANT, INSTANT))

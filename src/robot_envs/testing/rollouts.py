@@ -16,21 +16,13 @@ Make = Callable[..., gymnasium.Env[Any, Any]]
 
 @dataclass(frozen=True)
 class Subject:
-    """An environment under test.
+    """An environment under test."""
 
-    Args:
-        make: makes one, from options.
-        options: that it is made with.
-        identifier: Gymnasium's; None: it has none.
-        steps: of a rollout.
-        backend: by name.
-    """
-
-    make: Make
-    options: dict[str, Any] = field(default_factory=dict)
-    identifier: str | None = None
-    steps: int = 100
-    backend: str | None = None
+    make: Make  # makes one, from options
+    options: dict[str, Any] = field(default_factory=dict)  # that it is made with
+    identifier: str | None = None  # Gymnasium's; None: it has none
+    steps: int = 100  # of a rollout
+    backend: str | None = None  # by name
 
     @contextlib.contextmanager
     def made(self, **options: Any) -> Iterator[RobotEnv]:

@@ -52,10 +52,6 @@ class Applier:
     """Applies variations to robots as they were found.
 
     What the world doesn't report, a joint's own friction, is taken from the robot's file.
-
-    Args:
-        scene: the robots.
-        world: in which they are.
     """
 
     def __init__(self, scene: Scene, world: Changeable) -> None:

@@ -66,17 +66,11 @@ MOST_DELAY: Final = 1000  # [control steps]
 
 
 class Encoder(NamedTuple):
-    """How a joint is measured.
+    """How a joint is measured."""
 
-    Args:
-        noise: standard deviation of a position [rad, m].
-        rate_noise: standard deviation of a velocity [rad/s, m/s].
-        step: resolution of positions [rad, m]; 0: exact.
-    """
-
-    noise: float = 0.0
-    rate_noise: float = 0.0
-    step: float = 0.0
+    noise: float = 0.0  # standard deviation of a position [rad, m]
+    rate_noise: float = 0.0  # standard deviation of a velocity [rad/s, m/s]
+    step: float = 0.0  # resolution of positions [rad, m]; 0: exact
 
     def rounded(self, position: float) -> float:
         """Returns the position that the encoder measures."""

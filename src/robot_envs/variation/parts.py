@@ -43,9 +43,6 @@ class Parts:
     | `joints` | joints that move |
     | `controllers` | controllers that run |
 
-    Args:
-        scene: the robots.
-
     Raises:
         RobotEnvError: if something in a robot's description is wrong.
     """

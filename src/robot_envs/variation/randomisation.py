@@ -27,26 +27,17 @@ WORLD = Kind("world", "")
 
 
 class Option(NamedTuple):
-    """An option of a randomisation.
-
-    Args:
-        name: of the option.
-        of: what a number is drawn for.
-        least: smallest value that may be drawn.
-        most: largest value that may be drawn.
-        nominal: the value of a robot that isn't varied.
-        numbers: how many are drawn for each.
-        either_way: whether a single number is a half-width about the nominal value, or else the largest
-            value.
-    """
+    """An option of a randomisation."""
 
     name: str
-    of: Kind
-    least: float
-    most: float
-    nominal: float = 1.0
-    numbers: int = 1
-    either_way: bool = True
+    of: Kind  # what a number is drawn for
+    least: float  # smallest value that may be drawn
+    most: float  # largest value that may be drawn
+    nominal: float = 1.0  # of a robot that isn't varied
+    numbers: int = 1  # how many are drawn for each
+    either_way: bool = (
+        True  # a single number is a half-width about the nominal value, or else the largest
+    )
 
 
 OPTIONS = (  # in the order of drawing, which changes results: append new ones at the end

@@ -81,11 +81,6 @@ class LockstepTest(unittest.TestCase):
     def test_sleep_and_read(self):
         self.assertEqual(len(self.twice("sleep_read.py").stdout.splitlines()), 200)
 
-    def test_a_loop_at_50_hz(self):
-        lines = self.twice("rate_loop.py").stdout.splitlines()
-        self.assertEqual(len(lines), 200)
-        self.check_50_hz(lines)
-
     def test_unpause_publish_wait_pause(self):
         run = self.twice("pause_environment.py")
         self.assertNotIn("no joint states", run.stdout)

@@ -107,18 +107,6 @@ class Lockstep(SecondRobot):
         self.assertEqual(runs[0], runs[1])
         self.assertEqual(runs[0][-1].time, 0.2)
 
-    def test_an_episode_that_another_environment_has_ended_goes_no_further(self):
-        first, second = (make_pendulum("ros", self.scene.robots[0]) for _ in range(2))
-        self.addCleanup(first.close)
-        self.addCleanup(second.close)
-        action = np.zeros(1, np.float32)
-        first.reset(seed=1)
-        first.step(action)
-        second.reset(seed=2)
-        with self.assertRaisesRegex(SimulatorError, "another environment .* has moved the same"):
-            first.step(action)
-        second.step(action)
-
     def test_what_one_environment_varies_is_taken_back_for_another_one(self):
         """Also where the first one is closed while the other one's episode is under way."""
         robot, action = self.scene.robots[0], np.zeros(1, np.float32)

@@ -15,9 +15,7 @@ from controller_manager_msgs.srv import (
     ListControllers,
     LoadController,
     SwitchController,
-    UnloadController,
 )
-from gazebo_msgs.srv import SpawnModel
 from std_srvs.srv import Empty, EmptyResponse
 from support.ros.calls import BOUND, wait_until
 
@@ -26,7 +24,6 @@ from ros_utils import (
     ros_gazebo,
     ros_launch,
     ros_node,
-    ros_spawn,
     ros_urdf,
 )
 
@@ -86,12 +83,6 @@ class Nodes(unittest.TestCase):
         self.assertEqual(stranger.wait(BOUND), 0)
         self.assertFalse(ros_node.ros_kill_master(), "the master isn't ours")
 
-    def test_robot_state_publisher(self):
-        self.assertTrue(load_description())
-        self.assertTrue(ros_spawn.init_robot_state_pub("/b", max_pub_freq=20))
-        self.assertEqual(rospy.get_param("/b/rob_st_pub/publish_frequency"), 20.0)
-        self.assertIn("/b/rob_st_pub", registered())
-
     def test_launch(self):
         self.assertTrue(load_description("/c"))
         self.assertTrue(ros_launch.ros_launch_from_path(LAUNCH, ["rate:=20"]))
@@ -131,40 +122,6 @@ class Services(unittest.TestCase):
             self.assertFalse(ros_gazebo.gazebo_reset_world(timeout=0.3))
         self.assertIn("within 0.3 s", str(told.call_args))
 
-    def test_what_spawn_sends(self):
-        requests = []
-
-        def spawn(request):
-            requests.append(request)
-            return False, "no, thanks"
-
-        self.offer("/gazebo/spawn_urdf_model", SpawnModel, spawn)
-        rospy.set_param("/e/description", "<robot/>")
-        answer = ros_gazebo.gazebo_spawn_urdf_param(
-            "description", "m", "/e", pos_x=1, ori_w=0.0, reference_frame="base"
-        )
-        self.assertEqual(answer, (False, "no, thanks"))
-        (request,) = requests
-        self.assertEqual(request.model_xml, "<robot/>")
-        self.assertEqual(
-            (request.model_name, request.robot_namespace, request.reference_frame),
-            ("m", "/e", "base"),
-        )
-        self.assertEqual(request.initial_pose.position.x, 1.0)
-        self.assertEqual(request.initial_pose.orientation.w, 1.0)
-        self.assertFalse(ros_gazebo.gazebo_spawn_urdf_param("nix", "m", "/e")[0])
-
-    def test_controllers(self):
-        manager = FakeManager(self)
-        self.assertTrue(ros_controllers.load_controller_list_srv(["a"], ns="/f"))
-        self.assertTrue(ros_controllers.spawn_controllers_srv(["a", "b"], ns="/f/"))
-        self.assertEqual(manager.states, {"a": "running", "b": "running"})
-        self.assertEqual(manager.loads, ["a", "b"], "a was loaded already")
-        self.assertTrue(ros_controllers.reset_controllers_srv(["a"], ns="/f"))
-        self.assertEqual(manager.switches[-2:], [([], ["a"]), (["a"], [])])
-        self.assertTrue(ros_controllers.kill_controllers_srv(["a"], ns="f"))
-        self.assertEqual(manager.states, {"b": "running"})
-
     def test_a_controller_that_cannot_be_loaded(self):
         manager = FakeManager(self)
         self.assertFalse(ros_controllers.spawn_controllers_srv(["bad", "a"], ns="/f"))
@@ -179,9 +136,8 @@ class FakeManager:
     """Keeps a book about controllers; refuses to load "bad"."""
 
     def __init__(self, test):
-        self.states, self.loads, self.switches = {}, [], []
+        self.states, self.loads = {}, []
         test.offer("/f/controller_manager/load_controller", LoadController, self.load)
-        test.offer("/f/controller_manager/unload_controller", UnloadController, self.unload)
         test.offer("/f/controller_manager/switch_controller", SwitchController, self.switch)
         test.offer("/f/controller_manager/list_controllers", ListControllers, self.list)
 
@@ -192,12 +148,7 @@ class FakeManager:
             self.states[request.name] = "initialized"
         return ok
 
-    def unload(self, request):
-        return self.states.pop(request.name, None) is not None
-
     def switch(self, request):
-        self.switches.append((request.start_controllers, request.stop_controllers))
-        self.states.update(dict.fromkeys(request.stop_controllers, "stopped"))
         self.states.update(dict.fromkeys(request.start_controllers, "running"))
         return True
 

@@ -6,8 +6,6 @@ import pytest
 from support.robots.cartpole import CONTROLLERS, cartpole_urdf
 from support.robots.worlds import add_robot, start
 
-from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
-from bullet_gazebo.physics.world import World
 from bullet_gazebo.simulator import NotInLockstep, Simulator
 
 BOUND = 60.0  # [s]
@@ -44,9 +42,8 @@ def test_lock_step_is_bit_for_bit_repeatable_across_resets(sim):
         for step in range(100):
             robot.manager.get("cart").command(0.02 * (step % 7))
             advance(sim, 8)
-            track.append(
-                [(j.position, j.velocity, j.effort) for j in robot.hardware.joints.values()]
-            )
+            joints = robot.hardware.joints.values()
+            track.append([(each.position, each.velocity, each.effort) for each in joints])
         runs.append(track)
     assert runs[0] == runs[1] == runs[2]
 
@@ -58,15 +55,14 @@ def test_less_than_one_tick_is_refused(sim, ticks):
     assert sim.now == 0
 
 
-def test_a_world_that_runs_by_itself_cannot_be_stepped():
-    sim = Simulator(World(BulletEngine()))
+def test_a_world_that_runs_by_itself_cannot_be_stepped(sim):
+    sim.lockstep = False
     with sim.lock, pytest.raises(NotInLockstep, match="lockstep:=true"):
         sim.advance(1)
-    sim.world.close()
 
 
-def test_a_slow_rate_can_be_changed_and_stopped_at_once():
-    sim = Simulator(World(BulletEngine()), max_update_rate=5e-324)
+def test_a_slow_rate_can_be_changed_and_stopped_at_once(sim):
+    sim = Simulator(sim.world, max_update_rate=5e-324)
     thread = threading.Thread(target=sim.run)
     thread.start()
     ticking = threading.Event()
@@ -77,7 +73,6 @@ def test_a_slow_rate_can_be_changed_and_stopped_at_once():
     sim.stop()
     thread.join(BOUND)
     assert not thread.is_alive()
-    sim.world.close()
 
 
 @pytest.mark.parametrize(
@@ -91,14 +86,13 @@ def test_a_slow_rate_can_be_changed_and_stopped_at_once():
         ({}, 1000.0, True, True),  # only gz world moves it then
     ],
 )
-def test_it_knows_when_it_is_faster_than_the_clock(options, rate, paused, outruns):
-    sim = Simulator(World(BulletEngine()), **options)
+def test_it_knows_when_it_is_faster_than_the_clock(sim, options, rate, paused, outruns):
+    sim = Simulator(sim.world, **options)
     assert sim.outruns_the_clock == sim.lockstep
     sim.max_update_rate = rate
     if paused:
         sim.pause()
     assert sim.outruns_the_clock == outruns
-    sim.world.close()
 
 
 def test_steps_wait_for_the_end_of_a_hold_and_services_do_not(sim):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from file_access.content import FileError, NotAFile, open_file, open_text, read_file
+from file_access.content import FileError, NotAFile, TooLarge, open_file, open_text, read_file
 
 KINDS = ["pipe", "socket", "device", "folder"]
 
@@ -48,3 +48,20 @@ def test_files_are_read(tmp_path: Path) -> None:
     assert read_file(path, 4) == "ä\r\n".encode()
     with pytest.raises(FileNotFoundError):
         open_file(tmp_path / "none")
+    with pytest.raises(TooLarge, match="it has more than 3 bytes"):
+        read_file(path, 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("loop", "Too many levels"),
+        ("gone", "No such file"),
+        ("x\0y", ""),
+        ("x" * 300, "File name too long"),
+    ],
+)
+def test_a_file_that_cannot_be_read_says_why(tmp_path: Path, name: str, fault: str) -> None:
+    (tmp_path / "loop").symlink_to("loop")
+    with pytest.raises(FileError, match=f"^it can't be read: {fault}"):
+        read_file(tmp_path / name)

@@ -1,13 +1,11 @@
 """XML of every encoding, with whatever before its declaration, and texts that only exhaust their reader."""
 
-import os
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from file_access import content, xml_text
-from file_access.content import FileError, TooLarge, read_file
+from file_access import xml_text
+from file_access.content import FileError, TooLarge
 from file_access.xml_text import parse
 
 TEXT = '<a name="Gelände">\r\n<b/>\r\n</a>'
@@ -130,26 +128,6 @@ def test_who_counts_may_end_the_parsing():
     assert sum(counted) == 1501
     with pytest.raises(TooLarge, match="enough"):
         parse("<a>" + "<b/>" * 1500 + "</a>", count)
-
-
-def test_only_files_are_read(tmp_path):
-    (tmp_path / "file").write_bytes(b"12345")
-    assert read_file(tmp_path / "file") == b"12345"
-    with pytest.raises(TooLarge, match=r"it has more than 4 bytes"):
-        read_file(tmp_path / "file", 4)
-    os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "loop").symlink_to("loop")
-    (tmp_path / "zero").symlink_to("/dev/zero")
-    faults = {
-        "pipe": "it is not a file", "zero": "it is not a file", "": "it is not a file",
-        "loop": "it can't be read: Too many levels", "gone": "it can't be read: No such file",
-        "x\0y": "it can't be read: ", "x" * 300: "it can't be read: File name too long",
-    }  # fmt: skip
-    for name, fault in faults.items():
-        with pytest.raises(FileError) as raised:
-            read_file(tmp_path / name)
-        assert str(raised.value).startswith(fault)
-    assert content.MAX_BYTES >= 2**20
 
 
 @settings(deadline=None)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support.scenes.rover import ROVER, Push
 from support.scenes.two_arms import LEFT, RIGHT, Volley
 
 from robot_envs import InitialState, Pose, RobotEnv
@@ -58,17 +57,6 @@ def test_a_joint_that_no_state_tells_is_drawn_where_it_is(arms):
         arms.reset(options={"initial_state": InitialState({"left::thread": angle})})
         pictures.append(arms.render())
     assert not np.array_equal(*pictures)
-
-
-def test_the_camera_follows_the_rover_and_shows_what_it_pushes():
-    env = RobotEnv(ROVER, Push(), render_mode="rgb_array", width=320, height=160)
-    env.reset(seed=0)
-    for _ in range(45):
-        env.step(np.ones(2, np.float32))
-    colours = env.render().astype(int)
-    yellow = (colours[..., 0] - colours[..., 2] > 90).sum()
-    env.close()
-    assert yellow > 500
 
 
 def test_a_page_has_the_same_links_where_they_are(arms, server):

@@ -209,21 +209,6 @@ def test_the_next_episode_touches_the_ground_as_the_first_one_did(make):
     assert not differences(runs[0], runs[3])
 
 
-@pytest.mark.slow
-def test_worlds_of_one_process_know_nothing_of_each_other(make):
-    alone = [
-        rollout(make(name), 40, seed) for name, seed in (("arms", 1), ("rover", 2), ("arms", 3))
-    ]
-    envs = [make(name) for name in ("arms", "rover", "arms")]
-    runs = [[env.reset(seed=seed)] for env, seed in zip(envs, (1, 2, 3), strict=True)]
-    for env, seed in zip(envs, (1, 2, 3), strict=True):
-        env.action_space.seed(seed)
-    for _ in range(40):
-        for env, run in zip(envs, runs, strict=True):
-            run.append(env.step(env.action_space.sample()))
-    assert not any(map(differences, alone, runs))
-
-
 def test_names_that_are_there_twice_are_told(tmp_path):
     for robots, message in (
         ([LEFT, LEFT], "a world has each model once, and 'left' is there twice"),

@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from support.robots.pendulum import MOTOR, PENDULUM, STRONGEST, hanging, make_pendulum
+from support.robots.pendulum import MOTOR, PENDULUM, hanging, make_pendulum
 
 from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.scene import Scene
@@ -63,23 +63,6 @@ def test_friction_comes_on_top_of_the_joints_own_and_goes_again(backend):
     lost = DAMPING * 10.0 / INERTIA * PERIOD
     assert rates[0] - rates[1] == pytest.approx(lost, rel=0.1)
     assert rates[2] == rates[0]
-
-
-def test_a_rod_of_another_mass_and_length_moves_as_its_figures_say(backend):
-    backend.vary(Variation({"rod": LinkScale(mass=2.0, length=0.5)}))
-    backend.reset(0.0, 0.0)
-    assert backend.act(0.3).velocity == pytest.approx(0.3 / (INERTIA / 2) * PERIOD, rel=0.02)
-
-
-def test_the_strongest_action_is_what_the_task_makes_of_it():
-    env, robot = make_pendulum(), Plant()
-    env.task.noise = 0.0
-    env.reset(seed=0)
-    observation, *_ = env.step(np.ones(1, np.float32))
-    robot.reset(0.0, 0.0)
-    assert observation[2] == np.float32(robot.act(STRONGEST).velocity)
-    env.close()
-    robot.close()
 
 
 @pytest.mark.extras("mujoco")

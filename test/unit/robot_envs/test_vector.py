@@ -52,14 +52,6 @@ def test_all_ways_give_the_same_bits(mode):
         assert all(same(a, b, exact=True) for a, b in zip(first, other, strict=True))
 
 
-@pytest.mark.parametrize("identifier", ["robot_envs/TwoLinkReachGoal-v0", "robot_envs/Furuta-v0"])
-def test_environments_that_are_registered_by_name_with_goals_too(many, identifier):
-    kinds = [
-        vector_rollout(many(identifier, 2, vectorization_mode=kind)) for kind in (None, "sync")
-    ]
-    assert all(same(a, b, exact=True) for a, b in zip(*kinds, strict=True))
-
-
 def test_only_the_masked_are_reset_where_episodes_end_apart(many):
     vector = many(num_envs=COUNT, autoreset_mode="Disabled")
     vector.reset(seed=1)

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from support.scenes.solo_arm import NOTHING, SOLO, Hold, Reach, episode, is_a_line
+from support.scenes.solo_arm import Reach, episode, is_a_line
 
-from robot_envs import InitialState, Robot, RobotEnv, RobotEnvError
+from robot_envs import InitialState, Robot, RobotEnvError
 from robot_envs.making import make_environment
 
 NAN = math.nan
@@ -62,17 +62,6 @@ def test_an_option_or_action_that_cannot_be(case):
     with pytest.raises((RobotEnvError, ValueError), match=text) as error:
         episode(**options)
     assert is_a_line(error.value)
-
-
-def test_a_refused_action_moves_nothing():
-    env = RobotEnv(SOLO, Hold())
-    env.reset(seed=0)
-    with pytest.raises(ValueError, match="an action is"):
-        env.step(np.array([0.0, 2.0]))
-    after = env.step(NOTHING)[0]
-    env.reset(seed=0)
-    assert np.array_equal(after, env.step(NOTHING)[0])
-    env.close()
 
 
 @pytest.mark.parametrize(

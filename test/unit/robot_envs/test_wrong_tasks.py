@@ -54,7 +54,7 @@ TASKS = {
     "no info": (Hold(info=lambda _: None), r"Hold.info\(\) returned None; it must be a dict"),
     "no actions": (
         Hold(action_space=lambda: None),
-        r"Hold.action_space\(\) returned None; .* gymnasium.spaces.Space",
+        r"Hold.action_space\(\) returned None; .* gymnasium.Space",
     ),
     "no observations": (
         Hold(observation_space=lambda: 2),

@@ -92,11 +92,7 @@ class VelocityGroup(ForwardGroup):
 
 
 def check_length(controller: Controller, values: Sequence[float], joints: int) -> None:
-    """Checks the length of a list of commands.
-
-    Raises:
-        ControlError: if there isn't one for each joint.
-    """
+    """Checks the length of a list of commands."""
     if len(values) != joints:
         raise ControlError(
             f"controller '{controller.name}' has {joints} joints, but {len(values)} commands came: ignored"

@@ -69,48 +69,23 @@ class PositionLoop:
         return error
 
 
-class StateReport:
-    """The topic `state` of a controller with one joint, published on every tenth update since its load."""
-
-    __slots__ = ("_joint", "_pid", "_updates", "output")
-
-    def __init__(self, joint: JointHandle, pid: Pid) -> None:
-        self.output = Output("state", "JointControllerState")
-        self._joint = joint
-        self._pid = pid
-        self._updates = 0
-
-    def due(self) -> bool:
-        """Counts an update; returns whether to report it."""
-        count = self._updates
-        self._updates = count + 1
-        return count % REPORT_EVERY == 0 and self.output.wanted
-
-    def send(
-        self, now: int, dt: float, set_point: float, value: float, rate: float, error: float
-    ) -> None:
-        """Reports process `value` and its `rate`; `now` [ns], `dt` [s]."""
-        gains = self._pid.gains
-        self.output.send(
-            JointControllerSample(
-                now, set_point, value, rate, error, dt, self._joint.command,
-                gains.p, gains.i, gains.d, gains.i_max, gains.antiwindup,
-            )
-        )  # fmt: skip
-
-
 class PidJoint(Controller):
-    """A controller of one joint with one PID and the topics `command` and `state`."""
+    """A controller of one joint with one PID and the topics `command` and `state`.
+
+    The state is published on every tenth update since the controller's load.
+    """
 
     of_velocity: ClassVar[bool] = False  # whether the error is one of velocity
 
     def __init__(self, name: str, joint: JointHandle, pid: Pid) -> None:
         super().__init__(name)
         self.joint = joint
-        self._report = StateReport(joint, pid)
+        self._pid = pid
+        self._state = Output("state", "JointControllerState")
+        self._updates = 0
         self.claimed = (joint.name,)
         self.inputs = [Input("command", "Float64", self.command)]
-        self.outputs = [self._report.output]
+        self.outputs = [self._state]
         self.pids = {"pid": pid}
         if self.interface == EFFORT:
             self.loops = [Loop(joint.name, pid, self.of_velocity)]
@@ -123,6 +98,24 @@ class PidJoint(Controller):
     @abstractmethod
     def command(self, value: float) -> None:
         """Takes a new set-point."""
+
+    def _report_is_due(self) -> bool:
+        """Counts an update; returns whether to report it."""
+        count = self._updates
+        self._updates = count + 1
+        return count % REPORT_EVERY == 0 and self._state.wanted
+
+    def _report(
+        self, now: int, dt: float, set_point: float, value: float, rate: float, error: float
+    ) -> None:
+        """Reports process `value` and its `rate`; `now` [ns], `dt` [s]."""
+        gains = self._pid.gains
+        self._state.send(
+            JointControllerSample(
+                now, set_point, value, rate, error, dt, self.joint.command,
+                gains.p, gains.i, gains.d, gains.i_max, gains.antiwindup,
+            )
+        )  # fmt: skip
 
 
 class EffortJointPosition(PidJoint):
@@ -148,9 +141,9 @@ class EffortJointPosition(PidJoint):
 
     def update(self, now: int, dt: float) -> None:
         error = self._loop.update(dt)
-        if self._report.due():
+        if self._report_is_due():
             joint = self.joint
-            self._report.send(now, dt, self._loop.target, joint.position, joint.velocity, error)
+            self._report(now, dt, self._loop.target, joint.position, joint.velocity, error)
 
 
 class VelocityJointPosition(EffortJointPosition):
@@ -169,7 +162,6 @@ class EffortJointVelocity(PidJoint):
 
     def __init__(self, name: str, joint: JointHandle, pid: Pid) -> None:
         super().__init__(name, joint, pid)
-        self._pid = pid
         self._set_point = 0.0
 
     def command(self, value: float) -> None:
@@ -183,9 +175,9 @@ class EffortJointVelocity(PidJoint):
         velocity = self.joint.velocity
         error = self._set_point - velocity
         self.joint.command = self._pid.compute(error, dt)
-        if self._report.due():
+        if self._report_is_due():
             # As upstream, without the acceleration.
-            self._report.send(now, dt, self._set_point, velocity, 0.0, error)
+            self._report(now, dt, self._set_point, velocity, 0.0, error)
 
 
 class EffortGroupPosition(Controller):

@@ -22,12 +22,7 @@ def collides_with_itself(description: ModelDescription) -> bool:
 
 
 def contacts(client: int, sides: Mapping[tuple[int, int], Side]) -> list[Contact]:
-    """Returns where bodies touched in the last step, without those that were only near.
-
-    Args:
-        client: the world.
-        sides: what PyBullet's bodies and links are.
-    """
+    """Returns where bodies touched in the last step, without those that were only near."""
     found = pybullet.getContactPoints(physicsClientId=client)
     return [_contact(each, sides) for each in found if each[9] > 0.0]
 

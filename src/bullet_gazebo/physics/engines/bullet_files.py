@@ -25,8 +25,6 @@ def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
     from an OBJ file is written as one.
 
     Args:
-        mesh: the mesh.
-        folder: the folder.
         concave: whether to write its triangles instead of its hulls.
         objects: whether it came from an OBJ file.
     """
@@ -74,10 +72,10 @@ def _obj(mesh: Mesh) -> str:
     return "\n".join([*lines, ""])
 
 
-def write_urdf(model: ModelDescription, folder: Path | None = None) -> str:
+def write_urdf(model: ModelDescription, folder: Path) -> str:
     """Returns URDF text with the numbers of `model` to the last digit.
 
-    Visuals are left out: nothing is drawn. Meshes are written into `folder`, if one is given. PyBullet never
+    Visuals are left out: nothing is drawn. Meshes are written into `folder`. PyBullet never
     opens a user's file: it would crash over a broken one, and cache an old one.
     """
     robot = Element("robot", name="model")
@@ -89,7 +87,7 @@ def write_urdf(model: ModelDescription, folder: Path | None = None) -> str:
     return tostring(robot, encoding="unicode")
 
 
-def _write_link(robot: Element, link: Link, static: bool, folder: Path | None) -> None:
+def _write_link(robot: Element, link: Link, static: bool, folder: Path) -> None:
     element = SubElement(robot, "link", name=link.name)
     # Without an inertial PyBullet would assume 1 kg; only the immovable link `world` has none.
     _write_inertia(element, link.inertia or Inertia(mass=0.0))
@@ -98,19 +96,19 @@ def _write_link(robot: Element, link: Link, static: bool, folder: Path | None) -
         written = SubElement(element, "collision")
         if static and shape.kind == "mesh":
             written.set("concave", "yes")  # moving bodies collide by their convex hulls
-        if shape.solid is not None and folder is not None:
+        if shape.solid is not None:
             objects = Path(shape.mesh).suffix.lower() == ".obj"
             written_mesh = write_mesh(shape.solid, folder, concave=static, objects=objects)
             shape = replace(shape, mesh=written_mesh)
         _write_shape(written, shape)
 
 
-def _finer(shape: Shape, folder: Path | None) -> Shape:
+def _finer(shape: Shape, folder: Path) -> Shape:
     """Returns a cylinder as a mesh with more sides than PyBullet's own, on whose 32 sides a wheel rocks.
 
     PyBullet adds a margin around a mesh, by which a wheel would be too large.
     """
-    if shape.kind != "cylinder" or folder is None:
+    if shape.kind != "cylinder":
         return shape
     radius, length = max(shape.size[0] - MARGIN, 0.5 * shape.size[0]), shape.size[1]
     length = max(length - 2.0 * MARGIN, 0.5 * length)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from bullet_gazebo.physics.description import DescriptionError, Inertia, Joint, ModelDescription
+from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription
 from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Body, Contact, Side, Twist
 from bullet_gazebo.physics.engines.mujoco_model import Elements, priority, wxyz, xyzw
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, conjugate, rotate, scale
@@ -117,11 +117,7 @@ class MujocoState:
         return Pose((x, y, z), xyzw(data.xquat[index])), ((vx, vy, vz), (ax, ay, az))
 
     def contacts(self, sides: Mapping[int, Side]) -> list[Contact]:
-        """Returns where bodies touched in the last step, without those that were only near.
-
-        Args:
-            sides: what the geoms are, by number.
-        """
+        """Returns where bodies touched in the last step, without those that were only near."""
         found, wrench = [], np.empty(6)
         for index in range(self.data.ncon):
             mujoco.mj_contactForce(self.model, self.data, index, wrench)
@@ -156,11 +152,6 @@ class JointSettings:
     speed: float
     effort: float
 
-    @classmethod
-    def of(cls, joint: Joint) -> "JointSettings":
-        lower, upper = (joint.lower, joint.upper) if joint.bounded else (1.0, -1.0)
-        return cls(joint.damping, lower, upper, 0.0, joint.friction)
-
 
 class MujocoBody(Body):
     """The bodies and joints of one model. `bind` finds them again after the world was recompiled."""
@@ -174,13 +165,7 @@ class MujocoBody(Body):
         pose: Pose,
         compile_anew: Callable[[], None],
     ) -> None:
-        """
-        Args:
-            state: the world's.
-            description: the model.
-            pose: of the root link.
-            compile_anew: recompiles the world's model from its bodies' present settings.
-        """
+        """`compile_anew` recompiles the world's model from its bodies' present settings."""
         self.description = description
         self.pose = pose  # of the root link; of one that is free, where it was loaded
         self.link_names = tuple(description.links)
@@ -189,7 +174,10 @@ class MujocoBody(Body):
         self.inertias = {name: link.inertia for name, link in description.links.items()}
         self._gravity = {name: link.gravity for name, link in description.links.items()}
         self._frictions: dict[str, float] = {}  # factors, by link
-        self._joints = [JointSettings.of(joint) for joint in joints]
+        self._joints = []
+        for joint in joints:
+            lower, upper = (joint.lower, joint.upper) if joint.bounded else (1.0, -1.0)
+            self._joints.append(JointSettings(joint.damping, lower, upper, 0.0, joint.friction))
         self._state = state
         self._compile_anew = compile_anew
 

@@ -40,18 +40,18 @@ class Elements:
 
 @dataclass
 class ModelWriter:
-    """Writes one model. Names begin with `key` to be unique in the world."""
+    """Writes one model."""
 
-    _spec: mujoco.MjSpec  # of the world
-    _key: str
-    _model: ModelDescription
-    _inertias: Mapping[str, Inertia | None]  # of links, which replace those of the description
+    spec: mujoco.MjSpec  # of the world
+    key: str  # begins names, which are unique in the world
+    model: ModelDescription
+    inertias: Mapping[str, Inertia | None]  # of links, which replace those of the description
     _elements: Elements = field(default_factory=Elements)
 
     def write(self, pose: Pose) -> Elements:
         """Adds the model with its root link's frame at `pose`."""
-        model = self._model
-        base = self._add_link(self._spec.worldbody, model.root, pose)
+        model = self.model
+        base = self._add_link(self.spec.worldbody, model.root, pose)
         if not model.fixed_base:
             self._elements.free = base.add_freejoint()
         below = model.joints_by_parent()
@@ -68,11 +68,11 @@ class ModelWriter:
 
     def _add_link(self, parent: mujoco.MjsBody, link: str, pose: Pose) -> mujoco.MjsBody:
         body = parent.add_body(
-            name=f"{self._key}:{link}", pos=pose.position, quat=wxyz(pose.orientation),
+            name=f"{self.key}:{link}", pos=pose.position, quat=wxyz(pose.orientation),
             explicitinertial=True,
         )  # fmt: skip
-        inertia = self._inertias[link]
-        if inertia is None or self._model.static:
+        inertia = self.inertias[link]
+        if inertia is None or self.model.static:
             inertia = FASTENED
         axes, moments = principal(inertia)
         body.mass, body.ipos, body.iquat = inertia.mass, inertia.com.position, wxyz(axes)
@@ -82,18 +82,18 @@ class ModelWriter:
         if not max(moments) <= sum(moments) - max(moments):
             body.inertia = (max(moments),) * 3
             self._elements.moments[link] = moments
-        for shape in self._model.links[link].collisions:
+        for shape in self.model.links[link].collisions:
             self._add_shape(body, shape)
         self._elements.bodies[link] = body
         return body
 
     def _add_joint(self, parent: mujoco.MjsBody, joint: Joint) -> None:
         body = self._add_link(parent, joint.child, joint.pose)
-        if not joint.movable or self._model.static:
+        if not joint.movable or self.model.static:
             return  # a body without a joint is fixed to its parent
         slide = joint.kind == "prismatic"
         self._elements.joints[joint.name] = body.add_joint(
-            name=f"{self._key}:{joint.name}",
+            name=f"{self.key}:{joint.name}",
             type=mujoco.mjtJoint.mjJNT_SLIDE if slide else mujoco.mjtJoint.mjJNT_HINGE,
             pos=joint.anchor.position,
             axis=rotate(joint.anchor.orientation, joint.axis),
@@ -122,9 +122,9 @@ class ModelWriter:
         """Adds the points of a mesh, once for each scale; returns their name."""
         assert shape.solid is not None  # collisions are read
         name = f"{shape.mesh}:{shape.solid.digest}:{shape.size}"  # MuJoCo's errors show it
-        if self._spec.mesh(name) is None:
+        if self.spec.mesh(name) is None:
             points = np.unique(np.concatenate(shape.solid.hulls), axis=0) * np.array(shape.size)
-            self._spec.add_mesh(
+            self.spec.add_mesh(
                 name=name, uservert=points.ravel().tolist(),
                 inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
             )  # fmt: skip
@@ -132,14 +132,14 @@ class ModelWriter:
 
     def _keep_apart(self) -> None:
         """Excludes contacts of links unless one wants self-collision and no joint connects them (SDF)."""
-        model = self._model
+        model = self.model
         joined = {frozenset((joint.parent, joint.child)) for joint in model.joints.values()}
         solid = [link for link in model.links.values() if link.collisions]
         for a, b in combinations(solid, 2):
             meet = (a.self_collide or b.self_collide) and frozenset((a.name, b.name)) not in joined
             if not meet:
-                self._spec.add_exclude(
-                    bodyname1=f"{self._key}:{a.name}", bodyname2=f"{self._key}:{b.name}"
+                self.spec.add_exclude(
+                    bodyname1=f"{self.key}:{a.name}", bodyname2=f"{self.key}:{b.name}"
                 )
 
 

@@ -55,20 +55,15 @@ class Resources:
 
     def _candidates(self, uri: str, folder: Path | None) -> Iterable[Path]:
         scheme, colon, rest = uri.partition("://")
-        if not colon:
-            path = Path(os.path.expanduser(uri))
-            return [path] if path.is_absolute() else [f / path for f in self._relative(folder)]
+        if not colon or scheme == "file":
+            path = Path(rest if colon else os.path.expanduser(uri))
+            folders = [*([] if folder is None else [folder]), *self.media]
+            return [path] if path.is_absolute() else [each / path for each in folders]
         if scheme == "package":
             return self._in_package(rest)
         if scheme == "model":
             return [*(models / rest for models in self.models), *self._in_package(rest)]
-        if scheme == "file":
-            path = Path(rest)
-            return [path] if path.is_absolute() else [f / path for f in self._relative(folder)]
         raise DescriptionError(f"'{uri[:200]}': {scheme[:20]}:// is not supported")
-
-    def _relative(self, folder: Path | None) -> list[Path]:
-        return [*([] if folder is None else [folder]), *self.media]
 
     def _in_package(self, rest: str) -> list[Path]:
         """Looks a URI up in ROS packages: sdformat turns a URDF's package:// into model://."""

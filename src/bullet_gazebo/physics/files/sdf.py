@@ -191,11 +191,7 @@ def first_entity(root: Element) -> Element:
 
 
 def read_model(element: Element, context: FileContext) -> ModelDescription:
-    """Returns the model of a `<model>` element.
-
-    Raises:
-        DescriptionError: if it can't be simulated.
-    """
+    """Returns the model of a `<model>` element."""
     name = named(element, "model")
     with elements.place(f"model '{shown(name)}'"):
         static = truth(element.findtext("static"))

@@ -4,6 +4,7 @@ They end with 0, even if the manager refused; with 1 if there is no manager or n
 wrong command line.
 """
 
+import argparse
 import sys
 from collections.abc import Callable, Sequence
 
@@ -23,39 +24,10 @@ from controller_manager.controller_manager_interface import (
 from ros_calls import master
 from ros_calls.waiting import service_comes_up
 
-MANAGER_USAGE = """\
-usage: controller_manager COMMAND [NAME...]
-
-commands on controllers, one or more:
-    load NAME...            load
-    unload NAME...          unload
-    start NAME...           start
-    stop NAME...            stop
-    spawn NAME... (sp)      load, then start
-    kill NAME... (kl)       stop, then unload
-
-commands on the controller manager:
-    list (lc)               names, hardware interfaces and states of the loaded controllers
-    list-types (lt)         types that can be loaded
-    reload-libraries [--restore]
-                            stop and unload all controllers, and look for types anew;
-                            with --restore load and start them again
-
-The manager is the one in this program's namespace; another one: __ns:=/NAMESPACE"""
-GROUP_USAGE = """\
-usage: controller_group COMMAND
-
-commands:
-    list            the groups and their controllers
-    spawn GROUP     load and start the controllers of a group
-    switch GROUP    stop the running controllers of the other groups, and start those of this one;
-                    controllers that aren't loaded are loaded first
-
-Groups are in the parameter controller_groups: {GROUP: [NAME, ...], ...}; they may share controllers, and a
-controller in no group is left alone.
-The manager is the one in this program's namespace; another one: __ns:=/NAMESPACE"""
-HELP = ("-h", "--help")
-SAME = {"sp": "spawn", "kl": "kill", "lc": "list", "lt": "list-types"}
+MANAGER_HELP = "The manager is the one in this program's namespace; another one: __ns:=/NAMESPACE"
+GROUP_HELP = f"""\
+Groups are in the parameter controller_groups: {{GROUP: [NAME, ...], ...}}; they may share controllers, and a
+controller in no group is left alone. {MANAGER_HELP}"""
 PARAMETER = "controller_groups"
 LAST = "controller_manager/reload_controller_libraries"  # of a manager's services to come up
 PATIENCE = 30.0  # [s]; launch files start scripts before there is a manager
@@ -68,49 +40,60 @@ class CommandFailed(Exception):
     """There is no master, no manager, or no such group; the text says which."""
 
 
-ON_CONTROLLERS: dict[str, tuple[Callable[[str], bool], ...]] = {
-    "load": (load_controller,),
-    "unload": (unload_controller,),
-    "start": (start_controller,),
-    "stop": (stop_controller,),
-    "spawn": (load_controller, start_controller),
-    "kill": (stop_controller, unload_controller),
-}
-ON_MANAGER: dict[tuple[str, ...], Callable[[], object]] = {
-    ("list",): list_controllers,
-    ("list-types",): list_controller_types,
-    ("reload-libraries",): lambda: reload_libraries(force_kill=True),
-    ("reload-libraries", "--restore"): lambda: reload_libraries(force_kill=True, restore=True),
+SPAWN = (load_controller, start_controller)
+ON_CONTROLLERS: dict[str, tuple[Sequence[Callable[[str], bool]], list[str], str]] = {
+    # command: what is done to all controllers, one after the other; another name of it; what it is
+    "load": ([load_controller], [], "load"),
+    "unload": ([unload_controller], [], "unload"),
+    "start": ([start_controller], [], "start"),
+    "stop": ([stop_controller], [], "stop"),
+    "spawn": (SPAWN, ["sp"], "load, then start"),
+    "kill": ([stop_controller, unload_controller], ["kl"], "stop, then unload"),
 }
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs `controller_manager`; returns its exit code."""
-    arguments = rospy.myargv(list(sys.argv if argv is None else argv))[1:]
-    command, *names = arguments or [""]
-    command = SAME.get(command, command)
-    if command in ON_CONTROLLERS and names:
-        steps = ON_CONTROLLERS[command]
-        return _run("controller_manager", lambda: _on_controllers(steps, names))
-    if (command, *names) in ON_MANAGER:
-        return _run("controller_manager", lambda: _on_manager(ON_MANAGER[command, *names]))
-    print(MANAGER_USAGE)
-    return 0 if command in HELP else 2
+    parser = argparse.ArgumentParser(prog="controller_manager", epilog=MANAGER_HELP)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    for name, (steps, others, text) in ON_CONTROLLERS.items():
+        command = commands.add_parser(name, aliases=others, help=text)
+        command.add_argument("names", nargs="+", metavar="NAME", help="of a controller")
+        command.set_defaults(act=lambda options, steps=steps: _on_controllers(steps, options.names))
+    command = commands.add_parser("list", aliases=["lc"], help="the loaded controllers")
+    command.set_defaults(act=lambda _: list_controllers())
+    command = commands.add_parser("list-types", aliases=["lt"], help="types that can be loaded")
+    command.set_defaults(act=lambda _: list_controller_types())
+    text = "stop and unload all controllers, and look for types anew"
+    command = commands.add_parser("reload-libraries", help=text)
+    command.add_argument("--restore", action="store_true", help="load and start them again")
+    command.set_defaults(act=lambda options: reload_libraries(True, restore=options.restore))
+    options = parser.parse_args(rospy.myargv(list(sys.argv if argv is None else argv))[1:])
+
+    def act() -> None:
+        _require_manager()
+        options.act(options)
+
+    return _run("controller_manager", act)
 
 
 def group_main(argv: Sequence[str] | None = None) -> int:
     """Runs `controller_group`; returns its exit code."""
-    arguments = rospy.myargv(list(sys.argv if argv is None else argv))[1:]
-    match arguments:
-        case ["list"]:
-            return _run("controller_group", lambda: _list_groups(_read_groups()))
-        case ["spawn", group]:
-            steps = ON_CONTROLLERS["spawn"]
-            return _run("controller_group", lambda: _on_controllers(steps, _group(group)))
-        case ["switch", group]:
-            return _run("controller_group", lambda: _switch_to(_group(group)))
-    print(GROUP_USAGE)
-    return 0 if arguments and arguments[0] in HELP else 2
+    parser = argparse.ArgumentParser(prog="controller_group", epilog=GROUP_HELP)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    command = commands.add_parser("list", help="the groups and their controllers")
+    command.set_defaults(act=lambda _: _list_groups(_read_groups()))
+    command = commands.add_parser("spawn", help="load and start the controllers of a group")
+    command.set_defaults(act=lambda options: _spawn(_group(options.group)))
+    command.add_argument("group", metavar="GROUP")
+    text = (
+        "stop the other groups' running controllers, and start those of a group, loaded if need be"
+    )
+    command = commands.add_parser("switch", help=text)
+    command.set_defaults(act=lambda options: _switch_to(_group(options.group)))
+    command.add_argument("group", metavar="GROUP")
+    options = parser.parse_args(rospy.myargv(list(sys.argv if argv is None else argv))[1:])
+    return _run("controller_group", lambda: options.act(options))
 
 
 def _run(name: str, act: Callable[[], object]) -> int:
@@ -122,13 +105,7 @@ def _run(name: str, act: Callable[[], object]) -> int:
     return 0
 
 
-def _on_manager(act: Callable[[], object]) -> None:
-    _require_manager()
-    act()
-
-
 def _on_controllers(steps: Sequence[Callable[[str], bool]], names: Sequence[str]) -> None:
-    _require_manager()
     for step in steps:
         for name in names:
             step(name)
@@ -140,11 +117,7 @@ def _require_master() -> None:
 
 
 def _require_manager() -> None:
-    """Waits for the manager in the program's namespace.
-
-    Raises:
-        CommandFailed: it doesn't come up in time.
-    """
+    """Waits for the manager in the program's namespace."""
     _require_master()
     name = str(rospy.resolve_name(LAST))
     if service_comes_up(name, NOTICE):
@@ -186,6 +159,11 @@ def _list_groups(groups: Groups) -> None:
         print(f"  {group}")
         for name in groups[group]:
             print(f"      {name}")
+
+
+def _spawn(names: Sequence[str]) -> None:
+    _require_manager()
+    _on_controllers(SPAWN, names)
 
 
 def _switch_to(wanted: Sequence[str]) -> None:

@@ -167,11 +167,7 @@ def _wait_for_topic(topic: str, timeout: float) -> None:
 
 
 def _names(argument: str, namespace: str) -> list[str]:
-    """Returns the controller of an argument, or those of a YAML file, whose parameters it loads.
-
-    Raises:
-        FileError: the file can't be read, or is no YAML mapping.
-    """
+    """Returns the controller of an argument, or those of a YAML file, whose parameters it loads."""
     if not os.path.isfile(argument):
         return [argument]
     try:

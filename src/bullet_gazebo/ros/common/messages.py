@@ -80,11 +80,7 @@ def to_wrench_msg(force: poses.Vector, torque: poses.Vector) -> Wrench:
 
 
 def check_numbers(what: str, values: Sequence[float]) -> None:
-    """Refuses numbers that no world can hold.
-
-    Raises:
-        ControlError: for a number that isn't finite or is too large.
-    """
+    """Raises ControlError for a number that isn't finite, or is too large for a world."""
     if all(map(math.isfinite, values)) and max(map(abs, values), default=0.0) <= LARGEST:
         return
     for value in values:

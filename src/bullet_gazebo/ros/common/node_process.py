@@ -65,10 +65,7 @@ def one_at_a_time(name: str, bound: float = STARTING) -> Iterator[None]:
 
 
 def wait_for_master(name: str) -> None:
-    """Waits until there is a master; rospy's own wait can't be interrupted.
-
-    Args:
-        name: of the node that waits, for its message.
+    """Waits until there is a master, for the node `name`; rospy's own wait can't be interrupted.
 
     Raises:
         rospy.ROSInterruptException: a signal came meanwhile.

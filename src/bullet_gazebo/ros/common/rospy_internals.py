@@ -54,7 +54,6 @@ def wait_until_sent(publisher: rospy.Publisher, bound: float = 1.0) -> None:
     """Waits until rospy's threads have written all messages, so that closing the topic loses none.
 
     Args:
-        publisher: of the topic.
         bound: of the wait [s of wall time], for a client that doesn't read.
     """
     deadline = time.monotonic() + bound
@@ -202,11 +201,7 @@ def witness() -> tuple[str, str]:
 def register_again(timeout: float) -> None:
     """Registers all topics and services of this node at the master, the witness last.
 
-    Args:
-        timeout: of each call [s].
-
-    Raises:
-        NoAnswer: the master has gone again.
+    Each call takes up to `timeout` [s]. NoAnswer: the master has gone again.
     """
     topics = rospy.impl.registration.get_topic_manager()
     with topics.lock:

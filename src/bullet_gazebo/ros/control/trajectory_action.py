@@ -99,8 +99,7 @@ class TrajectoryAction:
         self._sim = sim
         self._controller = controller
         self._news = threading.Condition()
-        self._feedback: tuple[ServerGoalHandle, TrajectorySample] | None = None  # the newest one
-        self._outcomes: list[tuple[ServerGoalHandle, GoalOutcome]] = []
+        self._kept: list[tuple[ServerGoalHandle, TrajectorySample | GoalOutcome]] = []
         self._closing = False
         self._status_due = 0.0  # [s]
         self._name = rospy.names.ns_join(namespace, "follow_joint_trajectory")
@@ -121,16 +120,10 @@ class TrajectoryAction:
         self._thread.join(STOP_TIMEOUT)
         self._server.stop()
 
-    def note_feedback(self, handle: ServerGoalHandle, sample: TrajectorySample) -> None:
-        """Keeps the newest feedback, to be published soon."""
+    def note(self, handle: ServerGoalHandle, news: TrajectorySample | GoalOutcome) -> None:
+        """Keeps a goal's feedback or result, to be published soon."""
         with self._news:
-            self._feedback = (handle, sample)
-            self._news.notify()
-
-    def note_outcome(self, handle: ServerGoalHandle, outcome: GoalOutcome) -> None:
-        """Keeps a goal's result, to be published soon."""
-        with self._news:
-            self._outcomes.append((handle, outcome))
+            self._kept.append((handle, news))
             self._news.notify()
 
     def _pursue(self, handle: ServerGoalHandle) -> None:
@@ -154,18 +147,17 @@ class TrajectoryAction:
 
     def has_messages(self) -> bool:
         """Returns whether there is something to publish; called within a tick."""
-        return bool(self._feedback or self._outcomes) or self._status_is_due()
+        return bool(self._kept) or self._status_is_due()
 
     def deliver(self) -> None:
-        """Publishes results, the newest feedback and, when it is due, the status."""
+        """Publishes feedback, results and, when it is due, the status."""
         with self._news:
-            feedback, self._feedback = self._feedback, None
-            outcomes, self._outcomes = self._outcomes, []
-        if feedback is not None:
-            handle, sample = feedback
-            handle.publish_feedback(msg.FollowJointTrajectoryFeedback(*_fields(sample)))
-        for handle, outcome in outcomes:
-            _settle(handle, outcome)
+            kept, self._kept = self._kept, []
+        for handle, news in kept:
+            if isinstance(news, GoalOutcome):
+                _settle(handle, news)
+            else:
+                handle.publish_feedback(msg.FollowJointTrajectoryFeedback(*_fields(news)))
         if self._status_is_due():
             self._status_due = self._clock() + STATUS_PERIOD
             self._server.publish_status()
@@ -189,8 +181,7 @@ class TrajectoryAction:
         return self._sim.sim_time if self._sim.deliver_with_steps else time.monotonic()
 
     def _has_news(self) -> bool:
-        news = self._feedback or self._outcomes
-        return self._closing or bool(news and not self._sim.deliver_with_steps)
+        return self._closing or bool(self._kept and not self._sim.deliver_with_steps)
 
 
 class ActionGoal:
@@ -201,10 +192,10 @@ class ActionGoal:
         self._handle = handle
 
     def feedback(self, sample: TrajectorySample) -> None:
-        self._action.note_feedback(self._handle, sample)
+        self._action.note(self._handle, sample)
 
     def finished(self, outcome: GoalOutcome) -> None:
-        self._action.note_outcome(self._handle, outcome)
+        self._action.note(self._handle, outcome)
 
 
 def _settle(handle: ServerGoalHandle, outcome: GoalOutcome) -> None:

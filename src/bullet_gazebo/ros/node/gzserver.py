@@ -183,11 +183,7 @@ class GazeboNode:
 
 
 def _recording(args: argparse.Namespace) -> RecordingOptions | None:
-    """Returns the recording that the command line asks for.
-
-    Raises:
-        RecordingError: if it can't be made.
-    """
+    """Returns the recording that the command line asks for."""
     if not args.video:
         return None
     width, height = args.video_size

@@ -51,11 +51,6 @@ class _Prepared:
     """What a handle stands for."""
 
     def __init__(self, sim: Simulator, addresses: Addresses, request: PrepareStepRequest) -> None:
-        """
-        Raises:
-            ControlError: for a controller or joint that can't be commanded.
-            UnknownName: for a name of nothing in the world.
-        """
         self.addresses = addresses
         self.commanded = addresses.commanded(request.controllers, request.commanded_joints)
         self.reader = StateReader(sim.world, query_of(request))

@@ -19,7 +19,6 @@ from ros_calls.service import ServiceFailed
 
 NONE = "(none)"
 MOST_SHOWN = 50  # models in the list
-MOST_SLIDERS = 64
 REACH = {"revolute": math.pi, "continuous": math.pi, "prismatic": 2.0}  # [rad, m] without stops
 NO_STOP = 1e15
 HANDS_OFF = 2.0  # [s] after somebody moved a slider
@@ -80,7 +79,7 @@ class ModelPanel:
         """Makes sliders for the chosen model."""
         self._chosen = self._choice.value
         model = self._models.get(self._chosen)
-        joints = list(model.joints)[:MOST_SLIDERS] if model is not None else []
+        joints = list(model.joints) if model is not None else []
         self._joints.visible = bool(joints)
         for slider in self._sliders.values():
             slider.remove()

@@ -283,11 +283,7 @@ class SharedWorld:
 
 
 class JointStateReader:
-    """Reads a scene's joints from joint states, whose names may be plain or model::joint.
-
-    Args:
-        scene: the robots.
-    """
+    """Reads a scene's joints from joint states, whose names may be plain or model::joint."""
 
     def __init__(self, scene: Scene) -> None:
         self._wanted = {

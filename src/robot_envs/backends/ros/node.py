@@ -42,11 +42,7 @@ def service_is_registered(name: str) -> bool:
 
 
 def private_parameters(name: str) -> dict[str, Any]:
-    """Returns the private parameters of a node; empty if there are none, or no master.
-
-    Raises:
-        RobotEnvError: see `master_is_up`.
-    """
+    """Returns the private parameters of a node; empty if there are none, or no master."""
     found = _ask_master("getParam", name) if master_is_up() else None
     return found if isinstance(found, dict) else {}
 

@@ -69,12 +69,7 @@ class Journal:
 
 
 def checked(state: WorldState, expected: int) -> WorldState:
-    """Returns a simulator's answer; raises SimulatorFault unless it is of the expected time.
-
-    Args:
-        state: the answer.
-        expected: simulated time since the episode began [ns].
-    """
+    """Returns a simulator's answer; raises SimulatorFault unless it is of that time of the episode [ns]."""
     if round(state.time * NANOSECONDS) != expected:
         raise SimulatorFault(
             f"its time stands at {state.time:.9g} s of the episode, and {expected / NANOSECONDS:.9g} s were "

@@ -47,11 +47,7 @@ _ONLY_JOINTS = "a world in real time gives the joints alone (backend 'ros-realti
 
 
 class JointStates:
-    """Subscribes to a robot's joint states, and keeps the newest.
-
-    Args:
-        scene: of one robot.
-    """
+    """Subscribes to the joint states of a scene's one robot, and keeps the newest."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene

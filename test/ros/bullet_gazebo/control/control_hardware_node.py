@@ -74,14 +74,8 @@ class HardwareTest(SlidesTest):
 
     def test_each_field_of_a_controllers_state(self):
         self.begin()
-        pid = {
-            "p": 20.0,
-            "i": 2.0,
-            "d": 0.25,
-            "i_clamp_min": -2.0,
-            "i_clamp_max": 3.0,
-            "antiwindup": True,
-        }
+        pid = {"p": 20.0, "i": 2.0, "d": 0.25, "i_clamp_min": -2.0, "i_clamp_max": 3.0}
+        pid["antiwindup"] = True
         for name, joint, due in (
             ("effort_position", "effort_a", 21_000_000),
             ("velocity_position", "velocity_a", 51_000_000),
@@ -120,9 +114,9 @@ class HardwareTest(SlidesTest):
         topic.close()
 
     def start_states(self):
-        self.assertTrue(self.load("states"))
+        self.assertTrue(self.manager.load("states"))
         topic = listen("joint_states", JointState)
-        self.assertTrue(self.switch(["states"]))
+        self.assertTrue(self.manager.switch(["states"]))
         return topic
 
     # controllers of users
@@ -131,16 +125,14 @@ class HardwareTest(SlidesTest):
         rospy.set_param(
             "/slides/rude", {"type": "my_controllers/Rude", "joint": "effort_b", "where": where}
         )
-        return self.load("rude")
+        return self.manager.load("rude")
 
     def test_a_controller_that_is_made_wrongly_is_refused_and_leaves_nothing(self):
         self.begin()
         for where in ("create", "nothing", "claimed", "topic"):
             self.assertFalse(self.load_rude(where), where)
-            self.assertEqual(self.listed(), [])
-            topics = [
-                name for name, _ in rosgraph.Master("/test").getPublishedTopics("/slides/rude")
-            ]
+            self.assertEqual(self.manager.listed(), [])
+            topics = rosgraph.Master("/test").getPublishedTopics("/slides/rude")
             self.assertEqual(topics, [], where)
 
     def test_a_controller_that_ends_its_thread_or_reports_nonsense_is_stopped(self):
@@ -149,20 +141,20 @@ class HardwareTest(SlidesTest):
         for where in ("update", "report"):
             self.assertTrue(self.load_rude(where))
             topic = listen("rude/report", rospy.AnyMsg)
-            self.assertTrue(self.switch(["rude"]))
+            self.assertTrue(self.manager.switch(["rude"]))
             joints = self.step(500, effort_position=0.1)
             self.assertEqual(
                 (self.state("rude"), self.state("effort_position")), ("stopped", "running")
             )
             self.assertAlmostEqual(joints["effort_a"][0], 0.1, delta=0.01)
-            self.assertTrue(self.unload("rude"))
+            self.assertTrue(self.manager.unload("rude"))
             topic.close()
 
     def test_a_message_that_cannot_be_sent_silences_nobody(self):
         self.begin()
         self.assertTrue(self.load_rude("content"))
         topic = listen("rude/report", rospy.AnyMsg)
-        self.assertTrue(self.switch(["rude"]))
+        self.assertTrue(self.manager.switch(["rude"]))
         states = self.start_states()
         self.step(200)
         self.assertEqual(self.state("rude"), "running")
@@ -175,7 +167,7 @@ class HardwareTest(SlidesTest):
     def test_a_reader_that_raises_loses_its_message_and_goes_on(self):
         self.begin()
         self.assertTrue(self.load_rude("command"))
-        self.assertTrue(self.switch(["rude"]))
+        self.assertTrue(self.manager.switch(["rude"]))
         command = self.publisher("rude/command", Float64)
         self.publish_until(command, 1.0, lambda joints: joints["effort_b"][2] == 1.0)
         command.publish(-1.0)

@@ -1,19 +1,11 @@
-"""A client of one controller manager, and robots to spawn."""
+"""The cart-pole in a world that stands still, and controllers for it."""
 
 import re
 
 import rospy
-from controller_manager_msgs.srv import (
-    ListControllers,
-    ListControllerTypes,
-    LoadController,
-    ReloadControllerLibraries,
-    SwitchController,
-    UnloadController,
-)
-from support.ros.calls import BOUND, call, delete_model, sim_time, spawn_model
+from support.ros.calls import BOUND, delete_model, sim_time, spawn_model
+from support.ros.manager import Manager
 
-BEST_EFFORT, STRICT = 1, 2
 POSITION = "effort_controllers/JointPositionController"
 WEAK = {"p": 1e-6}  # so weak that the cart stays where it is
 CONTROLLERS = {
@@ -36,37 +28,6 @@ def spawn(name="cartpole", robot_namespace="/", own_namespace=None, y=0.0):
         tag = f"<robotNamespace>{own_namespace}</robotNamespace>"
         xml = PLUGIN.sub(rf"\1>{tag}</plugin>", xml)
     return spawn_model(name, xml, robot_namespace, y)
-
-
-class Manager:
-    """The six services of the manager in a namespace."""
-
-    def __init__(self, namespace=""):
-        self.prefix = f"{namespace}/controller_manager"
-
-    def load(self, name):
-        return call(f"{self.prefix}/load_controller", LoadController, name).ok
-
-    def unload(self, name):
-        return call(f"{self.prefix}/unload_controller", UnloadController, name).ok
-
-    def switch(self, start, stop, strictness, start_asap=False, timeout=0.0):
-        request = (start, stop, strictness, start_asap, timeout)
-        return call(f"{self.prefix}/switch_controller", SwitchController, *request).ok
-
-    def listed(self):
-        return call(f"{self.prefix}/list_controllers", ListControllers).controller
-
-    def states(self):
-        """Name: state, in the order of the list."""
-        return {each.name: each.state for each in self.listed()}
-
-    def types(self):
-        return call(f"{self.prefix}/list_controller_types", ListControllerTypes)
-
-    def reload(self, force_kill):
-        name = f"{self.prefix}/reload_controller_libraries"
-        return call(name, ReloadControllerLibraries, force_kill).ok
 
 
 class PausedRobot:

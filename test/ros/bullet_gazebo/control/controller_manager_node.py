@@ -9,11 +9,11 @@ import unittest
 
 import rospy
 import rostest
-from controller_client import BEST_EFFORT, CONTROLLERS, POSITION, STRICT, WEAK, PausedRobot
-from controller_manager_msgs.srv import ListControllers
+from controller_client import CONTROLLERS, POSITION, WEAK, PausedRobot
 from gazebo_msgs.srv import GetWorldProperties
 from std_msgs.msg import Float64
 from support.ros.calls import BOUND, wait_until
+from support.ros.manager import BEST_EFFORT, STRICT
 
 
 class ControllerManagerTest(PausedRobot, unittest.TestCase):
@@ -124,15 +124,6 @@ class ControllerManagerTest(PausedRobot, unittest.TestCase):
         self.assertEqual(answer.base_classes, bases)
 
     # the services as such
-
-    def test_a_persistent_connection_serves_many_calls(self):
-        rospy.wait_for_service("/controller_manager/list_controllers", BOUND)
-        name = "/controller_manager/list_controllers"
-        proxy = rospy.ServiceProxy(name, ListControllers, persistent=True)
-        self.addCleanup(proxy.close)
-        for expected in ([], ["cart"], ["cart", "pole"]):
-            self.load(*expected[-1:])
-            self.assertEqual([each.name for each in proxy().controller], expected)
 
     def test_clients_at_once_are_all_answered(self):
         self.load("cart", "pole")

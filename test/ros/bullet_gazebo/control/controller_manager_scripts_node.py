@@ -14,20 +14,14 @@ import unittest
 
 import rospy
 import rostest
-from controller_client import STRICT, Manager, spawn
+from controller_client import CONTROLLERS, spawn
 from controller_manager import controller_manager_interface as interface
 from support.ros.calls import BOUND, delete_model, executable
+from support.ros.manager import STRICT, Manager
 
 from bullet_gazebo.ros.clients.manager_commands import group_main
 from bullet_gazebo.ros.clients.manager_commands import main as manager_main
 
-POSITION = "effort_controllers/JointPositionController"
-CONTROLLERS = {
-    "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 100.0},
-    "cart": {"type": POSITION, "joint": "stand_cart", "pid": {"p": 1.0}},
-    "cart2": {"type": POSITION, "joint": "stand_cart", "pid": {"p": 1.0}},
-    "pole": {"type": POSITION, "joint": "cart_pole", "pid": {"p": 1.0}},
-}
 GROUPS = {"upper": ["pole"], "lower": ["cart", "pole"], "other": ["cart2", "pole"], "empty": []}
 NONE = "No controllers are loaded in mechanism control\n"
 PATIENCE = 30.0  # [s] that the scripts wait for a manager

@@ -5,7 +5,7 @@ import unittest
 
 import rospy
 import rostest
-from controller_client import BEST_EFFORT, STRICT, Manager, spawn
+from controller_client import spawn
 from controller_manager_msgs.utils import (
     ControllerLister,
     ControllerManagerLister,
@@ -17,6 +17,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
 from support.ros.calls import BOUND, call, delete_model, wait_until
+from support.ros.manager import BEST_EFFORT, STRICT, Manager
 from support.ros.subscribed import Listener
 
 CONTROLLERS = {
@@ -42,9 +43,7 @@ class RobotsTest(unittest.TestCase):
         for name, params in CONTROLLERS.items():
             rospy.set_param(f"{namespace}/{name}", params)
         manager = Manager(namespace)
-        for name in CONTROLLERS:
-            self.assertTrue(manager.load(name), name)
-        self.assertTrue(manager.switch(list(CONTROLLERS), [], STRICT))
+        self.assertTrue(manager.start(*CONTROLLERS))
         return manager
 
     def joints(self, topic="/joint_states"):
@@ -72,9 +71,8 @@ class RobotsTest(unittest.TestCase):
         self.joints("/mine/joint_states")
 
     def test_two_robots_do_not_mix(self):
-        for place, name in enumerate(
-            ("first", "second")
-        ):  # side by side: they would push each other
+        # Side by side: they would push each other.
+        for place, name in enumerate(("first", "second")):
             self.assertTrue(spawn(name, robot_namespace=f"/{name}", y=float(place)).success)
         first, second = self.start("/first"), self.start("/second")
         self.command("/first/cart/command", 0.4)

@@ -9,10 +9,11 @@ import unittest
 import rospy
 import rostest
 from control_msgs.msg import JointControllerState
-from controller_client import BEST_EFFORT, CONTROLLERS, STRICT, PausedRobot
+from controller_client import CONTROLLERS, PausedRobot
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
 from support.ros.calls import BOUND, sim_time, wait_until
+from support.ros.manager import BEST_EFFORT, STRICT
 
 # start, stop, ok if strict, states after it, ok if loose, states after it; `cart` runs before
 SWITCHES = {

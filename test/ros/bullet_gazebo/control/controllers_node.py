@@ -8,7 +8,6 @@ import math
 
 import rospy
 import rostest
-from control_msgs.msg import JointControllerState
 from geometry_msgs.msg import Vector3
 from sensor_msgs.msg import JointState
 from slides_client import SlidesTest, listen
@@ -30,7 +29,7 @@ TYPES = {
 
 class ControllersTest(SlidesTest):
     def test_the_types_are_those_of_the_table(self):
-        self.assertLessEqual(TYPES, set(self.types()))
+        self.assertLessEqual(TYPES, set(self.manager.types().types))
 
     def test_effort_joint(self):
         self.run_controllers("effort_joint")
@@ -39,37 +38,20 @@ class ControllersTest(SlidesTest):
         self.assertAlmostEqual(velocity, 0.2, places=6)
         self.assertAlmostEqual(position, 0.5 * 2.0 * 0.1**2, delta=2e-4)
         self.assertEqual(effort, 2.0)
-        self.assertTrue(self.switch(stop=["effort_joint"]))
+        self.assertTrue(self.manager.switch(stop=["effort_joint"]))
         self.assertAlmostEqual(self.step(100)["effort_a"][1], 0.4, places=6)  # it stays latched
 
     def test_effort_joint_takes_its_command_from_the_topic_once_it_runs(self):
-        self.assertTrue(self.load("effort_joint"))
+        self.assertTrue(self.manager.load("effort_joint"))
         command = self.publisher(
             "effort_joint/command", Float64
         )  # there is a subscriber from load on
         command.publish(9.0)
-        self.assertTrue(self.switch(["effort_joint"]))
+        self.assertTrue(self.manager.switch(["effort_joint"]))
         command.publish(1e9)
         self.assertTrue(wait_until(lambda: self.step(1)["effort_a"][2] == 50.0))  # the URDF's limit
         self.publish_until(command, 3.0, lambda joints: joints["effort_a"][2] == 3.0)
         self.publish_until(command, math.nan, lambda joints: joints["effort_a"][2] == 0.0)
-
-    def test_effort_position_with_its_state_topic(self):
-        self.run_controllers("effort_position")
-        topic = listen("effort_position/state", JointControllerState)
-        joints = self.step(1000, effort_position=0.3)
-        self.assertAlmostEqual(joints["effort_a"][0], 0.3, places=3)
-        self.assertTrue(
-            topic.wait_for(lambda got: got and got[-1].header.stamp.to_nsec() == 991_000_000)
-        )
-        state = topic.messages[-1]
-        self.assertEqual(
-            (state.set_point, state.time_step, state.p, state.d), (0.3, 0.001, 400.0, 40.0)
-        )
-        self.assertAlmostEqual(state.error, state.set_point - state.process_value, places=12)
-        self.step(20, effort_position=9.0)  # beyond the rail's end
-        self.assertTrue(topic.wait_for(lambda got: got[-1].set_point == 5.0))
-        topic.close()
 
     def test_groups_take_their_joints_in_the_order_of_the_parameter(self):
         for name, wanted in (
@@ -93,9 +75,9 @@ class ControllersTest(SlidesTest):
             )
 
     def test_joint_states_list_all_joints_alphabetically_at_the_rate(self):
-        self.assertTrue(self.load("states"))
+        self.assertTrue(self.manager.load("states"))
         topic = listen("joint_states", JointState)
-        self.assertTrue(self.switch(["states"]))
+        self.assertTrue(self.manager.switch(["states"]))
         self.step(2)  # the queue holds four: one message at a time
         for count in range(1, 7):  # beyond real time topics are thinned
             self.assertTrue(topic.wait_for(lambda got, count=count: len(got) >= count))
@@ -107,9 +89,9 @@ class ControllersTest(SlidesTest):
         topic.close()
 
     def test_joint_states_of_some_joints_and_of_extra_ones(self):
-        self.assertTrue(self.load("some_states"))
+        self.assertTrue(self.manager.load("some_states"))
         topic = listen("joint_states", JointState)
-        self.assertTrue(self.switch(["some_states"]))
+        self.assertTrue(self.manager.switch(["some_states"]))
         self.step(2)
         self.assertTrue(topic.wait_for(len))
         message = topic.messages[0]
@@ -129,21 +111,23 @@ class ControllersTest(SlidesTest):
             self.assertEqual(joints["effort_a"], (0.0, 0.0, 0.0))  # no kick
 
     def test_what_cannot_be_loaded(self):
-        before = self.types()
+        before = self.manager.types().types
         for name in ("no_joint", "wrong_interface", "no_gains", "nan_gains", "empty_group", "twice",
                      "text_group", "no_class", "broken"):  # fmt: skip
-            self.assertFalse(self.load(name), name)
-        self.assertEqual(len(self.listed()), 0)
-        self.assertEqual(self.types(), before)
+            self.assertFalse(self.manager.load(name), name)
+        self.assertEqual(len(self.manager.listed()), 0)
+        self.assertEqual(self.manager.types().types, before)
         self.run_controllers("position_joint")  # the manager goes on
 
     def test_a_users_own_controller(self):
         self.run_controllers("spring")
         stretch = listen("spring/stretch", Vector3)
         joints = self.step(100, spring=0.1)
-        self.assertIn("my_controllers/Spring", self.types())
-        self.assertEqual(self.listed()[0].type, "my_controllers/Spring")
-        self.assertEqual(list(self.listed()[0].claimed_resources[0].resources), ["effort_b"])
+        self.assertIn("my_controllers/Spring", self.manager.types().types)
+        self.assertEqual(self.manager.listed()[0].type, "my_controllers/Spring")
+        self.assertEqual(
+            list(self.manager.listed()[0].claimed_resources[0].resources), ["effort_b"]
+        )
         angle = math.sqrt(30.0) * 0.1  # an oscillator of 1 kg
         self.assertAlmostEqual(joints["effort_b"][0], 0.1 * (1.0 - math.cos(angle)), delta=3e-4)
         self.assertTrue(stretch.wait_for(len))

@@ -41,7 +41,7 @@ class GainsTest(SlidesTest):
         state.close()
 
     def test_gains_are_written_to_the_parameter_server_at_load(self):
-        self.assertTrue(self.load("effort_position"))
+        self.assertTrue(self.manager.load("effort_position"))
         self.assertLessEqual(set(NAMES), set(rospy.get_param(PID)))
         self.assertEqual(rospy.get_param(f"{PID}/i_clamp_max"), 0.0)
 
@@ -89,7 +89,7 @@ class GainsTest(SlidesTest):
         self.assertTrue(math.isfinite(self.step(10, effort_position=0.1)["effort_a"][0]))
 
     def test_the_descriptions_name_the_six_parameters(self):
-        self.assertTrue(self.load("effort_position"))
+        self.assertTrue(self.manager.load("effort_position"))
         topic = listen("effort_position/pid/parameter_descriptions", ConfigDescription)
         self.assertTrue(topic.wait_for(len))
         description = topic.messages[0]
@@ -119,11 +119,11 @@ class GainsTest(SlidesTest):
     def test_they_go_with_the_controller(self):
         service = f"{PID}/set_parameters"
         for _ in range(2):
-            self.assertTrue(self.load("effort_position"))
+            self.assertTrue(self.manager.load("effort_position"))
             rospy.wait_for_service(service, 60.0)
             kept = rospy.ServiceProxy(service, Reconfigure, persistent=True)
             kept(ReconfigureRequest())
-            self.assertTrue(self.unload("effort_position"))
+            self.assertTrue(self.manager.unload("effort_position"))
             with self.assertRaisesRegex(rospy.ServiceException, "the parameters are gone"):
                 kept(ReconfigureRequest())
             kept.close()

@@ -4,19 +4,10 @@ import unittest
 
 import rospy
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
-from controller_manager_msgs.srv import (
-    ListControllers,
-    ListControllerTypes,
-    LoadController,
-    SwitchController,
-    UnloadController,
-)
 from std_srvs.srv import Empty
 from support.ros.calls import call, delete_model, spawn_model, wait_until
+from support.ros.manager import Manager
 from support.ros.subscribed import Listener
-
-STRICT = 2
-MANAGER = "/slides/controller_manager/"
 
 
 def listen(name, kind):
@@ -26,6 +17,8 @@ def listen(name, kind):
 
 class SlidesTest(unittest.TestCase):
     """Spawns the robot for each test."""
+
+    manager = Manager("/slides")
 
     def setUp(self):
         self.publishers = []
@@ -44,30 +37,11 @@ class SlidesTest(unittest.TestCase):
     def delete(self):
         delete_model("slides")
 
-    def load(self, name):
-        return call(MANAGER + "load_controller", LoadController, name).ok
-
-    def unload(self, name):
-        return call(MANAGER + "unload_controller", UnloadController, name).ok
-
-    def switch(self, start=(), stop=(), strictness=STRICT):
-        return call(
-            MANAGER + "switch_controller", SwitchController, start, stop, strictness, False, 0.0
-        ).ok
-
     def run_controllers(self, *names):
-        for name in names:
-            self.assertTrue(self.load(name), name)
-        self.assertTrue(self.switch(names))
-
-    def listed(self):
-        return call(MANAGER + "list_controllers", ListControllers).controller
-
-    def types(self):
-        return call(MANAGER + "list_controller_types", ListControllerTypes).types
+        self.assertTrue(self.manager.start(*names), names)
 
     def state(self, name):
-        return {each.name: each.state for each in self.listed()}[name]
+        return self.manager.states()[name]
 
     def step(self, ticks, **commands):
         """Lets time pass; returns {joint: (position, velocity, effort)}."""
@@ -77,13 +51,8 @@ class SlidesTest(unittest.TestCase):
         answer = call("/gazebo/step_world", StepWorld, request)
         self.assertTrue(answer.success, answer.status_message)
         states = answer.joint_states
-        return dict(
-            zip(
-                states.name,
-                zip(states.position, states.velocity, states.effort, strict=True),
-                strict=True,
-            )
-        )
+        found = zip(states.position, states.velocity, states.effort, strict=True)
+        return dict(zip(states.name, found, strict=True))
 
     def publisher(self, topic, kind):
         """A publisher that has found its subscriber."""

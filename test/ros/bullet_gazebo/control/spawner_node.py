@@ -11,10 +11,11 @@ from pathlib import Path
 
 import rospy
 import rostest
-from controller_client import STRICT, Manager, spawn
+from controller_client import spawn
 from std_msgs.msg import Bool
 from std_srvs.srv import Empty
 from support.ros.calls import BOUND, call, delete_model, executable, wait_until
+from support.ros.manager import STRICT, Manager
 
 LAUNCH = """
 <launch>

@@ -11,10 +11,10 @@ import rostest
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 from control_msgs.msg import JointTolerance
 from control_msgs.srv import QueryTrajectoryState
-from controller_client import STRICT, Manager
 from gazebo_msgs.srv import GetJointProperties
 from std_srvs.srv import Empty
 from support.ros.calls import BOUND, call, delete_model, spawn_model, wait_until
+from support.ros.manager import STRICT, Manager
 from trajectory_client import Arm, trajectory
 
 EFFORT = ["effort_a", "effort_b"]
@@ -110,12 +110,8 @@ class TrajectoryTest(unittest.TestCase):
         unpause()
         tolerance = [JointTolerance(name="effort_a", position=1e-9)]
         plan = trajectory(EFFORT, (0.1, [7.0, 0.0]))  # the rail ends at 5 m
-        self.check(
-            arm.pursue(plan, goal=tolerance, goal_time=0.1),
-            "ABORTED",
-            "GOAL",
-            "effort_a goal error",
-        )
+        pursuit = arm.pursue(plan, goal=tolerance, goal_time=0.1)
+        self.check(pursuit, "ABORTED", "GOAL", "effort_a goal error")
 
     def test_wrong_joints(self):
         arm = self.arm()
@@ -184,8 +180,6 @@ class TrajectoryTest(unittest.TestCase):
         self.check(pursuit, "PREEMPTED", "SUCCEEDED", "command topic")
         self.assertTrue(arm.wait_state(lambda state: state.desired.positions == (0.1, -0.2)))
 
-    # state, query
-
     # pause, reset, unload
 
     def test_a_goal_sent_while_paused_begins_with_time(self):
@@ -248,13 +242,7 @@ class TrajectoryTest(unittest.TestCase):
                 self.arms.remove(arm)
                 arm.close()
                 self.assertTrue(wait_until(lambda: not topics_below("/slides/effort_arm")))
-                self.assertFalse(
-                    [
-                        s
-                        for s in rosnode.get_node_info_description("/gazebo").split()
-                        if "effort_arm" in s
-                    ]
-                )
+                self.assertNotIn("effort_arm", rosnode.get_node_info_description("/gazebo"))
                 pause()
 
     def test_stopping_ends_the_goal_and_starting_begins_where_the_joints_are(self):

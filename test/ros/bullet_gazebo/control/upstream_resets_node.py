@@ -23,7 +23,7 @@ class UpstreamResetsTest(SlidesTest):
     def test_a_latched_effort_survives_a_reset(self):
         self.run_controllers("effort_joint")
         self.step(10, effort_joint=2.0)
-        self.assertTrue(self.switch(stop=["effort_joint"]))
+        self.assertTrue(self.manager.switch(stop=["effort_joint"]))
         call("/gazebo/reset_simulation", Empty)
         self.assertAlmostEqual(self.step(100)["effort_a"][1], 0.2, places=6)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Gazebo's interface on MuJoCo: spawn, control, reset, place, step, delete; and the error without MuJoCo."""
+"""Gazebo's interface on MuJoCo: spawn, control, reset, place, step; and the error without MuJoCo."""
 
 import importlib.util
 import subprocess
@@ -10,17 +10,11 @@ import unittest
 import rospy
 import rostest
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
-from controller_manager_msgs.srv import LoadController, SwitchController
-from gazebo_msgs.srv import (
-    DeleteModel,
-    GetLinkState,
-    SetModelConfiguration,
-    SpawnModel,
-    SpawnModelRequest,
-)
+from gazebo_msgs.srv import GetLinkState, SetModelConfiguration
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
-from support.ros.calls import BOUND, call
+from support.ros.calls import BOUND, call, delete_model, spawn_model
+from support.ros.manager import Manager
 from support.ros.subscribed import wait_until_heard
 
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"
@@ -33,31 +27,18 @@ sys.exit(main(["gzserver", "-e", "mujoco", "__name:=lonely"]))
 """
 
 
-def spawn(name):
-    request = SpawnModelRequest(
-        model_name=name, model_xml=rospy.get_param("/robot_description"), robot_namespace="/"
-    )
-    return call("/gazebo/spawn_urdf_model", SpawnModel, request)
-
-
-def step(ticks, controllers=(), commands=(), **more):
-    request = StepWorldRequest(ticks=ticks, controllers=controllers, commands=commands, **more)
+def step(ticks, controllers=(), commands=()):
+    request = StepWorldRequest(ticks=ticks, controllers=controllers, commands=commands)
     return call("/gazebo/step_world", StepWorld, request)
 
 
 @unittest.skipIf(importlib.util.find_spec("mujoco") is None, "mujoco is not installed")
 class MujocoTest(unittest.TestCase):
     def setUp(self):
-        self.assertTrue(spawn("cartpole").success)
-        for name in (STATES, CART):
-            self.assertTrue(call("/controller_manager/load_controller", LoadController, name).ok)
-        answer = call("/controller_manager/switch_controller", SwitchController,
-                      [STATES, CART], [], 2, False, 0.0)  # fmt: skip
-        self.assertTrue(answer.ok)
+        self.assertTrue(spawn_model("cartpole", rospy.get_param("/robot_description")).success)
+        self.addCleanup(delete_model)
+        self.assertTrue(Manager().start(STATES, CART))
         call("/gazebo/reset_simulation", Empty)
-
-    def tearDown(self):
-        call("/gazebo/delete_model", DeleteModel, "cartpole")
 
     def test_it_is_mujoco_that_runs(self):
         """PyBullet would tell the pole's height in single precision."""
@@ -70,16 +51,6 @@ class MujocoTest(unittest.TestCase):
         self.assertAlmostEqual(answer.sim_time, 1.0, places=9)
         self.assertEqual(answer.joint_states.name, ["cart_pole", "stand_cart"])
         self.assertLess(abs(answer.joint_states.position[1] - 0.1), 0.05)
-
-    def test_an_episode_begins_where_it_is_told_and_goes_alike(self):
-        runs = []
-        for before in (0, 77):
-            step(1 + before, [CART], [0.2])
-            place = {"joints": ["cart_pole", "stand_cart"], "positions": [0.1, 0.05]}
-            run = [step(8, [CART], [0.07], reset=StepWorldRequest.WORLD, **place).joint_states]
-            run += [step(8, [CART], [0.01 * index]).joint_states for index in range(20)]
-            runs.append([(state.position, state.velocity, state.effort) for state in run])
-        self.assertEqual(runs[0], runs[1])
 
     def test_set_model_configuration_publishes_joint_states_and_a_reset_takes_it_back(self):
         moved = threading.Event()
@@ -96,15 +67,6 @@ class MujocoTest(unittest.TestCase):
         answer = step(1)
         self.assertAlmostEqual(answer.sim_time, 0.001, places=9)
         self.assertEqual(answer.joint_states.position, (0.0, 0.0))
-
-    def test_another_robot_comes_and_goes_without_a_trace(self):
-        place = {"joints": ["cart_pole", "stand_cart"], "positions": [0.1, 0.0]}
-        step(0, reset=StepWorldRequest.WORLD, **place)
-        self.assertTrue(spawn("second").success)
-        self.assertTrue(call("/gazebo/delete_model", DeleteModel, "second").success)
-        alone = step(50).joint_states
-        self.assertEqual(step(50, reset=StepWorldRequest.WORLD, **place).joint_states.position,
-                         alone.position)  # fmt: skip
 
     def test_without_it_the_simulator_says_how_to_get_it_and_ends(self):
         ended = subprocess.run(

@@ -7,17 +7,13 @@ import unittest
 import rospy
 import rosservice
 import rostest
-from controller_manager_msgs.srv import LoadController, SwitchController
 from gazebo_msgs.msg import ModelStates
-from gazebo_msgs.srv import (
-    GetPhysicsProperties,
-    GetWorldProperties,
-    SetPhysicsProperties,
-)
+from gazebo_msgs.srv import GetPhysicsProperties, SetPhysicsProperties
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
-from support.ros.calls import call, spawn_model
+from support.ros.calls import call, sim_time, spawn_model
+from support.ros.manager import Manager
 from support.ros.subscribed import Listener
 
 from ros_utils import ros_gazebo
@@ -32,19 +28,14 @@ class ThinningTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         assert spawn_model("cartpole", rospy.get_param("/robot_description")).success
-        name = "joint_state_controller"
-        assert call("/controller_manager/load_controller", LoadController, name).ok
-        assert call(
-            "/controller_manager/switch_controller", SwitchController, [name], [], 2, False, 0.0
-        ).ok
+        assert Manager().start("joint_state_controller")
         cls.clock = Listener("/clock", Clock, False, lambda m: m.clock.to_nsec())
         cls.joints = Listener(
             "/joint_states", JointState, False, lambda m: m.header.stamp.to_nsec()
         )
         cls.models = Listener("/gazebo/model_states", ModelStates, False, lambda m: len(m.name))
-        assert ros_gazebo.gazebo_step_physics(
-            1
-        )  # all three have found their publisher when it shows
+        # All three have found their publisher when it shows.
+        assert ros_gazebo.gazebo_step_physics(1)
         while not (cls.clock.messages and cls.joints.messages and cls.models.messages):
             assert ros_gazebo.gazebo_step_physics(1)
 
@@ -64,7 +55,7 @@ class ThinningTest(unittest.TestCase):
         self.assertTrue(answer.success, answer.status_message)
 
     def time(self):
-        return round(call("/gazebo/get_world_properties", GetWorldProperties).sim_time * 1e9)
+        return round(sim_time() * 1e9)
 
     def assert_last_is(self, time):
         for topic in (self.clock, self.joints):
@@ -85,25 +76,6 @@ class ThinningTest(unittest.TestCase):
             seen = self.run_until(self.time() + 1000 * MILLISECOND)
             # At most one in each millisecond of the wall's, and the one before the pause.
             self.assertLessEqual(len(seen), (time.monotonic() - start) * 1000 + 2)
-
-    def test_a_change_of_the_rate_at_run_time_counts_at_once(self):
-        self.set_rate(UNLIMITED)
-        call("/gazebo/unpause_physics", Empty)
-        self.assertTrue(self.clock.wait_for(lambda got: got[-1] > 100 * MILLISECOND))
-        self.set_rate(REAL_TIME)
-        begin = self.time()
-        # Queues are short, so a machine that is late may lose some; a stretch of all of them comes soon.
-        stretch = range(0, 100 * MILLISECOND, MILLISECOND)
-        self.assertTrue(
-            self.joints.wait_for(
-                lambda got: (
-                    got[-1] > begin + stretch[-1]
-                    and [stamp - got[-100] for stamp in got[-100:]] == list(stretch)
-                )
-            )
-        )
-        call("/gazebo/pause_physics", Empty)
-        self.assert_last_is(self.time())
 
     def test_steps_of_gz_world_end_with_their_last_message(self):
         for ticks in (1, 2, 3, 500):

@@ -2,7 +2,6 @@
 """A node that roslaunch starts finds ROS, PyPI's packages and ours."""
 
 import importlib
-import os
 import unittest
 
 import rospy
@@ -25,9 +24,6 @@ class Workspace(unittest.TestCase):
         ):
             with self.subTest(name):
                 importlib.import_module(name)
-
-    def test_loopback(self):
-        self.assertTrue(os.environ["ROS_IP"].startswith("127."))
 
     def test_master(self):
         publisher = rospy.Publisher("said", String, queue_size=1, latch=True)

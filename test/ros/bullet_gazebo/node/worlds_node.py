@@ -13,7 +13,6 @@ import unittest
 import rospy
 import rostest
 from gazebo_msgs.srv import (
-    ApplyBodyWrench,
     DeleteLight,
     DeleteModel,
     GetLinkState,
@@ -24,7 +23,7 @@ from gazebo_msgs.srv import (
     SpawnModel,
     SpawnModelRequest,
 )
-from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
+from geometry_msgs.msg import Point, Pose, Quaternion
 from support.ros.calls import BOUND, call
 
 from ros_utils import ros_gazebo
@@ -124,16 +123,10 @@ class Spawning(unittest.TestCase):
             (True, "SpawnModel: Successfully spawned entity"),
         )
 
-    def test_an_sdf_box_falls_and_rests(self):
-        self.spawned("sdf_box", BOX.format(more=""), initial_pose=at(5.0, 0.0, 0.5))
-        self.assertAlmostEqual(resting_height("sdf_box"), 0.1, delta=0.005)
-        found = call("/gazebo/get_model_properties", GetModelProperties, "sdf_box")
-        self.assertEqual((found.body_names, found.geom_names), (["body"], ["shell"]))
-
     def test_an_sdf_robot_has_its_names_and_stands(self):
         self.spawned("sdf_robot", ROBOT, initial_pose=at(0.0, 5.0, 0.2), robot_namespace="/arm")
         found = call("/gazebo/get_model_properties", GetModelProperties, "sdf_robot")
-        self.assertEqual(found.body_names, ["base", "arm"])
+        self.assertEqual((found.body_names, found.geom_names), (["base", "arm"], ["c1"]))
         self.assertEqual(found.joint_names, ["shoulder"])
         self.assertAlmostEqual(resting_height("sdf_robot"), 0.1, delta=0.01)
 
@@ -154,29 +147,6 @@ class Spawning(unittest.TestCase):
         self.spawned("urdf", URDF, initial_pose=at(-5.0, 0.0, 1.0))
         found = call("/gazebo/get_model_properties", GetModelProperties, "urdf")
         self.assertEqual(found.geom_names, ["a_collision", "a_fixed_joint_lump__b_collision_1"])
-
-    def test_a_lumped_caster_slides(self):
-        """Pushed over the edge of sticking: with its own friction of 0 it goes off at once."""
-        ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
-        moment = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-        xml = (
-            f'<robot name="r"><link name="a"><inertial><mass value="1"/>{moment}</inertial><collision>'
-            '<geometry><box size="0.1 0.1 0.02"/></geometry></collision></link>'
-            f'<link name="c"><inertial><mass value="0.1"/>{moment}</inertial>{ball}</link>'
-            '<joint name="j" type="fixed"><parent link="a"/><child link="c"/></joint>'
-            '<gazebo reference="c"><mu1>0</mu1><mu2>0</mu2></gazebo></robot>'
-        )
-        self.spawned("puck", xml, initial_pose=at(0.0, 30.0, 0.1), service="urdf")
-        push = Wrench(force=Vector3(0.55, 0.0, 0.0))
-        always = rospy.Duration(-1)
-        call("/gazebo/apply_body_wrench", ApplyBodyWrench, "puck::a", "", Point(), push,
-             rospy.Time(), always)  # fmt: skip
-        deadline = time.monotonic() + BOUND
-        while position("puck").x < 0.2:
-            self.assertLess(time.monotonic(), deadline, "it sticks")
-            time.sleep(0.1)
-        found = call("/gazebo/get_model_properties", GetModelProperties, "puck")
-        self.assertEqual((found.body_names, found.joint_names), (["a"], []))
 
     def test_thousands_of_faults_are_a_few_lines(self):
         """Each would be a line in the log, and the spawn would take minutes."""

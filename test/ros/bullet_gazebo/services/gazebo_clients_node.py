@@ -63,12 +63,8 @@ class ClientsTest(unittest.TestCase):
             self.assertTrue(done.wait(BOUND), "services don't answer any more")
 
     def test_a_request_that_cannot_be_read_ends_the_connection(self):
-        fields = (
-            b"callerid=/raw",
-            b"md5sum=*",
-            b"service=/gazebo/get_model_state",
-            b"persistent=1",
-        )
+        service = b"service=/gazebo/get_model_state"
+        fields = (b"callerid=/raw", b"md5sum=*", service, b"persistent=1")
         with connect("get_model_state") as client:
             client.sendall(packed(b"".join(packed(field) for field in fields)))
             (length,) = struct.unpack("<I", client.recv(4, socket.MSG_WAITALL))

@@ -73,14 +73,6 @@ class ForcesTest(GazeboTest):
             "ApplyBodyWrench: wrench.force.x is nan", "apply_body_wrench", "body", "box", *rest
         )
 
-    def test_a_deleted_model_takes_its_forces_along(self):
-        wrench = Wrench(force=Vector3(x=5.0))
-        call("apply_body_wrench", "body", "", Point(), wrench, rospy.Time(), rospy.Duration(-1))
-        call("delete_model", "box")
-        spawn("box", BOX, (3.0, 0.0, 20.0))
-        run(0.05)
-        self.assertEqual(self.box().twist.linear.x, 0.0)
-
     def without_gravity(self):
         call("set_physics_properties", physics(gravity=Vector3()))
         self.addCleanup(call, "set_physics_properties", physics())
@@ -108,18 +100,6 @@ class ForcesTest(GazeboTest):
         self.close([(found.linear.y, 0.001 / 2.0 * 0.01), (found.angular.x, 0.02 / 0.1 * 0.01),
                     (found.angular.z, -0.003 / 0.1 * 0.01)], places=5)  # fmt: skip
 
-    def test_efforts_add_up(self):
-        self.without_gravity()
-        rates = []
-        for efforts in ((0.1,), (0.04, 0.06)):
-            call("set_model_configuration", "cartpole", "", ["stand_cart", "cart_pole"], [0.0, 0.0])
-            for effort in efforts:
-                call("apply_joint_effort", "cart_pole", effort, rospy.Time(), rospy.Duration(0.02))
-            run(0.03)
-            rates.append(self.joint("cart_pole")[1])
-        self.assertGreater(rates[0], 0.01)
-        self.assertAlmostEqual(rates[0], rates[1], delta=0.01 * rates[0])
-
     def test_resets_keep_what_is_applied(self):
         self.without_gravity()
         self.push((2.0, 0, 0), duration=-1.0)
@@ -131,13 +111,17 @@ class ForcesTest(GazeboTest):
         self.assertEqual(self.box().twist.linear.x, 0.0)
         call("clear_body_wrenches", "box::body")
 
-    def test_a_deleted_model_takes_the_efforts_of_others_on_joints_of_the_same_names_along(self):
+    def test_a_deleted_model_takes_its_forces_and_the_efforts_on_joints_of_its_names_along(self):
         self.without_gravity()
+        self.push((5.0, 0, 0), duration=-1.0)
+        call("delete_model", "box")
+        spawn("box", BOX, (3.0, 0.0, 20.0))
         self.add("twin", rospy.get_param("/robot_description"), (0.0, 5.0, 0.0), "/twin")
         call("apply_joint_effort", "cartpole::cart_pole", 0.1, rospy.Time(), rospy.Duration(-1))
         call("delete_model", "twin")
         run(0.02)
         self.assertEqual(self.joint("cartpole::cart_pole")[1], 0.0)
+        self.assertEqual(self.box().twist.linear.x, 0.0)
 
 
 if __name__ == "__main__":

@@ -117,6 +117,8 @@ class JointsTest(GazeboTest):
             topic.unregister()
         self.assertEqual(first[Clock].clock.to_nsec(), 1_000_000)
         states = first[LinkStates]
+        links = ["ground_plane::link", "cartpole::stand", "cartpole::cart", "cartpole::pole"]
+        self.assertEqual(states.name, [*links, "box::body"])
         self.assertEqual(len(states.name), len(states.pose))
         box = states.name.index("box::body")
         self.assertEqual((states.pose[box].position.z, states.twist[box].linear.z), (20.0, 0.0))

@@ -78,15 +78,11 @@ class LinksTest(GazeboTest):
         pose = Pose(position=Point(1.0, 0, 1.0))
         self.assertTrue(call("set_link_state", LinkState("body", pose, Twist(), "stand")).success)
         self.assertEqual(self.box().pose.position, Point(1.0, 0, 1.0))
-        self.fails(
-            "SetLinkState: link does not exist",
-            "set_link_state",
-            LinkState("box", pose, Twist(), ""),
-        )
+        state = LinkState("box", pose, Twist(), "")
+        self.fails("SetLinkState: link does not exist", "set_link_state", state)
         for frame in ("cartpole", "nowhere", "body_collision"):
-            self.fails(
-                "SetLinkState: failed", "set_link_state", LinkState("body", pose, Twist(), frame)
-            )
+            state = LinkState("body", pose, Twist(), frame)
+            self.fails("SetLinkState: failed", "set_link_state", state)
         twist = Twist(angular=Vector3(y=NAN))
         self.refuses("angular.y is nan", "set_link_state", LinkState("body", pose, twist, ""))
 
@@ -96,12 +92,8 @@ class LinksTest(GazeboTest):
         self.assertAlmostEqual(self.box().twist.linear.x, -0.5, places=6)
 
     def test_link_state_in_other_frames(self):
-        for frame, z in (
-            ("cartpole", 0.18),
-            ("/map", 0.18),
-            ("cartpole::cart", 0.03),
-            ("pole", 0.0),
-        ):
+        heights = {"cartpole": 0.18, "/map": 0.18, "cartpole::cart": 0.03, "pole": 0.0}
+        for frame, z in heights.items():
             found = call("get_link_state", "cartpole::pole", frame).link_state
             self.assertAlmostEqual(found.pose.position.z, z, places=6)
             self.assertEqual((found.link_name, found.reference_frame), ("cartpole::pole", frame))

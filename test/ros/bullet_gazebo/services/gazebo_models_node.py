@@ -83,16 +83,10 @@ class ModelsTest(GazeboTest):
 
     def test_a_plain_name_is_the_first_ones(self):
         self.add("twin", BOX, (5.0, 0.0, 20.0))
-        for name, x in (
-            ("body", 3.0),
-            ("box::body", 3.0),
-            ("twin::body", 5.0),
-            ("body_collision", None),
-        ):
+        for name, x in {"body": 3.0, "box::body": 3.0, "twin::body": 5.0}.items():
             found = call("get_link_state", name, "world")
-            self.assertEqual(
-                (found.success, x and found.link_state.pose.position.x), (x is not None, x)
-            )
+            self.assertEqual((found.success, found.link_state.pose.position.x), (True, x))
+        self.assertFalse(call("get_link_state", "body_collision", "world").success)
 
     def test_a_model_named_as_an_earlier_link_is_not_found(self):
         self.add("cart", BOX, (5.0, 0.0, 20.0))
@@ -109,18 +103,13 @@ class ModelsTest(GazeboTest):
     def test_model_state_in_the_frame_of_a_model_link_or_collision(self):
         turned = Pose(Point(1, 0, 20), Quaternion(0, 0, math.sqrt(0.5), math.sqrt(0.5)))
         self.add("frame", BOX)
-        call(
-            "set_model_state",
-            ModelState("frame", turned, Twist(Vector3(0, 1, 0), Vector3(0, 0, 2)), ""),
-        )
-        call(
-            "set_model_state",
-            ModelState("box", self.box().pose, Twist(linear=Vector3(5, 0, 0)), ""),
-        )
+        twist = Twist(Vector3(0, 1, 0), Vector3(0, 0, 2))
+        call("set_model_state", ModelState("frame", turned, twist, ""))
+        twist = Twist(linear=Vector3(5, 0, 0))
+        call("set_model_state", ModelState("box", self.box().pose, twist, ""))
         for name in ("frame", "frame::body", "frame::body::body_collision"):
-            found = self.box(
-                name
-            )  # 2 m before it along the world's x, its y; no ω × r in the twist
+            found = self.box(name)
+            # 2 m before it along the world's x, its y; no ω × r in the twist
             self.close([(found.pose.position.x, 0.0), (found.pose.position.y, -2.0),
                         (found.pose.orientation.z, -math.sqrt(0.5)), (found.twist.linear.x, -1.0),
                         (found.twist.linear.y, -5.0), (found.twist.angular.z, -2.0)])  # fmt: skip

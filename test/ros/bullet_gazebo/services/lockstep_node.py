@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The step service: exact ticks, repeatable bits, refusals."""
+"""The step service: exact ticks, repeatable bits, several clients."""
 
 import threading
 import unittest
@@ -7,13 +7,13 @@ import unittest
 import rospy
 import rostest
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
-from controller_manager_msgs.srv import LoadController, SwitchController
-from gazebo_msgs.srv import GetWorldProperties, SpawnModel, SpawnModelRequest
+from gazebo_msgs.srv import GetWorldProperties
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty
+from support.ros.calls import BOUND, spawn_model
+from support.ros.manager import Manager
 from support.ros.subscribed import wait_until_heard
 
-BOUND = 60.0  # [s of wall time]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"
 
 
@@ -26,13 +26,8 @@ class LockstepTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         xml = rospy.get_param("/robot_description")
-        request = SpawnModelRequest(model_name="cartpole", model_xml=xml, robot_namespace="/")
-        assert proxy("/gazebo/spawn_urdf_model", SpawnModel)(request).success
-        for name in (STATES, CART):
-            assert proxy("/controller_manager/load_controller", LoadController)(name).ok
-        assert proxy("/controller_manager/switch_controller", SwitchController)(
-            [STATES, CART], [], 2, False, 0.0
-        ).ok
+        assert spawn_model("cartpole", xml).success
+        assert Manager().start(STATES, CART)
         cls.call = staticmethod(proxy("/gazebo/step_world", StepWorld))
         cls.reset = staticmethod(proxy("/gazebo/reset_simulation", Empty))
         cls.world = staticmethod(proxy("/gazebo/get_world_properties", GetWorldProperties))
@@ -63,57 +58,10 @@ class LockstepTest(unittest.TestCase):
         # The kick of docs/contract/ros_control.md 4, clipped.
         self.assertEqual(answer.joint_states.effort, (0.0, 30.0))
 
-    def test_the_same_commands_give_the_same_bits(self):
-        runs = []
-        for _ in range(2):
-            self.reset()
-            run = []
-            for index in range(200):
-                state = self.step(8, [CART], [0.02 * (index % 5)]).joint_states
-                run.append((state.position, state.velocity, state.effort))
-            runs.append(run)
-        self.assertEqual(runs[0], runs[1])
-
-    def test_what_is_refused_leaves_the_world_as_it_was(self):
-        for args, text in (
-            ((0, [], []), "ticks is 0"),
-            ((1, ["nobody"], [0.1]), "no controller named 'nobody'"),
-            ((1, [CART, "nobody"], [0.1, 0.1]), "no controller named 'nobody'"),
-            ((1, [CART], []), "1 controllers but 0 commands"),
-            ((1, [CART], [float("nan")]), "not finite"),
-            ((1, [CART], [float("inf")]), "not finite"),
-            ((1, [STATES], [0.1]), "takes no numbers"),
-            ((1, [CART], [1e300]), "can't be beyond"),
-            ((1, [CART], [0.1, 0.2]), "1 controllers but 2 commands"),
-            ((-1, [], []), "ticks is -1"),
-            ((2_000_000, [], []), "ticks is 2000000"),
-            ({"ticks": 1, "reset": 7}, "reset is 7"),
-            ({"ticks": 1, "seed": 7}, "seed is 7, which goes with a reset only"),
-            ({"ticks": 0, "joints": ["elbow"], "positions": [0.0]}, "no movable joint 'elbow'"),
-            ({"ticks": 0, "joints": ["cart_pole"], "positions": []}, "1 joints but 0 positions"),
-            ({"ticks": 0, "joints": ["cart_pole"] * 2, "positions": [0, 1]}, "names one twice"),
-            ({"ticks": 0, "joints": ["cart_pole"], "positions": [float("nan")]}, "not finite"),
-            (
-                {"ticks": 1, "commanded_joints": ["stand_cart"], "joint_commands": [1.0]},
-                "belongs to",
-            ),
-            ({"ticks": 1, "commanded_joints": ["elbow"], "joint_commands": [1.0]}, "no robot has"),
-        ):
-            with self.subTest(text):
-                answer = self.step(**args) if isinstance(args, dict) else self.step(*args)
-                self.assertFalse(answer.success)
-                self.assertIn(text, answer.status_message)
-                self.assertEqual(answer.sim_time, 0.0)
-        self.assertEqual(self.step(1, [], []).joint_states.effort, (0.0, 0.0))
-
     def test_an_episode_begins_in_one_call(self):
         self.step(50, [CART], [0.3])
-        place = {
-            "joints": ["stand_cart", "cart_pole"],
-            "positions": [0.1, -0.2],
-            "velocities": [0.5, 1.5],
-        }
-        answer = self.step(0, reset=StepWorldRequest.SIMULATION, **place)
+        place = {"joints": ["stand_cart", "cart_pole"], "positions": [0.1, -0.2]}
+        answer = self.step(0, reset=StepWorldRequest.SIMULATION, **place, velocities=[0.5, 1.5])
         self.assertTrue(answer.success, answer.status_message)
         self.assertEqual(answer.sim_time, 0.0)
         self.assertEqual(answer.joint_states.position, (-0.2, 0.1))
@@ -131,19 +79,6 @@ class LockstepTest(unittest.TestCase):
             run += [self.step(8, [CART], [0.01 * index]).joint_states for index in range(50)]
             runs.append([(state.position, state.velocity, state.effort) for state in run])
         self.assertEqual(runs[0], runs[1])
-
-    def test_a_joint_that_no_controller_has_takes_an_effort(self):
-        answer = self.step(10, commanded_joints=["cartpole::cart_pole"], joint_commands=[0.25])
-        self.assertEqual(answer.joint_states.effort[0], 0.25)
-        self.assertLess(answer.joint_states.velocity[0] * 0.25, 1.0)
-        self.assertNotEqual(answer.joint_states.velocity[0], 0.0)
-
-    def test_models_are_told_on_request(self):
-        self.assertEqual(self.step(1).model_names, [])
-        answer = self.step(1, model_states=True)
-        self.assertEqual(answer.model_names, ["ground_plane", "cartpole"])
-        self.assertEqual(len(answer.model_poses), 2)
-        self.assertEqual(len(answer.model_twists), 2)
 
     def test_two_clients_at_once_each_get_their_ticks(self):
         def work():

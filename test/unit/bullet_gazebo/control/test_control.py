@@ -77,6 +77,12 @@ def test_effort_saturation_only_blocks_pushing_further(position, velocity, comma
     assert joint.command == wanted
 
 
+def test_without_limits_nothing_is_enforced():
+    joint = JointHandle("j", "prismatic", command=1e9)
+    effort_enforcer(joint.limits)(joint)
+    assert joint.command == 1e9
+
+
 def test_soft_limits_brake_before_the_end():
     limits = JointLimits(-1.0, 1.0, 2.0, 30.0, SoftLimits(-0.9, 0.9, 10.0, 20.0))
     joint = JointHandle("j", "revolute", limits)
@@ -84,12 +90,6 @@ def test_soft_limits_brake_before_the_end():
     joint.position, joint.velocity, joint.command = 0.85, 1.0, 30.0
     effort_enforcer(limits)(joint)
     assert joint.command == pytest.approx(-10.0)
-
-
-def test_without_limits_nothing_is_enforced():
-    joint = JointHandle("j", "prismatic", command=1e9)
-    effort_enforcer(joint.limits)(joint)
-    assert joint.command == 1e9
 
 
 def test_the_description_gives_joints_limits_and_transmissions():

@@ -54,25 +54,19 @@ def test_a_goals_own_tolerances_override_or_disable_the_parameters():
     assert "shoulder path error 1.000000 (position, tolerance 0.1)" in told.outcomes[0].text
 
 
-def test_a_missed_end_aborts_once_its_time_is_over():
+@pytest.mark.parametrize(
+    ("own", "ticks"),
+    [({}, 1500), ({"goal_time": S // 5}, 1200), ({"goal_time": -S}, 1000)],  # below 0 is none
+)
+def test_a_missed_end_aborts_once_its_time_is_over(own, ticks):
     rig = Rig("Effort", constraints={"shoulder": {"goal": 0.1}, "goal_time": 0.5}).start()
-    told = rig.pursue(move((1.0, (1.0,))))
-    rig.run(1499)
+    told = rig.pursue(move((1.0, (1.0,))), **own)
+    rig.run(ticks - 1)
     assert told.outcomes == []
     rig.run(2)
     (outcome,) = told.outcomes
     assert (outcome.kind, outcome.code) == ("aborted", GOAL_TOLERANCE_VIOLATED)
     assert outcome.text == "shoulder goal error 1.000000 (position, tolerance 0.1)"
-
-
-def test_the_goals_own_time_counts_and_less_than_0_is_none():
-    for goal_time, ticks in ((S // 5, 1200), (-S, 1000)):
-        rig = Rig("Effort", constraints={"shoulder": {"goal": 0.1}, "goal_time": 0.5}).start()
-        told = rig.pursue(move((1.0, (1.0,))), goal_time=goal_time)
-        rig.run(ticks - 1)
-        assert told.outcomes == []
-        rig.run(2)
-        assert told.outcomes[0].code == GOAL_TOLERANCE_VIOLATED
 
 
 def test_a_joint_that_does_not_come_to_rest_misses_its_end_by_default():

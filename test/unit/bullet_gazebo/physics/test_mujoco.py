@@ -107,9 +107,8 @@ def test_a_motor_damping_and_efforts_move_a_joint_as_their_equations_say(world):
     run(world, 100)
     assert driven.joint_state("j")[1] == pytest.approx(-0.2, rel=1e-3)  # with no more than 4 N
     assert damped.joint_state("j")[1] == pytest.approx(math.exp(-0.1 * 4.0 / 2.0), rel=2e-3)
-    assert pushed.joint_state("j")[1] == pytest.approx(
-        6.0 / 2.0 * 0.001, rel=1e-9
-    )  # in one step only
+    # What pushes acts in one step only.
+    assert pushed.joint_state("j")[1] == pytest.approx(6.0 / 2.0 * 0.001, rel=1e-9)
     run(world, 1500)
     assert driven.joint_state("j")[1] == pytest.approx(-2.0, rel=1e-3)
 

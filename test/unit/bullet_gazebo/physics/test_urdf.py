@@ -56,9 +56,9 @@ def test_the_cartpole_keeps_its_names_and_figures():
     assert cart.damping == cart.friction == pole.damping == pole.friction == 0.0
 
 
-def test_writing_loses_no_digit():
+def test_writing_loses_no_digit(tmp_path):
     model = parse_urdf(cartpole_urdf())
-    again = parse_urdf(write_urdf(model))
+    again = parse_urdf(write_urdf(model, tmp_path))
     assert again.links == model.links
     assert again.joints == model.joints
 

@@ -99,14 +99,6 @@ def test_an_inertial_that_cannot_be_read_leaves_a_link_without_mass(inertial, fa
     assert len(held.warnings) == 1
 
 
-def test_a_root_without_mass_says_what_it_comes_from():
-    text = f'<robot name="r"><link name="a"><inertial><mass value="x"/>{TENSOR}</inertial></link></robot>'
-    with pytest.raises(DescriptionError) as raised:
-        parse_urdf(text)
-    assert "the root link has no mass" in str(raised.value)
-    assert "'x' is not a number" in str(raised.value)
-
-
 def test_moments_that_are_missing_are_zero():
     moments = '<inertial><mass value="1"/><inertia ixx="1" iyy="2" izz="3"/></inertial>'
     inertia = parse_urdf(robot(arm=moments)).links["arm"].inertia

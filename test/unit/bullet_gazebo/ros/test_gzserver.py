@@ -2,17 +2,13 @@
 
 import argparse
 import socket
+from types import SimpleNamespace
 
 import pytest
 import rospy
 
 from bullet_gazebo.ros.node import gzserver
 from ros_calls import master
-
-
-class NoSignals:
-    def noted(self) -> bool:
-        return False
 
 
 @pytest.fixture
@@ -22,8 +18,9 @@ def failing(monkeypatch):
     def made(*_):
         raise ConnectionRefusedError("refused")
 
+    signals = SimpleNamespace(noted=lambda: False)
     monkeypatch.setattr(gzserver, "GazeboNode", made)
-    return lambda: gzserver.simulate(argparse.Namespace(), object(), NoSignals())
+    return lambda: gzserver.simulate(argparse.Namespace(), object(), signals)
 
 
 def test_a_master_that_goes_meanwhile_is_told_in_one_line(failing, capsys):

@@ -20,21 +20,17 @@ HELP = ["-h", "--help"]
 
 
 @pytest.mark.parametrize(
-    ("main", "usage", "name", "line"),
-    [(commands.main, commands.MANAGER_USAGE, "controller_manager", line) for line in MANAGER + HELP]
-    + [
-        (commands.group_main, commands.GROUP_USAGE, "controller_group", line)
-        for line in GROUP + HELP
-    ],
+    ("main", "name", "line"),
+    [(commands.main, "controller_manager", line) for line in MANAGER + HELP]
+    + [(commands.group_main, "controller_group", line) for line in GROUP + HELP],
 )
-def test_what_is_no_command_is_answered_with_the_usage(main, usage, name, line, capsys):
+def test_what_is_no_command_is_answered_with_the_usage(main, name, line, capsys):
     # What roslaunch adds to each command line is no argument.
-    code = main([name, *line.split(), "__name:=node", "__log:=file"])
+    with pytest.raises(SystemExit) as ended:
+        main([name, *line.split(), "__name:=node", "__log:=file"])
     output, errors = capsys.readouterr()
-    assert output == f"{usage}\n"
-    assert errors == ""
-    assert output.startswith(f"usage: {name} COMMAND")
-    assert code == (0 if line in HELP else 2)
+    assert (output or errors).startswith(f"usage: {name} ")
+    assert (ended.value.code, bool(output)) == ((0, True) if line in HELP else (2, False))
 
 
 EFFORT, VELOCITY = (

@@ -23,7 +23,7 @@ class Setting:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.master = FakeMaster()
         self.master.services[SERVICE] = OURS
-        self.use(self.master, monkeypatch)
+        monkeypatch.setenv("ROS_MASTER_URI", self.master.uri)
         self.told: list[str] = []
         self.registered = 0
         for level in ("logwarn", "loginfo"):
@@ -32,9 +32,6 @@ class Setting:
         monkeypatch.setattr(rospy, "get_name", lambda: "/gazebo")
         monkeypatch.setattr(master_watch, "witness", lambda: (SERVICE, OURS))
         self.watch = MasterWatch(self.register)
-
-    def use(self, master: FakeMaster, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setenv("ROS_MASTER_URI", master.uri)
 
     def register(self, timeout: float) -> None:
         self.registered += 1

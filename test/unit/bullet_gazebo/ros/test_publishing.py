@@ -45,9 +45,17 @@ def thinner(sim):
     thinner._stop()
 
 
-def test_the_newest_is_always_sent_and_order_kept(thinner):
-    reader = Reader()
-    topic = ThinnedTopic(thinner, "/topic", reader)
+@pytest.fixture
+def reader():
+    return Reader()
+
+
+@pytest.fixture
+def topic(thinner, reader):
+    return ThinnedTopic(thinner, "/topic", reader)
+
+
+def test_the_newest_is_always_sent_and_order_kept(topic, reader):
     for sample in range(100_000):
         topic.send(sample)
     assert reader.wait_for(99_999)
@@ -56,19 +64,15 @@ def test_the_newest_is_always_sent_and_order_kept(thinner):
     assert len(reader.got) < 10_000
 
 
-def test_in_real_time_everything_is_sent_at_once(sim, thinner):
+def test_in_real_time_everything_is_sent_at_once(sim, topic, reader):
     sim.outruns_the_clock = False
-    reader = Reader()
-    topic = ThinnedTopic(thinner, "/topic", reader)
     for sample in range(1000):
         topic.send(sample)
     assert reader.got == list(range(1000))
 
 
-def test_a_world_that_slows_down_sends_nothing_stale(sim, thinner, monkeypatch):
+def test_a_world_that_slows_down_sends_nothing_stale(sim, topic, reader, monkeypatch):
     monkeypatch.setattr(publishing, "PERIOD", BOUND)
-    reader = Reader()
-    topic = ThinnedTopic(thinner, "/topic", reader)
     topic.send(1)
     topic.send(2)  # kept
     sim.outruns_the_clock = False
@@ -78,9 +82,7 @@ def test_a_world_that_slows_down_sends_nothing_stale(sim, thinner, monkeypatch):
     assert reader.got == [1, 3, 4, 5]
 
 
-def test_a_closed_topic_publishes_nothing(thinner):
-    reader = Reader()
-    topic = ThinnedTopic(thinner, "/topic", reader)
+def test_a_closed_topic_publishes_nothing(topic, reader):
     topic.send(1)
     topic.send(2)
     topic.close()
@@ -89,7 +91,9 @@ def test_a_closed_topic_publishes_nothing(thinner):
     assert reader.got in ([1], [1, 2])
 
 
-def test_a_topic_whose_message_can_not_be_sent_silences_no_other(thinner, monkeypatch):
+def test_a_topic_whose_message_can_not_be_sent_silences_no_other(
+    thinner, topic, reader, monkeypatch
+):
     told = threading.Event()
     monkeypatch.setattr(publishing.rospy, "logerr_throttle", lambda period, text: told.set())
 
@@ -100,8 +104,6 @@ def test_a_topic_whose_message_can_not_be_sent_silences_no_other(thinner, monkey
     bad._kept = 1
     thinner.remember(bad)
     assert told.wait(BOUND)
-    reader = Reader()
-    good = ThinnedTopic(thinner, "/topic", reader)
     for sample in range(1000):
-        good.send(sample)
+        topic.send(sample)
     assert reader.wait_for(999)

@@ -184,9 +184,8 @@ def test_links_models_and_contacts_are_told_after_the_ticks(objects):
 
 def test_all_models_and_all_contacts(objects):
     answer = objects.call(500, model_states=True, contacts=True)
-    assert (
-        objects.call(0, contacts=True).contacts == answer.contacts
-    )  # still those of the last tick
+    # Without a tick they are still those of the last one.
+    assert objects.call(0, contacts=True).contacts == answer.contacts
     assert answer.model_names == ["slides", "ground_plane", "crate"]
     assert len(answer.contacts) == 1
 

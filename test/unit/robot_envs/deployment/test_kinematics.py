@@ -70,10 +70,6 @@ def test_they_are_those_of_the_physics() -> None:
     assert fastest > 3.0, "it moved"
 
 
-def test_who_asks_for_no_links_gets_none() -> None:
-    assert LinkView(ARM, StateQuery())({}) == {}
-
-
 @pytest.mark.parametrize(
     ("query", "words"),
     [

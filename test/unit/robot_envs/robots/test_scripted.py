@@ -56,32 +56,19 @@ class TestTwoLinkArm:
         assert observation["achieved_goal"] == pytest.approx((3.0, -2.0), abs=1e-5)
         assert info["is_success"]
 
-    def test_every_target_is_reached_and_held(self) -> None:
-        env = gymnasium.make("robot_envs/TwoLinkReach-v0")
+    @pytest.mark.parametrize(
+        ("name", "least"), [("TwoLinkReach", 0.0), ("TwoLinkReachGoal", -40.0)]
+    )
+    def test_every_target_is_reached_and_held(self, name: str, least: float) -> None:
+        env = gymnasium.make(f"robot_envs/{name}-v0")
         for seed in range(20):
             env.reset(seed=seed)
-            total, _, infos, _ = play(env, self.towards(*env.unwrapped.task.target))
+            task: Any = env.unwrapped.task
+            target = task.target if name == "TwoLinkReach" else 0.1 * task.desired
+            total, _, infos, _ = play(env, self.towards(*map(float, target)))
             assert all(info["is_success"] for info in infos[40:])
-            assert total > 0.0
+            assert total > least
         env.close()
-
-    def test_every_goal_is_reached_and_held(self) -> None:
-        env = gymnasium.make("robot_envs/TwoLinkReachGoal-v0")
-        for seed in range(20):
-            observation, _ = env.reset(seed=seed)
-            total, _, infos, _ = play(
-                env, self.towards(*(0.1 * observation["desired_goal"]).tolist())
-            )
-            assert all(info["is_success"] for info in infos[40:])
-            assert total > -40.0
-        env.close()
-
-    def test_rewards_of_many_goals_at_once_are_those_of_each(self) -> None:
-        env: Any = gymnasium.make("robot_envs/TwoLinkReachGoal-v0").unwrapped
-        achieved = np.array([[3.0, 0.0], [3.0, 0.19], [3.0, 0.21]], np.float32)
-        desired = np.array([[3.0, 0.0]] * 3, np.float32)
-        assert env.compute_reward(achieved, desired, [{}] * 3).tolist() == [0.0, 0.0, -1.0]
-        assert env.compute_reward(achieved[2], desired[2], {}) == -1.0
 
 
 class TestSixJointArm:
@@ -166,13 +153,6 @@ class TestFuruta:
             assert 100.0 < total < 300.0
         env.close()
 
-    def test_left_alone_it_hangs(self) -> None:
-        env = gymnasium.make("robot_envs/Furuta-v0")
-        env.reset(seed=0)
-        total, steps, infos, _ = play(env, lambda state: np.zeros(1))
-        assert (steps, any(info["upright"] for info in infos)) == (300, False)
-        assert total < 3.0
-
     def test_an_arm_that_goes_round_ends_the_episode(self) -> None:
         env = gymnasium.make("robot_envs/Furuta-v0")
         env.reset(seed=0)
@@ -198,13 +178,6 @@ class TestDoublePendulum:
             assert (steps, terminated) == (500, False)
             assert total > 495.0
         env.close()
-
-    def test_left_alone_it_falls(self) -> None:
-        env = gymnasium.make("robot_envs/DoublePendulum-v0")
-        env.reset(seed=0)
-        _, steps, _, terminated = play(env, lambda state: np.zeros(1))
-        assert terminated
-        assert steps < 150
 
 
 class TestHopper:

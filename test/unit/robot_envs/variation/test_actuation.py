@@ -44,12 +44,6 @@ def test_a_step_rises_as_the_lag_says():
     assert risen[4] == pytest.approx(2.0 * 0.632, rel=1e-3)  # after a time constant
 
 
-def test_half_a_period_gives_the_same_rise():
-    coarse = run(Actuator({"motor": False}, 0.01, lag=0.03), "motor", [1.0] * 20)
-    fine = run(Actuator({"motor": False}, 0.005, lag=0.03), "motor", [1.0] * 40)
-    assert fine[1::2] == pytest.approx(coarse, rel=1e-12)
-
-
 @given(st.lists(numbers, min_size=1), st.floats(0.0, 1e3))
 def test_efforts_are_cut_either_way(wanted, most):
     found = run(Actuator({"motor": False}, PERIOD, limit=most), "motor", wanted)
@@ -96,14 +90,6 @@ def test_those_that_a_mapping_leaves_out_are_ideal():
     arrived = actuator({"motor": 3.0, "servo": 3.0})
     assert arrived["motor"] == 1.0
     assert 0.0 < arrived["servo"] < 3.0
-
-
-def test_what_is_given_is_not_changed():
-    actuator = Actuator(KINDS, PERIOD, lag=0.1, limit=1.0)
-    held, sent = {"motor": 0.0, "servo": 0.0}, {"motor": 3.0, "servo": 3.0}
-    actuator.begin(held)
-    actuator(sent)
-    assert (held, sent) == ({"motor": 0.0, "servo": 0.0}, {"motor": 3.0, "servo": 3.0})
 
 
 @pytest.mark.parametrize(

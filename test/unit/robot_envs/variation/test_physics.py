@@ -105,14 +105,6 @@ def test_surfaces_brake_so_many_times_as_much(engine, factor):
     assert 1.0 - seen[-2] == pytest.approx(factor * 0.2 * G * 20 * PERIOD, rel=0.05)
 
 
-def test_a_lag_is_felt_as_its_exponential_says():
-    """The efforts of a lagging motor add up to what speed the cart has."""
-    lag, steps = 0.05, 12
-    pushed = joints_after(make_rig(actuator_lag={"motors": lag}), (5.0, 0.0, 0.0), steps)
-    efforts = [5.0 * (1.0 - math.exp(-(k + 1) * PERIOD / lag)) for k in range(steps)]
-    assert pushed["rail"][1] == pytest.approx(sum(efforts) * PERIOD / MASS, rel=1e-3)
-
-
 def test_a_delayed_action_comes_as_much_later():
     early = joints_after(make_rig(), (5.0, 0.0, 0.0), 7)
     late = joints_after(make_rig(action_delay=3), (5.0, 0.0, 0.0), 10)

@@ -74,13 +74,6 @@ def test_options_do_not_change_what_others_draw_nor_the_stream(chosen):
     assert rng.random() == other.random()
 
 
-def test_values_do_not_change_the_stream():
-    rng, other = np.random.default_rng(3), np.random.default_rng(3)
-    UniformRandomisation(SCENE, {"mass": 0.0, "com": 0.0}).draw(rng)
-    UniformRandomisation(SCENE, {"mass": {"cart": (0.3, 0.4)}}).draw(other)
-    assert rng.random() == other.random()
-
-
 def test_a_variation_has_what_was_told():
     options = {"mass": 0.2, "length": {"wheel": 0.2}, "com": {"cart": 0.1}, "damping": 0.1,
                "friction": 0.2, "gains": 0.3, "gravity": 0.1}  # fmt: skip
@@ -151,11 +144,6 @@ def test_what_can_not_be_is_refused(options, text):
     with pytest.raises(ValueError) as refused:
         draw(options)
     assert text in str(refused.value)
-
-
-def test_an_environment_refuses_it_before_there_is_a_world():
-    with pytest.raises(ValueError, match="randomisation has no option 'mas'"):
-        make_rig(randomisation={"mas": 0.1})
 
 
 def test_a_link_that_is_part_of_another_one_is_told_so():

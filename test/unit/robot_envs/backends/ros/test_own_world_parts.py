@@ -1,7 +1,5 @@
 """The parts of a simulator of one's own that need none: its journal, the checks of its answers, memory."""
 
-from types import SimpleNamespace
-
 import pytest
 
 from robot_envs.backends.backend import (
@@ -11,7 +9,6 @@ from robot_envs.backends.backend import (
     next_slot,
     side_by_side,
 )
-from robot_envs.backends.ros import own_simulator
 from robot_envs.backends.ros.own_world import Journal, checked
 from robot_envs.errors import RobotEnvError, SimulatorFault
 from robot_envs.variation import LinkScale, Variation
@@ -73,16 +70,6 @@ def test_an_answer_of_another_time_is_a_fault() -> None:
     assert checked(answer, 300_000_000) is answer
     with pytest.raises(SimulatorFault, match="its time stands at 0.3 s .* and 0 s were asked for"):
         checked(answer, 0)
-
-
-def test_more_than_there_is_memory_for_is_refused(monkeypatch) -> None:
-    free = SimpleNamespace(available=1_000_000_000)
-    monkeypatch.setattr(own_simulator.psutil, "virtual_memory", lambda: free)
-    own_simulator.check_memory(8)
-    with pytest.raises(
-        RobotEnvError, match=r"^16 simulators need about 1.9 GB .* 1.0 GB are free: .*$"
-    ):
-        own_simulator.check_memory(16)
 
 
 class World:
