@@ -76,7 +76,7 @@ def new_engine(request: pytest.FixtureRequest) -> Callable:
     return partial(make_engine, request.param)
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def signals() -> Iterator[None]:
     """Restore the signal handlers after a command that replaces them."""
     taken = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)

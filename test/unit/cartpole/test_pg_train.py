@@ -11,8 +11,6 @@ from cartpole.pg_train import ENV_ID, RobotOptions, choose, main
 from rl_workbench.training import train as cli
 from rl_workbench.training.options import TrainingOptions
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 SHORT = ["--episodes=2", "--eval-episodes=1"]
 PLAIN = ["--env-id=CartPole-v1", *SHORT]
 BULLET = ["--backend=bullet", *SHORT]

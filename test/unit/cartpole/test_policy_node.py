@@ -14,8 +14,6 @@ from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
 from robot_envs.errors import RobotEnvError
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 ROBOT_RUN = {"env_id": "cartpole/Balance-v0", "episodes": 2, "eval_frequency": 0}
 
 

@@ -12,8 +12,6 @@ from support.training import workbench_runs
 from cartpole.workbench import PROGRAM, WorkspaceHints, main
 from rl_workbench.starting import JOB
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 
 def test_the_cart_pole_is_known_and_roslaunchs_arguments_are_left_out(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

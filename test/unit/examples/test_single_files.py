@@ -28,7 +28,7 @@ LIMIT = 300.0  # [s] for a process
 
 
 @pytest.fixture(autouse=True)
-def kept_torch(signals: None) -> Any:
+def kept_torch() -> Any:
     """Gives torch's generator and threads back: the files are made to have a process of their own."""
     threads, state = torch.get_num_threads(), torch.get_rng_state()
     yield

@@ -33,8 +33,6 @@ from package_writing import cli as new_robot
 from rl_workbench.training import train as training_cli
 from rl_workbench.training.algorithms import ALGORITHMS
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 ROOT = Path(__file__).resolve().parents[3]
 RUN_ELSEWHERE = (
     "docs/tutorial_dqn.md", "docs/tutorial_dqn.zh.md", "docs/tutorial_robot.md", "docs/tutorial_robot.zh.md",

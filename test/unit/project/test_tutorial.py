@@ -16,8 +16,6 @@ import pytest
 
 from cartpole import dqn_train, workbench
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 ROOT = Path(__file__).resolve().parents[3]
 ENGLISH, CHINESE = (ROOT / "docs" / name for name in ("tutorial_dqn.md", "tutorial_dqn.zh.md"))
 BLOCK = re.compile(r"^( *)```(\S+)(?: (\S+))?\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)

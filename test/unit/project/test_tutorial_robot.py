@@ -23,8 +23,6 @@ import pytest
 
 from cartpole import workbench
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 ROOT = Path(__file__).resolve().parents[3]
 ENGLISH, CHINESE = (ROOT / "docs" / name for name in ("tutorial_robot.md", "tutorial_robot.zh.md"))
 BLOCK = re.compile(r"^```(\S+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)

@@ -12,8 +12,6 @@ from support.training.training_runs import SMALL, flags, summary
 from rl_workbench.cli import COMMANDS, main
 from rl_workbench.training.train import PROGRAM
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 SHORT = {"total_timesteps": 60, "eval_episodes": 1, "confirm_episodes": 0}
 
 

@@ -32,8 +32,6 @@ from rl_workbench.tools.runs import cost_file, open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.train import PROGRAM
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 SUITE = """
 two:
   about: Two ways.

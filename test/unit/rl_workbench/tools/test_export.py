@@ -20,8 +20,6 @@ from rl_workbench.tools.runs import Run, open_run
 from rl_workbench.tools.torchscript import open_exported
 from rl_workbench.training.algorithms import ALGORITHMS
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 KINDS = {
     "plain": ("dqn", {"normalize_observations": "false"}),
     "dueling": ("dqn", {"dueling": "true"}),

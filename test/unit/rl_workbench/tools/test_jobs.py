@@ -28,8 +28,6 @@ from rl_workbench.tools.runs import cost_file, cost_of
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.train import PROGRAM
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 LONGER = {"total_timesteps": 3000, "checkpoint_frequency": 100}
 HERE = Program(PROGRAM, search_path())
 

@@ -14,7 +14,7 @@ from rl_workbench import cli
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training.train import PROGRAM
 
-pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.slow]
+pytestmark = pytest.mark.slow
 
 ENV_ID = "own_arm.tasks:own_arm/Reach-v0"
 MODULE = """

@@ -16,7 +16,6 @@ from rl_workbench import cli
 from rl_workbench.tools.record import Film, SideBySide, write_video
 from rl_workbench.tools.recording import EpisodeFrame, PictureView, record_episode
 
-pytestmark = pytest.mark.usefixtures("signals")
 RATE = 40.0  # [Hz]
 
 

@@ -28,7 +28,7 @@ from rl_workbench.tools.sweep import (
 from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.options import known_options
 
-pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.extras("optuna", "stable_baselines3")]
+pytestmark = pytest.mark.extras("optuna", "stable_baselines3")
 RANGES = {"x": OptionRange(-10.0, 10.0, False, ()), "kind": OptionRange(0, 0, False, ("a", "b"))}
 EVERY, STEPS = 100, 400
 Curve = Callable[[int, float], float]  # of a seed and x: the return that it comes to

@@ -24,8 +24,6 @@ from rl_workbench.tools.runs import open_run
 from rl_workbench.training.folder import held
 from robot_envs.errors import SimulatorError
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 BOUND = 180.0  # [s]
 TICK = 0.1  # [s]
 

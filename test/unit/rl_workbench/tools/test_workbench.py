@@ -15,8 +15,6 @@ from support.training import workbench_runs
 import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -10,7 +10,7 @@ from rl_workbench import cli
 from rl_workbench.tools.policies import load_learned
 from rl_workbench.tools.runs import open_run
 
-pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.extras("stable_baselines3")]
+pytestmark = pytest.mark.extras("stable_baselines3")
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from rl_workbench.starting import Interrupt
 
 
 @pytest.fixture
-def interrupt(signals) -> Interrupt:
+def interrupt() -> Interrupt:
     return Interrupt().install()
 
 
@@ -65,7 +65,7 @@ def test_other_signals_have_codes_of_their_own(
     assert (signal.getsignal(number) == signal.SIG_IGN) == (number == signal.SIGXCPU)
 
 
-def test_a_closed_terminal_that_is_to_be_ignored_is_ignored(signals) -> None:
+def test_a_closed_terminal_that_is_to_be_ignored_is_ignored() -> None:
     signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
     interrupt = Interrupt().install()
     signal.raise_signal(signal.SIGHUP)

@@ -16,8 +16,6 @@ from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.page import Page
 from rl_workbench.training.train import choose
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 SHORT = ["--algo=dqn", "--total-timesteps=300", "--learning-starts=50", "--eval-episodes=1"]
 # Writes the arguments once it is up, and a file once its input has ended.
 PAGE = """import sys

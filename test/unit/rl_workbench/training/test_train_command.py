@@ -16,8 +16,6 @@ from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.folder import held
 from rl_workbench.training.train import choose_training, main
 
-pytestmark = pytest.mark.usefixtures("signals")
-
 SHORT = {"total_timesteps": 60, "eval_episodes": 1, "confirm_episodes": 0}
 DQN = ["--algo=dqn", *flags(SMALL["dqn"] | SHORT)]
 REINFORCE = ["--algo=reinforce", *flags({"episodes": 2, "eval_episodes": 1})]
