@@ -32,7 +32,7 @@ TRAINING = {
     "value_learning_rate": 0.01, "value_epochs": 20,
 }  # fmt: skip
 MOVES, LATE = "the policy moves the robot", "no joint state on /joint_states for 1 s"
-OVER, AGAIN, STOPPED = "an episode would be over here", "going on", "the robot is stopped"
+OVER, AGAIN, STOPPED = "an episode would be over here", "continuing", "the robot is stopped"
 
 
 class PolicyNode(unittest.TestCase):
