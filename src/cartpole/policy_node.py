@@ -30,7 +30,7 @@ DESCRIPTION = """\
 A trained policy moves a robot over ROS, simulated or real. The node subscribes to /joint_states and publishes
 the policy's commands to the controllers, each control period of ROS time, with the robot and the task of the
 run's environment. Commands stay within the URDF's limits. When joint states are late the robot stops, and
-goes on when they come; Ctrl-C stops it and ends. Robot and controllers have to run: nothing is started or
+continues when they come; Ctrl-C stops it and ends. Robot and controllers have to run: nothing is started or
 spawned.
 
 RUN is a run folder, or a file written by `workbench.py export`."""
@@ -164,7 +164,7 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
         base = env.unwrapped
         if not isinstance(base, RobotEnv):
             raise RobotEnvError(
-                f"{path} is a policy of {env_id}, which is no environment of a robot"
+                f"{path} is a policy of {env_id}, which is not an environment of a robot"
             )
         if base.scene.several:
             raise RobotEnvError(f"{path} is a policy of {env_id}, which has several robots")

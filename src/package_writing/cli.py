@@ -22,7 +22,7 @@ def check_name(name: str) -> None:
         words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
         near = re.sub(r"[^a-z0-9]+", "_", words).strip("_").removeprefix("my_") or "robot"
         raise CannotWrite(
-            "a package's name has small letters, digits and _, begins with a letter, and is no keyword of "
+            "a package's name has small letters, digits and _, begins with a letter, and is not a keyword of "
             f"Python: '{name}' isn't one, 'my_{near}' would be"
         )
     if importlib.util.find_spec(name) is not None or _is_package(name):
@@ -107,7 +107,7 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _write(args: argparse.Namespace, parent: Path) -> list[str]:
-    """Writes the package beside its destination, and moves it there once complete; returns lines to print."""
+    """Writes the package next to its destination, then moves it there; returns lines to print."""
     check_name(args.name)
     folder = parent.absolute() / args.name
     if os.path.lexists(folder):

@@ -23,7 +23,7 @@ from robot_envs import Robot, RobotEnvError, controllers, files
 TREE = Path(__file__).resolve().parents[2]  # the source tree
 IS_CHECKOUT = (TREE / "ws").is_file()
 PARENT = TREE.parent if IS_CHECKOUT else Path()
-"""Where packages are written by default: beside the checkout."""
+"""Where packages are written by default: next to the checkout."""
 
 INTERFACES = ("effort", "position", "velocity")
 ARM = contents.TEMPLATE / "urdf/two_link_arm.urdf.xacro"
@@ -70,7 +70,7 @@ def read_arguments(texts: Sequence[str]) -> dict[str, str]:
     for text in texts:
         name, sign, value = text.partition(":=")
         if not sign or not re.fullmatch(r"\w+", name):
-            raise CannotWrite(f"'{text}' is no argument of xacro, which are written NAME:=VALUE")
+            raise CannotWrite(f"'{text}' is not an argument of xacro (NAME:=VALUE)")
         found[name] = value
     return found
 
@@ -268,7 +268,7 @@ def _report(
         yield f"note: {warning}"
     if len(warnings) > NOTES:
         yield f"note: {len(warnings) - NOTES} more of such"
-    yield f"in {TREE}, to go on:" if IS_CHECKOUT else "to go on:"
+    yield f"in {TREE}, next:" if IS_CHECKOUT else "next:"
     yield from (f"  {each}" for each in _commands(request, copied))
 
 

@@ -181,7 +181,7 @@ def stop(server: viser.ViserServer) -> None:
 
 @contextlib.contextmanager
 def hidden_page() -> Iterator[viser.ViserServer]:
-    """Serves a page for recordings, which viser can make only from a server; nobody has its token."""
+    """Serves a page for recordings, which viser can make only from a server; no one has its token."""
     server = _start(Address(LOOPBACK, 0, secrets.token_urlsafe(TOKEN_BYTES)))
     try:
         yield server

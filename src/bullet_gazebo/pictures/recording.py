@@ -167,7 +167,7 @@ class FrameDrawer:
         self._followed, self._offset = "", ZERO
 
     def change(self, models: list[RecordedModel]) -> None:
-        """Replaces the models; the next frame places the camera anew."""
+        """Replaces the models; the next frame places the camera from scratch."""
         for model in self._models:
             self._renderer.remove(model.name)
         for model in models:

@@ -66,7 +66,7 @@ def open_exported(path: Path) -> ExportedPolicy:
     except _DAMAGED as error:
         raise WorkbenchError(f"{path} is damaged, or no exported policy") from error
     if metadata.get("format") != FORMAT:
-        raise WorkbenchError(f"{path} is no exported policy of this version")
+        raise WorkbenchError(f"{path} is not an exported policy of this version")
     lacks = [name for name, kind in READ.items() if not isinstance(metadata.get(name), kind)]
     if lacks:
         raise WorkbenchError(

@@ -280,7 +280,7 @@ class PolicyNode:
             return f"a possible state: {fault}"
         missing = [f"the state of {', '.join(joints)} on {self._joints.topic}"] if joints else []
         deaf = [each for each in self._topics.values() if each.get_num_connections() == 0]
-        missing += [f"somebody who listens on {each.resolved_name}" for each in deaf]
+        missing += [f"a subscriber of {each.resolved_name}" for each in deaf]
         return ", and ".join(missing)
 
     def _sleep_until(self, due: float) -> None:
@@ -336,7 +336,7 @@ class PolicyNode:
     def _report(self, reason: str, hint: Callable[[], str] = str) -> None:
         """Logs once why the robot stands still, with a hint, and once that it moves again."""
         if reason != self._reported:
-            (rospy.logwarn if reason else rospy.loginfo)(f"{reason}{hint()}" or "going on")
+            (rospy.logwarn if reason else rospy.loginfo)(f"{reason}{hint()}" or "continuing")
         self._reported = reason
 
     def _publish(self, commands: Mapping[str, Command]) -> None:

@@ -34,7 +34,7 @@ TRAINING = {
 }  # fmt: skip
 MOVES, LATE = "the policy moves the robot", "no joint state on /joint_states for 1 s"
 CONTROLLER, BEYOND = "stand_cart_position_controller", "beyond its stops at -0.5 and 0.5"
-OVER, AGAIN, STOPPED = "an episode would be over here", "going on", "the robot is stopped"
+OVER, AGAIN, STOPPED = "an episode would be over here", "continuing", "the robot is stopped"
 
 
 class PolicyNode(unittest.TestCase):
@@ -175,7 +175,7 @@ class PolicyNode(unittest.TestCase):
         before = node.output.count(AGAIN)
         self.assertTrue(ros_controllers.start_controllers_srv([CONTROLLER]))
         self.put(PUSHED)
-        self.eventually("going on", lambda: node.output.count(AGAIN) > before)
+        self.eventually("continuing", lambda: node.output.count(AGAIN) > before)
         with self.news:
             self.assertTrue(all(abs(each) <= 0.5 for each in self.commands))
         node.send(signal.SIGTERM)

@@ -59,7 +59,7 @@ FAULTS = {
     "no cut": (
         episodes.ends,
         of(Hold, broken.NoCut),
-        "an episode with max_steps=1 goes on after its first step",
+        "an episode with max_steps=1 continues after its first step",
     ),
     "both ends": (
         episodes.ends,

@@ -3,8 +3,8 @@
 - `Reception`: a client that sends nothing keeps all others out; a lack of file descriptors ends the thread
   that accepts connections (gazebo_clients.test, test_rospy_connections.py)
 - `bound_messages`: rospy reads whatever size a client claims into memory (test_rospy_connections.py)
-- `bound_calls`: so does its XML-RPC server, where silent clients keep a thread each for ever (the same)
-- `hang_up_on_nonsense`: a client whose request can't be read waits for ever (gazebo_clients.test)
+- `bound_calls`: so does its XML-RPC server, where silent clients keep a thread each forever (the same)
+- `hang_up_on_nonsense`: a client whose request can't be read waits forever (gazebo_clients.test)
 """
 
 import errno
@@ -174,7 +174,7 @@ def bound_calls() -> None:
 def hang_up_on_nonsense() -> None:
     """Closes the connection after a request that can't be read; before the node offers services.
 
-    rospy's thread of the connection ends with a traceback and leaves it open: the client waits for ever.
+    rospy's thread of the connection ends with a traceback and leaves it open: the client waits forever.
     """
     handle = ServiceImpl.handle
 

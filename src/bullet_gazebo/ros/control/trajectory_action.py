@@ -90,7 +90,7 @@ class TrajectoryAction:
     """Serves the action from load to unload, in a thread of its own or along with steps in lock-step.
 
     Locks are taken in this order: the action server's, the simulator's, ours. The control tick holds the
-    simulator's and takes only ours, so it waits for nobody.
+    simulator's and takes only ours, so it waits for no other node.
     """
 
     def __init__(

@@ -102,7 +102,7 @@ class MasterWatch:
         self._misses += 1
         if self._misses == MISSES and not self._ending.is_set():
             rospy.logwarn(
-                "The master at %s is gone (%s). Existing connections stay, but nobody else finds this "
+                "The master at %s is gone (%s). Existing connections stay, but no other node finds this "
                 "simulator; it registers again once there is a master at that address",
                 master.uri(), fault,
             )  # fmt: skip

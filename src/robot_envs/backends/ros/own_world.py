@@ -23,7 +23,9 @@ from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
 from ros_calls import master
 
-DEADLINE = 30.0  # [s] of wall time for an answer, beside 10 ms for each tick; others may need the processor
+DEADLINE = (
+    30.0  # [s] of wall time for an answer, on top of 10 ms a tick; others may need the processor
+)
 SEED = 0  # of the simulator's own random numbers, as for the backend "ros"
 
 logger = logging.getLogger(__name__)
@@ -89,7 +91,7 @@ class OwnWorld(RobotBackend):
     Args:
         scene: the robots and objects.
         control_period: simulated time of one action [s].
-        deadline: wall time that an answer may take, beside 10 ms for each tick [s]; None: 30 s.
+        deadline: wall time that an answer may take, on top of 10 ms for each tick [s]; None: 30 s.
 
     Raises:
         ValueError: if the period isn't a whole number of physics steps.

@@ -39,7 +39,7 @@ class RosSession:
         gui: open the simulator's window, if it isn't open.
         seed: of a simulator that is started here.
         rviz: show the robot in RViz.
-        curves: a run folder, whose curves the window shows beside the robot, whoever opened it.
+        curves: a run folder, whose curves the window shows next to the robot, whoever opened it.
     """
 
     def __init__(
@@ -163,7 +163,7 @@ class RosSession:
             scene: the session's robots, and objects, which are in the world during this backend's episodes.
             control_period: simulated time of one action [s]; in real time 0 takes the newest joint state
                 without waiting.
-            deadline: wall time that an answer in lock-step may take, beside 10 ms for each tick [s].
+            deadline: wall time that an answer in lock-step may take, on top of 10 ms for each tick [s].
 
         Raises:
             ValueError: if the period isn't a whole number of physics steps.

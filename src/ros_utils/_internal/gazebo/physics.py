@@ -62,7 +62,7 @@ def gazebo_reset_sim(
 def gazebo_reset_world(
     retries: int = 5, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> bool:
-    """Puts all models back to where they began; time goes on. See `gazebo_reset_sim`."""
+    """Puts all models back to where they began; time continues. See `gazebo_reset_sim`."""
     return empty_call("reset_world", retries, timeout, gazebo_ns)
 
 
