@@ -10,9 +10,12 @@ import pytest
 from support.robots.new_robots import (
     BARE,
     FIXED,
+    JOINT,
+    LIMIT,
     LINK,
     MOTOR,
     NOBODYS,
+    PLUGIN,
     SWING,
     robot,
 )
@@ -42,6 +45,14 @@ from package_writing.cli import main
             [],
             "the package 'nobodys', which isn't found: ./ws --with FOLDER",
         ),
+        (
+            robot(*BARE, FIXED, LINK.format("end", ""), JOINT.format("a b", "revolute", "rod", "end", LIMIT))
+            .replace("swing", "a_b"),
+            [],
+            "would share the controller a_b_controller",
+        ),
+        (robot(*BARE, FIXED, PLUGIN.format("<robotNamespace>a b</robotNamespace>")), [], "'a b'"),
+        (robot(*BARE, FIXED).replace('value="0.5"', 'value="1e30"'), [], "can't take a step"),
         (robot(*BARE, FIXED), ["size=3"], "NAME:=VALUE"),
         (robot(*BARE, FIXED), ["--height", "nan"], "--height"),
         (robot(*BARE, FIXED), ["--passive", "swign"], "did you mean 'swing'?"),
