@@ -157,7 +157,7 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
         exported = open_exported(path)
         env_id, act = exported.metadata["env_id"], exported.act
         recorded = {**exported.metadata["env_kwargs"], **options}
-        sees_dict = exported.metadata["observation_space"]["kind"] == "Dict"
+        sees_dict = exported.metadata["observation_space"].get("kind") == "Dict"
         env = make_environment(env_id, _in_process(recorded), keep_dict=sees_dict)
         _check_same(path, exported.metadata, env)
     try:
