@@ -326,9 +326,10 @@ class Training:
         """Writes and reports the outcome; then raises a failure, unless the user had stopped anyway."""
         outcome = Outcome(
             self.options, self.folder, self.history, self._algorithm.steps, self._is_complete(),
-            self._interrupt.requested(), self._evaluation,
+            self._interrupt.requested(), self._evaluation, self._checkpoints.are_in_place(),
         )  # fmt: skip
         try:
+            self._checkpoints.check_place()
             self._algorithm.export(self.folder)
             self._callbacks.call("on_training_end", self)
             outcome.write_summary(str(failure) if failure else None)

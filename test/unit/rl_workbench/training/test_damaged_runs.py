@@ -118,6 +118,16 @@ def test_figures_that_were_lost_cost_nothing_else(
     assert_no_doubles(run)
 
 
+@pytest.mark.parametrize("damage", ["3,charts/x\n", "3,charts/x,1.0,2.0"])
+def test_complete_rows_before_a_damaged_one_are_kept(stopped: Path, capsys, damage: str) -> None:
+    path = stopped / "scalars.csv"
+    *kept, _, _ = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(kept) + damage)
+    resume(stopped)
+    assert "lacks rows that it had" in capsys.readouterr().out
+    assert path.read_text().startswith("".join(kept)) and damage not in path.read_text()
+
+
 def test_a_moved_run_goes_on_where_it_lies(short: Path, stopped: Path, tmp_path: Path) -> None:
     moved = resume(stopped.rename(tmp_path / "elsewhere"))
     assert rows(moved) == rows(short)
