@@ -55,7 +55,7 @@ def test_somebody_elses_torch_file_is_told_from_a_checkpoint(
     tmp_path: Path, content: object
 ) -> None:
     torch.save(content, tmp_path / "last.pt")
-    with pytest.raises(WorkbenchError, match="no checkpoint of a training"):
+    with pytest.raises(WorkbenchError, match="is not a checkpoint of a training"):
         read(tmp_path / "last.pt")
 
 
