@@ -16,7 +16,7 @@ from typing import Protocol
 
 import rospy
 
-from bullet_gazebo.physics.description import Plugin
+from bullet_gazebo.physics.description import CONTROL_PLUGIN, Plugin
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.ros.common.publishing import Thinner
 from bullet_gazebo.simulator import Simulator
@@ -24,7 +24,7 @@ from bullet_gazebo.simulator import Simulator
 # Library's file name: "module:Factory". Another one of ours, such as a sensor's, is a module of this folder
 # and a line here; what it measures with knows no ROS and belongs to bullet_gazebo/sensors.
 BUILT_IN = {
-    "libgazebo_ros_control.so": "bullet_gazebo.ros.plugins.control_plugin:ControlPlugin",
+    CONTROL_PLUGIN: "bullet_gazebo.ros.plugins.control_plugin:ControlPlugin",
     "libgazebo_ros_joint_state_publisher.so": "bullet_gazebo.ros.plugins.joint_state_plugin:JointStatePlugin",
 }  # fmt: skip
 PARAMETER = "~plugins"  # the same table for users' plugins
