@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from lockstep_runner.script import LIBRARIES
+
 SRC = Path(__file__).resolve().parents[3] / "src"
 ROOT = SRC.parent
 MODULES = sorted(SRC.rglob("*.py"))
@@ -118,6 +120,11 @@ def test_what_lies_in_a_folder_imports_in_no_circle(folder: Path) -> None:
         TopologicalSorter(children).prepare()
     except CycleError as error:
         pytest.fail(f"{folder.relative_to(SRC)}: {' -> '.join(error.args[1])}")
+
+
+def test_a_wait_in_our_libraries_stays_wall_time_under_the_lockstep_runner() -> None:
+    assert {path.name for path in SRC.iterdir() if (path / "__init__.py").exists()} == OURS
+    assert OURS <= LIBRARIES
 
 
 @pytest.mark.slow
