@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from lockstep_runner.script import LIBRARIES
+from rl_workbench.training.algorithms import ALGORITHMS
 
 SRC = Path(__file__).resolve().parents[3] / "src"
 ROOT = SRC.parent
@@ -44,6 +45,8 @@ ALLOWED = {
     "web_viewer": {"file_access"},
     "cartpole": {"rl_workbench", "robot_envs"},
 }
+# The modules or folders of the algorithms, below rl_workbench.training.
+ADAPTERS = {".".join(kind.implementation.split(".")[:3]) for kind in ALGORITHMS.values()}
 # A folder, and what nothing in it may import beside that.
 FORBIDDEN = [
     ("bullet_gazebo/physics", ("bullet_gazebo.control", "bullet_gazebo.ros", "bullet_gazebo.simulator",
@@ -56,9 +59,9 @@ FORBIDDEN = [
     ("cartpole", ("pybullet", "torch")),
     ("rl_workbench/agents", ("gymnasium", "rl_workbench.tools", "rl_workbench.training")),
     ("rl_workbench/training", ("rl_workbench.tools",)),
-    *((f"rl_workbench/training/{room}", tuple(f"rl_workbench.training.{each}" for each in
-                                              ("dqn", "pg", "sb3") if not room.startswith(each)))
-      for room in ("training.py", "dqn.py", "pg.py", "sb3")),
+    ("rl_workbench/training/training.py", tuple(ADAPTERS)),
+    *((f"{own.replace('.', '/')}{suffix}", tuple(ADAPTERS - {own}))
+      for own in ADAPTERS for suffix in ("", ".py")),
 ]  # fmt: skip
 WITHOUT_ROS = (
     "bullet_gazebo.physics.world",
