@@ -122,7 +122,7 @@ next_thing() {
 clean() {
     if [[ -d $WS ]]; then
         hold_lock
-        # Remove the lock last, so that nobody builds in a half-removed folder.
+        # Remove the lock last, so that no one builds in a half-removed folder.
         find "$WS" -mindepth 1 -maxdepth 1 ! -name lock -exec rm -rf -- {} +
         rm -rf -- "$WS"
     fi

@@ -3,7 +3,7 @@
 
     ./ws python3 benchmark/all_robots.py [--out FOLDER] [--seconds 2.0] [--rounds 5]
 
-The loop is what somebody writes who needs just this robot: PyBullet reads its URDF, and each tick of 1 ms
+The loop is what a user writes who needs just this robot: PyBullet reads its URDF, and each tick of 1 ms
 reads the joints, computes one line of control for each that is driven, writes and steps. A step is as many
 ticks in all three; the environments' take in observation, reward and resets. The rates of a round are taken
 one after the other; the table shows medians over rounds, also of the ratios. What is in one process is

@@ -64,7 +64,7 @@ def by_turns(
 def make_world(
     urdf: str, robots: int, controllers: Mapping[str, Mapping[str, object]]
 ) -> Simulator:
-    """As in `empty_world.launch`, with so many cart-poles; nobody listens."""
+    """As in `empty_world.launch`, with so many cart-poles; no one listens."""
     sim = Simulator(World(BulletEngine()), lockstep=True)
     sim.world.spawn("ground_plane", ground_plane(), Pose())
     for index in range(robots):

@@ -25,7 +25,7 @@ make_ready() {  # step...
     local step number=0 begin=$SECONDS todo=()
     are_ready "$@" && return 0
     hold_lock
-    for step in "$@"; do  # somebody else may just have made them
+    for step in "$@"; do  # another call may just have made them
         is_ready "$step" || todo+=("$step")
     done
     if [[ ${#todo[@]} -gt 0 ]]; then
@@ -80,7 +80,7 @@ tell_failure() {  # step, title, exit code, seconds
         tail -n 15 -- "$log" | sed 's/^/    /' >&2
     fi
     say "$2: failed after $(duration "$4") (exit code $3): $(reason_in "$log")$(space_left "$WS")"
-    say "what to do: ${REMEDY[$1]}; then call ws again, it goes on from here (log: $log)"
+    say "what to do: ${REMEDY[$1]}; then call ws again, which continues from here (log: $log)"
     exit 1
 }
 
@@ -93,7 +93,7 @@ reason_in() {  # log
 # Tells now and then how far a step is, until it is killed or ws is gone.
 watch_step() {  # log, begin
     local last
-    # Reading from a pipe into which nobody writes waits without a process of its own.
+    # Reading from a pipe into which no one writes waits without a process of its own.
     exec {silence}<> <(:)
     while ! read -rt "$PERIOD" -u "$silence" && kill -0 $$ 2>/dev/null; do
         last=$(tail -c 2000 -- "$1" | tr '\r' '\n' | grep -a '[[:alnum:]]' | tail -n 1 | cut -c 1-100) || true

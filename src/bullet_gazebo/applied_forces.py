@@ -12,7 +12,7 @@ Wrench = tuple[Vector, Vector]
 
 @dataclass(frozen=True)
 class ActingTime:
-    """When an effort or wrench acts, in simulated time [ns]; a negative duration is for ever."""
+    """When an effort or wrench acts, in simulated time [ns]; a negative duration is forever."""
 
     start: int
     duration: int

@@ -141,7 +141,7 @@ class ControlledRobot:
         blown = [names[index] for index in self._watched if not abs(states[index][1]) < self._fast]
         self._watch.blown_up(blown, self._fast)
         # A shaking joint keeps half of its speed, which its gains brake in the next step. At rest it would
-        # be pushed the same way for ever.
+        # be pushed the same way forever.
         self.model.calm({name: 0.5 if name in self._watch.shaking else 0.0 for name in blown})
         states = self.model.body.joint_states()
         for joint, index in self._joints:
@@ -193,7 +193,7 @@ class ControlledRobot:
     def joints_moved(self, now: int, relatch: bool) -> None:
         """Reads a state that something other than time has changed; `now` [ns].
 
-        With `relatch`, controllers begin anew, as an episode should.
+        With `relatch`, controllers start over, as an episode should.
         """
         self.read()
         self._waited = None
@@ -205,7 +205,7 @@ class ControlledRobot:
     def emergency_stop(self, on: bool) -> None:
         """Releases all joints but those with a position interface, which it holds.
 
-        When it ends, controllers begin anew.
+        When it ends, controllers start over.
         """
         if on:
             self.hardware.halt()

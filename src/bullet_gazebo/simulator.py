@@ -51,7 +51,7 @@ class Simulator:
             world: all models.
             lockstep: whether only advance() moves time.
             max_update_rate: ticks a second of wall time; 0 is as fast as possible.
-            relatch: whether controllers begin anew when a service moves joints or resets the world.
+            relatch: whether controllers start over when a service moves joints or resets the world.
         """
         self.world = world
         self.lock = FairLock()
@@ -185,7 +185,7 @@ class Simulator:
                 robot.read_ahead()
 
     def await_holds(self) -> None:
-        """Waits until nobody holds time. The caller steps the world; its lock is released meanwhile."""
+        """Waits until no one holds time. The caller steps the world; its lock is released meanwhile."""
         if self.holds:
             self.holds.await_end(self._stopping)
 
@@ -260,7 +260,7 @@ class Simulator:
             self.reset(everything=True)
 
     def reset_time(self) -> None:
-        """Sets the time to zero; models and controllers go on from where they are."""
+        """Sets the time to zero; models and controllers continue from where they are."""
         with self.lock:
             self.now = 0
             for robot in self.robots:

@@ -18,7 +18,7 @@ class FairLock:
     threads out; here every waiter gets its turn after at most one tick.
 
     Raises:
-        RuntimeError: if the thread that holds it acquires it again: it would wait for ever.
+        RuntimeError: if the thread that holds it acquires it again: it would wait forever.
     """
 
     def __init__(self) -> None:
@@ -103,7 +103,7 @@ class Holds:
     def hold(self, patience: float, late: Callable[[], None]) -> Iterator[None]:
         """Lets no time pass within the block. The caller doesn't hold the lock.
 
-        Code in the block that waits for time to pass would wait for ever. So time goes on after `patience`
+        Code in the block that waits for time to pass would wait forever. So time continues after `patience`
         [s of wall time], and `late` is called.
         """
         holder = object()
@@ -120,7 +120,7 @@ class Holds:
             self._release(holder)
 
     def await_end(self, stopping: threading.Event) -> None:
-        """Waits until nobody holds time or `stopping` is set, and releases the caller's lock meanwhile."""
+        """Waits until no one holds time or `stopping` is set, and releases the caller's lock meanwhile."""
         while self._holders and not stopping.is_set():
             self._lock.wait(self._free, POLL)
 

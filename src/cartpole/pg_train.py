@@ -38,10 +38,10 @@ class RobotOptions:
     realtime: bool = option(False, "let the world run in real time, as the existing script does")
     start_noise: float = option(
         0.0, "episodes start within +-X of the origin [m] and of upright [rad]; 0, as in the "
-        "existing script: all start alike", 0, LARGEST_NOISE,
+        "existing script: no noise", 0, LARGEST_NOISE,
     )  # fmt: skip
     rviz: bool = option(False, "show the robot in RViz")
-    headless: bool = option(False, "no window")
+    headless: bool = option(False, "show no window")
 
     def __post_init__(self) -> None:
         check_options(self)

@@ -30,7 +30,7 @@ DESCRIPTION = """\
 A trained policy moves a robot over ROS, simulated or real. The node subscribes to /joint_states and publishes
 the policy's commands to the controllers, each control period of ROS time, with the robot and the task of the
 run's environment. Commands stay within the URDF's limits. When joint states are late the robot stops, and
-goes on when they come; Ctrl-C stops it and ends. Robot and controllers have to run: nothing is started or
+continues when they come; Ctrl-C stops it and ends. Robot and controllers have to run: nothing is started or
 spawned.
 
 RUN is a run folder, or a file written by `workbench.py export`."""
@@ -157,14 +157,14 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
         exported = open_exported(path)
         env_id, act = exported.metadata["env_id"], exported.act
         recorded = {**exported.metadata["env_kwargs"], **options}
-        sees_dict = exported.metadata["observation_space"]["kind"] == "Dict"
+        sees_dict = exported.metadata["observation_space"].get("kind") == "Dict"
         env = make_environment(env_id, _in_process(recorded), keep_dict=sees_dict)
         _check_same(path, exported.metadata, env)
     try:
         base = env.unwrapped
         if not isinstance(base, RobotEnv):
             raise RobotEnvError(
-                f"{path} is a policy of {env_id}, which is no environment of a robot"
+                f"{path} is a policy of {env_id}, which is not an environment of a robot"
             )
         if base.scene.several:
             raise RobotEnvError(f"{path} is a policy of {env_id}, which has several robots")

@@ -146,7 +146,7 @@ class SwingUpTask(CartPoleTask):
         centred   (1 + g(position / 0.4 m)) / 2
         slow      (1 + g(angular velocity / 5 rad/s)) / 2
 
-    with the bell curve g(x) = 0.1 ** x², which is 0.1 at x = 1. There is no price on control.
+    with the bell curve g(x) = 0.1 ** x², which is 0.1 at x = 1. Control is free.
     The pole hangs within +-`noise` at the start, velocities too. It would hang through the
     ground, so the stand is raised by 0.5 m.
     """

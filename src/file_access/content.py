@@ -33,7 +33,7 @@ class NotAFile(OSError):
 def open_file(path: Path) -> BinaryIO:
     """Opens a regular file for reading.
 
-    Opening a pipe or a device could block for ever, so they are refused first.
+    Opening a pipe or a device could block forever, so they are refused first.
 
     Raises:
         NotAFile: if it isn't a regular file.

@@ -157,7 +157,7 @@ def serve(program: str, limits: tuple[int, float, int, int]) -> NoReturn:
     """Answers the requests of a LimitedProcess until it closes its end: the child's main function."""
     bounds = Limits(*limits)
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a library or a file prints is no answer
+    os.dup2(2, 1)  # what a library or a file prints is not an answer
     limit_memory(bounds.memory)
     module, _, function = program.partition(":")
     answer: Callable[[bytes], bytes] = getattr(importlib.import_module(module), function)

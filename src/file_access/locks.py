@@ -12,7 +12,7 @@ def locked_folder(folder: Path) -> Iterator[None]:
     """Holds the lock of an existing folder for the block.
 
     Raises:
-        BlockingIOError: if somebody else holds it, be it in this process.
+        BlockingIOError: if another holder has it, even in this process.
         FileNotFoundError: if there is no such folder, also if its last holder has just removed it.
         OSError: if it can't be opened, or its file system has no locks.
     """
@@ -27,9 +27,9 @@ def locked_folder(folder: Path) -> Iterator[None]:
 
 
 def is_locked(folder: Path) -> bool:
-    """Returns whether somebody holds the lock of an existing folder.
+    """Returns whether the lock of an existing folder is held.
 
-    It takes a shared lock for a moment, so it may refuse somebody else: call it seldom.
+    It takes a shared lock for a moment, so it may keep another process out: call it seldom.
     """
     try:
         descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)

@@ -131,5 +131,5 @@ def _decoded(data: bytes, name: str) -> str:
         return data.decode(name)
     except UnicodeDecodeError as error:
         raise FileError(
-            f"byte {error.start} is no {name}: is its encoding declared in the first line?"
+            f"byte {error.start} is not valid {name}: is its encoding declared in the first line?"
         ) from error

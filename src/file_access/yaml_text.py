@@ -85,7 +85,7 @@ class _Loader(yaml.SafeLoader):
             angle = _evaluated(ast.parse(inner, mode="eval").body)
         except (ValueError, SyntaxError, ZeroDivisionError, OverflowError) as error:
             raise yaml.constructor.ConstructorError(
-                problem=f"'{text[:MAX_ANGLE]}' is no angle", problem_mark=node.start_mark
+                problem=f"'{text[:MAX_ANGLE]}' is not an angle", problem_mark=node.start_mark
             ) from error
         return math.radians(angle) if node.tag == "!degrees" else angle
 
@@ -141,7 +141,7 @@ def _check_sendable(value: Any, place: str) -> None:
     if isinstance(value, dict):
         for name, each in value.items():
             if not isinstance(name, str):
-                raise FileError(f"{place}: the name {name!r} is no text: put it in quotes")
+                raise FileError(f"{place}: the name {name!r} is not a text: put it in quotes")
             _check_sendable(each, f"{place}/{name}")
     elif isinstance(value, list):
         for number, each in enumerate(value):

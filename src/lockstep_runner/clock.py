@@ -82,7 +82,7 @@ class Clock:
         self._order = 0
         self._now = 0  # [ns] simulator time in its last answer
         self.behind = False  # a call was interrupted, so the simulator may be ahead
-        self._released = False  # the node is shut down: nobody rests any more
+        self._released = False  # the node is shut down: no one rests any more
         self.callbacks = Callbacks(self.began, self.ended)
 
     def covers_this_thread(self) -> bool:
@@ -227,7 +227,7 @@ class Clock:
         rospy.rostime._set_rostime(genpy.Time(0, self.world.now))
 
     def _wait_paused(self, end: float, until: Condition | None) -> bool:
-        """Ends a plain sleep in a paused world at once; other waits go on in wall time, as others may act."""
+        """Ends a plain sleep in a paused world at once; other waits last in wall time, as others may act."""
         if until is None and end < math.inf:
             return False
         look, longest = PAUSED_LOOKS
@@ -282,6 +282,6 @@ class Clock:
                         tell_once(
                             f"busy {thread.name}",
                             f"thread '{thread.name}' has computed, or waited for something that isn't"
-                            f" simulated time, for {PATIENCE:g} s; time goes on without it, so that what"
+                            f" simulated time, for {PATIENCE:g} s; time continues without it, so that what"
                             " it does from here on isn't repeatable",
                         )

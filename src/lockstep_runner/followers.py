@@ -180,7 +180,7 @@ class Followers(Others):
                         node.covered = False
                         tell_once(
                             f"busy {node.name}",
-                            f"node {node.name} has computed for {PATIENCE:g} s; time goes on without it,"
+                            f"node {node.name} has computed for {PATIENCE:g} s; time continues without it,"
                             " so that what it does meanwhile isn't repeatable",
                         )
 

@@ -92,30 +92,33 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         description="Runs a script that was written for Gazebo, unchanged, in lock-step: repeatable, and as"
         " fast as it computes. A simulator that it launches comes up in lock-step.",
     )
-    parser.add_argument("--seed", type=_seed, help="of random, NumPy, torch, and the simulator")
+    parser.add_argument("--seed", type=_seed, help="seed random, NumPy, torch and the simulator")
     parser.add_argument(
         "--dt",
         type=_period,
         default=0.008,
-        help="what passes at a trigger [s], in whole physics steps (default: %(default)s)",
+        help="simulated time that passes at each trigger [s]; a multiple of the physics step"
+        " (default: %(default)s)",
     )
     parser.add_argument(
         STEP_ON,
         action="append",
         metavar="TOPIC-OR-SERVICE",
-        help="let that time pass at each message on, or call of, these; 'none' for none; else at commands"
-        " to controllers, where the script doesn't wait by itself",
+        help="let time pass at each message on this topic, or call of this service; may be repeated;"
+        " 'none': no triggers (default: commands to controllers, if the script doesn't wait by itself)",
     )
     parser.add_argument(
         "--virtual-wall-clock",
         action="store_true",
-        help="time.time(), monotonic() and perf_counter() are simulated, too",
+        help="simulate time.time(), monotonic() and perf_counter(), too",
     )
-    parser.add_argument("script", help="the Python file")
-    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="what the script gets")
+    parser.add_argument("script", help="the Python file to run")
+    parser.add_argument(
+        "arguments", nargs=argparse.REMAINDER, help="arguments passed to the script"
+    )
     args = parser.parse_args(_one_by_one(argv))
     if NO_TRIGGERS in (args.step_on or ()) and set(args.step_on) != {NO_TRIGGERS}:
-        parser.error(f"argument {STEP_ON}: '{NO_TRIGGERS}' stands alone")
+        parser.error(f"argument {STEP_ON}: '{NO_TRIGGERS}' can't be combined with other names")
     return args
 
 
@@ -151,6 +154,4 @@ def _period(text: str) -> float:
         value = float(text)
         if 0.0 < value <= LONGEST:
             return value
-    raise argparse.ArgumentTypeError(
-        f"{text}: seconds, more than 0, at most {LONGEST:g}, are needed"
-    )
+    raise argparse.ArgumentTypeError(f"{text}: must be above 0 and at most {LONGEST:g} seconds")

@@ -29,7 +29,7 @@ QUIET = ("get_", "list_", "pause_physics", "unpause_physics")  # services that p
 
 
 class BadPeriod(Exception):
-    """The period at a trigger is no whole number of physics steps; the text gives both."""
+    """The period at a trigger is not a whole number of physics steps; the text gives both."""
 
 
 Method = TypeVar("Method", bound=Callable[..., Any])
@@ -103,7 +103,9 @@ class ScriptRunner:
         step = self.world.step / NANOSECONDS
         ticks = self._period / step
         if round(ticks) < 1 or abs(ticks - round(ticks)) > 1e-6:
-            raise BadPeriod(f"--dt {self._period:g} is no multiple of the physics step, {step:g} s")
+            raise BadPeriod(
+                f"--dt {self._period:g} is not a multiple of the physics step, {step:g} s"
+            )
 
     @_ends_with_the_world(False)
     def wait(

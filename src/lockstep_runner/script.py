@@ -7,6 +7,7 @@ import importlib.machinery
 import importlib.util
 import os
 import random
+import re
 import sys
 import sysconfig
 import threading
@@ -14,6 +15,10 @@ import tokenize
 import types
 from collections.abc import Callable, Sequence
 
+# Python 3's complaints about what only Python 2 allowed.
+PYTHON_2 = re.compile(
+    "call to '(print|exec)'|multiple exception types|leading zeros|inconsistent use of tabs"
+)
 OURS = __name__.partition(".")[0]
 
 
@@ -33,7 +38,8 @@ def compiled(path: str) -> types.CodeType:
         what, place = str(fault), ""
         if isinstance(fault, SyntaxError):
             what, place = fault.msg, f", line {fault.lineno}"
-        raise NoScript(f"{path}{place}: {what}") from fault
+        hint = " (a script for Python 2? 2to3 mends most of it)" if PYTHON_2.search(what) else ""
+        raise NoScript(f"{path}{place}: {what}{hint}") from fault
 
 
 def run(path: str, arguments: Sequence[str], code: types.CodeType) -> None:

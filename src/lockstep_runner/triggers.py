@@ -33,7 +33,7 @@ class Triggers:
         self.passed()
 
     def passed(self) -> None:
-        """Notes that time has passed: looks are counted anew."""
+        """Notes that time has passed: looks are counted from zero."""
         self._looks.clear()
 
     def before(self, topic: str, is_command: bool) -> bool:

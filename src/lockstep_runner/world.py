@@ -144,7 +144,7 @@ class ScriptWorld:
         except (ServiceGone, ServiceHangs) as fault:
             raised = _raised_elsewhere(fault)
             if raised is not None:
-                raise raised  # noqa: B904 - as if nobody had taken it for the connection's
+                raise raised  # noqa: B904 - as if no one had taken it for the connection's
             self.forget()
             if isinstance(fault, ServiceGone) and not _is_registered(SERVICE):
                 raise WorldGone("the simulator has been ended") from fault

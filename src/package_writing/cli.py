@@ -18,18 +18,22 @@ VALID = re.compile(r"[a-z][a-z0-9_]*")
 
 def check_name(name: str) -> None:
     """Raises CannotWrite unless a name is free and valid for catkin and Python."""
+    words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+    other = "my_" + (re.sub(r"[^a-z0-9]+", "_", words).strip("_").removeprefix("my_") or "robot")
+    hint = "" if _is_taken(other) else f"; '{other}' would do"
     if not VALID.fullmatch(name) or keyword.iskeyword(name):
-        words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
-        near = re.sub(r"[^a-z0-9]+", "_", words).strip("_").removeprefix("my_") or "robot"
         raise CannotWrite(
-            "a package's name has small letters, digits and _, begins with a letter, and is no keyword of "
-            f"Python: '{name}' isn't one, 'my_{near}' would be"
+            "a package's name has small letters, digits and _, begins with a letter, and is not a keyword of "
+            f"Python: '{name}' isn't one{hint}"
         )
-    if importlib.util.find_spec(name) is not None or _is_package(name):
-        raise CannotWrite(f"the name '{name}' is taken; choose another one, such as 'my_{name}'")
+    if _is_taken(name):
+        raise CannotWrite(f"the name '{name}' is taken{hint}")
 
 
-def _is_package(name: str) -> bool:
+def _is_taken(name: str) -> bool:
+    """Returns whether a package or a Python module has the name."""
+    if importlib.util.find_spec(name) is not None:
+        return True
     if importlib.util.find_spec("rospkg") is None:
         return False
     import rospkg
@@ -107,7 +111,7 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _write(args: argparse.Namespace, parent: Path) -> list[str]:
-    """Writes the package beside its destination, and moves it there once complete; returns lines to print."""
+    """Writes the package next to its destination, then moves it there; returns lines to print."""
     check_name(args.name)
     folder = parent.absolute() / args.name
     if os.path.lexists(folder):

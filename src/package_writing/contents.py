@@ -1,10 +1,12 @@
 """A package's files: the template filled with the robot's names and numbers, and initial gains."""
 
+import json
 import math
+import re
 import string
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from xml.sax.saxutils import escape, quoteattr
+from xml.sax.saxutils import escape
 
 from bullet_gazebo.physics.description import ModelDescription
 from bullet_gazebo.physics.dynamics import (
@@ -12,6 +14,7 @@ from bullet_gazebo.physics.dynamics import (
     most_inertias,
     poses_at_zero,
 )
+from package_writing import CannotWrite
 from package_writing.survey import EFFORT, POSITION, Motor, Survey
 
 # [rad/s], at least, of a joint on its p and d with all that it carries stretched out
@@ -110,9 +113,32 @@ def fill(folder: Path, package: str, values: Mapping[str, str]) -> None:
         target.write_text(text, encoding="utf-8")
 
 
+def literal(text: str) -> str:
+    """Returns a text in double quotes, as both Python and YAML read it."""
+    return json.dumps(text, ensure_ascii=False)
+
+
+def xacro_attribute(text: str) -> str:
+    """Returns a text for an attribute in double quotes, in which xacro evaluates nothing."""
+    return escape(text.replace("$(", "$$(").replace("${", "$${"), QUOTE)
+
+
 def controller(motor: Motor) -> str:
-    """Returns the name of a joint's controller."""
-    return f"{motor.joint}_controller"
+    """Returns the name of a joint's controller: the joint's, as far as it makes a ROS name."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", motor.joint)
+    return f"{name if name[:1].isalpha() else f'joint_{name}'}_controller"
+
+
+def check_controllers(motors: Sequence[Motor]) -> None:
+    """Raises CannotWrite if the controllers of two joints would have one name."""
+    joints: dict[str, str] = {}
+    for motor in motors:
+        other = joints.setdefault(controller(motor), motor.joint)
+        if other != motor.joint:
+            raise CannotWrite(
+                f"the joints {literal(other)} and {literal(motor.joint)} would share the controller "
+                f"{controller(motor)}; rename one of them"
+            )
 
 
 def controllers_text(survey: Survey) -> str:
@@ -124,7 +150,7 @@ def controllers_text(survey: Survey) -> str:
         lines += [
             f"{controller(motor)}:",
             f"  type: {kind}_controllers/Joint{'Velocity' if motor.wheel else 'Position'}Controller",
-            f"  joint: {motor.joint}",
+            f"  joint: {literal(motor.joint)}",
         ]
         if motor.interface == EFFORT:
             gains = of_wheels if motor.wheel else by_joint
@@ -139,7 +165,7 @@ def controllers_text(survey: Survey) -> str:
             "joint_limits:",
         ]
         lines += [
-            f"  {joint}: {{has_effort_limits: false, has_velocity_limits: false}}"
+            f"  {literal(joint)}: {{has_effort_limits: false, has_velocity_limits: false}}"
             for joint in unlimited
         ]
         lines.append("")
@@ -160,8 +186,8 @@ def _units(motor: Motor) -> str:
 def ranges_text(survey: Survey) -> str:
     """Returns the ranges of the postures to reach, as the inside of a Python dict."""
     return "".join(
-        f'    "{motor.joint}": ({_inwards(motor.low, math.ceil)}, {_inwards(motor.high, math.floor)}),\n'
-        for motor in survey.motors
+        f"    {literal(each.joint)}: ({_inwards(each.low, math.ceil)}, {_inwards(each.high, math.floor)}),\n"
+        for each in survey.motors
     )
 
 
@@ -172,7 +198,7 @@ def _inwards(bound: float, rounded: Callable[[float], int]) -> float:
 
 def wheels_text(survey: Survey) -> dict[str, str]:
     """Returns the template's values about wheels; empty if there are no wheels."""
-    listed = "".join(f'    "{each.joint}",\n' for each in survey.motors if each.wheel)
+    listed = "".join(f"    {literal(each.joint)},\n" for each in survey.motors if each.wheel)
     where = (
         '        """Where the joints are{}."""\n        return np.array([{} for joint in RANGES])'
     )
@@ -201,16 +227,16 @@ def control_text(package: str, urdf: str, survey: Survey | None, loose: str) -> 
     """
     parts = []
     if loose:
-        parts.append(_part("fixed.xml.in", {"root": escape(loose, QUOTE)}))
+        parts.append(_part("fixed.xml.in", {"root": xacro_attribute(loose)}))
     if survey is not None and survey.added:
         motors = "\n".join(
-            f'  <xacro:motor joint={quoteattr(each.joint)} interface="{each.interface}"/>'
+            f'  <xacro:motor joint="{xacro_attribute(each.joint)}" interface="{each.interface}"/>'
             for each in survey.motors
         )
         parts.append(_part("motors.xml.in", {"motors": motors}))
     if survey is not None and not survey.has_plugin:
         parts.append(_part("plugin.xml.in", {}))
-    values = {"name": package, "urdf": escape(urdf, QUOTE), "parts": "".join(parts)}
+    values = {"name": package, "urdf": xacro_attribute(urdf), "parts": "".join(parts)}
     return _part("control.urdf.xacro.in", values)
 
 

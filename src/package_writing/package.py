@@ -5,9 +5,12 @@ import math
 import os
 import re
 import shlex
+import subprocess
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import yaml
 
@@ -20,10 +23,18 @@ from robot_envs import Robot, RobotEnvError, controllers, files
 TREE = Path(__file__).resolve().parents[2]  # the source tree
 IS_CHECKOUT = (TREE / "ws").is_file()
 PARENT = TREE.parent if IS_CHECKOUT else Path()
-"""Where packages are written by default: beside the checkout."""
+"""Where packages are written by default: next to the checkout."""
 
 INTERFACES = ("effort", "position", "velocity")
 ARM = contents.TEMPLATE / "urdf/two_link_arm.urdf.xacro"
+TRIAL = """
+import sys, gymnasium
+env = gymnasium.make(sys.argv[1])
+env.action_space.seed(0)
+env.reset(seed=0)
+env.step(env.action_space.sample())
+"""
+TRIAL_LIMIT = 300.0  # [s] of wall time, imports included
 NOTES = 3  # largest number of a URDF's warnings to show
 OURS = ("cartpole", "controller_manager", "gazebo_ros", "xacro")  # the template depends on them
 
@@ -59,7 +70,7 @@ def read_arguments(texts: Sequence[str]) -> dict[str, str]:
     for text in texts:
         name, sign, value = text.partition(":=")
         if not sign or not re.fullmatch(r"\w+", name):
-            raise CannotWrite(f"'{text}' is no argument of xacro, which are written NAME:=VALUE")
+            raise CannotWrite(f"'{text}' is not an argument of xacro (NAME:=VALUE)")
         found[name] = value
     return found
 
@@ -76,9 +87,14 @@ def write(request: PackageRequest, made: Path) -> list[str]:
     if request.height is not None and not math.isfinite(request.height):
         raise CannotWrite(f"--height is a number of metres, not {request.height}")
     copied = copy_urdf(request.urdf or ARM, request.arguments, request.name, made)
+    if not re.fullmatch(r"[\w .+@,=/-]+", copied.place):  # it stands in launch files and in Python
+        raise CannotWrite(
+            f"rename the file {copied.place!r}: letters, digits, blanks and . + @ , = - only"
+        )
     _check_packages(copied)
     loose = _loose_link(request, root_link(copied.xml), request.urdf or ARM)
     urdf, xml, survey, lacks = _completed(request, copied, made, loose)
+    contents.check_controllers(survey.motors)
     stands = None if survey.model.fixed_base else standing_height(survey.model)
     if request.height is None:
         request = replace(request, height=stands or 0.0)
@@ -90,8 +106,33 @@ def write(request: PackageRequest, made: Path) -> list[str]:
     wrong = list(controllers.faults(run, None, parameters, robot.hardware(), movable))
     if wrong:
         raise CannotWrite("; ".join(wrong))
+    _try_out(request.name, made)
     more = f"urdf/{urdf}, which includes it, adds {' and '.join(lacks)}" if lacks else ""
     return list(_report(request, copied, survey, more, stands))
+
+
+def _try_out(name: str, made: Path) -> None:
+    """Makes the package's environment and takes a step in it, in a process of its own.
+
+    Raises:
+        CannotWrite: if that fails.
+    """
+    paths = os.environ.get("ROS_PACKAGE_PATH", "")
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join([str(made / "src"), *sys.path]),
+        "ROS_PACKAGE_PATH": f"{made}:{paths}",
+    }
+    try:
+        ended = subprocess.run(
+            [sys.executable, "-B", "-c", TRIAL, f"{name}.environment:{name}/Reach-v0"],
+            env=environment, timeout=TRIAL_LIMIT, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired as error:
+        raise CannotWrite(f"a step of the robot took more than {TRIAL_LIMIT:g} s") from error
+    if ended.returncode:
+        lines = ended.stderr.strip().splitlines() or [f"it ended with {ended.returncode}"]
+        raise CannotWrite(f"the robot can't take a step: {lines[-1]}")
 
 
 def _completed(
@@ -159,13 +200,16 @@ def _values(request: PackageRequest, survey: Survey, urdf: str, copied: Copied) 
     pairs = [f"{name}:={value}" for name, value in request.arguments.items()]
     units = {"rad/s" if each.wheel else "m" if each.linear else "rad" for each in survey.motors}
     namespace = f'\n    namespace="{survey.namespace}",' if survey.namespace else ""
-    arguments = f"\n    arguments={json.dumps(request.arguments)}," if pairs else ""
+    arguments = (
+        f"\n    arguments={json.dumps(request.arguments, ensure_ascii=False)}," if pairs else ""
+    )
     return {
         "name": request.name,
         "urdf": urdf,
         "dependencies": "".join(f"  <exec_depend>{each}</exec_depend>\n" for each in needed),
         "controllers": "".join(
-            f'    "{each.joint}": "{contents.controller(each)}",\n' for each in survey.motors
+            f'    {contents.literal(each.joint)}: "{contents.controller(each)}",\n'
+            for each in survey.motors
         ),
         "controllers_yaml": contents.controllers_text(survey),
         "ranges": contents.ranges_text(survey),
@@ -173,7 +217,9 @@ def _values(request: PackageRequest, survey: Survey, urdf: str, copied: Copied) 
         **contents.wheels_text(survey),
         "run": " ".join(map(contents.controller, survey.motors)),
         "arguments": arguments,
-        "launch_arguments": "".join(f" {shlex.quote(each)}" for each in pairs),
+        "launch_arguments": "".join(
+            f" {escape(shlex.quote(each), contents.QUOTE)}" for each in pairs
+        ),
         "namespace": namespace,
         "ns": survey.namespace,
         "height": str(request.height),
@@ -222,7 +268,7 @@ def _report(
         yield f"note: {warning}"
     if len(warnings) > NOTES:
         yield f"note: {len(warnings) - NOTES} more of such"
-    yield f"in {TREE}, to go on:" if IS_CHECKOUT else "to go on:"
+    yield f"in {TREE}, next:" if IS_CHECKOUT else "next:"
     yield from (f"  {each}" for each in _commands(request, copied))
 
 

@@ -1,6 +1,7 @@
 """Surveys a URDF: its motors and passive joints, its plugin, and the height at which the robot stands."""
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
@@ -102,6 +103,8 @@ def look_at(
     namespace = "" if plugin is None else (plugin.findtext("robotNamespace") or "")
     without = tuple(name for name in movable if name not in driven)
     namespace = namespace.strip().strip("/")
+    if namespace and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*", namespace):
+        raise CannotWrite(f"the plugin's <robotNamespace> is no name of ROS: {namespace!r}")
     return Survey(model, motors, without, added, plugin is not None, namespace)
 
 

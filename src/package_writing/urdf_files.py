@@ -47,7 +47,7 @@ def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Pa
     Raises:
         CannotWrite: if one of them can't be read or copied.
     """
-    path = path.expanduser().absolute()
+    path = Path(os.path.abspath(path.expanduser()))  # without .., which git can't keep empty
     try:
         expand(path, arguments)
         files = [path, *map(Path, included_files(path, arguments))]

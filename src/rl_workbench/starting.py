@@ -56,7 +56,7 @@ def search_path() -> str:
 
 @contextlib.contextmanager
 def reader_may_go() -> Iterator[None]:
-    """Ends what runs inside silently once nobody reads standard output, as in `train --help | head`."""
+    """Ends what runs inside silently once no one reads standard output, as in `train --help | head`."""
     try:
         yield
         if sys.stdout is not None:  # it may have been closed by >&-

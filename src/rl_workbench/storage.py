@@ -52,7 +52,7 @@ def write_file(path: Path, write: Writer, told: Path | None = None) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, write)
     except FileExistsError as error:
-        raise WorkbenchError(f"can't write {told}: {told.parent} is no folder") from error
+        raise WorkbenchError(f"can't write {told}: {told.parent} is not a folder") from error
     except OSError as error:
         raise WorkbenchError(f"can't write {told}: {error.strerror or error}") from error
 
@@ -116,5 +116,5 @@ def read_record(folder: Path) -> Any:
     record = read_json(folder / CONFIG_RECORD)
     if record is None:
         why = f"it has no {CONFIG_RECORD}" if folder.is_dir() else "there is no such folder"
-        raise WorkbenchError(f"{folder} is no run folder: {why}")
+        raise WorkbenchError(f"{folder} is not a run folder: {why}")
     return record

@@ -84,7 +84,7 @@ def observation_reader(space: gymnasium.Space[Any], task: str) -> Callable[[Any]
 
     def read(observed: Any) -> Any:
         if not space.contains(observed):
-            raise TaskError(f"{task}.observe() returned what isn't of {space}: {observed!r}")
+            raise TaskError(f"{task}.observe() returned a value outside {space}: {observed!r}")
         return observed
 
     return read
@@ -114,7 +114,7 @@ def _array_reader(space: gymnasium.spaces.Box, task: str) -> Callable[[Any], np.
 
 
 def check_task(task: Any) -> None:
-    """Raises TaskError if `task` is no `Task`, or if its objects or its query can't be used."""
+    """Raises TaskError if `task` is not a `Task`, or if its objects or its query can't be used."""
     if isinstance(task, type) and issubclass(task, Task):
         raise TaskError(f"a task is an object, {task.__name__}(...), and not the class")
     if not isinstance(task, Task):

@@ -68,7 +68,7 @@ class RobotEnv(DrawnEnv):
             with the robot's engine. Or a backend, which the environment closes.
         control_period: simulated time of an action [s]; None: the robot's. In real time 0 takes the
             newest joint state without waiting.
-        deadline: wall time that a simulator over ROS in lock-step may take for an answer, beside 10 ms for
+        deadline: wall time that a simulator over ROS in lock-step may take for an answer, on top of 10 ms for
             each physics step [s]; None: 5 s, and 30 s for "ros-own", of which there may be many.
         max_steps: after how many steps an episode is truncated; None: the task's.
         sensor_noise: standard deviation of noise on joints' positions and velocities; see `Sensor`.

@@ -25,7 +25,7 @@ SHARE = Path(__file__).resolve().parent / "share"  # in a wheel (setup.py)
 def own_file(package: str, place: str) -> Path:
     """Finds a file of this package, or of one of its companions, without a running ROS.
 
-    It is in the source tree around this module; in a wheel beside this module; or in a catkin workspace,
+    It is in the source tree around this module; in a wheel next to this module; or in a catkin workspace,
     where rospkg finds the package.
 
     Args:
@@ -42,7 +42,7 @@ def own_file(package: str, place: str) -> Path:
     found = _rospkg_path(package)
     if found is None:
         raise RobotEnvError(
-            f"package '{package}' is neither beside {TREE} nor on ROS_PACKAGE_PATH; "
+            f"package '{package}' is neither next to {TREE} nor on ROS_PACKAGE_PATH; "
             "source the workspace that it is installed in"
         )
     return found / place
@@ -108,7 +108,7 @@ def _read(path: Path) -> bytes:
 def need_file(path: Path) -> None:
     """Raises RobotEnvError if there is no such file, with the nearest name in its folder."""
     if path.is_dir():
-        raise RobotEnvError(f"{path} is a folder, and no file")
+        raise RobotEnvError(f"{path} is a folder, not a file")
     if path.exists():
         return
     folder = path.parent
@@ -162,7 +162,7 @@ def _parameters(data: bytes, name: str) -> dict[str, Any]:
         raise RobotEnvError(f"{name}: {error}") from error
     content = documents[0] if len(documents) == 1 else None
     if not isinstance(content, dict):
-        raise RobotEnvError(f"{name}: that is no YAML of parameters, name: value")
+        raise RobotEnvError(f"{name}: not a YAML file of parameters (name: value)")
     return content
 
 

@@ -31,14 +31,16 @@ def make_environment(robot: str, task: str, backend: str | None = None, **option
     """
     make_task = named(task)
     if not callable(make_task):
-        raise RobotEnvError(f"{task} is {short(make_task)}, which is no class of robot_envs.Task")
+        raise RobotEnvError(
+            f"{task} is {short(make_task)}, which is not a subclass of robot_envs.Task"
+        )
     known = option_names(RobotEnv)
     own = {name: value for name, value in options.items() if name in known}
     others = {name: value for name, value in options.items() if name not in known}
     check_options(others, option_names(make_task))
     made = make_task(**others)
     if not isinstance(made, Task):
-        raise RobotEnvError(f"{task} makes {short(made)}, which is no robot_envs.Task")
+        raise RobotEnvError(f"{task} makes {short(made)}, which is not a robot_envs.Task")
     return RobotEnv(_robots(robot), made, backend, **own)
 
 
@@ -58,8 +60,8 @@ def _robots(name: str) -> Any:
     listed = [robots] if isinstance(robots, Robot) else robots
     if not isinstance(listed, (list, tuple)) or not all(isinstance(each, Robot) for each in listed):
         raise RobotEnvError(
-            f"{name} is {short(robots)}, which is no robot_envs.Robot, nor a list of them, nor a "
-            "function without arguments that makes them"
+            f"{name} is {short(robots)}, which is not a robot_envs.Robot, a list of them, or a "
+            "function without arguments that returns them"
         )
     return robots
 
@@ -80,7 +82,7 @@ def check_options(given: Iterable[str], known: Iterable[str] = ()) -> None:
 
     Args:
         given: their names.
-        known: names beside `RobotEnv`'s.
+        known: names besides `RobotEnv`'s.
 
     Raises:
         RobotEnvError: if one isn't.

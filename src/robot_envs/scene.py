@@ -17,7 +17,7 @@ Placed = dict[str, tuple[float, float]]
 
 
 class Scene:
-    """What is in a world beside the models of its file.
+    """What is in a world besides the models of its file.
 
     Args:
         robots: one or several; the first one defines world, engine and control period.
@@ -180,7 +180,7 @@ def _once(what: str, names: Sequence[str]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise RobotEnvError(
-                f"a world has each {what} once, and '{name}' is there twice"
+                f"each {what} must be unique in a world, but '{name}' is there twice"
                 if name
                 else f"in a world with several robots each needs its own {what}"
             )

@@ -17,7 +17,7 @@ from robot_envs.world_state import Commands, InitialState, Pose, StateQuery, Wor
 
 @dataclass(frozen=True)
 class Object:
-    """An obstacle or a thing to handle, which a task needs beside its robots.
+    """An obstacle or a thing to handle, which a task needs besides its robots.
 
     Args:
         name: of the model in the world.
@@ -38,8 +38,8 @@ class Task(ABC):
     | attribute | meaning |
     |---|---|
     | `max_steps` | after how many steps an episode is truncated; None: never |
-    | `query` | links, models and contacts that a `state` has beside joints; others cost nothing |
-    | `objects` | what is spawned beside the robots |
+    | `query` | links, models and contacts that a `state` has besides joints; others cost nothing |
+    | `objects` | what is spawned besides the robots |
 
     Names of joints in states and of controllers in commands are plain in a world with one robot; see
     `WorldState` for several. A task may store data between calls, if `initial_state`, which begins an

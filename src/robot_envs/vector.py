@@ -78,7 +78,7 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
         Raises:
             ValueError: if there are not as many seeds or flags as environments.
             gymnasium.error.ClosedEnvironmentError: after `close()`.
-            SimulatorError: if a simulator can't go on.
+            SimulatorError: if a simulator can't continue.
         """
         of_all = options is None or "reset_mask" not in options
         given = super().reset(seed=seed, options=None if options is None else dict(options))
@@ -94,7 +94,7 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
             gymnasium.error.ResetNeeded: if an ended episode isn't reset automatically, or an error
                 interrupted a step.
             gymnasium.error.ClosedEnvironmentError: after `close()`.
-            SimulatorError: if a simulator can't go on.
+            SimulatorError: if a simulator can't continue.
         """
         self._check_ready()
         read = [self._read(action) for action in iterate(self.action_space, actions)]
@@ -135,7 +135,7 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
 
 def _check(num_envs: Any, backend: str | None, render_mode: str | None) -> None:
     if type(num_envs) is not int or num_envs < 1:
-        raise ValueError(f"num_envs must be a whole number of 1 and more, not {num_envs!r}")
+        raise ValueError(f"num_envs must be a whole number, at least 1, not {num_envs!r}")
     if backend == REALTIME:
         raise ValueError(
             f"many robots need the backend 'ros', or one in this process; {REALTIME!r} has a single robot"

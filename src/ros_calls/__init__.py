@@ -7,7 +7,7 @@ needs only Python.
 - `master`: calls of the master and of nodes; another master for a block of code.
 - `service`: `ServiceClient`, a client with a time limit, and its errors.
 - `waiting`: bounded waits for services and anything else.
-- `absence`: why nobody offers a service, and what to start.
+- `absence`: why no node offers a service, and what to start.
 - `requirements`: which Python packages are missing, and the command that installs them.
 """
 

@@ -1,4 +1,4 @@
-"""Explains why nobody offers a service, and names what to start."""
+"""Explains why no node offers a service, and names what to start."""
 
 from ros_calls import master
 from ros_calls.master import NoAnswer, Refused
@@ -26,7 +26,7 @@ def why_absent(service: str) -> str:
     """Returns what is missing, and the command that fixes it.
 
     Args:
-        service: the full name of a service that nobody offers.
+        service: the full name of a service that no node offers.
 
     Raises:
         NoAnswer: the master doesn't answer.
@@ -44,7 +44,7 @@ def why_absent(service: str) -> str:
             f"there is no controller manager in the namespace {above or '/'}: spawn a robot there whose URDF "
             f"has the plugin libgazebo_ros_control.so, and is the parameter {above}/robot_description, too"
         )
-    return "nobody offers this service"
+    return "no node offers this service"
 
 
 def why_not_up(service: str) -> str:

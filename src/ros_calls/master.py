@@ -97,7 +97,7 @@ def call_plain(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> A
 class MasterDown(Exception):
     """No ROS master can be used; the text gives its address and what to do."""
 
-    port_is_free = False  # nobody listens there, so a master could be started
+    port_is_free = False  # no one listens there, so a master could be started
 
 
 def uri() -> str:

@@ -33,7 +33,7 @@ class ServiceFailed(Exception):
 
 
 class ServiceGone(ServiceFailed):
-    """Nobody offers the service, or its node ended during the call."""
+    """No one offers the service, or its node ended during the call."""
 
 
 class ServiceMissing(ServiceGone):
@@ -50,7 +50,7 @@ class ServiceClient:
     A call is `begin` and `end`: several services work in parallel if all calls begin before the first
     one ends.
 
-    rospy's ServiceProxy waits for ever for a node that hangs, and a persistent one keeps the connection
+    rospy's ServiceProxy waits forever for a node that hangs, and a persistent one keeps the connection
     to a node that has ended. This client does neither: after a failure the next call reconnects.
 
     Args:
@@ -79,7 +79,7 @@ class ServiceClient:
         """Calls the service with a request, or with its fields in order, and returns the response.
 
         Raises:
-            ServiceGone: nobody offers the service, or the connection broke; the call may or may not
+            ServiceGone: no node offers the service, or the connection broke; the call may or may not
                 have been carried out.
             ServiceHangs: no answer in time.
             ServiceFailed: the service reported a failure, or the request can't be sent.
@@ -111,7 +111,7 @@ class ServiceClient:
                 self.close()
 
     def end(self) -> Any:
-        """Waits for the response to `begin` and returns it; the time limit starts anew.
+        """Waits for the response to `begin` and returns it; the time limit starts again.
 
         Raises:
             ServiceFailed: as for a call.

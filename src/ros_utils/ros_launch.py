@@ -46,7 +46,7 @@ def ros_launch_from_pkg(
     Returns:
         A true handle once roslaunch has started its nodes (or has ended by itself without an error)
         and everything in `ready` is there. A node that dies at once only causes a warning, and the
-        rest of the launch goes on. False, with an error in the log, if the package or file is
+        rest of the launch continues. False, with an error in the log, if the package or file is
         missing, no master can be used, roslaunch fails, or something isn't ready in time (the
         launch is ended then).
     """

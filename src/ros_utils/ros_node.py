@@ -84,7 +84,7 @@ def ros_node_from_pkg(
         if not wait:
             return Started(handle)
         full_name = rosgraph.names.ns_join(_global(ns), name) if name else None
-        absent = f"not registered at {_master.uri()} (for a program that is no node: wait=False)"
+        absent = f"not registered at {_master.uri()} (for a program that is not a node: wait=False)"
         return await_start(
             handle, lambda: _is_registered(handle, full_name, before), absent, timeout, ready
         )
@@ -119,7 +119,7 @@ def ros_kill_all_nodes() -> bool:
 def ros_kill_master() -> bool:
     """Shuts down all nodes of this master except the caller's own, and the master if this toolkit started it.
 
-    A master that somebody else started keeps running, with a warning.
+    A master that another program started keeps running, with a warning.
 
     Returns:
         True if no master runs afterwards.
@@ -129,15 +129,15 @@ def ros_kill_master() -> bool:
     ros_kill_all_processes()
     if not _master.is_up():
         return True
-    _log.warn(f"the master at {_master.uri()} goes on: it wasn't started here")
+    _log.warn(f"the master at {_master.uri()} keeps running: it wasn't started here")
     return False
 
 
 def ros_kill_all_processes() -> bool:
     """Ends all that this toolkit started under this master, from any process, and shuts down other nodes.
 
-    Nodes that somebody else started are only asked to shut down, as rosnode kill does; the caller's
-    own node and a master that somebody else started keep running, as do other masters and their
+    Nodes that another program started are only asked to shut down, as rosnode kill does; the caller's
+    own node and a master that another program started keep running, as do other masters and their
     nodes. Returns at once without a master.
 
     Returns:

@@ -80,11 +80,11 @@ def spawn_model_in_gazebo(
         gazebo_name: name of the new model.
         gaz_ref_frame: model or link that the pose refers to.
         pos_x, pos_y, pos_z: position [m].
-        ori_w, ori_x, ori_y, ori_z: orientation, a quaternion with w first here; all zeros is no
+        ori_w, ori_x, ori_y, ori_z: orientation, a quaternion with w first here; all zeros means no
             rotation.
         controllers_pkg: package of `controllers_file`; None for `pkg_name`.
         timeout, gazebo_ns: see `ros_gazebo`.
-        verify: go on only once the model is in the world's list.
+        verify: return only once the model is in the world's list.
         ready: return only once the model is there and all listed controllers run, within `timeout`
             after their start.
 

@@ -32,7 +32,7 @@ STEP_SERVICE = "/gazebo/step_world"
 TIMEOUT = 10.0  # [s] of wall time
 SLOWEST_TICK = 0.01  # [s] of wall time; a tick of a very full world
 MOST_PREPARED = 16  # prepared steps kept; older ones are prepared again
-ATTEMPTS = 3  # to prepare a step anew while controllers or models come and go
+ATTEMPTS = 3  # to prepare a step again while controllers or models come and go
 MOTION = 13  # numbers per model or link: position, orientation, linear and angular velocity
 Commands = Mapping[str, float | Sequence[float]]
 Some = bool | Sequence[str]
@@ -232,7 +232,7 @@ class StepClient:
             positions: joint positions [rad, m]. Other joints stay, or go to 0 with `everything`.
             velocities: of the placed joints [rad/s, m/s]; the others rest.
             seed: seed of the simulator's random numbers; 0 leaves them.
-            everything: True as reset_simulation: time starts at 0. False as reset_world: time goes on.
+            everything: True as reset_simulation: time starts at 0. False as reset_world: time continues.
             models: poses of models in the world; the others stand where they were spawned.
             twists: of the placed models; the others rest.
             ticks, commands, model_states, links, contacts: as for `step`; no step unless asked for.

@@ -24,6 +24,9 @@ from websockets.http11 import Request, Response
 from web_viewer.address import LOOPBACK, TOKEN_BYTES, Address, PortInUse, has_display, is_loopback
 
 Answer = Callable[[Any, Request], Response | None]
+LONGEST_PATH = 1000  # of a request [characters]
+LONGEST_TEXT = 1000  # of a field [characters]
+LARGEST = 2.0**53  # integers that JavaScript has exactly
 Point = tuple[float, float, float]  # [m]
 
 
@@ -37,7 +40,7 @@ class Gate:
     def refusal(self, request: Request) -> str:
         """Returns why the request is refused; empty if it is admitted."""
         host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
-        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+        if origin is not None and _place(origin) != host.lower():
             return "it comes from another page"
         if self._token:
             return "" if self._has_token(request) else "the address needs its token"
@@ -62,6 +65,10 @@ class Gate:
                 return Response(
                     http.HTTPStatus.FORBIDDEN, "Forbidden", Headers(), f"{refusal}\n".encode()
                 )
+            if len(request.path) > LONGEST_PATH:  # longer than a file's name may be
+                return Response(
+                    http.HTTPStatus.NOT_FOUND, "Not Found", Headers(), b"no such page\n"
+                )
             response = answer(connection, request)
             if self._token and response is not None:
                 response.headers["Set-Cookie"] = (
@@ -72,11 +79,56 @@ class Gate:
         return guarded
 
 
+def _place(origin: str) -> str:
+    try:
+        return urlsplit(origin).netloc.lower()
+    except ValueError:
+        return ""
+
+
 def _host_name(header: str) -> str:
     try:
         return urlsplit(f"//{header}").hostname or ""
     except ValueError:
         return ""
+
+
+def acceptable(current: object, props: object, value: object) -> bool:
+    """Returns whether a page may give a field another value.
+
+    Args:
+        current: the field's value.
+        props: the field's properties in viser, with its options or bounds.
+        value: what the page sends; anything that msgpack carries.
+    """
+    if isinstance(current, bool):
+        return isinstance(value, bool)
+    if isinstance(current, str):
+        options = getattr(props, "options", None)
+        return isinstance(value, str) and (
+            value in options if options is not None else len(value) <= LONGEST_TEXT
+        )
+    if not isinstance(current, (int, float)) or isinstance(value, bool):
+        return False
+    low, high = (getattr(props, bound, None) for bound in ("min", "max"))
+    least, most = -LARGEST if low is None else low, LARGEST if high is None else high
+    return isinstance(value, (int, float)) and least <= value <= most
+
+
+def _check_fields(server: viser.ViserServer) -> None:
+    """Passes on only what a field can take: viser casts anything, and broadcasts it to all pages."""
+    gui, pages = server.gui, server._websock_server
+    pages.unregister_handler(messages.GuiUpdateMessage, gui._handle_gui_updates)
+
+    async def checked(client: Any, message: messages.GuiUpdateMessage) -> None:
+        uuid, updates = message.uuid, message.updates
+        handle = gui._gui_input_handle_from_uuid.get(uuid) if isinstance(uuid, str) else None
+        if handle is None or not isinstance(updates, dict) or set(updates) != {"value"}:
+            return
+        if acceptable(handle._impl.value, handle._impl.props, updates["value"]):
+            await gui._handle_gui_updates(client, message)
+
+    pages.register_handler(messages.GuiUpdateMessage, checked)
 
 
 def _start(address: Address, title: str = "") -> viser.ViserServer:
@@ -113,6 +165,7 @@ def serve(address: Address, title: str, camera: Point, look_at: Point) -> viser.
         raise PortInUse(f"another process has just taken port {address.port}; start again")
     for message in (messages.ShareUrlRequest, messages.ShareUrlDisconnect):
         server._websock_server.unregister_handler(message)
+    _check_fields(server)
     server.gui.main_panel.dock_right()
     server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
     server.initial_camera.position = camera
@@ -128,7 +181,7 @@ def stop(server: viser.ViserServer) -> None:
 
 @contextlib.contextmanager
 def hidden_page() -> Iterator[viser.ViserServer]:
-    """Serves a page for recordings, which viser can make only from a server; nobody has its token."""
+    """Serves a page for recordings, which viser can make only from a server; no one has its token."""
     server = _start(Address(LOOPBACK, 0, secrets.token_urlsafe(TOKEN_BYTES)))
     try:
         yield server

@@ -26,7 +26,7 @@ class TableUpdate:
 
 
 class GrowingTable:
-    """Follows a table that another process appends to, truncates, removes or begins anew.
+    """Follows a table that another process appends to, truncates, removes or starts over.
 
     Args:
         path: the file, or a run folder that has it or will have it.

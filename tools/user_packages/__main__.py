@@ -24,7 +24,7 @@ def main() -> int:
     parser.add_argument("--place", type=Path, required=True, help="the folder for what is made")
     parser.add_argument("--python", required=True, help="the interpreter of built scripts")
     parser.add_argument("--prefixes", required=True, help="CMAKE_PREFIX_PATH")
-    parser.add_argument("--state", required=True, help="changes when those are made anew")
+    parser.add_argument("--state", required=True, help="changes when those are made again")
     parser.add_argument("--also", default="", help="ROS_PACKAGE_PATH")
     parser.add_argument("folders", nargs="*", type=Path, help="the user's folders")
     args = parser.parse_args()

@@ -32,7 +32,7 @@ class Tools:
 
     python: str  # the interpreter of their scripts
     prefixes: str  # CMAKE_PREFIX_PATH
-    state: str  # changes when what lies there was made anew
+    state: str  # changes when what lies there was made again
 
 
 def say(text: str) -> None:
@@ -107,7 +107,7 @@ class Overlay:
         return self._place / "log" / f"{name}.log"
 
     def _sweep(self, names: set[str]) -> None:
-        """Begins anew where a package has gone: what was made of it would still be found."""
+        """Starts over where a package has gone: what was made of it would still be found."""
         if self._stamps.is_dir() and not {each.name for each in self._stamps.iterdir()} <= names:
             with self._locked():
                 for folder in (self._stamps, self.devel, self._place / "build"):

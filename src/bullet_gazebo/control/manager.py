@@ -153,13 +153,13 @@ class ControllerManager:
         return gone
 
     def loops_changed(self) -> None:
-        """Has gains checked that somebody has changed."""
+        """Has gains checked that someone has changed."""
         self.on_change()
 
     def joints_moved(self, now: int, relatch: bool) -> None:
         """Tells controllers that something other than time has moved joints.
 
-        If `relatch`, they begin anew: set-points at the new positions, no PID history, no old effort.
+        If `relatch`, they start over: set-points at the new positions, no PID history, no old effort.
         """
         self._now = now
         if relatch:
@@ -194,7 +194,7 @@ class ControllerManager:
         """Stops a controller that raised, and releases its joints."""
         if controller.state == RUNNING:
             self._stop(controller)
-        # A new list: the old one may be in use by the update that is going on.
+        # A new list: the old one may be in use by a running update.
         self._running = [c for c in self._running if c is not controller]
         self.hardware.relatch(controller.claimed)
         self.on_change()

@@ -13,6 +13,7 @@ from bullet_gazebo.control.trajectory import NANOSECONDS, Axis, Waypoint
 
 SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS = 0, -1, -2  # control_msgs/FollowJointTrajectoryResult
 PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = -4, -5
+MOST_NAMED = 10  # joints of the client in an error text
 LARGEST = (
     1e12  # of a position and its derivatives: the coefficients of a spline would overflow beyond it
 )
@@ -60,9 +61,9 @@ def check_joints(names: Sequence[str], joints: Sequence[str], partial: bool) -> 
     missing = [joint for joint in joints if joint not in names]
     fault = ""
     if unknown:
-        fault = f"the controller has no joint {unknown}; it has {list(joints)}"
+        fault = f"the controller has no joint {unknown[:MOST_NAMED]}; it has {list(joints)}"
     elif len(set(names)) < len(names):
-        fault = f"a joint is named twice: {list(names)}"
+        fault = f"a joint is named twice: {list(names[:MOST_NAMED])}"
     elif not names:
         fault = "it names no joint"
     elif missing and not partial:

@@ -26,7 +26,7 @@ class Model:
         self.initial_pose = pose
         self.time_step = 0.0  # [s], the world's
         self._damped: dict[str, float] = {}  # the engine's damping [N m s/rad, N s/m] by joint
-        self.damping_added: Mapping[str, float] = {}  # [N m s/rad, N s/m] beside the file's
+        self.damping_added: Mapping[str, float] = {}  # [N m s/rad, N s/m] in addition to the file's
         self._motors: dict[str, tuple[float, float]] = {}  # speed [rad/s, m/s] and effort [N m, N]
         self._grip: dict[str, float] = {}  # factors of the friction of links
         self._joints = {joint: index for index, joint in enumerate(body.joint_names)}

@@ -32,6 +32,7 @@ if TYPE_CHECKING:  # only the other process draws
     from bullet_gazebo.pictures.renderer import Renderer
 
 MAIN = "import sys; from bullet_gazebo.pictures.recording import main; sys.exit(main())"
+MOST_WAITING = 100_000_000  # [bytes] for the other process; beyond it frames are dropped
 LEAST_SIZE, LARGEST_SIZE, FASTEST = 16, 4096, 240.0
 NUMBERS = 7  # of a pose
 ROOM = 1.25  # factor on the camera's distance: things move
@@ -95,10 +96,13 @@ class SimulationRecorder:
         self._due, self._last = 0, -1  # [ns]
         self._models: list[Model] = []
         self._waiting: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-        self._waiting.put(pickle.dumps(options))
+        self._queued, self._sent = 0, 0  # [bytes]; each is written by one thread
+        self._dropped = 0
         self._ending = False
         self._process = _start()
-        self._thread = threading.Thread(target=self._feed, name="recording", daemon=True)
+        self._thread = threading.Thread(
+            target=self._feed, args=(options,), name="recording", daemon=True
+        )
         self._thread.start()
         sim.listeners.append(self._on_tick)
 
@@ -109,6 +113,9 @@ class SimulationRecorder:
         if now < self._due or self._ending:
             return
         self._due = max(self._due + self._period, now)
+        if self._queued - self._sent > MOST_WAITING:
+            self._dropped += 1
+            return
         models = list(self._sim.world.models.values())
         recorded = None
         if models != self._models:
@@ -118,19 +125,25 @@ class SimulationRecorder:
         for model in models:
             for position, orientation in model.link_poses():
                 poses.extend((*position, *orientation))
-        self._waiting.put(pickle.dumps((recorded, poses)))
+        data = pickle.dumps((recorded, poses))
+        self._queued += len(data)
+        self._waiting.put(data)
 
-    def _feed(self) -> None:
-        """Sends queued messages until `close`, or until the other process ends."""
+    def _feed(self, options: RecordingOptions) -> None:
+        """Sends the options, and queued messages until `close`, or until the other process ends."""
         pipe: Any = self._process.stdin
         try:
+            pipe.write(pickle.dumps(options))
             while (data := self._waiting.get()) is not None:
                 pipe.write(data)
                 pipe.flush()
+                self._sent += len(data)
             pipe.close()
         except OSError:  # the other process has printed why
             self._ending = True
             logger.warning("the recording has ended before the simulation")
+        if self._dropped:
+            logger.warning("%d frames of the recording were dropped", self._dropped)
 
     def close(self, patience: float) -> None:
         """Ends the recording, after up to `patience` [s] for what is queued.
@@ -167,7 +180,7 @@ class FrameDrawer:
         self._followed, self._offset = "", ZERO
 
     def change(self, models: list[RecordedModel]) -> None:
-        """Replaces the models; the next frame places the camera anew."""
+        """Replaces the models; the next frame places the camera from scratch."""
         for model in self._models:
             self._renderer.remove(model.name)
         for model in models:

@@ -58,7 +58,7 @@ class SceneOffer:
 class SceneServer:
     """Models and lights that a window doesn't know yet (~get_scene), ~scene_poses and ~scene_contacts.
 
-    While somebody subscribes, the topics come thirty times a second of wall time: a thread of its own copies
+    While it has subscribers, the topics come thirty times a second of wall time: a thread of its own copies
     the world between two ticks, and publishes the copies.
     """
 
@@ -118,7 +118,7 @@ class SceneServer:
                     copies = self._copy()
                 for publish in copies:
                     publish()
-            except Exception:  # noqa: BLE001 - the simulation goes on, and the next message comes
+            except Exception:  # noqa: BLE001 - the simulation continues, and the next message comes
                 if not rospy.is_shutdown():
                     rospy.logerr_throttle(REPEAT, f"a scene is lost:\n{traceback.format_exc()}")
             due = max(due + PERIOD, time.monotonic())  # missed messages aren't made up for

@@ -73,7 +73,7 @@ def _replace_waits(runner: ScriptRunner) -> None:
     def condition_wait(self: threading.Condition, timeout: float | None = None) -> bool:
         if not _is_covered(runner):
             return originals.condition_wait(self, timeout)
-        if timeout is not None and 0.0 < timeout < ROUNDING:  # else its caller asks again for ever
+        if timeout is not None and 0.0 < timeout < ROUNDING:  # else its caller asks again forever
             _rounded.passed = runner.clock.passed
             timeout = 0.0
         return wait_for_notice(runner, self, timeout)

@@ -80,7 +80,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     add("--episodes", type=number(1), default=100, metavar="N",
         help="greedy episodes on fresh seeds for each policy's score (default 100)")  # fmt: skip
     add("--out", type=Path, metavar="FOLDER",
-        help="for runs, tables and curves; a benchmark that was interrupted is continued there "
+        help="folder for runs, tables and curves; an interrupted benchmark is continued there "
         "(runs/benchmark/SUITE)")  # fmt: skip
 
 
@@ -111,7 +111,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
             interrupt.defer()
             pool.run_all(jobs)
         if interrupt.requested():
-            tell("interrupted; the same command goes on")
+            tell("interrupted; run the same command again to continue")
             return
         interrupt.at_once()  # the report takes minutes and can be repeated
         _report(folder, suite, planned, arguments.episodes, pool.where)
@@ -223,7 +223,7 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
     runs, results = _examine(planned, episodes)
     results = [replace(each, fault=each.fault.replace(f"{folder}/", "")) for each in results]
     if all(each.steps is None for each in results):
-        raise WorkbenchError(f"no training came to anything; see {planned[0].job.log}")
+        raise WorkbenchError(f"no training produced a result; see {planned[0].job.log}")
     groups = figures.grouped(results)
     summary = figures.summary_table(groups, figures.RESULTS_SUMMARY)
     every = figures.table(results, figures.RESULTS)

@@ -18,7 +18,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     add_policy_flags(parser)
     parser.add_argument("--episodes", type=number(1), default=1, metavar="N", help="default 1")
     parser.add_argument("--gui", action="store_true",
-                        help="on a page in the browser, even if the environment has a window; "
+                        help="show a page in the browser, even if the environment has a window; "
                         "each episode has its own seed, from --seed on")  # fmt: skip
 
 

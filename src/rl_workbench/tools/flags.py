@@ -30,9 +30,9 @@ def add_policy_flags(
 def add_environment_flags(parser: argparse.ArgumentParser) -> None:
     """Adds the seed of the episodes and the options of the environment."""
     parser.add_argument("--seed", type=number(0), default=0, metavar="N",
-                        help="of the episodes (default 0)")  # fmt: skip
+                        help="seed of the episodes (default 0)")  # fmt: skip
     parser.add_argument("--env-kwargs", nargs="+", default=[], metavar="KEY=VALUE",
-                        help="options of the environment, as max_steps=200")  # fmt: skip
+                        help="options of the environment, e.g. max_steps=200")  # fmt: skip
 
 
 def add_job_flags(parser: argparse.ArgumentParser) -> None:

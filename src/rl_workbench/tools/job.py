@@ -36,7 +36,7 @@ ONE_CORE = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 KILLED = {-signal.SIGKILL, -signal.SIGTERM, 128 + signal.SIGTERM}
 
 StopWithin = Callable[[], float | None]
-"""Says how long a training may take to save and end [s]; None: it goes on."""
+"""Says how long a training may take to save and end [s]; None: it keeps running."""
 
 
 @dataclass(frozen=True)

@@ -256,7 +256,7 @@ class JobStatus:
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of the command."""
     parser.add_argument("folder", type=Path, metavar="FOLDER",
-                        help="of a benchmark or a sweep, also while it runs")  # fmt: skip
+                        help="folder of a benchmark or sweep; it may still be running")  # fmt: skip
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the list as JSON, too")
 
 

@@ -50,7 +50,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     add("--max-steps", type=number(0), default=0, metavar="N",
         help="cut the episode off after N steps; 0: never (default)")  # fmt: skip
     add("--size", type=_size, metavar="WIDTHxHEIGHT",
-        help="of an episode's pictures [pixels]; by default the environment's")  # fmt: skip
+        help="size of the pictures [pixels] (default: the environment's)")  # fmt: skip
     add("--fps", type=_rate, metavar="HZ",
         help="frames per second of simulated time (default 25; 50 for an MP4)")  # fmt: skip
     add("--no-captions", action="store_true", help="no line with step, return and action")

@@ -54,7 +54,7 @@ def open_run(folder: Path) -> Run:
         names = run["exp_name"], run["env_id"]
         return Run(folder, config["algorithm"], *names, env_kwargs, run["seed"], config)
     except (KeyError, TypeError) as error:
-        raise WorkbenchError(f"{folder} is no run folder: its record lacks {error}") from error
+        raise WorkbenchError(f"{folder} is not a run folder: its record lacks {error}") from error
 
 
 def read_leniently(path: Path) -> dict[str, Any]:
@@ -72,7 +72,7 @@ def summary_of(run: Run) -> dict[str, Any]:
 
 
 def cost_file(folder: Path) -> Path:
-    """Returns the path of the file beside a run folder with its processes' times."""
+    """Returns the path of the file next to a run folder that holds its processes' times."""
     return folder.with_name(f"{folder.name}.cost.json")
 
 
@@ -97,7 +97,7 @@ def find_runs(patterns: Sequence[str], warn: Callable[[str], None]) -> list[Run]
     for pattern in patterns:
         runs = _matching(pattern, warn)
         if not runs:
-            raise WorkbenchError(f"there is no run folder at {pattern}")
+            raise WorkbenchError(f"there is not a run folder at {pattern}")
         found.update((run.folder, run) for run in runs)
     return list(found.values())
 

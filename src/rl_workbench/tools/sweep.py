@@ -48,21 +48,26 @@ RANGES = "sweep.yaml"  # in the package's config
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of the command."""
     add = parser.add_argument
-    add("--algo", choices=tuple(ALGORITHMS), default="dqn", help="default dqn")
-    add("--env-id", default="CartPole-v1", metavar="ID", help="default CartPole-v1")
+    add("--algo", choices=tuple(ALGORITHMS), default="dqn", help="the algorithm (default dqn)")
+    add(
+        "--env-id",
+        default="CartPole-v1",
+        metavar="ID",
+        help="the environment (default CartPole-v1)",
+    )
     add("--params", nargs="+", default=[], metavar="KEY=VALUE",
-        help="options of every training, which are then not searched")  # fmt: skip
-    add("--ranges", type=Path, metavar="FILE", help="what is searched (config/sweep.yaml)")
-    add("--trials", type=number(1), default=20, metavar="N", help="in all (default 20)")
+        help="fixed options of every training, excluded from the search")  # fmt: skip
+    add("--ranges", type=Path, metavar="FILE", help="ranges to search (default config/sweep.yaml)")
+    add("--trials", type=number(1), default=20, metavar="N", help="number of trials (default 20)")
     add("--seeds", type=number(1), default=1, metavar="N",
-        help="trainings of a trial; its score is their mean (default 1)")  # fmt: skip
-    add("--seed", type=number(0), default=0, metavar="N", help="of the search (default 0)")
-    add("--total-timesteps", type=number(1), metavar="N", help="of each training")
+        help="trainings per trial; its score is their mean (default 1)")  # fmt: skip
+    add("--seed", type=number(0), default=0, metavar="N", help="seed of the search (default 0)")
+    add("--total-timesteps", type=number(1), metavar="N", help="length of each training [steps]")
     add("--pruner", choices=PRUNERS, default=PRUNERS[0],
-        help="ends trials whose evaluations fall behind those of others (default median)")  # fmt: skip
+        help="how to end trials that fall behind the others (default median)")  # fmt: skip
     add_job_flags(parser)
     add("--out", type=Path, metavar="FOLDER",
-        help="of the study; one that exists is continued (runs/sweep__ENV__ALGO)")  # fmt: skip
+        help="folder of the study; an existing one is continued (default runs/sweep__ENV__ALGO)")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -125,7 +130,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         except OSError as error:  # of Optuna's journal
             raise WorkbenchError(f"can't write to {folder}: {error.strerror}") from error
     if interrupt.requested():
-        tell("interrupted; the same command goes on")
+        tell("interrupted; run the same command again to continue")
 
 
 def open_study(sweep: Sweep) -> Any:
@@ -152,7 +157,7 @@ def open_study(sweep: Sweep) -> Any:
 
 
 def _repair(path: Path) -> None:
-    """Removes what a killed search left: its lock, which nobody else can hold, and an unfinished line."""
+    """Removes what a killed search left: its lock, which no one else can hold, and an unfinished line."""
     path.with_name(f"{path.name}.lock").unlink(missing_ok=True)
     with contextlib.suppress(FileNotFoundError):
         content = path.read_bytes()

@@ -28,6 +28,7 @@ from rl_workbench.training.environments import as_float32
 from rl_workbench.training.folder import library_versions
 
 FORMAT = "rl_workbench policy 1"  # changes when older files can't be read any more
+READ = {"env_id": str, "env_kwargs": dict, "observation_space": dict, "action_space": dict}
 METADATA = "metadata.json"  # its name within the file
 SAMPLES = 1000  # observations for the comparison
 ROUNDING = 1e-4  # largest difference from summing the same float32 numbers in another order
@@ -65,7 +66,12 @@ def open_exported(path: Path) -> ExportedPolicy:
     except _DAMAGED as error:
         raise WorkbenchError(f"{path} is damaged, or no exported policy") from error
     if metadata.get("format") != FORMAT:
-        raise WorkbenchError(f"{path} is no exported policy of this version")
+        raise WorkbenchError(f"{path} is not an exported policy of this version")
+    lacks = [name for name, kind in READ.items() if not isinstance(metadata.get(name), kind)]
+    if lacks:
+        raise WorkbenchError(
+            f"{path}: its {METADATA} has no {' and no '.join(lacks)} that can be read"
+        )
 
     @torch.no_grad()
     def act(observation: Observation) -> Any:

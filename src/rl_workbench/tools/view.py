@@ -8,7 +8,7 @@ from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import POLICIES, add_environment_flags, env_options
 from web_viewer.address import add_flags as add_page_flags
 
-NICENESS = 10  # of a page beside a training, so that the training has priority
+NICENESS = 10  # of a page that accompanies a training, so that the training has priority
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

@@ -143,7 +143,7 @@ class CallbackList:
     """Calls the callbacks of a training.
 
     Args:
-        own: Ours. Their errors go on as they are.
+        own: Ours. Their errors propagate as they are.
         users: The user's. Their errors end the training with one line.
     """
 

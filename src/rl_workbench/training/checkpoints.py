@@ -56,7 +56,7 @@ class Checkpoints:
         return path
 
     def remove_leftovers(self) -> None:
-        """Removes what a killed training had begun to write. Nobody else may be writing."""
+        """Removes what a killed training had begun to write. No one else may be writing."""
         for folder in (self._run, self._run / FOLDER):
             for pattern in LEFTOVERS:
                 for path in folder.glob(pattern):
@@ -96,7 +96,7 @@ def read(path: Path) -> dict[str, Any]:
     except _DAMAGED as error:
         raise WorkbenchError(f"{path} is damaged, or no checkpoint") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise WorkbenchError(f"{path} is no checkpoint of a training")
+        raise WorkbenchError(f"{path} is not a checkpoint of a training")
     return content
 
 
@@ -117,7 +117,7 @@ def read_newest(run: Path, say: Callable[[str], None]) -> dict[str, Any]:
             return read(path)
         except WorkbenchError as error:
             say(f"{error}; looking for an earlier one")
-    raise WorkbenchError(f"{run} holds no checkpoint to go on from")
+    raise WorkbenchError(f"{run} holds no checkpoint to continue from")
 
 
 def candidates(run: Path, best_first: bool = False) -> list[Path]:

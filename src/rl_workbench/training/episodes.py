@@ -111,7 +111,7 @@ class EpisodeSource:
             The episodes in the order of the environments; None if `should_stop()` became true.
         """
         agent = self._agent
-        # Nobody else waits while a single environment takes its step.
+        # No one else waits while a single environment takes its step.
         begins: list[Callable[[Any], object]] = [lambda action: None]
         if len(self._envs) > 1:
             begins = [env.get_wrapper_attr(BEGIN_STEP) for env in self._envs]

@@ -66,7 +66,7 @@ def held(folder: Path, holder: str = "a training") -> Iterator[None]:
             raise WorkbenchError(f"{holder} is running in {folder}") from error
         except OSError as error:
             reason = error.strerror or "it was removed just now"
-            raise WorkbenchError(f"{folder} is no run folder: {reason}") from error
+            raise WorkbenchError(f"{folder} is not a run folder: {reason}") from error
         yield
 
 

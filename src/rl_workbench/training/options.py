@@ -30,33 +30,36 @@ class RunOptions:
     train_env_kwargs: dict[str, Any] = option({}, "further options, for training")
     eval_env_kwargs: dict[str, Any] = option({}, "further options, for evaluations")
     seed: int = option(0, "seed of weights, exploration, environment and evaluation", 0, 2**31 - 1)
-    num_envs: int = option(1, "environments to learn in at the same time", 1, 1024)
-    total_timesteps: int = option(0, "length of the training [steps]; 0: any", 0, LARGEST)
-    episodes: int = option(0, "length in episodes, if that comes first; 0: any", 0, LARGEST)
+    num_envs: int = option(1, "number of environments to learn in at the same time", 1, 1024)
+    total_timesteps: int = option(0, "length of the training [steps]; 0: no limit", 0, LARGEST)
+    episodes: int = option(0, "length in episodes, if that comes first; 0: no limit", 0, LARGEST)
     stop_at_return: float | None = option(
         None, "end the training when a confirmed mean return reaches X", -1e18, 1e18, metavar="X"
     )
     stop_at_length: float = option(
-        0.0, "end it when the last 20 episodes lasted X steps on average; 0: never", 0, 1e9,
+        0.0, "end the training when the last 20 episodes lasted X steps on average; 0: never", 0, 1e9,
         metavar="X",
     )  # fmt: skip
-    device: str = option("cpu", "torch's device, as in cpu or cuda")
+    device: str = option("cpu", "torch device, e.g. cpu or cuda")
     exp_name: str = option("", "part of the run folder's name; the algorithm's name by default")
     run_dir: str = option("", "a new or empty folder for all results (runs/ENV__EXP__SEED__TIME)")
     eval_frequency: int = option(
-        10_000, "steps between two evaluations; 0: at the end only", 0, LARGEST
+        10_000, "steps between evaluations; 0: only at the end", 0, LARGEST
     )
-    eval_episodes: int = option(10, "greedy episodes of an evaluation", 1, 10**6)
+    eval_episodes: int = option(10, "greedy episodes per evaluation", 1, 10**6)
     confirm_episodes: int = option(
-        0, "greedy episodes that confirm a new best policy; 0: those of the evaluation", 0, 10**6
+        0,
+        "greedy episodes that confirm a new best policy; 0: as many as in an evaluation",
+        0,
+        10**6,
     )
     checkpoint_frequency: int = option(
-        10_000, "steps between two checkpoints; 0: at start and end only", 0, LARGEST
+        10_000, "steps between checkpoints; 0: only at start and end", 0, LARGEST
     )
     keep_checkpoints: int = option(
         3, "how many of the newest checkpoints to keep; 0: all", 0, 10**6
     )
-    log_frequency: int = option(500, "steps between two points of losses/", 1, LARGEST)
+    log_frequency: int = option(500, "steps between logged points of losses/", 1, LARGEST)
 
     def __post_init__(self) -> None:
         check_options(self)
@@ -183,7 +186,7 @@ def _flat(record: Any, origin: str) -> dict[str, Any]:
 
 
 def default_file(name: str) -> Path:
-    """Finds the project's own config/NAME: in the source tree, or beside the installed modules."""
+    """Finds the project's own config/NAME: in the source tree, or next to the installed modules."""
     for folder in (TREE, SHARE):
         path = folder / "config" / name
         if path.is_file():

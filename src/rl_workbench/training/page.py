@@ -31,7 +31,7 @@ class Page(Callback):
                 env={**os.environ, "PYTHONPATH": search_path()},
             )  # fmt: skip
         except OSError as error:
-            tell(f"no page; the training goes on without one: {error.strerror}")
+            tell(f"no page; the training continues without one: {error.strerror}")
 
     def on_training_end(self, training: Any) -> None:
         if self._process is None:

@@ -23,7 +23,7 @@ EVENTS = "events.out.tfevents."
 VERSION = "brain.Event:2"  # of TensorBoard's format, in the first record of its files
 SHOWN_AFTER = 10.0  # [s], longest time until TensorBoard can see a point
 READ_AFTER = 1.0  # [s], longest time until a reader of the CSV can see a row, if others follow
-METRICS = (EVALUATION, RETURN)  # beside the settings, under HPARAMS
+METRICS = (EVALUATION, RETURN)  # next to the settings, under HPARAMS
 
 Point = tuple[str, float, int, float]  # tag, value, step, wall time [s]
 
@@ -33,7 +33,7 @@ class ScalarLog:
 
     Args:
         folder: Where both files go.
-        settings: Shown as a table under TEXT, and under HPARAMS beside those of other trainings.
+        settings: Shown as a table under TEXT, and under HPARAMS next to those of other trainings.
         length: The CSV's length [bytes] at the checkpoint to continue from; 0 starts a new one.
         say: Is called if the CSV has lost rows since then. The training doesn't depend on them.
     """
@@ -149,7 +149,7 @@ def _truncated(path: Path, length: int, say: Callable[[str], None]) -> list[Poin
             for row in rows
         ]
     except (FileNotFoundError, EOFError, ValueError, KeyError):
-        say(f"{path} lacks rows that it had at the checkpoint; going on without them")
+        say(f"{path} lacks rows that it had at the checkpoint; continuing without them")
         return []
     os.truncate(path, length)
     return points

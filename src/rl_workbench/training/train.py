@@ -304,7 +304,7 @@ def _parser(
     add = parser.add_argument
     add("--config", metavar="FILE", help=f"options in YAML (default config/{kind.config})")
     if kind.presets:
-        add("--preset", metavar="NAME", help="a section of that file by its name, as in: tutorial")
+        add("--preset", metavar="NAME", help="section of that file to use, e.g. tutorial")
     add("--params", metavar="KEY=VALUE", nargs="+", help="options by name")
     add("--resume", metavar="RUN_DIR", help="continue an interrupted training")
     options.add_flags(parser, {"exp_name": kind.name, **kind.defaults, "env_id": env_id})

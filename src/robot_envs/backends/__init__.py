@@ -16,7 +16,7 @@ __all__ = ["BACKENDS", "IN_PROCESS", "LOCKSTEP", "MUJOCO", "OWN", "REALTIME",
            "has_ros", "make_backend", "need_ros"]  # fmt: skip
 
 IN_PROCESS, MUJOCO, LOCKSTEP, REALTIME = "bullet", "mujoco", "ros", "ros-realtime"
-OWN = "ros-own"  # lock-step in a simulator that nobody else uses
+OWN = "ros-own"  # lock-step in a simulator that no one else uses
 BACKENDS = (IN_PROCESS, MUJOCO, LOCKSTEP, OWN, REALTIME)
 
 
@@ -41,7 +41,7 @@ def make_backend(
         backend: one of `BACKENDS`; None: in this process, with the first robot's engine.
         control_period: simulated time of one action [s]; in real time 0 takes the newest joint state without
             waiting.
-        deadline: wall time that a simulator in lock-step may take for an answer, beside 10 ms for each
+        deadline: wall time that a simulator in lock-step may take for an answer, on top of 10 ms for each
             tick [s]; None: the backend's default.
 
     Raises:

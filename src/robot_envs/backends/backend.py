@@ -68,7 +68,7 @@ def ticks_per_action(control_period: float, physics_step: float) -> int:
     ticks = round(ratio) if 0.0 < ratio < 1e6 else 0  # also for NaN
     if ticks < 1 or abs(ticks * physics_step - control_period) > 1e-9:
         raise ValueError(
-            f"control period {control_period} s is no multiple of the physics step {physics_step} s"
+            f"control period {control_period} s is not a multiple of the physics step {physics_step} s"
         )
     return ticks
 

@@ -1,4 +1,4 @@
-"""Models of a world in this process beside its robots: those of a world file, and a task's objects."""
+"""Models of a world in this process besides its robots: those of a world file, and a task's objects."""
 
 import logging
 from dataclasses import replace

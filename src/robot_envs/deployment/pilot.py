@@ -22,7 +22,7 @@ class CommandLimits:
 
     | command | limited to |
     |---|---|
-    | position | `lower` and `upper`, also the soft ones; and moves no faster than `velocity` |
+    | position | moves no faster than `velocity`; and `lower` and `upper`, also the soft ones |
     | velocity | `velocity` either way |
     | effort | `effort` either way |
 
@@ -50,18 +50,24 @@ class CommandLimits:
         for joint, value, start, (lower, upper), way in zip(
             self._port.joints, wanted, before, self._bounds, self._ways, strict=True
         ):
-            bounded = min(max(value, lower), upper)
-            if bounded != value:
+            if not lower <= value <= upper:
                 exceeded.append(joint)
-            numbers.append(min(max(bounded, start - way), start + way))
+            near = min(max(value, start - way), start + way)
+            numbers.append(min(max(near, lower), upper))  # last: `start` may lie beyond a stop
         return numbers[0] if self._port.single else tuple(numbers), exceeded
 
     def _numbers(self, command: Command) -> list[float]:
         return [command] if self._port.single else list(command)  # type: ignore[list-item, arg-type]
 
     def stop(self, joints: Mapping[str, JointState]) -> Command:
-        """Returns the command that stops the joints: their present positions, or zero velocity or effort."""
-        return self._port.at_start({name: each.position for name, each in joints.items()})
+        """Returns the command that stops the joints: zero velocity or effort, or their present positions.
+
+        A joint beyond a stop is commanded to the stop.
+        """
+        command = self._port.at_start({name: each.position for name, each in joints.items()})
+        bounds = zip(self._numbers(command), self._bounds, strict=True)
+        numbers = [min(max(value, lower), upper) for value, (lower, upper) in bounds]
+        return numbers[0] if self._port.single else tuple(numbers)
 
 
 def _bounds(limits: JointLimits, quantity: str) -> tuple[float, float]:
@@ -72,6 +78,26 @@ def _bounds(limits: JointLimits, quantity: str) -> tuple[float, float]:
     lower = [each for each in (limits.lower, soft.lower if soft else None) if each is not None]
     upper = [each for each in (limits.upper, soft.upper if soft else None) if each is not None]
     return max(lower, default=-math.inf), min(upper, default=math.inf)
+
+
+MARGIN = 0.1  # of a joint's range, that it may be beyond its stops
+LEAST_MARGIN = 0.05  # [rad, m]
+FASTEST = 10.0  # times its velocity limit, which a joint that is pushed may exceed
+LARGEST = 1e6  # [rad, m, rad/s, m/s] that any joint may have
+
+
+def impossible(limits: JointLimits, position: float, velocity: float) -> str:
+    """Returns why no joint with these limits has this state [rad or m, and 1/s]; empty if one may have it."""
+    if not (abs(position) <= LARGEST and abs(velocity) <= LARGEST):  # NaN, too
+        return f"position {position:g} and velocity {velocity:g}, which no joint has"
+    lower, upper = limits.lower, limits.upper
+    if lower is not None and upper is not None:
+        margin = max(MARGIN * (upper - lower), LEAST_MARGIN)
+        if not lower - margin <= position <= upper + margin:
+            return f"position {position:g}, beyond its stops at {lower:g} and {upper:g}"
+    if limits.velocity and abs(velocity) > FASTEST * limits.velocity:
+        return f"velocity {velocity:g}, where its limit is {limits.velocity:g}"
+    return ""
 
 
 Joints = Mapping[str, JointState]

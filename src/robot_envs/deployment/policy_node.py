@@ -9,36 +9,47 @@ from typing import Any
 
 import rosgraph
 import rospy
+from controller_manager_msgs.srv import ListControllers
 from sensor_msgs.msg import JointState as JointStateMsg
 from std_msgs.msg import Float64, Float64MultiArray
 
+from bullet_gazebo.control.joint import JointLimits
 from robot_envs.backends.ros import node
 from robot_envs.backends.ros.bringup import full_name
 from robot_envs.backends.ros.gazebo import lockstep_hint
-from robot_envs.deployment.pilot import Pilot
+from robot_envs.deployment.pilot import Pilot, impossible
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import Command, JointState
+from ros_utils.service_client import ServiceClient, ServiceFailed
+
+AHEAD = 1.0  # [s] that the stamp of a joint state may be ahead of ROS time
+ASKING = 1.0  # [s] of wall time between two questions to the controller manager
 
 
 class JointListener:
     """Keeps the newest state of each joint, and when it has come.
 
-    States without velocities or with numbers that aren't finite are ignored, and so are those whose stamp
-    isn't newer than the one before: a driver that repeats itself reports nothing new.
+    States without velocities are ignored, and so are those whose stamp isn't newer than the one before: a
+    driver that repeats itself reports nothing new. A state that the joint can't have, or a stamp in the
+    future, is a fault until the joint's next good state.
 
     Args:
         topic: of the joint states.
         model: of the robot: joints may be named model::joint.
         joints: their plain names.
+        limits: of the joints that have any.
     """
 
-    def __init__(self, topic: str, model: str, joints: Sequence[str]) -> None:
+    def __init__(
+        self, topic: str, model: str, joints: Sequence[str], limits: Mapping[str, JointLimits]
+    ) -> None:
         self._names = {f"{model}::{name}": name for name in joints} | {
             name: name for name in joints
         }
-        self._joints = tuple(joints)
+        self._joints, self._limits = tuple(joints), limits
+        self._faults: dict[str, str] = {}  # by joint
         self._lock = threading.Lock()
         self._known: dict[str, tuple[JointState, rospy.Time, float]] = {}  # with stamp and arrival
         self._subscriber = rospy.Subscriber(
@@ -58,11 +69,32 @@ class JointListener:
         with self._lock:
             for full, *values in numbers:
                 name = self._names.get(full)
-                if name is None or not all(map(math.isfinite, values)):
+                if name is None:
+                    continue
+                if fault := self._fault(name, stamp.to_sec() - now, *values):
+                    self._faults[name] = fault
                     continue
                 if name in self._known and zero != stamp <= self._known[name][1]:
                     continue
                 self._known[name] = JointState(*values), stamp, now
+                self._faults.pop(name, None)
+
+    def _fault(
+        self, name: str, ahead: float, position: float, velocity: float, effort: float
+    ) -> str:
+        if ahead > AHEAD:
+            return (
+                f"joint states are stamped {ahead:.1f} s in the future: the machines' clocks differ"
+            )
+        bad = impossible(self._limits.get(name, JointLimits()), position, velocity)
+        if not bad and not math.isfinite(effort):
+            bad = f"effort {effort:g}"
+        return f"the joint '{name}' is reported at {bad}" if bad else ""
+
+    def fault(self) -> str:
+        """Returns what is wrong with a joint's newest state; empty if nothing is."""
+        with self._lock:
+            return next(iter(self._faults.values()), "")
 
     def missing(self) -> list[str]:
         """Returns the joints whose states aren't known yet."""
@@ -80,10 +112,40 @@ class JointListener:
         """Forgets all states, as after time has gone back."""
         with self._lock:
             self._known.clear()
+            self._faults.clear()
 
     def close(self) -> None:
         """Unsubscribes."""
         self._subscriber.unregister()
+
+
+class ControllerWatch:
+    """Asks a robot's controller manager again and again, in a thread, whether the controllers run.
+
+    A real robot may have no controller manager; then nothing is known of them.
+
+    Args:
+        robot: whose controllers take the commands.
+        over: ends the thread.
+    """
+
+    def __init__(self, robot: Robot, over: threading.Event) -> None:
+        self.stopped: list[str] = []  # loaded controllers that don't run
+        self._names = {port.name for port in robot.ports}
+        self._service = full_name(robot, "controller_manager/list_controllers")
+        self._over = over
+        threading.Thread(target=self._watch, name="controllers", daemon=True).start()
+
+    def _watch(self) -> None:
+        client = ServiceClient(self._service, ListControllers, timeout=ASKING)
+        while not self._over.wait(ASKING):
+            try:
+                loaded = client().controller
+            except ServiceFailed:
+                loaded = []
+            self.stopped = [
+                each.name for each in loaded if each.name in self._names and each.state != "running"
+            ]
 
 
 LATE_PERIODS, LATE_AT_LEAST = 5, 0.1  # control periods, and [s]
@@ -139,7 +201,10 @@ class PolicyNode:
         self._last: Mapping[str, JointState] | None = None  # joints; None: nothing was commanded
         self._should_end: Callable[[], bool] = rospy.is_shutdown
         self._is_killed, self._ended = threading.Event(), threading.Event()
-        self._joints = JointListener(full_name(robot, "joint_states"), robot.model, robot.joints)
+        self._joints = JointListener(
+            full_name(robot, "joint_states"), robot.model, robot.joints, robot.limits
+        )
+        self._controllers = ControllerWatch(robot, self._ended)
         self._topics = {
             port.name: rospy.Publisher(
                 f"{full_name(robot, port.name)}/command",
@@ -211,9 +276,11 @@ class PolicyNode:
 
     def _missing(self) -> str:
         joints = self._joints.missing()
+        if joints and (fault := self._joints.fault()):
+            return f"a possible state: {fault}"
         missing = [f"the state of {', '.join(joints)} on {self._joints.topic}"] if joints else []
         deaf = [each for each in self._topics.values() if each.get_num_connections() == 0]
-        missing += [f"somebody who listens on {each.resolved_name}" for each in deaf]
+        missing += [f"a subscriber of {each.resolved_name}" for each in deaf]
         return ", and ".join(missing)
 
     def _sleep_until(self, due: float) -> None:
@@ -232,9 +299,8 @@ class PolicyNode:
 
     def _step(self, now: float, passed: float) -> None:
         self._last, arrival = self._joints.look()
-        if now - arrival > self._late:
-            topic = self._joints.topic
-            self._report(f"no joint state on {topic} for {self._late:g} s: the robot is stopped")
+        if trouble := self._trouble(now - arrival):
+            self._report(f"{trouble}: the robot is stopped")
             self._publish(self._pilot.stop(self._last))
             return
         self._aim_if_told()
@@ -245,6 +311,17 @@ class PolicyNode:
         else:
             self._report("")
         self._publish(commands)
+
+    def _trouble(self, age: float) -> str:
+        """Returns why the policy can't move the robot now, for joint states of an age [s]; or nothing."""
+        if fault := self._joints.fault():
+            return fault
+        if age > self._late:
+            return f"no joint state on {self._joints.topic} for {self._late:g} s"
+        if stopped := self._controllers.stopped:
+            start = f"rosrun controller_manager controller_manager start {stopped[0]}"
+            return f"{' and '.join(stopped)} doesn't run ({start})"
+        return ""
 
     def _aim_if_told(self) -> None:
         goal, self._wanted = self._wanted, None
@@ -259,7 +336,7 @@ class PolicyNode:
     def _report(self, reason: str, hint: Callable[[], str] = str) -> None:
         """Logs once why the robot stands still, with a hint, and once that it moves again."""
         if reason != self._reported:
-            (rospy.logwarn if reason else rospy.loginfo)(f"{reason}{hint()}" or "going on")
+            (rospy.logwarn if reason else rospy.loginfo)(f"{reason}{hint()}" or "continuing")
         self._reported = reason
 
     def _publish(self, commands: Mapping[str, Command]) -> None:

@@ -37,7 +37,7 @@ class RobotOnPage:
     """A robot on a page; the first one brings a ground, lights and the initial camera.
 
     The first robot stays in place on the page, and the world moves instead. So all cameras follow it, however
-    somebody has turned them, and so does a recording's.
+    a viewer has turned them, and so does a recording's.
 
     Args:
         server: of the page.

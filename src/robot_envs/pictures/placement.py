@@ -20,7 +20,7 @@ Shapes = list[tuple[str, Shape]]  # each with its link
 
 
 class Surroundings:
-    """What is visible beside the first robot: other robots, a task's objects, the world file's models.
+    """What is visible besides the first robot: other robots, a task's objects, the world file's models.
 
     A backend is asked where they are, and also for the first robot's links if it has joints that a state
     doesn't have.
@@ -45,7 +45,7 @@ class Surroundings:
 
     @property
     def robots(self) -> Sequence[Robot]:
-        """The robots beside the first one."""
+        """The robots besides the first one."""
         return self._scene.robots[1:]
 
     def poses(self) -> dict[str, dict[str, Pose]]:

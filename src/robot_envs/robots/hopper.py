@@ -15,7 +15,7 @@ from robot_envs.world_state import InitialState, StateQuery, WorldState
 
 LEG = ("hip", "knee", "ankle")
 STANCE = (-0.45, 0.9, -0.45)  # [rad] of the leg's joints: bent, the foot flat below the hip
-SWING = (0.6, 0.7, 0.5)  # [rad] that an action asks for beside it, either way
+SWING = (0.6, 0.7, 0.5)  # [rad] that an action asks for around it, either way
 LOW = -0.25  # [m] of the hip, below that of a stretched leg: it counts as fallen
 LEAN = 0.6  # [rad] of the torso, the same
 
@@ -44,7 +44,7 @@ class HopForward(Task):
     | 0 | height of the hip over that of the stance | 0.1 m |
     | 1, 2 | its speed forward and up | m/s |
     | 3, 4 | the torso's pitch and its speed | 0.3 rad, 3 rad/s |
-    | 5 to 7 | angles of hip, knee, ankle beside the stance | 0.5 rad |
+    | 5 to 7 | angles of hip, knee, ankle relative to the stance | 0.5 rad |
     | 8 to 10 | their speeds | 10 rad/s |
     | 11 | 1 if the foot touches something, else 0 | 1 |
 

@@ -63,7 +63,7 @@ def ends(subject: Subject) -> None:
             env.reset(seed=seed)
             _, _, terminated, truncated, _ = env.step(action)
             assert terminated or truncated, (
-                "an episode with max_steps=1 goes on after its first step"
+                "an episode with max_steps=1 continues after its first step"
             )
             assert not (terminated and truncated), "an episode is terminated and truncated at once"
             cut = cut or truncated
@@ -177,7 +177,7 @@ def goals(subject: Subject) -> None:
     with subject.made() as env:
         if not isinstance(env.task, GoalTask):
             assert not hasattr(env, "compute_reward"), (
-                "it has compute_reward(), and its task is no GoalTask"
+                "it has compute_reward(), and its task is not a GoalTask"
             )
             return
         given = [each for each in rollout(env, subject.steps, seed=5) if len(each) == 5]

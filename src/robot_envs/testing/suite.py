@@ -42,7 +42,10 @@ def check_robot_env(
 
     Raises:
         AssertionError: lists broken promises and the environment's own errors, a line each.
+        RuntimeError: under `python -O`, which removes the checks.
     """
+    if not __debug__:
+        raise RuntimeError("check_robot_env checks by assert statements: run Python without -O")
     if isinstance(env, str):
         identifier = env
 

@@ -63,6 +63,7 @@ def steps(option: str, given: Any, most: int) -> int:
 
 Noise = float | tuple[float, float] | Mapping[str, Any]
 MOST_DELAY: Final = 1000  # [control steps]
+LEAST_STEP: Final = 1e-9  # [rad, m]; of an encoder
 
 
 class Encoder(NamedTuple):
@@ -111,6 +112,9 @@ class Sensor:
         sizes = {name: _pair("sensor_noise", size) for name, size in found.items()}
         found = by_name("encoder_step", encoder_step, joints, "joint")
         notches = {name: at_least_zero("encoder_step", size) for name, size in found.items()}
+        for size in notches.values():
+            if 0.0 < size < LEAST_STEP:
+                raise ValueError(f"encoder_step must be 0 or at least {LEAST_STEP:g}, not {size!r}")
         self._encoders = {
             name: Encoder(*sizes.get(name, (0.0, 0.0)), notches.get(name, 0.0))
             for name in dict.fromkeys([*sizes, *joints])

@@ -133,8 +133,8 @@ class UniformRandomisation:
     | `mass` | link | factor of its mass and moments | half-width: 0.2 is 0.8 to 1.2 |
     | `length` | link | factor of the distance of its centre of mass, and of its moments | half-width |
     | `com` | link | its centre of mass [m], each of x, y and z | half-width |
-    | `damping` | joint | viscous friction [N s/m, N m s/rad] beside its own | largest value |
-    | `friction` | joint | dry friction [N, N m] beside its own | largest value |
+    | `damping` | joint | viscous friction [N s/m, N m s/rad] in addition to its own | largest value |
+    | `friction` | joint | dry friction [N, N m] in addition to its own | largest value |
     | `surface_friction` | link | factor of the friction of its surfaces | half-width |
     | `gains` | controller | factor of p, i and d of its PIDs | half-width |
     | `gravity` | the world | factor of its gravity | half-width |

@@ -80,7 +80,7 @@ def ask_to_shut_down(address: str) -> bool:
     """Asks the node at an XML-RPC address to shut itself down, as rosnode kill does.
 
     Returns:
-        False if nobody listens there, or a node of another master does: it may have got a dead
+        False if no one listens there, or a node of another master does: it may have got a dead
         node's port.
     """
     theirs = _master_of(address)
@@ -128,7 +128,7 @@ def shut_down_nodes(nodes: dict[str, str], timeout: float = 5.0) -> list[str]:
 
 
 def _is_dead(address: str) -> bool:
-    """Returns True if nobody listens at a node's XML-RPC address any more."""
+    """Returns True if no one listens at a node's XML-RPC address any more."""
     try:
         call_node(address, "getPid", timeout=1.0)
     except NobodyListens:

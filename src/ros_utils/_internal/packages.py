@@ -30,7 +30,7 @@ def file(package: str, subfolder: str, name: str) -> str:
 
 
 def existing(path: str) -> str:
-    """Returns the path itself; raises NotFound if it is no file."""
+    """Returns the path itself; raises NotFound if it is not a file."""
     if not os.path.isfile(path):
         raise NotFound(f"{path}: no such file")
     return path

@@ -80,7 +80,7 @@ def has_started(handle: Handle) -> bool:
         time.sleep(POLL)
     if seen[1]:
         _warn(handle, f"ended already: {', '.join(seen[1])}")
-    for line in handle.lines("cannot launch node"):  # roslaunch goes on with the other nodes
+    for line in handle.lines("cannot launch node"):  # roslaunch continues with the other nodes
         _warn(handle, line)
     return True
 

@@ -4,6 +4,7 @@
 import os
 import signal
 import threading
+import time
 import unittest
 
 import rospy
@@ -32,7 +33,8 @@ TRAINING = {
     "value_learning_rate": 0.01, "value_epochs": 20,
 }  # fmt: skip
 MOVES, LATE = "the policy moves the robot", "no joint state on /joint_states for 1 s"
-OVER, AGAIN, STOPPED = "an episode would be over here", "going on", "the robot is stopped"
+CONTROLLER, BEYOND = "stand_cart_position_controller", "beyond its stops at -0.5 and 0.5"
+OVER, AGAIN, STOPPED = "an episode would be over here", "continuing", "the robot is stopped"
 
 
 class PolicyNode(unittest.TestCase):
@@ -156,6 +158,28 @@ class PolicyNode(unittest.TestCase):
         self.assertEqual(node.output.count(MOVES), 2)
         node.send(signal.SIGTERM)
         self.ends_with_a_stop(143)
+
+    def test_it_stops_at_a_state_that_cannot_be_and_while_its_controller_is_stopped(self):
+        node = self.start(self.exported)
+        source = rospy.Publisher("/joint_states", JointState, queue_size=1)
+        self.addCleanup(source.unregister)
+        bad = JointState(name=["stand_cart"], position=[50.0], velocity=[0.0], effort=[0.0])
+        deadline = time.monotonic() + BOUND
+        while BEYOND not in node.output and time.monotonic() < deadline:
+            source.publish(bad)  # again, as the simulator's next good state takes its place
+            self.put(PUSHED)
+        node.wait_for(BEYOND, BOUND)
+        node.wait_for(AGAIN, BOUND)
+        self.assertTrue(ros_controllers.stop_controllers_srv([CONTROLLER]))
+        node.wait_for(f"{CONTROLLER} doesn't run", BOUND)
+        before = node.output.count(AGAIN)
+        self.assertTrue(ros_controllers.start_controllers_srv([CONTROLLER]))
+        self.put(PUSHED)
+        self.eventually("continuing", lambda: node.output.count(AGAIN) > before)
+        with self.news:
+            self.assertTrue(all(abs(each) <= 0.5 for each in self.commands))
+        node.send(signal.SIGTERM)
+        self.assertEqual(node.end(BOUND), 143, node.output)
 
     def test_waiting_for_a_simulator_in_lockstep_is_told(self):
         """Joint states that don't come, and the service that tells why."""

@@ -99,7 +99,7 @@ class Lockstep(unittest.TestCase):
         env = gymnasium.make("cartpole/Balance-v0", backend="ros")
         ros_gazebo.gazebo_set_time_step(0.004)
         try:
-            with self.assertRaisesRegex(ValueError, r"0.006 s is no multiple .* 0.004 s"):
+            with self.assertRaisesRegex(ValueError, r"0.006 s is not a multiple .* 0.004 s"):
                 gymnasium.make("cartpole/Balance-v0", backend="ros", control_period=0.006)
         finally:
             ros_gazebo.gazebo_set_time_step(0.001)

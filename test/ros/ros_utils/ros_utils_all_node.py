@@ -5,6 +5,7 @@ import math
 import os
 import unittest
 
+import numpy as np
 import rosgraph
 import rospy
 import rostest
@@ -71,7 +72,9 @@ class All(unittest.TestCase):
         self.assertEqual(ros_gazebo.gazebo_get_time_step(), 0.002)
         self.assertFalse(ros_gazebo.gazebo_set_time_step(0.0))
         self.assertFalse(ros_gazebo.gazebo_set_gravity(0.0, 0.0, math.nan))
-        self.assertTrue(ros_gazebo.gazebo_set_physics_properties(gravity=(0.0, 0.0, -1.0)))
+        self.assertTrue(
+            ros_gazebo.gazebo_set_physics_properties(gravity=np.array([0.0, 0.0, -1.0]))
+        )
         self.assertEqual(ros_gazebo.gazebo_get_time_step(), 0.002, "not named, not changed")
         self.assertTrue(
             ros_gazebo.gazebo_set_ODE_physics(False, 0, 70, 1.3, 0, 0.001, 1, 0, 0.2, 20)

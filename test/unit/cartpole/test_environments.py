@@ -63,9 +63,9 @@ def test_importing_the_package_loads_no_engine_no_ros_and_no_torch():
         ({"randomisation": {"mass": 0.1, "damping": {"cart": 0.1}}}, "there is no joint 'cart'"),
         ({"action_delay": -1}, "action_delay must be a number of control steps"),
         ({"encoder_step": {"cart": 0.1}}, "encoder_step: there is no joint 'cart'"),
-        ({"control_period": 0.0, "backend": "ros"}, "control period 0.0 s is no multiple"),
-        ({"control_period": 0.0}, "control period 0.0 s is no multiple"),
-        ({"control_period": float("nan")}, "control period nan s is no multiple"),
+        ({"control_period": 0.0, "backend": "ros"}, "control period 0.0 s is not a multiple"),
+        ({"control_period": 0.0}, "control period 0.0 s is not a multiple"),
+        ({"control_period": float("nan")}, "control period nan s is not a multiple"),
         ({"render_mode": "ansi"}, "render_mode is"),
     ],
 )

@@ -50,7 +50,7 @@ def test_a_run_that_learned_over_ros_needs_no_simulator_here(run: Path) -> None:
 def test_policies_of_other_environments_are_refused(tmp_path: Path) -> None:
     other = workbench_runs.dqn(tmp_path / "run", total_timesteps=100)
     with pytest.raises(
-        RobotEnvError, match="policy of CartPole-v1, which is no environment of a robot"
+        RobotEnvError, match="policy of CartPole-v1, which is not an environment of a robot"
     ):
         policy_node.load(other, "best", {})
 

@@ -159,5 +159,5 @@ def test_the_robot_is_found_from_anywhere_without_ros(tmp_path, root: Path):
 def test_also_where_there_is_no_ros_to_ask(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "TREE", tmp_path)
     monkeypatch.setitem(sys.modules, "rospkg", None)
-    with pytest.raises(RobotEnvError, match="'cartpole' is neither beside"):
+    with pytest.raises(RobotEnvError, match="'cartpole' is neither next to"):
         own_file("cartpole", "urdf/cartpole.urdf.xacro")

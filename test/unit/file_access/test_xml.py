@@ -62,8 +62,8 @@ def test_utf_16_needs_no_mark(codec):
 @pytest.mark.parametrize(
     ("data", "fault"),
     [
-        (b"<a>\xe9</a>", "byte 3 is no utf-8: is its encoding declared in the first line?"),
-        (b"\xff\xfe<", "is no utf-16-le"),
+        (b"<a>\xe9</a>", "byte 3 is not valid utf-8: is its encoding declared in the first line?"),
+        (b"\xff\xfe<", "is not valid utf-16-le"),
         (
             b'<?xml version="1.0" encoding="klingon"?><a/>',
             "its encoding 'klingon' is not supported",

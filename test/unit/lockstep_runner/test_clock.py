@@ -140,7 +140,7 @@ def test_a_thread_that_hangs_is_told_of_once_and_time_goes_on(clock, monkeypatch
     clock.wait(0.1)
     clock.wait(0.1)
     assert clock.passed == 200 * MS
-    assert capsys.readouterr().err.count("time goes on without it") == 1
+    assert capsys.readouterr().err.count("time continues without it") == 1
     go.set()
 
 

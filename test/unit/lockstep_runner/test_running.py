@@ -58,6 +58,12 @@ def test_what_is_no_python_is_one_line(run, text):
     assert "\n" not in str(fault.value)
 
 
+@pytest.mark.parametrize("line", ["print 'x'", "x = 010", "try: f()\nexcept A, b: pass"])
+def test_a_script_for_python_2_gets_a_hint(run, line):
+    with pytest.raises(running.NoScript, match="2to3"):
+        run(line)
+
+
 def test_no_such_file_and_folders(tmp_path):
     for path in (tmp_path / "none.py", tmp_path):
         with pytest.raises(running.NoScript, match=str(path)):

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from xml.sax import saxutils as xml_text
 
 import pytest
 import yaml
@@ -47,6 +48,25 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "joint",
+    [
+        "123", "yes", "~", "- a", "a: b", "{x}", '"""', 'a"b', "a<b>&", "a'b", "a\\b", "#", "${1 / 0}",
+        "$(cwd)", "x\"] + [__import__('os').mkdir('owned')] + [\"",
+    ],
+)  # fmt: skip
+def test_names_of_a_file_are_data_in_what_is_written(new, joint, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = robot(*BARE, FIXED).replace('"swing"', xml_text.quoteattr(joint))
+    text = text.replace("${", "$${").replace("$(", "$$(")  # as xacro writes them
+    folder, made, task, _ = new("my_arm", text)
+    assert made.joints == (joint,)
+    described = yaml.safe_load((folder / "config/controllers.yaml").read_text())
+    assert joint in [each.get("joint") for each in described.values()]
+    assert not (tmp_path / "owned").exists()
 
 
 @pytest.mark.slow

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import sys
+from importlib.machinery import ModuleSpec
+from importlib.util import module_from_spec
+
 import pytest
 from support.robots.new_robots import (
     BARE,
     FIXED,
+    JOINT,
+    LIMIT,
     LINK,
     MOTOR,
     NOBODYS,
+    PLUGIN,
     SWING,
     robot,
 )
@@ -38,6 +45,14 @@ from package_writing.cli import main
             [],
             "the package 'nobodys', which isn't found: ./ws --with FOLDER",
         ),
+        (
+            robot(*BARE, FIXED, LINK.format("end", ""), JOINT.format("a b", "revolute", "rod", "end", LIMIT))
+            .replace("swing", "a_b"),
+            [],
+            "would share the controller a_b_controller",
+        ),
+        (robot(*BARE, FIXED, PLUGIN.format("<robotNamespace>a b</robotNamespace>")), [], "'a b'"),
+        (robot(*BARE, FIXED).replace('value="0.5"', 'value="1e30"'), [], "can't take a step"),
         (robot(*BARE, FIXED), ["size=3"], "NAME:=VALUE"),
         (robot(*BARE, FIXED), ["--height", "nan"], "--height"),
         (robot(*BARE, FIXED), ["--passive", "swign"], "did you mean 'swing'?"),
@@ -63,14 +78,22 @@ def test_a_robot_that_can_not_be_used_is_one_line(tmp_path, capsys, text, argume
 )
 def test_a_name_that_can_not_be_is_refused_with_one_that_can(tmp_path, capsys, name, near):
     assert main([name, "--to", str(tmp_path)]) == 1
-    assert f"'{name}' isn't one, '{near}' would be" in capsys.readouterr().err
+    assert f"'{name}' isn't one; '{near}' would do" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", ["cartpole", "gazebo_msgs", "random"])
 def test_a_name_that_is_taken_is_refused(tmp_path, capsys, name):
     assert main([name, "--to", str(tmp_path)]) == 1
-    assert f"the name '{name}' is taken" in capsys.readouterr().err
+    assert f"the name '{name}' is taken; 'my_{name}' would do" in capsys.readouterr().err
+
+
+def test_no_name_that_is_taken_is_suggested(tmp_path, capsys, monkeypatch):
+    taken = module_from_spec(ModuleSpec("my_arm", None))
+    monkeypatch.setitem(sys.modules, "my_arm", taken)
+    for name in ("MyArm", "my_arm"):
+        assert main([name, "--to", str(tmp_path)]) == 1
+        assert "would do" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("there", ["folder", "file", "link"])

@@ -5,12 +5,14 @@ import signal
 import socket
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 pytestmark = pytest.mark.slow
 
 BOUND = 60.0  # [s]
+SCRIPTS = Path(__file__).parents[3] / "scripts"
 MAIN = "import sys; from bullet_gazebo.ros.{} import {} as main; sys.exit(main())"
 PROGRAMS = {  # module and function: arguments, exit code after Ctrl-C
     "clients.spawner main": (["a_controller"], 0),
@@ -76,3 +78,10 @@ def test_without_a_master_it_says_so_until_it_is_interrupted(start, name):
         output, _ = program.communicate(timeout=BOUND)
     assert program.returncode == PROGRAMS[name][1]
     assert "Traceback" not in output
+
+
+@pytest.mark.parametrize("name", ["shown_joints.py", "spawn_robot.py"])
+def test_help_ends_at_once(name):
+    command = [sys.executable, str(SCRIPTS / name), "--help"]
+    told = subprocess.run(command, capture_output=True, text=True, check=True, timeout=BOUND)
+    assert told.stdout.startswith(f"usage: {name}")

@@ -103,7 +103,7 @@ def test_the_plan_comes_first_and_a_second_call_goes_on(ws, checkout, debian):
         "[1/4] Debian packages: failed after 0 s (exit code 100): "
         "E: Failed to fetch http://deb.example/one.deb",
         "what to do: check the network and the free disk space; on other systems than Debian 12 see "
-        f"docs/catkin.md; then call ws again, it goes on from here (log: {place}/log/debian.log)",
+        f"docs/catkin.md; then call ws again, which continues from here (log: {place}/log/debian.log)",
     ]
 
     second = ws("true", script=checkout / "ws", FREE="3M", **debian)

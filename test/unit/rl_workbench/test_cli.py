@@ -46,12 +46,12 @@ def test_errors_begin_with_the_commands_name(
 ) -> None:
     assert main(["eval", str(tmp_path)], prog) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"{prog}: {tmp_path} is no run folder")
+    assert line.startswith(f"{prog}: {tmp_path} is not a run folder")
     with pytest.raises(SystemExit) as ended:
         main(["train", f"--resume={tmp_path}"], prog)
     usage, line = capsys.readouterr().err.splitlines()
     assert ended.value.code == 2 and usage.startswith(f"usage: {prog} train")
-    assert line.startswith(f"{prog} train: error: {tmp_path} is no run folder")
+    assert line.startswith(f"{prog} train: error: {tmp_path} is not a run folder")
 
 
 def test_it_can_be_started_without_a_script() -> None:

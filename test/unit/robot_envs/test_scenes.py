@@ -211,9 +211,15 @@ def test_the_next_episode_touches_the_ground_as_the_first_one_did(make):
 
 def test_names_that_are_there_twice_are_told(tmp_path):
     for robots, message in (
-        ([LEFT, LEFT], "a world has each model once, and 'left' is there twice"),
-        ([LEFT, replace(LEFT, name="third")], "namespace once, and 'left' is there twice"),
-        ([replace(LEFT, name="ball"), RIGHT], "model once, and 'ball' is there twice"),
+        ([LEFT, LEFT], "each model must be unique in a world, but 'left' is there twice"),
+        (
+            [LEFT, replace(LEFT, name="third")],
+            "namespace must be unique in a world, but 'left' is there twice",
+        ),
+        (
+            [replace(LEFT, name="ball"), RIGHT],
+            "model must be unique in a world, but 'ball' is there twice",
+        ),
         (
             [replace(LEFT, name="wall"), RIGHT],
             "the world has a model 'wall'; give the robot another name",

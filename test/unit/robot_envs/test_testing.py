@@ -1,5 +1,7 @@
 """The conformance suite finds each fault that it is there for, and says what was seen and expected."""
 
+import subprocess
+import sys
 from functools import partial
 from typing import Any
 
@@ -23,6 +25,13 @@ STEPS = 12
 @pytest.mark.parametrize("task", [Hold, Reach, wobbling])
 def test_sound_environments_pass(task):
     check_robot_env(of(task), steps=STEPS)
+
+
+def test_without_asserts_it_checks_nothing_and_says_so():
+    text = "from robot_envs.testing import check_robot_env; check_robot_env('any')"
+    command = [sys.executable, "-O", "-c", text]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "RuntimeError: check_robot_env checks by assert" in run.stderr
 
 
 @pytest.mark.slow
@@ -59,7 +68,7 @@ FAULTS = {
     "no cut": (
         episodes.ends,
         of(Hold, broken.NoCut),
-        "an episode with max_steps=1 goes on after its first step",
+        "an episode with max_steps=1 continues after its first step",
     ),
     "both ends": (
         episodes.ends,

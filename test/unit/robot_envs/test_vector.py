@@ -84,8 +84,8 @@ def test_pictures_of_all_and_how_it_resets(many):
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"num_envs": 0}, "num_envs must be a whole number of 1 and more, not 0"),
-        ({"num_envs": 2.0}, "num_envs must be a whole number of 1 and more, not 2.0"),
+        ({"num_envs": 0}, "num_envs must be a whole number, at least 1, not 0"),
+        ({"num_envs": 2.0}, "num_envs must be a whole number, at least 1, not 2.0"),
         ({"backend": "ros-realtime"}, "has a single robot"),
         ({"backend": "rose"}, "there is no backend .rose."),
         ({"render_mode": "human"}, "can't be shown on one page"),

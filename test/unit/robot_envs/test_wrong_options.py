@@ -17,7 +17,7 @@ OPTIONS = {
     ),
     "a period that is no multiple": (
         {"control_period": 0.0085},
-        "control period 0.0085 s is no multiple of",
+        "control period 0.0085 s is not a multiple of",
     ),
     "a period that is no number": (
         {"control_period": "slow"},
@@ -77,10 +77,10 @@ def test_an_option_or_action_that_cannot_be(case):
         (
             "support.scenes.solo_arm:arm",
             "Hold",
-            "is <function arm at .*no robot_envs.Robot, nor a list",
+            "is <function arm at .*not a robot_envs.Robot, a list",
         ),
         ("support.scenes.solo_arm:SOLO", "Hol", "has no 'Hol'; did you mean 'Hold'"),
-        ("support.scenes.solo_arm:SOLO", "SOLO", "which is no class of robot_envs.Task"),
+        ("support.scenes.solo_arm:SOLO", "SOLO", "which is not a subclass of robot_envs.Task"),
     ],
 )
 def test_names_of_what_an_id_is_made_of(robot, task, text):

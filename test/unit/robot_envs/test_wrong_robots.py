@@ -169,12 +169,12 @@ def test_gains_and_limits_of_joints_that_are_not_there_are_told_and_no_fault(cap
     [
         ("urdf", "arms.urdf", "there is no file .*arms.urdf; did you mean 'arm.urdf'"),
         ("urdf", "urdf/arm.urdf", "there is no file .*urdf/arm.urdf: there is no folder .*urdf"),
-        ("urdf", "folder", "folder is a folder, and no file"),
+        ("urdf", "folder", "folder is a folder, not a file"),
         ("urdf", "broken.urdf", "can't read .*broken.urdf: unclosed token: line 1"),
         ("urdf", "broken.xacro", "can't read .*broken.xacro: name 'nothing' is not defined"),
         ("controllers", "arm.yml", "there is no file .*arm.yml; did you mean 'arm.yaml'"),
         ("controllers", "broken.yaml", "broken.yaml: line 1, column 6"),
-        ("controllers", "list.yaml", "list.yaml: that is no YAML of parameters"),
+        ("controllers", "list.yaml", "list.yaml: not a YAML file of parameters"),
         ("world", "hal.world", "there is no file .*hal.world; did you mean 'hall.world'"),
     ],
 )

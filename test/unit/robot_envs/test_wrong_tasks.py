@@ -139,7 +139,7 @@ TASKS = {
     ),
     "an object of a robot's name": (
         Hold(objects=(Object("arm", PLINTH),)),
-        "model once, and 'arm' is there twice",
+        "model must be unique in a world, but 'arm' is there twice",
     ),
     "an object of the world's name": (
         Hold(objects=(Object("ground_plane", PLINTH),)),

@@ -31,7 +31,7 @@ LOCKSTEP = "roslaunch gazebo_ros empty_world.launch lockstep:=true"
             "no controller manager in the namespace /:",
         ),
         ("/arm/controller_manager/list_controllers", "", "is the parameter /arm/robot_description"),
-        ("/fake/set", WORLD, "nobody offers this service"),
+        ("/fake/set", WORLD, "no node offers this service"),
     ],
 )
 def test_what_is_missing_and_what_mends_it(monkeypatch, service, offered, words):

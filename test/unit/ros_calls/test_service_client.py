@@ -85,7 +85,7 @@ def test_a_kept_connection_serves_all_calls(offer, client, master):
 
 
 def test_nobody_offers_it(master, client):
-    with pytest.raises(ServiceGone, match="/fake/set: nobody offers this service"):
+    with pytest.raises(ServiceGone, match="/fake/set: no node offers this service"):
         client()(True)
 
 

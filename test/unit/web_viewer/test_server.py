@@ -1,13 +1,15 @@
 """Where a page is, and who gets in."""
 
+import asyncio
 import socket
 
 import pytest
+from viser._messages import GuiUpdateMessage
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from web_viewer.address import Address, PortInUse, find_address
-from web_viewer.server import Gate
+from web_viewer.server import Gate, serve, stop
 
 TOKEN = "a-token"
 WINDOW = ("the window", "moves the simulation")
@@ -107,3 +109,60 @@ def test_without_the_token_nobody_gets_in():
     cookie = answer.headers["Set-Cookie"].partition(";")[0]
     assert ask(gate, host=host, cookie=cookie, origin=f"http://{host}").status_code == 200
     assert ask(gate, host=host, cookie=cookie, origin="http://other").status_code == 403
+
+
+@pytest.mark.parametrize("origin", ["http://[", "http://[::1", "null"])
+def test_an_origin_that_is_none_is_refused(origin):
+    assert (
+        ask(Gate(Address("127.0.0.1", 8080)), host="127.0.0.1:8080", origin=origin).status_code
+        == 403
+    )
+
+
+def test_a_path_that_is_too_long_is_not_found():
+    gate = Gate(Address("127.0.0.1", 8080))
+    assert ask(gate, "/" + 7000 * "a", host="127.0.0.1:8080").status_code == 404
+
+
+@pytest.fixture
+def page():
+    made = serve(find_address("127.0.0.1", None), "a page", (1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
+    yield made
+    stop(made)
+
+
+@pytest.mark.parametrize(
+    ("field", "good", "bad"),
+    [
+        ("number", 7, [10**20, -1, float("nan"), float("inf"), 10**400, "7", None, [], {}, True]),
+        ("slider", 0.5, [-9999, 2.0, float("nan"), "0.5"]),
+        ("dropdown", "2 x", ["unknown", 3, None, "1 x\n"]),
+        ("checkbox", True, [1, "yes", None]),
+        ("text", "hello", [1000 * "long", 5, None]),
+        ("button", True, ["pressed"]),
+    ],
+)  # fmt: skip
+def test_a_field_takes_only_what_it_can(page, field, good, bad):
+    gui = page.gui
+    handle = {
+        "number": lambda: gui.add_number("n", 1, min=0, max=100),
+        "slider": lambda: gui.add_slider("s", 0.0, 1.0, 0.1, 0.0),
+        "dropdown": lambda: gui.add_dropdown("d", ["1 x", "2 x"]),
+        "checkbox": lambda: gui.add_checkbox("c", False),
+        "text": lambda: gui.add_text("t", ""),
+        "button": lambda: gui.add_button("b"),
+    }[field]()
+    (handler,) = page._websock_server._incoming_handlers[GuiUpdateMessage]
+
+    def send(updates):
+        asyncio.run(handler(0, GuiUpdateMessage(handle._impl.uuid, updates)))
+
+    before = handle.value
+    for value in bad:
+        send({"value": value})
+        assert handle.value == before, value
+    for other in ({"visible": False}, {"value": good, "order": 1.0}, {}, [], None):
+        send(other)
+    assert handle.value == before and handle.visible
+    send({"value": good})
+    assert handle.value == good

@@ -1,6 +1,6 @@
 """The controllers, by the type name that a parameter file gives them.
 
-To add one: a module beside this one, and its class in BUILT_IN. Users write their own as `type:
+To add one: a module next to this one, and its class in BUILT_IN. Users write their own as `type:
 my_package/MyController`, a Python class (docs/controllers.md).
 """
 
@@ -79,7 +79,7 @@ def find_type(type_name: str) -> type[Controller] | None:
         )
     if not isinstance(found, type) or not issubclass(found, Controller):
         raise ControlError(
-            f"controller type '{type_name}': {name} of {where} is no subclass of "
+            f"controller type '{type_name}': {name} of {where} is not a subclass of "
             "bullet_gazebo.control.controllers.base.Controller"
         )
     if getattr(found, "type_name", None) != type_name:

@@ -84,7 +84,7 @@ class Controller(ABC):
         """
 
     def starting(self, now: int) -> None:
-        """Called when the controller is started, and when a reset has it begin anew."""
+        """Called when the controller is started, and when a reset makes it start over."""
 
     @abstractmethod
     def update(self, now: int, dt: float) -> None:

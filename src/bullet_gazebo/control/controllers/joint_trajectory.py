@@ -135,7 +135,7 @@ class JointTrajectoryController(Controller):
         return cls(name, read_axes(params, joints, name), settings)
 
     def starting(self, now: int) -> None:
-        self._end_goal("the controller began anew: it was restarted, or its joints were moved")
+        self._end_goal("the controller started over: it was restarted, or its joints were moved")
         self._now = now
         self._uptime = 0
         self._next_state = 0

@@ -214,7 +214,7 @@ class BulletEngine(Engine):
         fresh = BulletClient(self._settings)
         try:
             moved = [_moved(description, body, fresh) for description, body in bodies]
-        except DescriptionError:  # no space for their files: the old world goes on
+        except DescriptionError:  # no space for their files: the old world continues
             fresh.close()
             self._most_waste = 2 * self._client.waste
             return super().renewed(bodies)

@@ -1,4 +1,4 @@
-"""Colours and textures of mesh files; the child process of `meshes` reads them, beside `mesh_program`.
+"""Colours and textures of mesh files; the child process of `meshes` reads them.
 
 Whatever is raised here over broken materials only leaves the mesh without them.
 """

@@ -255,7 +255,9 @@ def _obj_index(word: str, count: int, number: int) -> int:
     try:
         index = int(word.partition("/")[0])
     except ValueError as error:
-        raise DescriptionError(f"line {number}: '{shown(word)}' is no corner of a face") from error
+        raise DescriptionError(
+            f"line {number}: '{shown(word)}' is not a corner of a face"
+        ) from error
     if index == 0 or index < -count:
         raise DescriptionError(f"line {number}: a face names vertex {index} of {count}")
     return index if index > 0 else count + 1 + index

@@ -131,7 +131,7 @@ def check_mesh(path: Path) -> None:
     """Refuses what can't be a mesh, without reading it."""
     if path.suffix.lower() not in SUFFIXES:
         raise DescriptionError(f"mesh '{path}': only {', '.join(SUFFIXES)} files are read")
-    if not path.is_file():  # reading a pipe would wait for ever
+    if not path.is_file():  # reading a pipe would wait forever
         raise DescriptionError(f"mesh '{path}': it is not a file")
     if path.stat().st_size == 0:
         raise DescriptionError(f"mesh '{path}': the file is empty")

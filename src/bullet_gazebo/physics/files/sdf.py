@@ -95,7 +95,7 @@ def _open(uri: str, context: FileContext) -> tuple[Element, FileContext]:
 
 
 def _overridden(entity: Element, include: Element) -> Element:
-    """Returns a copy of the model's top element. Its children are shared: nobody changes them."""
+    """Returns a copy of the model's top element. Its children are shared: no one changes them."""
     given = [child for child in include if child.tag in OVERRIDES]
     tags = {child.tag for child in given}
     copy = Element(entity.tag, entity.attrib)

@@ -38,6 +38,11 @@ from bullet_gazebo.physics.lumping import find_roots, lump_fixed_joints, unique
 from bullet_gazebo.physics.pose import Pose, from_rpy
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+UNUSED = {  # elements that urdfdom reads and the physics doesn't use, with their numbers
+    "mimic": ("multiplier", "offset"),
+    "calibration": ("rising", "falling"),
+    "safety_controller": ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"),
+}
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 Part = TypeVar("Part")
 YES = ("true", "yes", "1")
@@ -89,12 +94,7 @@ def read_joint(element: Element, warnings: list[str]) -> Joint:
     if dynamics is not None:
         joint.damping = read_number(dynamics, "damping", place)
         joint.friction = read_number(dynamics, "friction", place)
-    # Nothing here reads them; urdfdom refuses the robot, and so do other programs.
-    mimic, safety = element.find("mimic"), element.find("safety_controller")
-    if mimic is not None and not mimic.get("joint"):
-        raise DescriptionError(f"{place}: <mimic> needs the attribute 'joint'")
-    if safety is not None:
-        read_number(safety, "k_velocity", place, required=True)
+    _check_unused(element, place)
     return joint
 
 
@@ -113,6 +113,18 @@ def _set_limit(joint: Joint, element: Element, place: str, warnings: list[str]) 
     if lower > upper:
         warnings.append(f"{place}: lower {lower} is above upper {upper}; the two are swapped")
     joint.lower, joint.upper = min(lower, upper), max(lower, upper)
+
+
+def _check_unused(element: Element, place: str) -> None:
+    """Refuses what urdfdom, and so other programs, can't read."""
+    for tag, keys in UNUSED.items():
+        child = element.find(tag)
+        if child is None:
+            continue
+        if tag == "mimic" and not child.get("joint"):
+            raise DescriptionError(f"{place}: <mimic> needs the attribute 'joint'")
+        for key in keys:
+            read_number(child, key, place, required=key == "k_velocity")
 
 
 def _referred_link(element: Element, role: str, place: str) -> str:

@@ -78,7 +78,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     world.add_argument("-w", "--world-name", help="accepted: a simulator has one world")
     world.add_argument("--node", default=NODE, help="the simulator's node (default: %(default)s)")
     what = world.add_mutually_exclusive_group(required=True)
-    what.add_argument("-p", "--pause", choices=("0", "1"), help="1 stops the time, 0 lets it go on")
+    what.add_argument("-p", "--pause", choices=("0", "1"), help="1 pauses the world, 0 resumes it")
     what.add_argument("-s", "--step", action="store_true", help="pause and do one step")
     what.add_argument("-m", "--multi-step", type=_count, metavar="N", help="pause and do N steps")
     what.add_argument("-r", "--reset-all", action="store_true", help="reset time and models")

@@ -58,13 +58,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for name, (steps, others, text) in ON_CONTROLLERS.items():
         command = commands.add_parser(name, aliases=others, help=text)
-        command.add_argument("names", nargs="+", metavar="NAME", help="of a controller")
+        command.add_argument("names", nargs="+", metavar="NAME", help="name of a controller")
         command.set_defaults(act=lambda options, steps=steps: _on_controllers(steps, options.names))
     command = commands.add_parser("list", aliases=["lc"], help="the loaded controllers")
     command.set_defaults(act=lambda _: list_controllers())
     command = commands.add_parser("list-types", aliases=["lt"], help="types that can be loaded")
     command.set_defaults(act=lambda _: list_controller_types())
-    text = "stop and unload all controllers, and look for types anew"
+    text = "stop and unload all controllers, then look for controller types again"
     command = commands.add_parser("reload-libraries", help=text)
     command.add_argument("--restore", action="store_true", help="load and start them again")
     command.set_defaults(act=lambda options: reload_libraries(True, restore=options.restore))
@@ -125,7 +125,7 @@ def _require_manager() -> None:
     print(f"waiting up to {PATIENCE:g} s for the service {name}", file=sys.stderr)
     if not service_comes_up(name, PATIENCE - NOTICE):
         raise CommandFailed(
-            f"there is no controller manager: nobody offers the service {name}. Is the robot"
+            f"there is no controller manager: no node offers the service {name}. Is the robot"
             " spawned, and is its manager in this namespace? (Another one: __ns:=/NAMESPACE)"
         )
 

@@ -5,7 +5,7 @@ while simulated time passes, in a paused world or in lock-step maybe never. So u
 asks the simulator by a service that also answers while paused. Then it forwards the newest state, except
 joint_state_publisher's, which are zeros.
 
-Nobody publishes the pose of a robot that isn't fixed to the world to tf: this node asks the simulator for it,
+No node publishes the pose of a robot that isn't fixed to the world to tf: this one asks the simulator for it,
 and publishes the transform from world to the root link.
 """
 

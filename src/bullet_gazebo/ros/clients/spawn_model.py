@@ -76,8 +76,12 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     source.add_argument("-stdin", action="store_true", help="read it from standard input")
     parser.add_argument("-model", required=True, metavar="NAME", help="name of the new model")
     parser.add_argument("-reference_frame", default="", help="model or link of the pose")
-    parser.add_argument("-gazebo_namespace", default="/gazebo", help="of the simulator's services")
-    parser.add_argument("-robot_namespace", help="of the model's plugins; default: the node's")
+    parser.add_argument(
+        "-gazebo_namespace", default="/gazebo", help="namespace of the simulator's services"
+    )
+    parser.add_argument(
+        "-robot_namespace", help="namespace of the model's plugins (default: the node's)"
+    )
     parser.add_argument("-unpause", action="store_true", help="unpause the world afterwards")
     parser.add_argument("-wait", metavar="MODEL", help="wait for another model first")
     for name, what in zip("xyzRPY", ("[m]",) * 3 + ("[rad]",) * 3, strict=True):
@@ -109,7 +113,7 @@ def _position(parser: argparse.ArgumentParser, text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        parser.error(f"argument -J: {text!r} is no number")
+        parser.error(f"argument -J: {text!r} is not a number")
 
 
 def _run(options: argparse.Namespace, piped: bytes) -> int:

@@ -1,7 +1,7 @@
 """The commands `spawner` and `unspawner` of package controller_manager (docs/contract/ros_control.md 2).
 
 spawner loads and starts controllers, and stays until it is shut down; then it stops and unloads them.
-unspawner stops controllers, again whenever somebody starts them; when it is shut down, it starts those that
+unspawner stops controllers, again whenever someone starts them; when it is shut down, it starts those that
 it stopped.
 """
 
@@ -125,7 +125,7 @@ def _work(manager: ManagerClient, options: argparse.Namespace) -> int:
 def _find(manager: ManagerClient, timeout: float) -> str | None:
     """Waits for the manager; returns the service still missing at the time limit, or None.
 
-    While simulated time is zero, the simulator isn't ready yet, and the wait begins anew.
+    While simulated time is zero, the simulator isn't ready yet, and the wait starts over.
     """
     while missing := manager.wait(SERVICES, timeout):
         if not rospy.get_param("/use_sim_time", False) or rospy.get_rostime():
@@ -140,9 +140,11 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="spawner", description="Load, start and keep controllers")
     parser.add_argument("--stopped", action="store_true", help="load, but don't start")
     parser.add_argument("--wait-for", metavar="TOPIC", help="first wait for true on a Bool topic")
-    parser.add_argument("--namespace", default="", help="of the controller manager")
-    parser.add_argument("--timeout", type=float, default=30.0, help="for services [s]; <= 0: none")
-    parser.add_argument("--no-timeout", action="store_true", help="wait for ever")
+    parser.add_argument("--namespace", default="", help="namespace of the controller manager")
+    parser.add_argument(
+        "--timeout", type=float, default=30.0, help="time limit for services [s]; <= 0: none"
+    )
+    parser.add_argument("--no-timeout", action="store_true", help="wait forever")
     parser.add_argument("--shutdown-timeout", type=float, help="ignored")
     parser.add_argument("controllers", nargs="+", help="names, or YAML files of controllers")
     options = parser.parse_intermixed_args(arguments)
@@ -152,7 +154,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _wait_for_topic(topic: str, timeout: float) -> None:
-    """Waits for `true`; goes on without it after the time limit."""
+    """Waits for `true`; continues without it after the time limit."""
     arrived = threading.Event()
 
     def hear(message: Bool) -> None:
@@ -162,7 +164,7 @@ def _wait_for_topic(topic: str, timeout: float) -> None:
     rospy.loginfo("Controller Spawner: Waiting for true on %s", topic)
     listener = rospy.Subscriber(topic, Bool, hear)
     if not wait_until(arrived.is_set, timeout, f"true on {topic}"):
-        rospy.logwarn("Controller Spawner: no true on %s in %g s; going on", topic, timeout)
+        rospy.logwarn("Controller Spawner: no true on %s in %g s; continuing", topic, timeout)
     listener.unregister()
 
 
@@ -245,7 +247,7 @@ class _Spawner:
 
     def _stop(self) -> None:
         rospy.loginfo("Stopping all controllers...")
-        # Somebody else may have stopped one: a strict request that names it would stop none.
+        # Someone else may have stopped one: a strict request that names it would stop none.
         running = [name for name in self._manager.running(FAREWELL) if name in self._loaded]
         self._manager.switch([], running, STRICT, FAREWELL)
 

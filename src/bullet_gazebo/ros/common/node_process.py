@@ -26,7 +26,7 @@ from ros_calls import master
 from ros_calls.waiting import wait_until
 
 DONE = "done"
-POLL = 0.1  # [s] between two looks whether the node was shut down by somebody else
+POLL = 0.1  # [s] between two looks whether the node was shut down by someone else
 SHUTDOWN = 14.0  # [s] at most; roslaunch sends SIGTERM after 15 s
 GRACE = 2.0  # [s] for interrupted work to notice that the node is down
 STARTING = 20.0  # [s] for another process to become a node
@@ -93,7 +93,7 @@ class SignalHandler:
     """
 
     def __init__(self) -> None:
-        # Its put() may interrupt its own get(); an event's set() in a handler may wait for ever.
+        # Its put() may interrupt its own get(); an event's set() in a handler may wait forever.
         self._news: queue.SimpleQueue[str] = queue.SimpleQueue()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._note)
@@ -102,7 +102,7 @@ class SignalHandler:
         self._news.put("signal")
 
     def noted(self) -> bool:
-        """Returns whether a signal has come that nobody has waited for yet; for long work before `wait`."""
+        """Returns whether a signal has come that no one has waited for yet; for long work before `wait`."""
         return not self._news.empty()
 
     def wait(self, over: Callable[[], bool] = lambda: False) -> bool:
@@ -121,7 +121,7 @@ class SignalHandler:
                 break
             except queue.Empty:
                 continue
-        # In a thread, because rospy's shutdown waits for ever for an answer of a dead master.
+        # In a thread, because rospy's shutdown waits forever for an answer of a dead master.
         closing = threading.Thread(target=rospy.signal_shutdown, args=(reason,), daemon=True)
         closing.start()
         closing.join(SHUTDOWN)
@@ -157,7 +157,7 @@ class SignalHandler:
 
 
 def end_within(bound: float, code: int) -> None:
-    """Ends the process after `bound` [s] with that exit code, whatever in it waits for ever.
+    """Ends the process after `bound` [s] with that exit code, whatever in it waits forever.
 
     Python itself waits for its threads, and runs what plugins registered for the end.
     """

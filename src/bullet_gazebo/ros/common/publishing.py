@@ -27,7 +27,7 @@ QUEUE = 10  # messages of /clock and the states
 
 
 class SubscriberCount(rospy.SubscribeListener):
-    """Counts a topic's subscribers, so that no message is made for nobody."""
+    """Counts a topic's subscribers, so that none is made in vain."""
 
     def __init__(self, changed: Callable[[], None] = lambda: None) -> None:
         """Calls `changed` after each change, from a thread of rospy's."""
@@ -111,7 +111,7 @@ class Thinner:
         self._ending = threading.Event()
         self._sender = threading.Thread(target=self._send, name="thinned topics", daemon=True)
         self._sender.start()
-        # Whether somebody needs every message of a topic.
+        # Whether a subscriber needs every message of a topic.
         self.is_whole: Callable[[str], bool] = lambda name: False
         rospy.on_shutdown(self._stop)
 
@@ -148,7 +148,7 @@ class Thinner:
 
 
 class StateTopic(ThinnedTopic):
-    """A topic with the state before each step, built only while somebody subscribes."""
+    """A topic with the state before each step, built only while it has subscribers."""
 
     def __init__(
         self, name: str, kind: type, sim: Simulator, thinner: Thinner, make: Callable[[], object]

@@ -1,12 +1,13 @@
 """Changes of rospy that protect the node from clients that send nothing, too much or nonsense.
 
-- `Reception`: a client that sends nothing keeps all others out; a lack of file descriptors ends the thread
-  that accepts connections (gazebo_clients.test, test_rospy_connections.py)
+- `Reception`: a client that sends nothing keeps all others out; many of them, or a lack of file
+  descriptors, end the thread that accepts connections (gazebo_clients.test, test_rospy_connections.py)
 - `bound_messages`: rospy reads whatever size a client claims into memory (test_rospy_connections.py)
-- `bound_calls`: so does its XML-RPC server, where silent clients keep a thread each for ever (the same)
-- `hang_up_on_nonsense`: a client whose request can't be read waits for ever (gazebo_clients.test)
+- `bound_calls`: so does its XML-RPC server, where silent clients keep a thread each forever (the same)
+- `hang_up_on_nonsense`: a client whose request can't be read waits forever (gazebo_clients.test)
 """
 
+import contextlib
 import errno
 import io
 import os
@@ -35,7 +36,7 @@ LARGEST_MESSAGE = 2**27
 LARGEST_CALL = 2**24  # [bytes] of an XML-RPC call
 SILENCE = 30.0  # [s] that a client may be silent in the middle of a header
 IDLE = 300.0  # [s] the same in an XML-RPC call and between two: clients keep connections, and renew them
-BACKLOG = 64  # connections that wait to be accepted
+MOST_STRANGERS = 64  # connections whose header hasn't come yet
 EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 RECOVERY = 0.1  # [s] until the next try
 REPEAT = 1.0  # [s] between two logs of the same complaint
@@ -48,13 +49,15 @@ class Reception:
     rospy reads it in the thread that accepts connections. A client that connects and then hangs keeps
     everybody else out of all services and topics of the node.
 
-    A connection whose header doesn't come ends after SILENCE. None is accepted where few file descriptors are
-    left, because the node itself needs some.
+    At most MOST_STRANGERS connections wait for their header, for SILENCE each; another one pushes out the
+    oldest. None is accepted where few file descriptors are left, because the node itself needs some.
     """
 
     def __init__(self, handle: Callable[[socket.socket, Address], None]) -> None:
         """`handle` reads the header and passes the connection to a topic or service."""
         self._handle = handle
+        self._strangers: dict[socket.socket, None] = {}  # in the order in which they came
+        self._guard = threading.Lock()
 
     @classmethod
     def open(cls) -> None:
@@ -68,6 +71,14 @@ class Reception:
         if _crowded():
             self._turn_away(client, address, CROWDED)
             return
+        with self._guard:
+            self._strangers[client] = None
+            if len(self._strangers) > MOST_STRANGERS:
+                # Here, not when its thread ends: clients that come at once would push out the same one.
+                oldest = next(iter(self._strangers))
+                del self._strangers[oldest]
+                with contextlib.suppress(OSError):  # it has gone already
+                    oldest.shutdown(socket.SHUT_RDWR)
         listen = threading.Thread(
             target=self._listen, args=(client, address), name="greeting", daemon=True
         )
@@ -79,11 +90,19 @@ class Reception:
     def _listen(self, client: socket.socket, address: Address) -> None:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)  # its machine may go
         client.settimeout(SILENCE)  # rospy resets it after the header
-        self._handle(client, address)
+        try:
+            self._handle(client, address)
+        finally:
+            self._forget(client)
 
     def _turn_away(self, client: socket.socket, address: Address, reason: str) -> None:
+        self._forget(client)
         client.close()
         rospy.logwarn_throttle(REPEAT, f"{reason}; a client of {address[0]} is turned away")
+
+    def _forget(self, client: socket.socket) -> None:
+        with self._guard:
+            self._strangers.pop(client, None)
 
 
 class _Listener:
@@ -92,7 +111,7 @@ class _Listener:
     def __init__(self, listener: socket.socket) -> None:
         self._listener = listener
         self.close = listener.close
-        listener.listen(BACKLOG)  # rospy lets five wait; the others retry after seconds
+        listener.listen(MOST_STRANGERS)  # rospy lets five wait; the others retry after seconds
 
     def accept(self) -> tuple[socket.socket, Address]:
         try:
@@ -174,7 +193,7 @@ def bound_calls() -> None:
 def hang_up_on_nonsense() -> None:
     """Closes the connection after a request that can't be read; before the node offers services.
 
-    rospy's thread of the connection ends with a traceback and leaves it open: the client waits for ever.
+    rospy's thread of the connection ends with a traceback and leaves it open: the client waits forever.
     """
     handle = ServiceImpl.handle
 

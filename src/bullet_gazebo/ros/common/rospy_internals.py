@@ -91,7 +91,7 @@ def divert_messages(sink_of: Callable[[str], Sink | None]) -> None:
 
 
 def publish_without_yielding() -> None:
-    """Lets a publisher go on at once: rospy yields the processor after each message to each connection.
+    """Lets a publisher continue at once: rospy yields the processor after each message to each connection.
 
     For a world that moves only at a request: the threads that send run between two requests.
     """

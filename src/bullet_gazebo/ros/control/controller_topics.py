@@ -121,7 +121,7 @@ class ControllerTopics:
                     port.receive(command)
             except ControlError as error:
                 rospy.logerr_throttle(REPEAT, f"{topic}: {error}")
-            except faults() as error:  # a user's code: the message is lost, the topic goes on
+            except faults() as error:  # a user's code: the message is lost, the topic continues
                 text = "".join(traceback.format_exception(error))
                 rospy.logerr_throttle(
                     REPEAT, f"{topic}: a message is lost, its reader raised:\n{text}"

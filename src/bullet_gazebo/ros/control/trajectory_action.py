@@ -90,7 +90,7 @@ class TrajectoryAction:
     """Serves the action from load to unload, in a thread of its own or along with steps in lock-step.
 
     Locks are taken in this order: the action server's, the simulator's, ours. The control tick holds the
-    simulator's and takes only ours, so it waits for nobody.
+    simulator's and takes only ours, so it waits for no other node.
     """
 
     def __init__(
@@ -121,8 +121,11 @@ class TrajectoryAction:
         self._server.stop()
 
     def note(self, handle: ServerGoalHandle, news: TrajectorySample | GoalOutcome) -> None:
-        """Keeps a goal's feedback or result, to be published soon."""
+        """Keeps a goal's feedback or result, to be published soon; new feedback replaces older one."""
         with self._news:
+            # A result is a goal's last news. Without this, feedback that nobody delivers would pile up.
+            if self._kept and self._kept[-1][0] is handle and isinstance(news, TrajectorySample):
+                self._kept.pop()
             self._kept.append((handle, news))
             self._news.notify()
 

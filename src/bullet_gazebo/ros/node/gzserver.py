@@ -102,7 +102,7 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     option("--video-rate", type=float, default=30.0, help="frames per second of simulated time")
     option("--video-size", type=int, nargs=2, default=(640, 480), help="width, height [pixels]")
     option("--video-model", default="", help="keep this model in the middle; default: all movable")
-    option("--seed", type=int, help="of Python's and NumPy's random numbers")
+    option("--seed", type=int, help="seed of Python's and NumPy's random numbers")
     for names, values in INERT.items():
         kind = {"nargs": values} if values else {"action": "store_const", "const": True}
         option(*names, help="accepted, without effect", **kind)

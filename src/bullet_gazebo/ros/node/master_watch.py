@@ -70,9 +70,10 @@ class MasterWatch:
     def __init__(self, register: Callable[[float], None] = register_again) -> None:
         """`register` registers the node; its argument is the time limit of each call [s]."""
         self._register = register
-        self._witness, _ = witness()
+        self._witness, self._address = witness()
         self._use_sim_time = rospy.get_param(TIME)
         self._misses = 0
+        self._taken = ""  # address of another node with our name, once reported
         self._ending = threading.Event()
 
     def start(self) -> None:
@@ -88,9 +89,11 @@ class MasterWatch:
         """Asks once, and acts on the answer."""
         try:
             try:
-                master.call("lookupService", self._witness, timeout=TIMEOUT)
+                known = master.call("lookupService", self._witness, timeout=TIMEOUT)
             except Refused:
                 self._come_back()
+            else:
+                self._compare(str(known))
         except NoAnswer as fault:
             self._miss(fault)
             return
@@ -102,7 +105,7 @@ class MasterWatch:
         self._misses += 1
         if self._misses == MISSES and not self._ending.is_set():
             rospy.logwarn(
-                "The master at %s is gone (%s). Existing connections stay, but nobody else finds this "
+                "The master at %s is gone (%s). Existing connections stay, but no other node finds this "
                 "simulator; it registers again once there is a master at that address",
                 master.uri(), fault,
             )  # fmt: skip
@@ -120,4 +123,14 @@ class MasterWatch:
             "The master at %s was restarted: this node wasn't registered there, and is now. Parameters, such "
             "as robot descriptions and settings of controllers, went with the old master; set them again, or "
             "restart the launch", master.uri(),
+        )  # fmt: skip
+
+    def _compare(self, known: str) -> None:
+        if known in (self._address, self._taken):
+            return
+        self._taken = known
+        rospy.logwarn(
+            "The master at %s was restarted, and another node (at %s) has the name %s there: nobody finds "
+            "this simulator (at %s). End one of the two",
+            master.uri(), known, rospy.get_name(), self._address,
         )  # fmt: skip

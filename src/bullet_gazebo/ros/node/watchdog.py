@@ -26,7 +26,7 @@ DEPTH = 12  # innermost frames that are logged
 
 
 class Watchdog:
-    """Moves the world in a thread of its own, and knows whether it goes on.
+    """Moves the world in a thread of its own, and knows whether it advances.
 
     Others move the world in a ``with watchdog:`` block. An exception there or in the thread is logged, and
     `failed` returns true from then on.
@@ -101,7 +101,7 @@ class Watchdog:
 
 
 class StallWatch:
-    """Notices that somebody has kept the world's lock for PATIENCE without a tick.
+    """Notices that a thread has held the world's lock for PATIENCE without a tick.
 
     A paused, held or slow world doesn't count: its lock is free in between.
     """

@@ -68,7 +68,7 @@ class ControlPlugin:
             if not self._gone.is_set():
                 try:
                     self._start(str(text))
-                except Exception as error:  # noqa: BLE001 - this robot has no control, all others go on
+                except Exception as error:  # noqa: BLE001 - this robot has no control, all others continue
                     self._started.close()
                     known = isinstance(error, ControlError)
                     rospy.logfatal(

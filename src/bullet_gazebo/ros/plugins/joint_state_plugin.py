@@ -71,6 +71,6 @@ def _period(context: PluginContext) -> int:
         rate = float(text)
     except ValueError:
         file = context.plugin.filename
-        rospy.logwarn("%s: updateRate '%s' is no number; %s Hz is used", file, text, RATE)
+        rospy.logwarn("%s: updateRate '%s' is not a number; %s Hz is used", file, text, RATE)
         rate = float(RATE)
     return round(NANOSECONDS / rate) if rate > 0.0 else 0

@@ -136,7 +136,7 @@ class AdvanceService:
         thinner: Thinner,
         one_at_a_time: threading.Lock,
     ) -> None:
-        """A fault in a block of `watchdog` ends the node; with `one_at_a_time`, nobody else's ticks come
+        """A fault in a block of `watchdog` ends the node; with `one_at_a_time`, no one else's ticks come
         within a request's.
         """
         self._sim = sim

@@ -202,7 +202,7 @@ class LinkServices:
         return "SetLinkState: success"
 
     def _frame(self, name: str) -> tuple[Pose, Twist] | None:
-        """Returns the state of a link or the world; a model is no frame here."""
+        """Returns the state of a link or the world; a model is not a frame here."""
         found = self._sim.world.link(name)
         if found is not None:
             return found[0].link_state(found[1])

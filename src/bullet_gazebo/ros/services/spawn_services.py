@@ -280,7 +280,7 @@ def _exported(package: str) -> list[str]:
         if EXPORT not in text:
             return []
         root = parse(text)
-    except FileError:  # somebody else's broken package
+    except FileError:  # a broken package of someone else's
         return []
     return [
         folder.replace("${prefix}", package)

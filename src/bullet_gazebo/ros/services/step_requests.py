@@ -222,7 +222,7 @@ class StepPlan:
 
 
 def query_of(request: StepWorldRequest | PrepareStepRequest) -> StateQuery:
-    """Returns what a request asks for beside the joints."""
+    """Returns what a request asks for besides the joints."""
     links, frames = request.link_states_of, request.link_frames
     if frames and len(links) != len(frames):
         raise ControlError(f"{len(links)} link_states_of but {len(frames)} link_frames")
@@ -270,7 +270,11 @@ def _check_ticks(request: StepWorldRequest, asks: bool) -> None:
     if not (0 if begins or asks else 1) <= request.ticks <= MAX_TICKS:
         raise ControlError(
             f"ticks is {request.ticks}: 1 to {MAX_TICKS} can be done in one call"
-            + (", or 0 with a reset, a placing or a question" if request.ticks == 0 else "")
+            + (
+                ", or 0 with a reset, joints or models to place, or states to report"
+                if request.ticks == 0
+                else ""
+            )
         )
     if request.reset > StepWorldRequest.SIMULATION:
         raise ControlError(f"reset is {request.reset}: 0 (none), 1 (world) or 2 (simulation)")

@@ -21,7 +21,7 @@ NONE = "(none)"
 MOST_SHOWN = 50  # models in the list
 REACH = {"revolute": math.pi, "continuous": math.pi, "prismatic": 2.0}  # [rad, m] without stops
 NO_STOP = 1e15
-HANDS_OFF = 2.0  # [s] after somebody moved a slider
+HANDS_OFF = 2.0  # [s] after someone moved a slider
 PARTS = 500  # steps of a slider
 UNMOVED = "These sliders work only while time stands still:"
 
@@ -56,7 +56,7 @@ class ModelPanel:
         self._wanted: dict[
             tuple[str, str], float
         ] = {}  # [rad, m] by model and joint, not yet carried out
-        self._touched: dict[str, float] = {}  # [s] when somebody moved a joint's slider
+        self._touched: dict[str, float] = {}  # [s] when someone moved a joint's slider
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._choice = server.gui.add_dropdown("Model", [NONE], initial_value=NONE)
         self._follow = server.gui.add_checkbox("Follow it", False)
@@ -96,7 +96,7 @@ class ModelPanel:
         )  # fmt: skip
 
         def moved(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None:  # somebody moved it
+            if event.client is not None:  # someone moved it
                 self._touched[joint.name] = time.monotonic()
                 self._wanted[model, joint.name] = float(slider.value)
                 self._attempt(lambda: self._move_newest(model, joint.name))
@@ -149,7 +149,7 @@ class ModelPanel:
             self._list.content = text
 
     def _show_joints(self, positions: list[float]) -> None:
-        """Moves the sliders with their joints, but for those that somebody has just moved."""
+        """Moves the sliders with their joints, but for those that someone has just moved."""
         now = time.monotonic()
         self._show_unmoved()
         for (name, slider), position in zip(list(self._sliders.items()), positions, strict=False):

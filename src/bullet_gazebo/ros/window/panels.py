@@ -27,7 +27,7 @@ SPEEDS = {
 }
 OTHER = "other"
 MOST_STEPS = 100_000
-STILL = 0.005  # of real time; nobody sees a slower pace
+STILL = 0.005  # of real time; no one sees a slower pace
 ONLY_STEPS = "a world in lock-step moves only by steps: a client's, or these here"
 
 
@@ -65,7 +65,7 @@ class TimePanel:
         many = gui.add_button("Do these steps", icon=viser.Icon.PLAYER_TRACK_NEXT)
         many.on_click(lambda _: attempt(lambda: commands.step(int(steps.value))))
         world = gui.add_button(
-            "Reset world", hint="put models back to where they were spawned; time goes on"
+            "Reset world", hint="put models back to where they were spawned; time continues"
         )
         world.on_click(lambda _: attempt(lambda: commands.reset(everything=False)))
         simulation = gui.add_button("Reset simulation", hint="set joints and time to zero as well")
@@ -74,7 +74,7 @@ class TimePanel:
         self._speed.on_update(self._choose_speed)
 
     def _choose_speed(self, event: viser.GuiEvent[Any]) -> None:
-        if event.client is not None and self._speed.value != OTHER:  # somebody chose it
+        if event.client is not None and self._speed.value != OTHER:  # someone chose it
             self._attempt(lambda: self._commands.set_speed(SPEEDS[self._speed.value]))
 
     def show(self, now: float, factor: float, paused: bool, lockstep: bool) -> None:
@@ -83,7 +83,7 @@ class TimePanel:
         if (paused, lockstep) != (self._paused, self._lockstep):
             self._paused, self._lockstep = paused, lockstep
             goes_on = paused and not lockstep
-            self._pause.label = "Go on" if goes_on else "Pause"
+            self._pause.label = "Resume" if goes_on else "Pause"
             self._pause.icon = viser.Icon.PLAYER_PLAY if goes_on else viser.Icon.PLAYER_PAUSE
             for each in (self._pause, self._speed):  # neither does anything in lock-step
                 each.disabled = lockstep
@@ -196,7 +196,7 @@ class Controllers:
             self._publishers[holder.topic] = rospy.Publisher(holder.topic, kind, queue_size=1)
         publisher = self._publishers[holder.topic]
         if not wait_until(publisher.get_num_connections, CONNECTING, holder.topic):
-            raise ServiceFailed(f"{holder.topic}: nobody listens to commands")
+            raise ServiceFailed(f"{holder.topic}: no controller listens to commands")
         if holder.kind == SINGLE:
             publisher.publish(Float64(positions[joint]))
             return

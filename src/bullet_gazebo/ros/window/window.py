@@ -169,7 +169,7 @@ class Window:
 
 
 class TrainingTab:
-    """A tab with a training's curves, shown once somebody has named a training.
+    """A tab with a training's curves, shown once someone has named a training.
 
     A thread of its own reads the training's table.
     """
@@ -218,7 +218,7 @@ def show(address: Address, browser: bool) -> None:
             print(f"gzclient: {line}", flush=True)
         if (
             not address.token
-        ):  # a token is for nobody else; without one other programs may show the lines
+        ):  # a token is for no one else; without one other programs may show the lines
             rospy.set_param(ADVICE, advice)
         if browser:  # may block until its user closes it
             threading.Thread(target=open_browser, args=(address, _warn), daemon=True).start()

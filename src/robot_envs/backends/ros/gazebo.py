@@ -148,7 +148,7 @@ def physics_step() -> float:
     """Returns the simulator's physics step [s]; raises RobotEnvError if it doesn't answer."""
     step = ros_gazebo.gazebo_get_time_step()
     if not step > 0.0:
-        raise RobotEnvError("the simulator doesn't tell its time step; see the messages above")
+        raise RobotEnvError("the simulator doesn't report its time step; see the messages above")
     return step
 
 
@@ -233,7 +233,7 @@ class SharedWorld:
         Raises:
             RobotEnvError: if an object can't be read or spawned, or the simulator doesn't answer.
         """
-        before, self._holder = self._holder, None  # nobody's, if something fails
+        before, self._holder = self._holder, None  # no one's, if something fails
         if before is not None and before is not user:
             before.restore()
         self.place_objects(user.scene.objects)
@@ -263,7 +263,7 @@ class SharedWorld:
         """
         if list(wanted) == self._objects:
             return
-        # All are spawned anew: the order of a world's models affects its bits.
+        # All are spawned again: the order of a world's models affects its bits.
         self._remove_objects()
         try:
             present = models() if wanted else []

@@ -48,7 +48,7 @@ class LockstepWorld(RobotBackend):
         scene: the robots and objects; they are there, and the controllers run.
         ticks: physics steps of one action.
         world: shared with the other environments of this process.
-        timeout: wall time [s] that an answer may take, beside 10 ms for each tick.
+        timeout: wall time [s] that an answer may take, on top of 10 ms for each tick.
     """
 
     deterministic = shared = True

@@ -75,5 +75,5 @@ def refuse_twin(name: str) -> None:
         raise RobotEnvError(f"the ROS master at {master.uri()}: {error}") from error
     raise RobotEnvError(
         f"a node {name} runs at {master.uri()} already; end it, or set "
-        "ROS_MASTER_URI to a free port to run beside it"
+        "ROS_MASTER_URI to a free port to run next to it"
     )

@@ -28,7 +28,7 @@ ANSWERING = "/gazebo/pause_physics"  # the last service that a client needs befo
 NOTICING = 2.0  # [s] for a supervisor to notice that its simulator has died
 ENDING = 10.0  # [s] for all processes to end after SIGTERM
 STARTING = 60.0  # [s] for one simulator to come up
-ONE_MORE = 15.0  # [s] for each that starts beside it
+ONE_MORE = 15.0  # [s] for each that starts at the same time
 SUPERVISOR = Path(__file__).with_name("supervisor.py")
 SOURCES = Path(bullet_gazebo.__file__).parents[1]
 # The client's own settings, which would give these processes another name or address.
@@ -53,7 +53,7 @@ class OwnSimulator:
 
     Args:
         slot: its place among the simulators that start together.
-        world: the robot's world file, or its text, which is written beside the log.
+        world: the robot's world file, or its text, which is written next to the log.
         seed: of random numbers that plugins draw.
 
     Raises:

@@ -23,7 +23,10 @@ from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
 from ros_calls import master
 
-DEADLINE = 30.0  # [s] of wall time for an answer, beside 10 ms for each tick; others may need the processor
+DEADLINE = (
+    30.0  # [s] of wall time for an answer, on top of 10 ms a tick; others may need the processor
+)
+BOUND = 1e9  # [rad, m, rad/s, m/s, N m, N]; no joint of a world of metres and seconds gets there
 SEED = 0  # of the simulator's own random numbers, as for the backend "ros"
 
 logger = logging.getLogger(__name__)
@@ -69,12 +72,23 @@ class Journal:
 
 
 def checked(state: WorldState, expected: int) -> WorldState:
-    """Returns a simulator's answer; raises SimulatorFault unless it is of that time of the episode [ns]."""
-    if round(state.time * NANOSECONDS) != expected:
+    """Returns a simulator's answer if it is plausible.
+
+    Args:
+        state: the answer.
+        expected: simulated time since the episode began [ns].
+
+    Raises:
+        SimulatorFault: if it is of another time, or a joint isn't finite and within bounds.
+    """
+    if not abs(state.time * NANOSECONDS - expected) < 0.5:  # NaN isn't
         raise SimulatorFault(
             f"its time stands at {state.time:.9g} s of the episode, and {expected / NANOSECONDS:.9g} s were "
             "asked for"
         )
+    for name, joint in state.joints.items():
+        if not all(abs(number) < BOUND for number in joint):
+            raise SimulatorFault(f"the joint '{name}' is out of all bounds: {joint}")
     return state
 
 
@@ -89,7 +103,7 @@ class OwnWorld(RobotBackend):
     Args:
         scene: the robots and objects.
         control_period: simulated time of one action [s].
-        deadline: wall time that an answer may take, beside 10 ms for each tick [s]; None: 30 s.
+        deadline: wall time that an answer may take, on top of 10 ms for each tick [s]; None: 30 s.
 
     Raises:
         ValueError: if the period isn't a whole number of physics steps.

@@ -127,7 +127,7 @@ class RosVariation:
         answer = self._call(name, Reconfigure, Config(doubles=wanted))
         now = {each.name: each.value for each in answer.config.doubles}
         if any(now.get(each.name) != each.value for each in wanted):
-            raise SimulatorError(f"{name} was asked for {gains}, and gave {now}")
+            raise SimulatorError(f"{name} was sent {gains} but applied {now}")
 
     def gravity(self) -> Vector:
         gravity = self._physics().gravity

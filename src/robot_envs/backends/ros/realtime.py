@@ -143,7 +143,7 @@ class CommandTopic:
         self._publisher.publish(Float64(value) if self._single else Float64MultiArray(data=value))
 
     def wait(self) -> None:
-        """Waits until the controller listens; advertises the topic anew halfway.
+        """Waits until the controller listens; advertises the topic again halfway.
 
         rospy turns a subscriber away that connects after one environment's end and before the next one's
         beginning in the same process, and doesn't try again.
@@ -157,7 +157,7 @@ class CommandTopic:
         self._publisher.unregister()
         self._publisher = self._advertise()
         if not wait_until(self._publisher.get_num_connections, STATE_TIMEOUT / 2, topic):
-            raise SimulatorError(f"nobody listens on {topic}: {ready(self._scene).missing()}")
+            raise SimulatorError(f"no node listens on {topic}: {ready(self._scene).missing()}")
 
     def close(self) -> None:
         """Leaves the topic."""

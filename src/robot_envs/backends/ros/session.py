@@ -39,7 +39,7 @@ class RosSession:
         gui: open the simulator's window, if it isn't open.
         seed: of a simulator that is started here.
         rviz: show the robot in RViz.
-        curves: a run folder, whose curves the window shows beside the robot, whoever opened it.
+        curves: a run folder, whose curves the window shows next to the robot, whoever opened it.
     """
 
     def __init__(
@@ -66,6 +66,8 @@ class RosSession:
     def start(self, say: Say) -> None:
         """Starts what is missing, and makes this the process's session.
 
+        If the simulator was started here and dies before its robots are there, another one is started once.
+
         Args:
             say: called with a line for each thing that is started.
 
@@ -73,6 +75,16 @@ class RosSession:
             RobotEnvError: if something can't be started, or what runs doesn't fit; `close` ends what was
                 started before.
         """
+        try:
+            self._start(say)
+        except RobotEnvError as error:
+            if not self._started_simulator or _simulator_runs():
+                raise
+            rospy.logwarn("%s; another simulator is started in its place", error)
+            self._undo.close()
+            self._start(say)
+
+    def _start(self, say: Say) -> None:
         robot = self._scene.robots[0]
         if rospy.core.is_initialized() and rospy.is_shutdown():
             raise RobotEnvError(
@@ -81,7 +93,7 @@ class RosSession:
             )
         if self._rviz:
             windows.check_rviz(robot)
-        self._started_simulator = not (node.master_is_up() and gazebo.simulator_answers())
+        self._started_simulator = not _simulator_runs()
         if self._started_simulator:
             say("starting the simulator")
             self._start_simulator()
@@ -163,7 +175,7 @@ class RosSession:
             scene: the session's robots, and objects, which are in the world during this backend's episodes.
             control_period: simulated time of one action [s]; in real time 0 takes the newest joint state
                 without waiting.
-            deadline: wall time that an answer in lock-step may take, beside 10 ms for each tick [s].
+            deadline: wall time that an answer in lock-step may take, on top of 10 ms for each tick [s].
 
         Raises:
             ValueError: if the period isn't a whole number of physics steps.
@@ -223,6 +235,10 @@ def running_session(scene: Scene, realtime: bool) -> RosSession:
         raise
     atexit.register(session.close)
     return session
+
+
+def _simulator_runs() -> bool:
+    return node.master_is_up() and gazebo.simulator_answers()
 
 
 def _undo_if_running(running: RunningSimulator, undo: Undo) -> None:

@@ -1,4 +1,4 @@
-"""The simulator's window, a page in the browser, and RViz: opened beside a session."""
+"""The simulator's window, a page in the browser, and RViz: opened along with a session."""
 
 import contextlib
 import os

@@ -67,7 +67,7 @@ def launch_Gazebo(
     Args:
         paused: start with the simulation paused.
         use_sim_time: let nodes use simulated time.
-        gui: with a window; without a display the simulation goes on without one.
+        gui: with a window; without a display the simulation continues without one.
         recording: record the state log.
         debug: run the server in a debugger.
         verbose: more messages from the server.

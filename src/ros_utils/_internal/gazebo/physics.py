@@ -62,7 +62,7 @@ def gazebo_reset_sim(
 def gazebo_reset_world(
     retries: int = 5, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> bool:
-    """Puts all models back to where they began; time goes on. See `gazebo_reset_sim`."""
+    """Puts all models back to where they began; time continues. See `gazebo_reset_sim`."""
     return empty_call("reset_world", retries, timeout, gazebo_ns)
 
 
@@ -156,7 +156,7 @@ def gazebo_set_physics_properties(
     now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
     if now is None:
         return False
-    fault = not_finite("gravity", *(gravity or ())) or not_finite(
+    fault = not_finite("gravity", *(() if gravity is None else gravity)) or not_finite(
         "max_update_rate", max_update_rate or 0.0
     )
     if time_step is not None and not 0.0 < time_step < math.inf:

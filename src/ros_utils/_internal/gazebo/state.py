@@ -91,7 +91,7 @@ def gazebo_set_model_state(
         model_name: the model's name.
         ref_frame: model or link that pose and twist refer to.
         pos_x, pos_y, pos_z: position [m].
-        ori_x, ori_y, ori_z, ori_w: orientation, a quaternion; all zeros is no rotation.
+        ori_x, ori_y, ori_z, ori_w: orientation, a quaternion; all zeros means no rotation.
         lin_vel_x, lin_vel_y, lin_vel_z: [m/s].
         ang_vel_x, ang_vel_y, ang_vel_z: [rad/s].
         sleep_time: pause afterwards [s of wall time].
@@ -203,7 +203,7 @@ def gazebo_apply_joint_effort(
 ) -> bool:
     """Applies an effort [N m, N] to a joint, from `start_time` or now on [s of simulated time].
 
-    It lasts for `duration` [s of simulated time]; a negative one is for ever.
+    It lasts for `duration` [s of simulated time]; a negative one is forever.
 
     Returns:
         True if the simulator does it.

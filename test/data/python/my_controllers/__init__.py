@@ -41,7 +41,7 @@ class Spring(Controller):
     def update(self, now, dt):
         stretch = self.set_point - self.joint.position
         self.joint.command = self.stiffness * stretch
-        if self.stretch.wanted:  # somebody listens
+        if self.stretch.wanted:  # the topic has subscribers
             self.stretch.send(Vector3(x=stretch))
 
 

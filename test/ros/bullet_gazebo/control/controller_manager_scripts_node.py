@@ -139,7 +139,7 @@ class ScriptsTest(unittest.TestCase):
             self.assertEqual((code, output), (1, ""))
             self.assertIn(f"waiting up to 30 s for the service {name}", errors)
             self.assertIn(
-                f"there is no controller manager: nobody offers the service {name}", errors
+                f"there is no controller manager: no node offers the service {name}", errors
             )
             self.assertNotIn("Traceback", errors)
         self.lonely.clear()

@@ -205,7 +205,7 @@ class TrajectoryTest(unittest.TestCase):
         pursuit = arm.pursue(trajectory(EFFORT, (5.0, [1.0, 1.0])))
         self.assertTrue(pursuit.wait_active())
         call("/gazebo/reset_simulation", Empty)
-        self.check(pursuit, "PREEMPTED", "SUCCEEDED", "began anew")
+        self.check(pursuit, "PREEMPTED", "SUCCEEDED", "started over")
         cancel.publish(GoalID(stamp=later))
         arm.states.clear()
         self.assertTrue(wait_until(lambda: len(arm.states) > 5))

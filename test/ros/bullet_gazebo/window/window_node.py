@@ -75,7 +75,7 @@ class WindowTest(WindowCase):
     def test_time_is_moved_by_clicks(self):
         self.spawn("ball", BALL, z=0.6)
         self.page.click("World")
-        self.page.click("Go on")
+        self.page.click("Resume")
         wait_for(lambda: not self.physics().pause, "time that runs")
         self.page.click("Pause")
         wait_for(lambda: self.physics().pause, "pause")

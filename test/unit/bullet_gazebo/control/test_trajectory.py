@@ -178,6 +178,7 @@ def test_bad_points_are_refused(points, text):
         (["a", "b", "c"], False, "no joint .'c'"),
         (["a", "a"], True, "named twice"),
         (["c"], True, "no joint .'c'"),
+        (["c"] * 1000, True, r"no joint \[('c', ){9}'c'\]"),
         ([], True, "names no joint"),
         ([], False, "names no joint"),
     ],

@@ -56,7 +56,7 @@ def test_a_module_without_such_a_class_is_named(kind) -> None:
 
 @pytest.mark.parametrize("kind", ["builtins/eval", "sys/exit", "unittest/TestCase"])
 def test_what_is_no_controller_is_refused(kind) -> None:
-    with pytest.raises(ControlError, match="is no subclass of .*Controller"):
+    with pytest.raises(ControlError, match="is not a subclass of .*Controller"):
         find_type(kind)
 
 
@@ -77,7 +77,7 @@ def test_whatever_an_import_raises_refuses_the_type(module, text) -> None:
 
 def test_a_class_that_is_no_controller_or_has_another_type_name_is_refused(module) -> None:
     name = module("class Spring:\n    type_name = '{module}/Spring'")
-    with pytest.raises(ControlError, match="is no subclass of bullet_gazebo"):
+    with pytest.raises(ControlError, match="is not a subclass of bullet_gazebo"):
         find_type(f"{name}/Spring")
     name = module(CONTROLLER.replace('"{module}/Spring"', '"other/Spring"'), "other_{module}.py")
     with pytest.raises(ControlError, match="must say so as type_name"):

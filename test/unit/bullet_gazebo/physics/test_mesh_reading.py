@@ -76,7 +76,7 @@ ILL = {
     "beyond.obj": (OBJ + "f 1 2 9\n", "line 21: a face names vertex 9 of 8"),
     "before.obj": (OBJ + "f 1 2 -9\n", "line 21: a face names vertex -9 of 8"),
     "zero.obj": (OBJ + "f 0 1 2\n", "line 21: a face names vertex 0 of 8"),
-    "corner.obj": (OBJ + "f 1 2 x/1\n", "line 21: 'x/1' is no corner"),
+    "corner.obj": (OBJ + "f 1 2 x/1\n", "line 21: 'x/1' is not a corner"),
     "edge.obj": (OBJ + "f 1 2\n", "line 21: a face has 2 corners"),
     "flat.obj": ("v 1 2\n" + OBJ, "line 1: a vertex must hold 3 numbers"),
     "nan.obj": ("v 1 2 nan\n" + OBJ, "line 1: a vertex: 'nan' is not finite"),

@@ -182,6 +182,12 @@ def test_crossed_limits_are_swapped():
         ('<axis xyz="1e200 1e200 0"/>' + LIMIT, "the axis has length inf"),
         ('<dynamics damping="soft"/>' + LIMIT, "<dynamics damping>: 'soft' is not a number"),
         ("<mimic/>" + LIMIT, "<mimic> needs the attribute 'joint'"),
+        ('<mimic joint="k" multiplier="-"/>' + LIMIT, "<mimic multiplier>: '-' is not a number"),
+        ('<calibration rising="up"/>' + LIMIT, "<calibration rising>: 'up' is not a number"),
+        (
+            '<safety_controller k_velocity="1" soft_lower_limit="v"/>' + LIMIT,
+            "<safety_controller soft_lower_limit>: 'v' is not a number",
+        ),
         ("<safety_controller/>" + LIMIT, "<safety_controller> needs the attribute 'k_velocity'"),
     ],
 )

@@ -13,6 +13,7 @@ from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
+from bullet_gazebo.pictures import recording
 from bullet_gazebo.pictures.recording import RecordingError, RecordingOptions, SimulationRecorder
 from bullet_gazebo.simulator import Simulator
 
@@ -120,6 +121,17 @@ def test_the_other_process_may_end_first(sim, tmp_path, caplog):
     recorder.close(LIMIT)
     sim.advance(100)
     assert "the recording has ended before the simulation" in caplog.text
+
+
+def test_what_the_other_process_cannot_take_in_time_is_left_out(sim, tmp_path, monkeypatch, caplog):
+    recorder = SimulationRecorder(sim, options(tmp_path))
+    sim.advance(100)
+    monkeypatch.setattr(recording, "MOST_WAITING", -1)
+    sim.advance(100)
+    recorder.close(LIMIT)
+    assert recorder._process.wait(LIMIT) == 0
+    assert "2 frames of the recording were dropped" in caplog.text
+    assert len(frames(tmp_path / "a.mp4")) == 3
 
 
 @pytest.mark.parametrize(

@@ -73,6 +73,15 @@ def test_one_that_goes_meanwhile_is_asked_again(setting) -> None:
     assert setting.registered == 1 and len(setting.told) == 1
 
 
+def test_another_node_of_our_name_is_told_and_left_alone(setting) -> None:
+    setting.master.services[SERVICE] = "rosrpc://127.0.0.1:2"
+    setting.watch.look()
+    setting.watch.look()
+    (told,) = setting.told
+    assert "another node (at rosrpc://127.0.0.1:2) has the name /gazebo" in told
+    assert not setting.registered
+
+
 def test_a_master_that_is_gone_is_told_once_and_its_return_too(setting, monkeypatch) -> None:
     with monkeypatch.context() as away:
         away.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")

@@ -126,9 +126,12 @@ def test_garbage_ends_its_own_connection_only(server, garbage) -> None:
     assert server.greet() == b"/any"
 
 
-def test_silent_clients_keep_nobody_out(server) -> None:
+def test_silent_clients_push_each_other_out_and_nobody_else(server, monkeypatch) -> None:
+    monkeypatch.setattr(connections, "MOST_STRANGERS", 5)
+    monkeypatch.setattr(connections, "SILENCE", 2 * BOUND)  # nobody ends by himself
     silent = [server.connect() for _ in range(20)]
     assert server.greet() == b"/any"
+    assert all(ends(client) for client in silent[:15])
     for client in silent:
         client.close()
 

@@ -135,7 +135,7 @@ def test_a_world_in_lockstep_says_so_and_has_nothing_to_pause(server):
 
     panel.show(590.465, 0.0, True, False)
     assert "590.465 s</b> &nbsp; paused" in status.content
-    assert (pause.label, is_off(), panel.stands) == ("Go on", False, True)
+    assert (pause.label, is_off(), panel.stands) == ("Resume", False, True)
     panel.show(590.465, 0.0, True, True)
     assert "590.465 s</b> &nbsp; lock-step, waits for a client's steps" in status.content
     assert (pause.label, is_off(), panel.stands) == ("Pause", True, True)

@@ -108,7 +108,7 @@ def test_an_interrupted_benchmark_goes_on_where_it_was(tmp_path: Path) -> None:
         said, _ = process.communicate()
     finally:
         process.kill()
-    assert process.returncode == 143 and "interrupted; the same command goes on" in said
+    assert process.returncode == 143 and "interrupted; run the same command again" in said
     first = json.loads((run / "summary.json").read_text())
     assert first["interrupted"] and not first["complete"]
     same = Job("t", run, ())

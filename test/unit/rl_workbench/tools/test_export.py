@@ -256,3 +256,8 @@ def test_files_that_are_no_exported_policies(run: Path, tmp_path: Path) -> None:
     bad.write_bytes(torchscript.written(module, {"format": "another's"}))
     with pytest.raises(WorkbenchError, match="of this version"):
         open_exported(bad)
+    metadata = open_exported(good).metadata
+    for name, wrong in (("env_id", None), ("env_kwargs", []), ("observation_space", "Box")):
+        bad.write_bytes(torchscript.written(module, {**metadata, name: wrong}))
+        with pytest.raises(WorkbenchError, match=f"has no {name} that can be read"):
+            open_exported(bad)

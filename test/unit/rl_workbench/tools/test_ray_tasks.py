@@ -119,7 +119,7 @@ def test_a_benchmark_whose_own_process_is_killed_or_stopped_goes_on(
         said = finished(driver, 130)
     finally:
         driver.kill()
-    assert "interrupted; the same command goes on" in said
+    assert "interrupted; run the same command again" in said
     wait_until(lambda: not trainings(tmp_path), "the end of its trainings")
     assert {state(tmp_path, seed).state for seed in range(2)} <= {"stopped", "waiting", "done"}
 

@@ -51,7 +51,7 @@ def test_without_any_good_checkpoint(stopped: Path, damage: Callable[[Path], obj
     if damage is Path.unlink:
         assert summary(resume(stopped))["complete"], "as one that was killed before its first"
         return
-    with pytest.raises(WorkbenchError, match="holds no checkpoint to go on from"):
+    with pytest.raises(WorkbenchError, match="holds no checkpoint to continue from"):
         resume(stopped)
 
 

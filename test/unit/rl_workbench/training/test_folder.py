@@ -67,7 +67,7 @@ def test_one_that_is_in_use(tmp_path: Path) -> None:
         pass
     with held(tmp_path):  # the first one is over
         pass
-    with pytest.raises(WorkbenchError, match="is no run folder"), held(tmp_path / "none"):
+    with pytest.raises(WorkbenchError, match="is not a run folder"), held(tmp_path / "none"):
         pass
 
 
@@ -84,6 +84,6 @@ def test_one_that_its_last_holder_removes_meanwhile(
     lock = fcntl.flock
     monkeypatch.setattr(fcntl, "flock", removed)
     (tmp_path / "run").mkdir()
-    with pytest.raises(WorkbenchError, match="is no run folder"), held(tmp_path / "run"):
+    with pytest.raises(WorkbenchError, match="is not a run folder"), held(tmp_path / "run"):
         pass
     assert (tmp_path / "run").exists() == again

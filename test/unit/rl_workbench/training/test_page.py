@@ -50,7 +50,7 @@ def test_without_a_page_the_training_goes_on(tmp_path, capsys) -> None:
     shown = Page(("/no/such/program",))
     shown.on_training_start(SimpleNamespace(folder=tmp_path))
     shown.on_training_end(None)
-    words = "no page; the training goes on without one: No such file or directory\n"
+    words = "no page; the training continues without one: No such file or directory\n"
     assert capsys.readouterr().out == words
 
 

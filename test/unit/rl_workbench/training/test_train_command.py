@@ -207,7 +207,7 @@ def test_a_run_folder_in_use(capsys, tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_resumed(capsys, tmp_path: Path) -> None:
-    assert "is no run folder" in refused(capsys, f"--resume={tmp_path}")
+    assert "is not a run folder" in refused(capsys, f"--resume={tmp_path}")
     assert main([*REINFORCE, "--run-dir=run"]) == 0
     with held(tmp_path / "run"):
         assert "a training is running in" in failed(capsys, "--resume=run")

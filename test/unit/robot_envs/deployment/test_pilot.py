@@ -1,5 +1,6 @@
 """A policy at the controls: the same commands as in an environment, kept within limits; and how it stops."""
 
+import math
 from pathlib import Path
 
 import gymnasium
@@ -7,8 +8,9 @@ import numpy as np
 import pytest
 
 import cartpole  # noqa: F401 - registers the environments
+from bullet_gazebo.control.joint import JointLimits
 from robot_envs import GoalTask, JointState, LinkQuery, Robot, RobotEnv, StateQuery
-from robot_envs.deployment.pilot import CommandLimits, Pilot
+from robot_envs.deployment.pilot import CommandLimits, Pilot, impossible
 from robot_envs.errors import RobotEnvError
 
 FILES = Path(__file__).resolve().parents[3] / "data" / "robots"
@@ -116,6 +118,36 @@ def test_positions_go_no_faster_than_their_joints_can() -> None:
     limits = CommandLimits(robot, port, way=0.5, period=0.01)  # half of 20 rad/s
     assert limits((0.4, -0.4), (0.0, 0.0)) == (pytest.approx((0.1, -0.1)), [])
     assert limits((0.4, 0.05), (0.35, 0.0)) == (pytest.approx((0.4, 0.05)), [])
+
+
+def test_after_a_state_beyond_a_stop_commands_are_within_at_once_and_so_is_the_stop() -> None:
+    robot = arm("position_controllers/JointGroupPositionController")
+    (port,) = robot.ports
+    limits = CommandLimits(robot, port, way=0.5, period=0.01)
+    beyond = {"shoulder": JointState(-50.0, 0.0, 0.0), "elbow": JointState(1e300, 0.0, 0.0)}
+    assert limits.stop(beyond) == (0.5, -1.0)
+    assert limits((0.0, 0.0), (1e300, -50.0))[0] == (0.5, -1.0)
+
+
+RAIL = JointLimits(lower=-0.5, upper=0.5, velocity=2.0)
+
+
+@pytest.mark.parametrize(
+    ("limits", "position", "velocity", "fault"),
+    [
+        (RAIL, 0.59, 19.0, ""),
+        (RAIL, 50.0, 0.0, "beyond its stops at -0.5 and 0.5"),
+        (RAIL, -0.7, 0.0, "beyond its stops"),
+        (RAIL, 0.0, 21.0, "velocity 21, where its limit is 2"),
+        (RAIL, math.nan, 0.0, "which no joint has"),
+        (JointLimits(), 1e300, 0.0, "which no joint has"),
+        (JointLimits(), 700.0, -90.0, ""),
+        (JointLimits(lower=-1.0, velocity=0.0), -700.0, -90.0, ""),
+    ],
+)
+def test_what_no_joint_can_do_is_known(limits, position, velocity, fault) -> None:
+    found = impossible(limits, position, velocity)
+    assert fault in found and bool(fault) == bool(found)
 
 
 class ReachGoal(GoalTask):

@@ -6,6 +6,7 @@ import pytest
 import rospy
 from sensor_msgs.msg import JointState as JointStateMsg
 
+from bullet_gazebo.control.joint import JointLimits
 from robot_envs.deployment import policy_node
 from robot_envs.world_state import JointState
 
@@ -28,7 +29,8 @@ class Subscriber:
 
 
 def listener(*joints: str) -> tuple[policy_node.JointListener, Subscriber]:
-    made = policy_node.JointListener("/joint_states", "arm", joints or ("elbow", "wrist"))
+    limits = {"elbow": JointLimits(lower=-3.0, upper=3.0)}
+    made = policy_node.JointListener("/joint_states", "arm", joints or ("elbow", "wrist"), limits)
     return made, made._subscriber
 
 
@@ -89,3 +91,24 @@ def test_what_was_forgotten_comes_anew_with_earlier_stamps(clock: Clock) -> None
     assert joints.missing() == ["elbow"]
     subscriber.take(message(0.1, elbow=(3.0, 0.0)))
     assert joints.look()[0]["elbow"].position == 3.0
+
+
+@pytest.mark.parametrize(
+    ("bad", "fault"),
+    [
+        (message(1.1, elbow=(50.0, 0.0)), "'elbow' is reported at position 50, beyond its stops"),
+        (message(1.1, elbow=(1.0, 1e300)), "which no joint has"),
+        (message(1.1, elbow=(1.0, 0.0, math.inf)), "effort inf"),
+        (message(3600.0, elbow=(1.0, 0.0)), "stamped 3590.0 s in the future"),
+    ],
+)
+def test_a_state_that_cannot_be_is_a_fault_until_a_good_one_comes(
+    clock: Clock, bad: JointStateMsg, fault: str
+) -> None:
+    joints, subscriber = listener("elbow")
+    subscriber.take(message(1.0, elbow=(1.0, 0.0)))
+    assert joints.fault() == ""
+    subscriber.take(bad)
+    assert fault in joints.fault() and joints.look()[0]["elbow"].position == 1.0
+    subscriber.take(message(1.2, elbow=(1.5, 0.0)))
+    assert joints.fault() == "" and joints.look()[0]["elbow"].position == 1.5

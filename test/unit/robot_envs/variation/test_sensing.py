@@ -146,6 +146,7 @@ def test_noise_comes_before_the_steps(rng):
         ({"delay": 1.5}, "sensor_delay"),
         ({"delay": float("nan")}, "sensor_delay"),
         ({"encoder_step": -0.1}, "encoder_step must be a number >= 0"),
+        ({"encoder_step": 1e-320}, "encoder_step must be 0 or at least 1e-09"),
         ({"encoder_step": {"knee": 0.1}}, "there is no joint 'knee'; there are elbow, shoulder"),
     ],
 )

@@ -1,5 +1,7 @@
 """The parts of a simulator of one's own that need none: its journal, the checks of its answers, memory."""
 
+import math
+
 import pytest
 
 from robot_envs.backends.backend import (
@@ -65,10 +67,23 @@ def test_a_variation_leaves_what_it_does_not_name() -> None:
     )
 
 
-def test_an_answer_of_another_time_is_a_fault() -> None:
-    answer = state(0.0, 0.0, 0.0, time=0.3)
+def test_a_plausible_answer_is_fine() -> None:
+    answer = state(-1e6, 1e6, 1e6, time=0.3)
     assert checked(answer, 300_000_000) is answer
-    with pytest.raises(SimulatorFault, match="its time stands at 0.3 s .* and 0 s were asked for"):
+
+
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [
+        (state(math.nan, 0.0, 0.0), "joint 'hinge' is out of all bounds: .*position=nan"),
+        (state(1e9, 0.0, 0.0), "joint 'hinge' is out of all bounds"),
+        (state(0.0, 0.0, -math.inf), "joint 'hinge' is out of all bounds: .*effort=-inf"),
+        (state(0.0, 0.0, 0.0, time=0.3), "its time stands at 0.3 s .* and 0 s were asked for"),
+        (state(0.0, 0.0, 0.0, time=math.nan), "its time stands at nan"),
+    ],
+)
+def test_an_impossible_answer_is_a_fault(answer: WorldState, told: str) -> None:
+    with pytest.raises(SimulatorFault, match=told):
         checked(answer, 0)
 
 
