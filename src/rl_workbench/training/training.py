@@ -162,7 +162,7 @@ class Training:
             self._callbacks.call("on_training_start", self)
             self._save()  # so that there is something to resume from, whatever happens
             return
-        others = run_folder.other_versions(read_record(self.folder)["versions"])
+        others = run_folder.other_versions(read_record(self.folder).get("versions"))
         if others:
             tell(f"{others}: from here on the bits may differ")
         with fitting("state of the environment"):
