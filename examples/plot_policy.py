@@ -58,7 +58,6 @@ PLANES = {
 def preference(network: torch.nn.Module, observations: np.ndarray) -> np.ndarray:
     """Returns the action, or how much the score of the last one is above that of the first: (N,)."""
     seen = torch.from_numpy(observations)
-    seen = torch.from_numpy(observations)
     if not isinstance(network, Choice):
         return network(seen)[:, 0].numpy()
     scores = network.scores(seen)

@@ -37,10 +37,10 @@ def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]
     name = as_file_name(f"{env}__{experiment}__{seed}__{int(time.time())}")
     folder = Path(run_dir or Path("runs") / name)
     try:
-        number = 2
-        while not run_dir and folder.exists():  # two runs of one second get two
-            folder, number = folder.with_name(f"{name}_{number}"), number + 1
-        folder.mkdir(parents=True, exist_ok=True)
+        if run_dir:
+            folder.mkdir(parents=True, exist_ok=True)
+        else:
+            folder = _make_new(folder)
     except OSError as error:
         raise WorkbenchError(f"can't write to the run folder {folder}: {error.strerror}") from error
     with held(folder):
@@ -54,6 +54,18 @@ def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]
         finally:
             with contextlib.suppress(OSError):  # it isn't empty: all is well
                 folder.rmdir()
+
+
+def _make_new(wanted: Path) -> Path:
+    """Makes a folder; two runs of one second get two."""
+    wanted.parent.mkdir(parents=True, exist_ok=True)
+    folder, number = wanted, 2
+    while True:
+        try:
+            folder.mkdir()
+            return folder
+        except FileExistsError:
+            folder, number = wanted.with_name(f"{wanted.name}_{number}"), number + 1
 
 
 @contextlib.contextmanager
@@ -97,12 +109,14 @@ def library_versions() -> dict[str, str]:
     return {name: each for name, each in versions().items() if name in LIBRARIES}
 
 
-def other_versions(before: dict[str, str]) -> str:
+def other_versions(before: Any) -> str:
     """Returns how the versions of now differ from those at a training's start; empty if they don't.
 
     Args:
-        before: What `versions` returned then.
+        before: What `versions` returned then. It may be damaged, since no training depends on it.
     """
+    if not isinstance(before, dict):
+        return ""
     now = library_versions()
     names = [name for name in LIBRARIES if name in before and before[name] != now.get(name)]
     return ", ".join(f"{name} {before[name]} is now {now.get(name)}" for name in names)

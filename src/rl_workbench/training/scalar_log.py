@@ -4,7 +4,7 @@ The CSV is the record. When a training is resumed, the CSV is truncated to where
 and TensorBoard's file is rewritten from it. So neither has duplicate rows.
 """
 
-import csv
+import contextlib
 import os
 import socket
 import time
@@ -137,21 +137,27 @@ class EventFile:
 
 
 def _truncated(path: Path, length: int, say: Callable[[str], None]) -> list[Point]:
-    """Truncates the CSV to a length [bytes] and returns its points; none if it isn't as it was then."""
-    try:
-        with open_file(path) as file:
-            content = file.read(length)
-        if len(content) < length:
-            raise EOFError
-        rows = csv.DictReader(content.decode().splitlines())
-        points = [
-            (row["tag"], float(row["value"]), int(row["step"]), float(row["wall_time"]))
-            for row in rows
-        ]
-    except (FileNotFoundError, EOFError, ValueError, KeyError):
+    """Truncates the CSV to a length [bytes], or to its last complete row before; returns its points."""
+    content = b""
+    with contextlib.suppress(FileNotFoundError), open_file(path) as file:
+        content = file.read(length)
+    points: list[Point] = []
+    complete = len(HEADER) if content.startswith(HEADER) else 0
+    rows = content[complete:].splitlines(keepends=True) if complete else []
+    for row in rows:
+        try:
+            step, tag, value, wall_time = row.decode().split(",")
+            point = (tag, float(value), int(step), float(wall_time))
+        except ValueError:  # also for bytes that aren't text
+            break
+        if not row.endswith(b"\n"):
+            break
+        points.append(point)
+        complete += len(row)
+    if complete < length:
         say(f"{path} lacks rows that it had at the checkpoint; continuing without them")
-        return []
-    os.truncate(path, length)
+    if content:
+        os.truncate(path, complete)
     return points
 
 

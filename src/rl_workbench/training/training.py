@@ -163,7 +163,7 @@ class Training:
             self._callbacks.call("on_training_start", self)
             self._save()  # so that there is something to resume from, whatever happens
             return
-        others = run_folder.other_versions(read_record(self.folder)["versions"])
+        others = run_folder.other_versions(read_record(self.folder).get("versions"))
         if others:
             tell(f"{others}: from here on the bits may differ")
         with fitting("state of the environment"):
@@ -326,9 +326,10 @@ class Training:
         """Writes and reports the outcome; then raises a failure, unless the user had stopped anyway."""
         outcome = Outcome(
             self.options, self.folder, self.history, self._algorithm.steps, self._is_complete(),
-            self._interrupt.requested(), self._evaluation,
+            self._interrupt.requested(), self._evaluation, self._checkpoints.are_in_place(),
         )  # fmt: skip
         try:
+            self._checkpoints.check_place()
             self._algorithm.export(self.folder)
             self._callbacks.call("on_training_end", self)
             outcome.write_summary(str(failure) if failure else None)
