@@ -7,6 +7,7 @@ from math import ceil, isfinite
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
+from bullet_gazebo.physics.description import Plugin
 from bullet_gazebo.physics.engine import FURTHEST
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.stability import Log, StabilityWatch
@@ -16,7 +17,25 @@ NANOSECONDS = 1_000_000_000
 FAST = 0.999 * FURTHEST  # [rad, m] in a step: only what has blown up moves like that
 STRONGEST = 1e9  # [N m, N]; of a motor without a limit: the engine's solver needs a finite number
 
+SLOWEST = 3600.0  # [s]; the longest control period
+
 logger = logging.getLogger(__name__)
+
+
+def control_period_of(plugin: Plugin) -> float:
+    """Returns `<controlPeriod>` of a control plugin [s]; 0, which is each step, if there is none.
+
+    Raises:
+        ControlError: If it isn't a number from 0 to SLOWEST.
+    """
+    text = (plugin.element.findtext("controlPeriod") or "").strip() or "0"
+    try:
+        period = float(text)
+    except ValueError as error:
+        raise ControlError(f"<controlPeriod> '{text}' is not a number") from error
+    if not 0.0 <= period <= SLOWEST:
+        raise ControlError(f"<controlPeriod> {text} is not within 0 and {SLOWEST:g} s")
+    return period
 
 
 class ControlledRobot:

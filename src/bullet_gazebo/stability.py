@@ -17,6 +17,7 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import GAINS, RobotHardware
 from bullet_gazebo.control.manager import RUNNING, ControllerManager
 from bullet_gazebo.control.pid import Loop
+from bullet_gazebo.physics.description import is_control_plugin
 from bullet_gazebo.physics.dynamics import mobility, most_inertias, poses_at_zero
 from bullet_gazebo.physics.model import Model
 
@@ -26,7 +27,6 @@ Log = Callable[[int, str], None]
 MOST = 4.0  # of the eigenvalue
 P_ONLY_DAMPING = 0.05  # of critical damping
 P_ONLY_TAG = "pOnlyDamping"
-CONTROL_PLUGIN = "libgazebo_ros_control.so"
 
 
 class OwnedLoop(NamedTuple):
@@ -161,7 +161,7 @@ def p_only_damping(model: Model) -> float:
     """Returns `<pOnlyDamping>` of the model's control plugin: a share of critical damping."""
     for plugin in model.description.plugins:
         text = plugin.element.findtext(P_ONLY_TAG)
-        if text is None or not plugin.filename.endswith(CONTROL_PLUGIN):
+        if text is None or not is_control_plugin(plugin.filename):
             continue
         try:
             value = float(text)

@@ -118,11 +118,12 @@ class AfterImport(importlib.abc.MetaPathFinder):
 STANDARD = sysconfig.get_path("stdlib") + "/"
 # They wait for their own processes, sockets, files and threads: such waits stay wall time.
 LIBRARIES = frozenset(
-    ["bullet_gazebo", "catkin_pkg", "genpy", "joblib", "lockstep_runner", "matplotlib",
-     "multiprocess", "numpy", "optuna", "psutil", "pybullet", "ray", "rl_workbench",
-     "robot_envs", "ros_calls", "ros_utils", "rosgraph", "roslaunch", "roslib", "rosmaster",
-     "rosnode", "rosparam", "rospkg", "rospy", "rosservice", "rostopic", "scipy",
-     "tensorboard", "tensorboardX", "tensorflow", "torch", "tqdm", "wandb", "xacro", "xmlrpc"]
+    ["bullet_gazebo", "cartpole", "catkin_pkg", "file_access", "genpy", "joblib",
+     "lockstep_runner", "matplotlib", "multiprocess", "numpy", "optuna", "package_writing",
+     "psutil", "pybullet", "ray", "rl_workbench", "robot_envs", "ros_calls", "ros_utils",
+     "rosgraph", "roslaunch", "roslib", "rosmaster", "rosnode", "rosparam", "rospkg", "rospy",
+     "rosservice", "rostopic", "scipy", "tensorboard", "tensorboardX", "tensorflow", "torch",
+     "tqdm", "wandb", "web_viewer", "xacro", "xmlrpc"]
 )  # fmt: skip
 
 

@@ -11,7 +11,12 @@ import numpy as np
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.transmissions import RobotDescription, read_description
-from bullet_gazebo.physics.description import DescriptionError, ModelDescription, Shape
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    ModelDescription,
+    Shape,
+    is_control_plugin,
+)
 from bullet_gazebo.physics.dynamics import poses_at_zero
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.urdf import parse_urdf
@@ -21,7 +26,6 @@ from file_access.text import did_you_mean
 from file_access.xml_text import parse
 from package_writing import CannotWrite
 
-PLUGIN = "libgazebo_ros_control.so"
 EFFORT, POSITION, VELOCITY = (
     f"{kind}JointInterface" for kind in ("Effort", "Position", "Velocity")
 )
@@ -172,7 +176,7 @@ def _range(joint: JointHandle) -> tuple[float, float]:
 def _plugins(robot: Element) -> Iterator[Element]:
     for block in robot.findall("gazebo"):
         for plugin in block.findall("plugin"):
-            if plugin.get("filename", "").endswith(PLUGIN):
+            if is_control_plugin(plugin.get("filename", "")):
                 yield plugin
 
 

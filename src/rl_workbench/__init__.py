@@ -1,7 +1,8 @@
 """Trains agents in Gymnasium's environments, and shows what they learned.
 
 Public names: `train` and `Callback`, to train from Python, and `WorkbenchError`, the error of both.
-The command line is `rl-workbench` (`python3 -m rl_workbench`).
+The command line is `python3 -m rl_workbench`. The installed command, `rl-workbench`, is this one with the
+environments of this project registered (`cartpole.workbench`).
 """
 
 from importlib import import_module

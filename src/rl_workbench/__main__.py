@@ -1,4 +1,4 @@
-"""`python3 -m rl_workbench`: the same as workbench.py, where there is no rosrun."""
+"""`python3 -m rl_workbench`: the command line in any Gymnasium environment; it registers none itself."""
 
 import sys
 

@@ -11,9 +11,14 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointLimits
 from bullet_gazebo.control.transmissions import RobotDescription, read_description
-from bullet_gazebo.physics.description import DescriptionError, ModelDescription
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    ModelDescription,
+    is_control_plugin,
+)
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.robot import control_period_of
 from file_access.text import did_you_mean
 from robot_envs import controllers, files
 from robot_envs.controllers import CommandPort
@@ -23,7 +28,6 @@ from robot_envs.files import Source
 logger = logging.getLogger(__name__)
 
 CONTROL_PERIOD = 0.01  # [s]
-DRIVES = "libgazebo_ros_control.so"  # the plugin that runs controllers over ROS
 EMPTY = "empty"
 """The world with just a ground plane, as in gazebo_ros's empty_world.launch."""
 
@@ -183,12 +187,14 @@ class Robot:
             except RobotEnvError as error:
                 yield f"its world: {error}"
         for plugin in self.links.plugins:
+            if not is_control_plugin(plugin.filename):
+                continue
+            try:
+                control_period_of(plugin)
+            except ControlError as error:
+                yield str(error)
             namespace = (plugin.element.findtext("robotNamespace") or "").strip()
-            if (
-                plugin.filename == DRIVES
-                and namespace
-                and namespace.strip("/") != self.namespace.strip("/")
-            ):
+            if namespace and namespace.strip("/") != self.namespace.strip("/"):
                 yield (
                     f"its URDF puts its controllers into the namespace '{namespace}' (<robotNamespace>), the "
                     f"description into '/{self.namespace.strip('/')}': give both the same"

@@ -182,7 +182,7 @@ class StepClient:
         Beside the joints, the answer holds only what is asked for; the rest costs nothing.
 
         Args:
-            ticks: at least 1.
+            ticks: at least 1; 0 if models, links or contacts are asked for, which only reports.
             commands: by controller name: a number, or for a group one per joint
                 [m, rad, m/s, rad/s, N, N m].
             joint_commands: for joints without a running controller, by name.

@@ -1,5 +1,6 @@
 """What a model consists of, whatever file it came from and whatever engine simulates it."""
 
+import os
 from collections import defaultdict
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
@@ -9,6 +10,7 @@ import numpy as np
 from bullet_gazebo.physics.pose import Pose, Vector
 from file_access.text import one_line
 
+CONTROL_PLUGIN = "libgazebo_ros_control.so"
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 
@@ -133,6 +135,11 @@ class Plugin:
     filename: str
     name: str
     element: Element
+
+
+def is_control_plugin(filename: str) -> bool:
+    """Returns whether a plugin's library is the one that runs ros_control. Its folder doesn't matter."""
+    return os.path.basename(filename) == CONTROL_PLUGIN
 
 
 @dataclass

@@ -58,6 +58,7 @@ class DQNAgent:
         self._returns = NStepReturns(settings.n_step, settings.gamma)
         self._epsilon = Epsilon(settings)
         self._explore, self._draw = (np.random.default_rng([seed, use]) for use in (0, 1))
+        self._before_action = self._explore.bit_generator.state
         self._values = self._fast_values()
         self.steps = 0  # environment steps
         self.gradient_steps = 0
@@ -81,9 +82,14 @@ class DQNAgent:
 
     def act(self, observation: np.ndarray) -> int:
         """Returns a random action with probability epsilon, else the greedy one."""
+        self._before_action = self._explore.bit_generator.state
         if self._explore.random() < self._epsilon.value:
             return int(self._explore.integers(self.actions))
         return self.act_greedily(observation)
+
+    def take_back_action(self) -> None:
+        """Takes back the draws of the last `act`, whose action wasn't carried out."""
+        self._explore.bit_generator.state = self._before_action
 
     def act_greedily(self, observation: np.ndarray) -> int:
         """Returns the action with the highest Q-value."""

@@ -27,7 +27,7 @@ from web_viewer.table import NAME as SCALARS
 
 POLL = 0.2  # [s]
 TIME_TO_SAVE = 60.0  # [s] for a training that is stopped early because it is no longer needed
-PAUSE = 1.0  # [s] between two attempts
+MAX_PAUSE = 30.0  # [s] between two attempts
 MAX_ATTEMPTS = 8  # lost in a row without a new checkpoint
 TAIL = 4096  # [bytes] at the end of a file, enough for its last line
 # The networks are too small to gain from more cores.
@@ -108,12 +108,18 @@ def run_here(
     job: Job, stop_within: StopWithin, say: Callable[[str], None], program: Program, since: float
 ) -> Ending:
     """Runs a training on this machine; one that is killed is resumed."""
+    pause = 1.0  # [s]
     while True:
         ending = run_attempt(job, program, stop_within, since)
-        if not ending.lost or is_hopeless(job, since) or stop_within() is not None:
+        if not ending.lost or is_hopeless(job, since):
             return ending
         say(ending.lost)
-        time.sleep(PAUSE)  # memory or the folder may be free again
+        until = time.monotonic() + min(pause, MAX_PAUSE)  # memory or the folder may be free then
+        while time.monotonic() < until and stop_within() is None:
+            time.sleep(POLL)
+        if stop_within() is not None:
+            return ending
+        pause *= 2
 
 
 def is_hopeless(job: Job, since: float) -> bool:
@@ -218,7 +224,9 @@ def _tail(path: Path) -> str:
 
 def steps_of(folder: Path) -> tuple[int, int]:
     """Returns the last step of a run and the steps of the whole training; 0 for unknown ones."""
-    length = read_leniently(folder / CONFIG_RECORD).get("run", {}).get("total_timesteps", 0)
+    run = read_leniently(folder / CONFIG_RECORD).get("run")
+    length = run.get("total_timesteps") if isinstance(run, dict) else 0
+    length = length if isinstance(length, int) else 0
     for row in reversed(_tail(folder / SCALARS).split("\n")[:-1]):  # the last one may be incomplete
         step, tag, *_ = *row.split(","), ""
         if step.isdigit() and "/" in tag:  # tags without a slash count episodes

@@ -34,7 +34,7 @@ from rl_workbench.tools.job import (
     run_here,
     steps_of,
 )
-from rl_workbench.tools.runs import cost_of, read_leniently
+from rl_workbench.tools.runs import cost_of
 from rl_workbench.training.folder import is_held
 from rl_workbench.training.progress import tell, writable
 
@@ -123,7 +123,10 @@ class JobPool:
         self._folder, self._run, self._interrupt = folder, run, interrupt
         self._lock = threading.Lock()
         self._total = len(jobs)
-        self._entries = {} if jobs else {each.folder: each for each in _written(folder)}
+        self._entries: dict[str, JobEntry] = {}
+        if not jobs:
+            with contextlib.suppress(WorkbenchError):  # the list is written anew
+                self._entries = {each.folder: each for each in _written(folder)}
         for each in self._entries.values():
             each.state = WAITING if each.state == RUNNING else each.state
         for job in jobs:
@@ -234,8 +237,12 @@ def _failure(job: Job, ending: Ending) -> str:
 
 
 def _written(folder: Path) -> list[JobEntry]:
-    """Returns the jobs of earlier commands; none if jobs.json can't be read."""
-    return [JobEntry(**each) for each in read_leniently(folder / NAME).get("jobs", [])]
+    """Returns the jobs of earlier commands."""
+    content = read_json(folder / NAME)
+    try:
+        return [JobEntry(**each) for each in content["jobs"]]
+    except (KeyError, TypeError) as error:
+        raise WorkbenchError(f"{folder / NAME} isn't a list of jobs: {error}") from error
 
 
 @dataclass(frozen=True)

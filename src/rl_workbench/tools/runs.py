@@ -16,6 +16,7 @@ from rl_workbench.training.scalar_log import RETURN
 from web_viewer.table import NAME as SCALARS
 
 SUMMARY = "summary.json"
+RECORDED = {"env_id": str, "env_kwargs": dict, "exp_name": str, "seed": int}  # types in config.json
 
 
 @dataclass(frozen=True)
@@ -50,11 +51,17 @@ def open_run(folder: Path) -> Run:
     folder = folder.resolve()
     try:
         run = config["run"]
+        for name, kind in RECORDED.items():
+            if not isinstance(run[name], kind):
+                raise TypeError(f"{name} is {run[name]!r}")
         env_kwargs = {**run["env_kwargs"], **run.get("eval_env_kwargs", {})}
         names = run["exp_name"], run["env_id"]
         return Run(folder, config["algorithm"], *names, env_kwargs, run["seed"], config)
-    except (KeyError, TypeError) as error:
+    except KeyError as error:
         raise WorkbenchError(f"{folder} is not a run folder: its record lacks {error}") from error
+    except TypeError as error:
+        text = f"its record is damaged: {error}"
+        raise WorkbenchError(f"{folder} is not a run folder: {text}") from error
 
 
 def read_leniently(path: Path) -> dict[str, Any]:
@@ -68,7 +75,14 @@ def read_leniently(path: Path) -> dict[str, Any]:
 
 def summary_of(run: Run) -> dict[str, Any]:
     """Returns a training's summary; empty until its end."""
-    return dict(read_json(run.folder / SUMMARY) or {})
+    path = run.folder / SUMMARY
+    content = read_json(path)
+    if content is None:
+        return {}
+    returns = content.get("returns", []) if isinstance(content, dict) else None
+    if not isinstance(returns, list) or not all(isinstance(each, int | float) for each in returns):
+        raise WorkbenchError(f"{path} isn't the summary of a training")
+    return dict(content)
 
 
 def cost_file(folder: Path) -> Path:

@@ -7,6 +7,7 @@ import numpy as np
 
 from rl_workbench.agents.dqn_agent import DQNAgent, Learned
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import mark_random_states, rewind_random_states
 from rl_workbench.training.algorithm import Algorithm, Policy, Say
 from rl_workbench.training.checkpoints import fitting
 from rl_workbench.training.environments import as_vector, discrete_actions, succeeded
@@ -53,6 +54,9 @@ class DQNTraining(Algorithm):
         self._observation: np.ndarray | None = None  # None: the next step begins an episode
         self._reward = 0.0  # of the episode so far
         self._last: Learned | None = None
+        # What `settle` takes back.
+        self._mark: Any = None  # before a reset or an evaluation, while that is under way
+        self._is_acting = self._is_learning = False
 
     @property
     def steps(self) -> int:
@@ -74,20 +78,41 @@ class DQNTraining(Algorithm):
         agent, env = self._agent, self._repeatable
         observation = self._observation
         if observation is None:
-            observation = as_vector(env.reset()[0])
+            self._set_mark()
+            self._observation = observation = as_vector(env.reset()[0])
+            self._mark = None
+        self._is_acting = True
         action = agent.act(observation)
         seen, reward, terminated, truncated, info = env.step(action)
+        self._is_acting = False
         following, reward = as_vector(seen), float(reward)
         self._reward += reward
         agent.observe((observation, action, reward), following, bool(terminated), bool(truncated))
         if agent.is_due:
+            self._is_learning = True
             self._last = agent.learn()
+            self._is_learning = False
         self._observation = following
         if terminated or truncated:
             agent.episode_done()
             total, self._reward, self._observation = self._reward, 0.0, None
             scalars, note = {"charts/epsilon": agent.epsilon}, f"ε: {agent.epsilon:.3f}"
             frame.episode_done(total, env.length, scalars, note, succeeded(info))
+
+    def _set_mark(self) -> None:
+        self._mark = self._repeatable.mark(), mark_random_states()
+
+    def settle(self) -> bool:
+        """Takes back the step that failed. A round of gradient steps can't be taken back."""
+        if self._is_learning:
+            return False
+        if self._mark is not None:
+            place, process = self._mark
+            self._repeatable.take_back(place)
+            rewind_random_states(process)
+        if self._is_acting:
+            self._agent.take_back_action()
+        return True
 
     def state_dict(self) -> dict[str, Any]:
         return self._agent.state_dict()
@@ -106,6 +131,10 @@ class DQNTraining(Algorithm):
             "last": None if self._last is None else list(self._last),
         }
 
+    def leave_environment(self) -> dict[str, Any]:
+        self._set_mark()
+        return self.environment_state()
+
     def start_environment(self, state: dict[str, Any] | None, say: Say) -> None:
         self._repeatable.reset(seed=self._seed)  # the resets of the episodes continue from here
         if state is not None:
@@ -116,8 +145,11 @@ class DQNTraining(Algorithm):
         last = state["last"]
         self._last = None if last is None else Learned(*map(float, last))
         self._repeatable.generator = state["generator"]
-        if state["episode"] is None:
-            return
+        if state["episode"] is not None:
+            self._repeat(state, say)
+        self._mark = None
+
+    def _repeat(self, state: dict[str, Any], say: Say) -> None:
         self._observation = self._repeatable.load_state_dict(state["episode"])
         self._reward = float(state["reward"])
         if self._observation is None:

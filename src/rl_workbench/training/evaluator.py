@@ -130,10 +130,12 @@ class Evaluator:
         must_return = self._is_guest and not is_last
         place = self._algorithm.leave_environment() if must_return else None
         states = random_states()
-        yield
-        if must_return:
-            self._algorithm.restore_environment(place, say)
-        restore_random_states(states)
+        try:
+            yield
+            if must_return:
+                self._algorithm.restore_environment(place, say)
+        finally:
+            restore_random_states(states)
 
     def _episodes(self, episodes: int, stream: int) -> Evaluation | None:
         seed = self._run.seed + EVALUATION_SEED * (1 + stream)

@@ -109,12 +109,14 @@ def library_versions() -> dict[str, str]:
     return {name: each for name, each in versions().items() if name in LIBRARIES}
 
 
-def other_versions(before: dict[str, str]) -> str:
+def other_versions(before: Any) -> str:
     """Returns how the versions of now differ from those at a training's start; empty if they don't.
 
     Args:
-        before: What `versions` returned then.
+        before: What `versions` returned then. It may be damaged, since no training depends on it.
     """
+    if not isinstance(before, dict):
+        return ""
     now = library_versions()
     names = [name for name in LIBRARIES if name in before and before[name] != now.get(name)]
     return ", ".join(f"{name} {before[name]} is now {now.get(name)}" for name in names)

@@ -153,14 +153,20 @@ class Outcome(NamedTuple):
         tell(f"watch: {errors.hints.replaying(self.folder)}")
         tell(f"curves: {errors.hints.watching(self.folder)}")
 
-    def failure_text(self, failure: WorkbenchError, is_written: bool) -> str:
-        """Returns the line for a training that failed."""
+    def failure_text(self, failure: WorkbenchError, saved_at: int) -> str:
+        """Returns the line for a training that failed.
+
+        Args:
+            failure: Why.
+            saved_at: The step of the last checkpoint; -1 if nothing was saved.
+        """
         text = (
             f"{failure}{_write_traceback(self.folder, failure)}; stopped after {self.steps} steps, "
         )
         text += f"{len(self.history.returns)} episodes"
-        if is_written:
-            text += f", what was learned is saved in {self.folder}"
+        if saved_at >= 0:
+            until = "" if saved_at == self.steps else f" up to step {saved_at}"
+            text += f", what was learned{until} is saved in {self.folder}"
         return text + self._how_to_resume()
 
     def _how_to_resume(self) -> str:

@@ -80,7 +80,8 @@ class Training:
             if self._resumed:
                 self._load(self._resumed)
             making.pop_all()
-        self._saved_at = -1  # [steps]
+        # [steps] of the last checkpoint; -1: there is none, or it is outdated.
+        self._saved_at = self._algorithm.steps if self._resumed else -1
         self._is_written = True  # no write has failed so far
         self._evaluation: Evaluation | None = None  # the last one
         self._began, self._first_step = time.monotonic(), self._algorithm.steps
@@ -162,7 +163,7 @@ class Training:
             self._callbacks.call("on_training_start", self)
             self._save()  # so that there is something to resume from, whatever happens
             return
-        others = run_folder.other_versions(read_record(self.folder)["versions"])
+        others = run_folder.other_versions(read_record(self.folder).get("versions"))
         if others:
             tell(f"{others}: from here on the bits may differ")
         with fitting("state of the environment"):
@@ -300,13 +301,12 @@ class Training:
         Raises:
             OSError: If it can't be written. The earlier checkpoints are untouched.
         """
-        steps = self._algorithm.steps
-        if steps != self._saved_at or best:
+        if self._algorithm.steps != self._saved_at or best:
             self._write_checkpoint(self._content(), best)
-            self._saved_at = steps
 
     def _write_checkpoint(self, content: dict[str, Any], best: bool) -> None:
         path = self._checkpoints.save(self._algorithm.steps, content, best)
+        self._saved_at = self._algorithm.steps
         self._callbacks.call("on_checkpoint", self, path)
 
     def _content(self) -> dict[str, Any]:
@@ -343,7 +343,8 @@ class Training:
         # After Ctrl-C the failure may be its effect, as it may have ended what the environment needs. A
         # failed write is reported all the same.
         if failure and not (self._interrupt.requested() and self._is_written):
-            raise WorkbenchError(outcome.failure_text(failure, self._is_written)) from failure
+            saved = self._saved_at if self._is_written else -1
+            raise WorkbenchError(outcome.failure_text(failure, saved)) from failure
 
     def _not_written(self, error: OSError | MemoryError) -> WorkbenchError:
         self._is_written = False

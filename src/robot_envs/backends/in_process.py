@@ -1,6 +1,5 @@
 """Robots in a physics world of this process: no ROS, and bit-identical to a simulator in lock-step."""
 
-import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from operator import attrgetter
@@ -11,7 +10,7 @@ from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.manager import STRICT
 from bullet_gazebo.control.pid import Gains
-from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription
+from bullet_gazebo.physics.description import DescriptionError, Inertia, is_control_plugin
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.model import Model
@@ -25,7 +24,7 @@ from bullet_gazebo.physics.properties import (
     set_link_properties,
 )
 from bullet_gazebo.physics.world import NameTaken, World
-from bullet_gazebo.robot import ControlledRobot
+from bullet_gazebo.robot import ControlledRobot, control_period_of
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 from bullet_gazebo.state import NOTHING, StateReader, UnknownName, find_link, find_model
 from robot_envs.backends.backend import PHYSICS_STEP, RobotBackend, ticks_per_action
@@ -33,7 +32,7 @@ from robot_envs.backends.world_files import fill, spawn
 from robot_envs.controllers import Loaded, load
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.files import resources
-from robot_envs.robot import DRIVES, Robot
+from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.variation.applying import Applier
@@ -110,7 +109,9 @@ class InProcessWorld(RobotBackend):
             model = self._sim.world.spawn(robot.model, description, robot.pose)
             hardware = robot.hardware()
             manager, loaded = load(robot.run, robot.parameters, hardware)
-            period, namespace = control_tick(description), f"/{robot.namespace.strip('/')}"
+            drives = (each for each in description.plugins if is_control_plugin(each.filename))
+            period = next(map(control_period_of, drives), 0.0)
+            namespace = f"/{robot.namespace.strip('/')}"
             controlled = ControlledRobot(model, hardware, manager, period, namespace)
             self._sim.add_robot(controlled)
             manager.switch(loaded, [], STRICT)
@@ -203,15 +204,6 @@ class InProcessWorld(RobotBackend):
         if not self._closed:
             self._closed = True
             self._sim.world.close()
-
-
-def control_tick(description: ModelDescription) -> float:
-    """Returns the period at which the URDF has controllers updated [s]; 0: every physics step."""
-    for plugin in description.plugins:
-        if plugin.filename == DRIVES:
-            with contextlib.suppress(ValueError):
-                return max(0.0, float(plugin.element.findtext("controlPeriod") or 0.0))
-    return 0.0
 
 
 class InProcessChanges:

@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from lockstep_runner.script import LIBRARIES
+from rl_workbench.training.algorithms import ALGORITHMS
+
 SRC = Path(__file__).resolve().parents[3] / "src"
 ROOT = SRC.parent
 MODULES = sorted(SRC.rglob("*.py"))
@@ -42,6 +45,8 @@ ALLOWED = {
     "web_viewer": {"file_access"},
     "cartpole": {"rl_workbench", "robot_envs"},
 }
+# The modules or folders of the algorithms, below rl_workbench.training.
+ADAPTERS = {".".join(kind.implementation.split(".")[:3]) for kind in ALGORITHMS.values()}
 # A folder, and what nothing in it may import beside that.
 FORBIDDEN = [
     ("bullet_gazebo/physics", ("bullet_gazebo.control", "bullet_gazebo.ros", "bullet_gazebo.simulator",
@@ -54,9 +59,9 @@ FORBIDDEN = [
     ("cartpole", ("pybullet", "torch")),
     ("rl_workbench/agents", ("gymnasium", "rl_workbench.tools", "rl_workbench.training")),
     ("rl_workbench/training", ("rl_workbench.tools",)),
-    *((f"rl_workbench/training/{room}", tuple(f"rl_workbench.training.{each}" for each in
-                                              ("dqn", "pg", "sb3") if not room.startswith(each)))
-      for room in ("training.py", "dqn.py", "pg.py", "sb3")),
+    ("rl_workbench/training/training.py", tuple(ADAPTERS)),
+    *((f"{own.replace('.', '/')}{suffix}", tuple(ADAPTERS - {own}))
+      for own in ADAPTERS for suffix in ("", ".py")),
 ]  # fmt: skip
 WITHOUT_ROS = (
     "bullet_gazebo.physics.world",
@@ -118,6 +123,11 @@ def test_what_lies_in_a_folder_imports_in_no_circle(folder: Path) -> None:
         TopologicalSorter(children).prepare()
     except CycleError as error:
         pytest.fail(f"{folder.relative_to(SRC)}: {' -> '.join(error.args[1])}")
+
+
+def test_a_wait_in_our_libraries_stays_wall_time_under_the_lockstep_runner() -> None:
+    assert {path.name for path in SRC.iterdir() if (path / "__init__.py").exists()} == OURS
+    assert OURS <= LIBRARIES
 
 
 @pytest.mark.slow

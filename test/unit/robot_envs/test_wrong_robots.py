@@ -3,16 +3,24 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from support.scenes.solo_arm import SOLO, episode, is_a_line
+from support.scenes.solo_arm import SOLO, Hold, episode, is_a_line
 from support.scenes.two_arms import LEFT_CONTROLLERS
 
-from robot_envs import Pose, RobotEnvError
+from robot_envs import Pose, RobotEnv, RobotEnvError
 
 XACRO = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">${nothing}</robot>'
 GROUP = LEFT_CONTROLLERS["pair"]
 DRIVES = """<gazebo><plugin name="drives" filename="libgazebo_ros_control.so">
   <robotNamespace>/right</robotNamespace></plugin></gazebo></robot>"""
+
+
+def with_period(text, library="libgazebo_ros_control.so"):
+    drives = f'filename="{library}"><controlPeriod>{text}</controlPeriod>'
+    urdf = SOLO.xml.replace('filename="libgazebo_ros_control.so">', drives)
+    assert urdf != SOLO.xml
+    return urdf
 
 
 def with_pair(**changes):
@@ -26,6 +34,18 @@ ROBOTS = {
     "another namespace than the URDF's": (
         {"namespace": "left", "urdf": SOLO.xml.replace("</robot>", DRIVES)},
         r"into the namespace '/right' \(<robotNamespace>\), the description into '/left'",
+    ),
+    "a negative control period": (
+        {"urdf": with_period("-0.1")},
+        "<controlPeriod> -0.1 is not within 0 and 3600 s",
+    ),
+    "a control period of more than an hour, for a library with its folder": (
+        {"urdf": with_period("3601", "/opt/ros/lib/libgazebo_ros_control.so")},
+        "<controlPeriod> 3601 is not within 0 and 3600 s",
+    ),
+    "a control period that is no number": (
+        {"urdf": with_period("fast")},
+        "<controlPeriod> 'fast' is not a number",
     ),
     "no transmissions": (
         {"urdf": SOLO.xml.replace("transmission", "nothing")},
@@ -106,6 +126,20 @@ def test_a_robot_that_cannot_be(case):
     with pytest.raises((RobotEnvError, ValueError), match=text) as error:
         episode(replace(SOLO, **changes))
     assert is_a_line(error.value)
+
+
+def test_a_control_period_acts_in_whatever_folder_the_library_is():
+    def joints(library):
+        env = RobotEnv(replace(SOLO, urdf=with_period("10", library)), Hold())
+        try:
+            env.reset(seed=0)
+            return [env.step(np.full(2, angle))[0].tolist() for angle in (0.1, 0.2, 0.3)]
+        finally:
+            env.close()
+
+    plain = joints("libgazebo_ros_control.so")
+    assert plain == joints("/opt/ros/lib/libgazebo_ros_control.so")
+    assert plain != joints("libmy_gazebo_ros_control.so")
 
 
 def test_all_faults_of_a_robot_are_told_at_once():

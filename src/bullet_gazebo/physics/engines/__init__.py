@@ -1,6 +1,9 @@
 """Physics engines by the names of `physics:=`. Each is imported when it is first used.
 
-To add one: a module with subclasses of Engine and Body (../engine.py), and its name in `make_engine`.
+To add one: a module with subclasses of Engine and Body (../engine.py), its name in `ENGINES`, and its
+import in `make_engine`. For environments it needs a backend, too: `BACKENDS` of robot_envs/backends and the
+list of those with the same bits in robot_envs/testing/suite.py. The help of gzserver and empty_world.launch
+name it.
 """
 
 import importlib.util
@@ -21,6 +24,9 @@ class EngineError(ValueError):
 
 def make_engine(name: str = BULLET[0]) -> Engine:
     """Returns a new, empty engine.
+
+    Args:
+        name: one of `ENGINES`.
 
     Raises:
         EngineError: if it is unknown or not installed.

@@ -15,14 +15,13 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import GAINS, RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.control.transmissions import read_description
-from bullet_gazebo.robot import ControlledRobot
+from bullet_gazebo.robot import ControlledRobot, control_period_of
 from bullet_gazebo.ros.control.controller_services import ControllerServices
 from bullet_gazebo.ros.control.controller_topics import PidTopics
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 
 POLL = 0.1  # [s]
 REMIND = 10.0  # [s]
-SLOWEST = 3600.0  # [s]; the longest control period
 
 
 class ControlPlugin:
@@ -115,14 +114,8 @@ class ControlPlugin:
             self._sim.remove_robot(robot)
 
     def _control_period(self) -> float:
-        """Returns `<controlPeriod>` [s]; 0, which is each step, if there is none."""
-        text = self._context.text("controlPeriod", "0")
-        try:
-            period = float(text)
-        except ValueError as error:
-            raise ControlError(f"<controlPeriod> '{text}' is not a number") from error
-        if not 0.0 <= period <= SLOWEST:
-            raise ControlError(f"<controlPeriod> {text} is not within 0 and {SLOWEST:g} s")
+        """Returns `<controlPeriod>` [s], after a message if it is shorter than the physics step."""
+        period = control_period_of(self._context.plugin)
         if 0.0 < period < self._sim.world.time_step:
             rospy.logerr(
                 "The control period %g s is shorter than the step of %g s, which is used.",

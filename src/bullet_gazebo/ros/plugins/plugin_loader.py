@@ -16,15 +16,15 @@ from typing import Protocol
 
 import rospy
 
-from bullet_gazebo.physics.description import Plugin
+from bullet_gazebo.physics.description import CONTROL_PLUGIN, Plugin
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.ros.common.publishing import Thinner
 from bullet_gazebo.simulator import Simulator
 
-# Library's file name: "module:Factory". Another one of ours, such as a sensor's, is a module of this folder
-# and a line here; what it measures with knows no ROS and belongs to bullet_gazebo/sensors.
+# Library's file name: "module:Factory". Another one of ours is a module of this folder and a line here. A
+# plugin within a <sensor> or a <link> never gets here: physics/files/sdf.py and urdf.py leave it out.
 BUILT_IN = {
-    "libgazebo_ros_control.so": "bullet_gazebo.ros.plugins.control_plugin:ControlPlugin",
+    CONTROL_PLUGIN: "bullet_gazebo.ros.plugins.control_plugin:ControlPlugin",
     "libgazebo_ros_joint_state_publisher.so": "bullet_gazebo.ros.plugins.joint_state_plugin:JointStatePlugin",
 }  # fmt: skip
 PARAMETER = "~plugins"  # the same table for users' plugins
@@ -145,7 +145,7 @@ class PluginRegistry:
             return self._built_in[library]
         place = places.get(library)
         if place is None:
-            # spawn_services.warn logs it together with the sensors.
+            # The spawn services log it together with the sensors.
             unknown = f"plugin {plugin.filename or 'without a filename'}"
             model.description.left_out.append(unknown)
             return None

@@ -90,7 +90,7 @@ def test_a_training_that_is_killed_goes_on_bit_identically(tmp_path: Path, capsy
 
 
 def test_one_that_is_killed_again_and_again_is_given_up(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(job_module, "PAUSE", 0.0)
+    monkeypatch.setattr(job_module, "MAX_PAUSE", 0.0)
     sleeping(monkeypatch, "import os, signal; os.kill(os.getpid(), signal.SIGKILL)")
     one = job(tmp_path)
     failure = pool(tmp_path, [one]).run(one)
@@ -237,6 +237,14 @@ def test_jobs_of_earlier_commands_stay_in_the_list(tmp_path: Path, monkeypatch) 
         pool(tmp_path, []).run(Job(name, tmp_path / name, ()))
     found = [(each.name, each.state, each.attempts) for each in read_jobs(tmp_path)]
     assert found == [("one", "failed", 2), ("two", "failed", 1)]
+
+
+@pytest.mark.parametrize("content", ["{", "[1]", '{"jobs": 5}', '{"jobs": [{"x": 1}]}'])
+def test_a_damaged_list_is_one_line(tmp_path: Path, capsys, content: str) -> None:
+    (tmp_path / "jobs.json").write_text(content)
+    assert cli.main(["jobs", str(tmp_path)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert str(tmp_path / "jobs.json") in line
 
 
 def test_where_there_are_no_jobs(tmp_path: Path, capsys) -> None:

@@ -229,6 +229,23 @@ def test_no_run_folder(tmp_path: Path, capsys) -> None:
     assert "no run folder at" in refused(capsys, "plot", tmp_path, "--out", tmp_path / "a.png")
 
 
+@pytest.mark.parametrize(
+    ("name", "value"), [("env_id", 5), ("seed", "x"), ("env_kwargs", [1]), ("eval_env_kwargs", 3)]
+)
+def test_a_record_of_other_types_is_one_line(own: Path, capsys, name: str, value: object) -> None:
+    content = json.loads((own / "config.json").read_text())
+    content["run"][name] = value
+    (own / "config.json").write_text(json.dumps(content))
+    assert f"{own} is not a run folder: its record is damaged" in refused(capsys, "eval", own)
+
+
+@pytest.mark.parametrize("content", ["[1]", '{"returns": ["x"]}'])
+def test_a_summary_of_other_types_is_a_fault_in_the_table(own: Path, capsys, content: str) -> None:
+    (own / "summary.json").write_text(content)
+    assert work("compare", own, "--episodes", 0) == 0
+    assert f"{own / 'summary.json'} isn't the summary of a training" in capsys.readouterr().out
+
+
 def test_a_damaged_checkpoint_gives_way_to_an_earlier_one(own: Path, capsys) -> None:
     (own / "best.pt").write_bytes(b"PK half a file")
     assert work("eval", own, "--episodes", 1, "--json", "-") == 0

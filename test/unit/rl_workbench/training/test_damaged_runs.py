@@ -89,6 +89,12 @@ def test_other_versions_are_told(stopped: Path, capsys) -> None:
     assert record(stopped)["versions"]["torch"] == "1.0", "those that it began with"
 
 
+def test_a_record_without_versions_resumes(stopped: Path) -> None:
+    content = record(stopped) | {"versions": None}
+    (stopped / "config.json").write_text(json.dumps(content))
+    assert summary(resume(stopped))["complete"]
+
+
 @pytest.mark.parametrize(
     "content",
     ['{"algorithm": "dqn"}', "[]", "{", "", '{"algorithm": "dqn", "run": [1], "dqn": {}}',

@@ -2,6 +2,7 @@
 
 import builtins
 import os
+import random
 import re
 import shutil
 from collections.abc import Callable
@@ -26,6 +27,8 @@ from support.training.training_runs import (
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
+from rl_workbench.training.callbacks import ScalarLogger
+from rl_workbench.training.evaluator import Evaluator
 from rl_workbench.training.history import History
 
 ON_A_ROBOT = {"env_id": POLE, "env_kwargs": {"noise": 0.05}}
@@ -220,13 +223,60 @@ def test_a_simulator_that_dies_costs_nothing_that_was_saved(
     assert f"what was learned is saved in {tmp_path / 'run'}; --resume" in line
     result = summary(tmp_path / "run")
     assert result["failure"] == "the connection broke; the simulator has ended"
+    assert checkpoint(tmp_path / "run")["steps"] == result["steps"]
     if name == "dqn":
-        assert checkpoint(tmp_path / "run")["steps"] == 70
         assert result["steps"] == 100
     else:  # all but the episode under way
-        assert checkpoint(tmp_path / "run")["steps"] == result["steps"] == sum(result["lengths"])
-        assert 0 < result["steps"] <= 100
+        assert 0 < result["steps"] == sum(result["lengths"]) <= 100
     assert_same_run(whole, resume(tmp_path / "run"))
+
+
+def fails_at(monkeypatch: pytest.MonkeyPatch, place: type, method: str, call: int) -> None:
+    """The n-th call of a method raises after what it does; a reset draws once more before that."""
+    calls, keep = [0], getattr(place, method)
+
+    def failing(*arguments: object, **options: object) -> object:
+        calls[0] += 1
+        result = keep(*arguments, **options)
+        if calls[0] == call:
+            if method == "reset":
+                random.random()
+            raise (Died if place is Pole else WorkbenchError)("the simulator has ended")
+        return result
+
+    monkeypatch.setattr(place, method, failing)
+
+
+@pytest.mark.parametrize("shares_robot", [False, True])
+@pytest.mark.parametrize(
+    ("place", "method", "call"),
+    [(Pole, "step", 98), (Pole, "reset", 3), (Pole, "reset", 6), (ScalarLogger, "on_step", 98),
+     (ScalarLogger, "on_episode", 4), (Evaluator, "_episodes", 1)],
+)  # fmt: skip
+def test_dqn_saves_its_last_whole_step_wherever_it_fails(
+    tmp_path: Path, monkeypatch, place: type, method: str, call: int, shares_robot: bool
+) -> None:
+    monkeypatch.setattr(Pole, "shares_robot", shares_robot, raising=False)
+    options = ON_A_ROBOT | {"checkpoint_frequency": 0, "total_timesteps": 300}
+    whole = train(tmp_path / "whole", "dqn", **options)
+    with monkeypatch.context() as patched:
+        fails_at(patched, place, method, call)
+        line = failure(lambda: train(tmp_path / "run", "dqn", **options))
+    steps = summary(tmp_path / "run")["steps"]
+    assert checkpoint(tmp_path / "run")["steps"] == steps > 0
+    assert f"stopped after {steps} steps" in line and "what was learned is saved in" in line
+    assert_same_run(whole, resume(tmp_path / "run"))
+
+
+def test_a_round_of_learning_that_fails_costs_the_steps_since_the_last_checkpoint(
+    tmp_path: Path,
+) -> None:
+    """Its first gradient steps can't be taken back."""
+    huge = {"env_id": SPOILT, "env_kwargs": {"reward": 3e38}, "eval_frequency": 0}
+    line = failure(lambda: train(tmp_path, "dqn", loss="mse", checkpoint_frequency=20, **huge))
+    steps = checkpoint(tmp_path)["steps"]
+    assert 0 < steps < summary(tmp_path)["steps"]
+    assert f"what was learned up to step {steps} is saved in {tmp_path}; --resume" in line
 
 
 @pytest.mark.extras("stable_baselines3")
