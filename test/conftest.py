@@ -76,13 +76,15 @@ def new_engine(request: pytest.FixtureRequest) -> Callable:
     return partial(make_engine, request.param)
 
 
+TAKEN = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)  # by commands
+HANDLERS = {number: signal.getsignal(number) for number in TAKEN}
+
+
 @pytest.fixture(autouse=True)
 def signals() -> Iterator[None]:
-    """Restore the signal handlers after a command that replaces them."""
-    taken = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
-    before = {number: signal.getsignal(number) for number in taken}
+    """Restores the signal handlers after a command that replaces them, also in a module's fixture."""
     yield
-    for number, handler in before.items():
+    for number, handler in HANDLERS.items():
         signal.signal(number, handler)
 
 

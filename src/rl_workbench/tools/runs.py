@@ -111,7 +111,7 @@ def find_runs(patterns: Sequence[str], warn: Callable[[str], None]) -> list[Run]
     for pattern in patterns:
         runs = _matching(pattern, warn)
         if not runs:
-            raise WorkbenchError(f"there is not a run folder at {pattern}")
+            raise WorkbenchError(f"there is no run folder at {pattern}")
         found.update((run.folder, run) for run in runs)
     return list(found.values())
 

@@ -8,6 +8,8 @@ import pytest
 from PIL import Image
 from support.training import workbench_runs
 
+import cartpole  # noqa: F401  registers cartpole/SwingUp-v0
+
 SCRIPT = Path(__file__).resolve().parents[3] / "examples/plot_policy.py"
 
 

@@ -82,7 +82,7 @@ ILL = {
     "nan.obj": ("v 1 2 nan\n" + OBJ, "line 1: a vertex: 'nan' is not finite"),
     "point.obj": ("v 1 2 3\nf 1 1 1\n", "nothing to touch"),
     "broken.dae": ("<COLLADA><asset>", "not well-formed"),
-    "rubbish.dae": (bytes(range(256)), "byte 128 is no utf-8"),
+    "rubbish.dae": (bytes(range(256)), "byte 128 is not valid utf-8"),
     "other.dae": ("<svg/>", "it is not COLLADA"),
     "empty.dae": ("<COLLADA/>", "it shows nothing: it has no <visual_scene>"),
     "beyond.dae": (DAE.replace("<p>0", "<p>8"), "beyond the limits of the source"),
