@@ -1,5 +1,6 @@
 """Writes one package, and reports its contents."""
 
+import importlib.util
 import json
 import math
 import os
@@ -117,6 +118,10 @@ def _try_out(name: str, made: Path) -> None:
     Raises:
         CannotWrite: if that fails.
     """
+    if (
+        importlib.util.find_spec("rospkg") is None
+    ):  # without ROS nothing finds the package by its name
+        return
     paths = os.environ.get("ROS_PACKAGE_PATH", "")
     environment = {
         **os.environ,
