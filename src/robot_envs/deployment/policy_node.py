@@ -4,149 +4,22 @@ import math
 import os
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import rosgraph
 import rospy
-from controller_manager_msgs.srv import ListControllers
-from sensor_msgs.msg import JointState as JointStateMsg
 from std_msgs.msg import Float64, Float64MultiArray
 
-from bullet_gazebo.control.joint import JointLimits
 from robot_envs.backends.ros import node
 from robot_envs.backends.ros.bringup import full_name
 from robot_envs.backends.ros.gazebo import lockstep_hint
-from robot_envs.deployment.pilot import Pilot, impossible
+from robot_envs.deployment.pilot import Pilot
+from robot_envs.deployment.reports import ControllerWatch, JointListener
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import Command, JointState
-from ros_utils.service_client import ServiceClient, ServiceFailed
-
-AHEAD = 1.0  # [s] that the stamp of a joint state may be ahead of ROS time
-ASKING = 1.0  # [s] of wall time between two questions to the controller manager
-
-
-class JointListener:
-    """Keeps the newest state of each joint, and when it has come.
-
-    States without velocities are ignored, and so are those whose stamp isn't newer than the one before: a
-    driver that repeats itself reports nothing new. A state that the joint can't have, or a stamp in the
-    future, is a fault until the joint's next good state.
-
-    Args:
-        topic: of the joint states.
-        model: of the robot: joints may be named model::joint.
-        joints: their plain names.
-        limits: of the joints that have any.
-    """
-
-    def __init__(
-        self, topic: str, model: str, joints: Sequence[str], limits: Mapping[str, JointLimits]
-    ) -> None:
-        self._names = {f"{model}::{name}": name for name in joints} | {
-            name: name for name in joints
-        }
-        self._joints, self._limits = tuple(joints), limits
-        self._faults: dict[str, str] = {}  # by joint
-        self._lock = threading.Lock()
-        self._known: dict[str, tuple[JointState, rospy.Time, float]] = {}  # with stamp and arrival
-        self._subscriber = rospy.Subscriber(
-            topic, JointStateMsg, self._receive, queue_size=10, tcp_nodelay=True
-        )
-
-    @property
-    def topic(self) -> str:
-        """The full name of the topic."""
-        return str(self._subscriber.resolved_name)
-
-    def _receive(self, message: JointStateMsg) -> None:
-        stamp, now, zero = message.header.stamp, rospy.get_time(), rospy.Time()
-        efforts = message.effort or [0.0] * len(message.name)
-        # Messages of joint_state_publisher are all zero, and carry no velocities.
-        numbers = zip(message.name, message.position, message.velocity, efforts, strict=False)
-        with self._lock:
-            for full, *values in numbers:
-                name = self._names.get(full)
-                if name is None:
-                    continue
-                if fault := self._fault(name, stamp.to_sec() - now, *values):
-                    self._faults[name] = fault
-                    continue
-                if name in self._known and zero != stamp <= self._known[name][1]:
-                    continue
-                self._known[name] = JointState(*values), stamp, now
-                self._faults.pop(name, None)
-
-    def _fault(
-        self, name: str, ahead: float, position: float, velocity: float, effort: float
-    ) -> str:
-        if ahead > AHEAD:
-            return (
-                f"joint states are stamped {ahead:.1f} s in the future: the machines' clocks differ"
-            )
-        bad = impossible(self._limits.get(name, JointLimits()), position, velocity)
-        if not bad and not math.isfinite(effort):
-            bad = f"effort {effort:g}"
-        return f"the joint '{name}' is reported at {bad}" if bad else ""
-
-    def fault(self) -> str:
-        """Returns what is wrong with a joint's newest state; empty if nothing is."""
-        with self._lock:
-            return next(iter(self._faults.values()), "")
-
-    def missing(self) -> list[str]:
-        """Returns the joints whose states aren't known yet."""
-        with self._lock:
-            return [name for name in self._joints if name not in self._known]
-
-    def look(self) -> tuple[dict[str, JointState], float]:
-        """Returns all joints, once known, and when the oldest of their states arrived [s of ROS time]."""
-        with self._lock:
-            known = {name: self._known[name] for name in self._joints}
-        oldest = min(arrival for _, _, arrival in known.values())
-        return {name: state for name, (state, _, _) in known.items()}, oldest
-
-    def forget(self) -> None:
-        """Forgets all states, as after time has gone back."""
-        with self._lock:
-            self._known.clear()
-            self._faults.clear()
-
-    def close(self) -> None:
-        """Unsubscribes."""
-        self._subscriber.unregister()
-
-
-class ControllerWatch:
-    """Asks a robot's controller manager again and again, in a thread, whether the controllers run.
-
-    A real robot may have no controller manager; then nothing is known of them.
-
-    Args:
-        robot: whose controllers take the commands.
-        over: ends the thread.
-    """
-
-    def __init__(self, robot: Robot, over: threading.Event) -> None:
-        self.stopped: list[str] = []  # loaded controllers that don't run
-        self._names = {port.name for port in robot.ports}
-        self._service = full_name(robot, "controller_manager/list_controllers")
-        self._over = over
-        threading.Thread(target=self._watch, name="controllers", daemon=True).start()
-
-    def _watch(self) -> None:
-        client = ServiceClient(self._service, ListControllers, timeout=ASKING)
-        while not self._over.wait(ASKING):
-            try:
-                loaded = client().controller
-            except ServiceFailed:
-                loaded = []
-            self.stopped = [
-                each.name for each in loaded if each.name in self._names and each.state != "running"
-            ]
-
 
 LATE_PERIODS, LATE_AT_LEAST = 5, 0.1  # control periods, and [s]
 POLL = 0.05  # [s] of wall time between two looks at what else might end a wait

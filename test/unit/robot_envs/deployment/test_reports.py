@@ -7,7 +7,7 @@ import rospy
 from sensor_msgs.msg import JointState as JointStateMsg
 
 from bullet_gazebo.control.joint import JointLimits
-from robot_envs.deployment import policy_node
+from robot_envs.deployment import reports
 from robot_envs.world_state import JointState
 
 
@@ -18,8 +18,8 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(policy_node.rospy, "Subscriber", Subscriber)
-    monkeypatch.setattr(policy_node.rospy, "get_time", lambda: clock.now)
+    monkeypatch.setattr(reports.rospy, "Subscriber", Subscriber)
+    monkeypatch.setattr(reports.rospy, "get_time", lambda: clock.now)
     return clock
 
 
@@ -28,9 +28,9 @@ class Subscriber:
         self.resolved_name, self.take = topic, take
 
 
-def listener(*joints: str) -> tuple[policy_node.JointListener, Subscriber]:
+def listener(*joints: str) -> tuple[reports.JointListener, Subscriber]:
     limits = {"elbow": JointLimits(lower=-3.0, upper=3.0)}
-    made = policy_node.JointListener("/joint_states", "arm", joints or ("elbow", "wrist"), limits)
+    made = reports.JointListener("/joint_states", "arm", joints or ("elbow", "wrist"), limits)
     return made, made._subscriber
 
 
