@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import signal
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import torch
 from support.training.learning_fakes import POLE
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
 from rl_workbench.training.algorithms import algorithm
 from rl_workbench.training.options import (
@@ -228,3 +230,11 @@ def assert_no_doubles(run: Path) -> None:
         wanted = [int(step) for step, its, _ in found if its == tag]
         assert [step for step, _ in shown.pop(tag)] == wanted
     assert not shown
+
+
+def failure(train_it: Callable[[], object]) -> str:
+    """The one line with which a training fails."""
+    with pytest.raises(WorkbenchError) as raised:
+        train_it()
+    assert "\n" not in str(raised.value)
+    return str(raised.value)

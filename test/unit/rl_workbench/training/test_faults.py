@@ -1,9 +1,7 @@
 """What goes wrong around a training: a clear line each, and nothing that was learned is lost."""
 
-import builtins
 import os
 import random
-import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +9,7 @@ from pathlib import Path
 import gymnasium
 import pytest
 import torch
-from support.training.learning_fakes import POLE, SPOILT, Died, Pole, register_with
+from support.training.learning_fakes import POLE, SPOILT, Died, Pole
 from support.training.training_runs import (
     ALL,
     EXACT,
@@ -19,6 +17,7 @@ from support.training.training_runs import (
     InterruptAfter,
     assert_same_run,
     checkpoint,
+    failure,
     files,
     resume,
     summary,
@@ -33,14 +32,6 @@ from rl_workbench.training.history import History
 
 ON_A_ROBOT = {"env_id": POLE, "env_kwargs": {"noise": 0.05}}
 LEARNERS = [*EXACT, OTHERS[0]]  # from single actions
-
-
-def failure(train_it: Callable[[], object]) -> str:
-    """The one line with which a training fails."""
-    with pytest.raises(WorkbenchError) as raised:
-        train_it()
-    assert "\n" not in str(raised.value)
-    return str(raised.value)
 
 
 def fill_disk(monkeypatch: pytest.MonkeyPatch, when: Callable[[], bool]) -> None:
@@ -353,76 +344,3 @@ def test_a_refused_checkpoint_leaves_no_environment_open(
     monkeypatch.setattr(Pole, "close", lambda env: closed.append(env))  # noqa: PLW0108 - binds
     assert "the checkpoint holds another history" in failure(lambda: resume(run))
     assert len(closed) == len({id(env) for env in closed}) == 2
-
-
-# A user's environment with a mistake in it.
-
-
-class Mistaken(Pole):
-    """Its 120th step in a process has a mistake.
-
-    Args:
-        where: "step", "reset" or "close".
-        error: to be raised.
-    """
-
-    steps = 0
-
-    def __init__(self, where: str = "step", error: str = "ZeroDivisionError") -> None:
-        super().__init__(0.05)
-        self._where, self._error = where, error
-
-    def _fail(self, method: str) -> None:
-        if method == self._where and Mistaken.steps >= 120:
-            raise getattr(builtins, self._error)("of\nmine")  # the place
-
-    def step(self, action):
-        Mistaken.steps += 1
-        self._fail("step")
-        return super().step(action)
-
-    def reset(self, *, seed=None, options=None):
-        self._fail("reset")
-        return super().reset(seed=seed, options=options)
-
-    def close(self):
-        self._fail("close")
-
-
-PLACE = next(
-    number
-    for number, line in enumerate(Path(__file__).read_text().splitlines(), 1)
-    if line.endswith("# the place")
-)
-ERRORS = ["ZeroDivisionError", "ConnectionResetError", "SystemExit", "KeyError"]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", LEARNERS)
-@pytest.mark.parametrize(
-    ("where", "error"), [*(("step", error) for error in ERRORS), ("reset", "TypeError")]
-)
-def test_a_mistake_in_an_environment_is_one_line_with_its_place(
-    tmp_path: Path, monkeypatch, name: str, where: str, error: str
-) -> None:
-    monkeypatch.setattr(Mistaken, "steps", 0)
-    env_id = register_with(monkeypatch, Mistaken)
-    options = {"env_id": env_id, "env_kwargs": {"where": where, "error": error}}
-    line = failure(lambda: train(tmp_path, name, **options, eval_frequency=0))
-    assert f"{env_id} failed in {where}(): {error}: " in line
-    assert re.search(r"of( |\\n)mine", line) and f" ({__file__}:{PLACE}); " in line
-    assert f"; the traceback is in {tmp_path / 'failure.txt'}; stopped after" in line
-    assert "what was learned is saved in" in line and "--resume" in line
-    text = (tmp_path / "failure.txt").read_text()
-    assert text.startswith("Traceback") and "self._fail(" in text and error in text
-    assert checkpoint(tmp_path)["steps"] <= summary(tmp_path)["steps"]
-    assert f"{error}: " in summary(tmp_path)["failure"]
-
-
-@pytest.mark.slow
-def test_one_that_cannot_be_closed_has_learned_all_the_same(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(Mistaken, "steps", 0)
-    options = {"env_id": register_with(monkeypatch, Mistaken), "env_kwargs": {"where": "close"}}
-    line = failure(lambda: train(tmp_path, "dqn", **options))
-    assert "failed in close(): ZeroDivisionError: of mine" in line
-    assert summary(tmp_path)["complete"] and (tmp_path / "best.pt").exists()
