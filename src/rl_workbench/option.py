@@ -18,7 +18,7 @@ import yaml
 
 from rl_workbench.errors import WorkbenchError
 
-_KEY = re.compile(r"(?:^|[\s,]+)([\w.-]+)=")  # in KEY=VALUE, KEY=VALUE
+_TOKEN = re.compile(r"(?P<open>[\[{])|(?P<close>[\]}])|(?P<between>[\s,]+)|.", re.DOTALL)
 
 
 def option(
@@ -217,6 +217,8 @@ def _number(value: Any) -> float:
 def _whole(value: Any) -> int:
     """Also reads 5e4 and 50_000, the way people write large numbers."""
     try:
+        if isinstance(value, str) and value.strip().lstrip("+-").replace("_", "").isdigit():
+            return int(value)  # exact, however large
         number = _number(value)
         if not number.is_integer():
             raise ValueError
@@ -239,16 +241,28 @@ def _numbers(value: Any, kind: type) -> tuple[Any, ...]:
 def _mapping(value: Any) -> dict[str, Any]:
     """Reads a mapping, or a text such as `control_period=0.02, variation={mass: 0.2, gain: [0.9, 1.1]}`."""
     if isinstance(value, str):
-        text, count = _KEY.subn(r", '\1': ", value)
+        pairs = [pair.partition("=") for pair in _split(value)]
         try:
-            value = _number_too(yaml.safe_load(f"{{{text.lstrip(', ')}}}"))
+            value = {name: _number_too(yaml.safe_load(text)) for name, _, text in pairs}
         except yaml.YAMLError:
             value = None
-        if value and len(value) > count:  # a word without =
+        if not all(sign for _, sign, _ in pairs):  # a word without =
             value = None
     if not isinstance(value, dict):
         raise ValueError("KEY=VALUE, several with commas")
     return value
+
+
+def _split(text: str) -> list[str]:
+    """Splits at commas and spaces outside of brackets."""
+    pieces, depth = [""], 0
+    for found in _TOKEN.finditer(text):
+        depth += bool(found["open"]) - bool(found["close"])
+        if found["between"] and depth <= 0:
+            pieces.append("")
+        else:
+            pieces[-1] += found[0]
+    return [piece for piece in pieces if piece]
 
 
 def _number_too(value: Any) -> Any:

@@ -88,6 +88,13 @@ def run_attempt(
         death_signal: sent to the training if this process is killed.
     """
     spans = cost_of(job.folder).get("spans", [])
+    lost = _lost_attempts(job, since)
+    # Memory or the folder may be free after a pause.
+    until = time.monotonic() + (min(2.0 ** (lost - 1), MAX_PAUSE) if lost else 0.0)
+    while time.monotonic() < until:
+        if stop_within() is not None:
+            return Ending()
+        time.sleep(POLL)
     try:
         job.folder.parent.mkdir(parents=True, exist_ok=True)
         words = command(job, program.words)
@@ -108,28 +115,25 @@ def run_here(
     job: Job, stop_within: StopWithin, say: Callable[[str], None], program: Program, since: float
 ) -> Ending:
     """Runs a training on this machine; one that is killed is resumed."""
-    pause = 1.0  # [s]
     while True:
         ending = run_attempt(job, program, stop_within, since)
         if not ending.lost or is_hopeless(job, since):
             return ending
         say(ending.lost)
-        until = time.monotonic() + min(pause, MAX_PAUSE)  # memory or the folder may be free then
-        while time.monotonic() < until and stop_within() is None:
-            time.sleep(POLL)
-        if stop_within() is not None:
-            return ending
-        pause *= 2
 
 
 def is_hopeless(job: Job, since: float) -> bool:
     """Returns whether MAX_ATTEMPTS attempts in a row were lost, so that another one is useless."""
+    return _lost_attempts(job, since) >= MAX_ATTEMPTS
+
+
+def _lost_attempts(job: Job, since: float) -> int:
+    """Returns how many attempts have begun since the last checkpoint, or since the command began."""
     from rl_workbench.training.checkpoints import LAST
 
     with contextlib.suppress(OSError):
         since = max(since, (job.folder / LAST).stat().st_mtime)
-    spans = cost_of(job.folder).get("spans", [])
-    return sum(began > since for began, _ in spans) >= MAX_ATTEMPTS
+    return sum(began > since for began, _ in cost_of(job.folder).get("spans", []))
 
 
 def _note(

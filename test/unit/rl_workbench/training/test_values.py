@@ -34,7 +34,8 @@ def test_options_of_the_environment(tmp_path: Path, name: str) -> None:
                           {"noise": 0.001, "render_mode": "1e", "backend": None}),
                          ("randomisation={mass: 1e-1, com: {pole: [0, 2e-2]}} backend=ros,sizes=[1, 2]",
                           {"randomisation": {"mass": 0.1, "com": {"pole": [0, 0.02]}}, "backend": "ros",
-                           "sizes": [1, 2]})]:  # fmt: skip
+                           "sizes": [1, 2]}),
+                         ("page=http://a/?x=1 n=5", {"page": "http://a/?x=1", "n": 5})]:  # fmt: skip
         assert getattr(read(tmp_path, EMPTY, DQN, f"{flag}={text}").run, name) == wanted
 
 
