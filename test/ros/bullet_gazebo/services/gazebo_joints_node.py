@@ -107,8 +107,9 @@ class JointsTest(GazeboTest):
             if first.setdefault(type(message), message) is message and len(first) == 2:
                 seen.set()
 
-        topics = [rospy.Subscriber("/clock", Clock, keep),
-                  rospy.Subscriber("/gazebo/link_states", LinkStates, keep)]  # fmt: skip
+        # rospy's own subscription to /clock keeps one message only, for all in this process.
+        topics = [rospy.Subscriber("/clock", Clock, keep, queue_size=100),
+                  rospy.Subscriber("/gazebo/link_states", LinkStates, keep, queue_size=100)]  # fmt: skip
         self.assertTrue(wait_until_heard("/clock", "/gazebo/link_states"))
         call("unpause_physics")
         self.assertTrue(seen.wait(BOUND))
