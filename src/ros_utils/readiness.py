@@ -94,7 +94,7 @@ class Ready:
                     f"gazebo_ros spawn_model -urdf -param robot_description -model {name}"
                 )
         for namespace, names in self._managers().items():
-            yield from _faults_of_manager(namespace, names, timeout)
+            yield from controller_faults(namespace, names, timeout)
 
     def _managers(self) -> dict[str, list[str]]:
         """Returns the controllers' names, by their manager's namespace."""
@@ -121,7 +121,17 @@ def still_missing(ready: Ready, timeout: float, is_over: Callable[[], bool] = la
     return missing
 
 
-def _faults_of_manager(namespace: str, names: Sequence[str], timeout: float) -> Iterator[str]:
+def controller_faults(namespace: str, names: Sequence[str], timeout: float) -> Iterator[str]:
+    """Yields a line for each controller of a manager that isn't loaded or doesn't run, with the remedy.
+
+    Args:
+        namespace: of the manager, without a slash at its end.
+        names: of the controllers.
+        timeout: limit of the call [s].
+
+    Raises:
+        ServiceFailed: if the manager doesn't answer.
+    """
     service = f"{namespace}/controller_manager/list_controllers"
     answer = ServiceClient(service, ListControllers, timeout=timeout)()
     states = {each.name: each.state for each in answer.controller}

@@ -134,6 +134,7 @@ class SimulationRecorder:
         pipe: Any = self._process.stdin
         try:
             pipe.write(pickle.dumps(options))
+            pipe.flush()  # so that it starts meanwhile
             while (data := self._waiting.get()) is not None:
                 pipe.write(data)
                 pipe.flush()

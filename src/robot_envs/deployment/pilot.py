@@ -22,7 +22,7 @@ class CommandLimits:
 
     | command | limited to |
     |---|---|
-    | position | moves no faster than `velocity`; and `lower` and `upper`, also the soft ones |
+    | position | `lower` and `upper`, also the soft ones; and moves no faster than `velocity` |
     | velocity | `velocity` either way |
     | effort | `effort` either way |
 
@@ -53,7 +53,7 @@ class CommandLimits:
             if not lower <= value <= upper:
                 exceeded.append(joint)
             near = min(max(value, start - way), start + way)
-            numbers.append(min(max(near, lower), upper))  # last: `start` may lie beyond a stop
+            numbers.append(min(max(near, lower), upper))  # last, whatever it starts from
         return numbers[0] if self._port.single else tuple(numbers), exceeded
 
     def _numbers(self, command: Command) -> list[float]:

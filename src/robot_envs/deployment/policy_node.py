@@ -191,10 +191,7 @@ class PolicyNode:
             return fault
         if age > self._late:
             return f"no joint state on {self._joints.topic} for {self._late:g} s"
-        if stopped := self._controllers.stopped:
-            start = f"rosrun controller_manager controller_manager start {stopped[0]}"
-            return f"{' and '.join(stopped)} doesn't run ({start})"
-        return ""
+        return self._controllers.trouble
 
     def _aim_if_told(self) -> None:
         goal, self._wanted = self._wanted, None

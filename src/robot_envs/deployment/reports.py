@@ -5,7 +5,6 @@ import threading
 from collections.abc import Mapping, Sequence
 
 import rospy
-from controller_manager_msgs.srv import ListControllers
 from sensor_msgs.msg import JointState as JointStateMsg
 
 from bullet_gazebo.control.joint import JointLimits
@@ -13,7 +12,8 @@ from robot_envs.backends.ros.bringup import full_name
 from robot_envs.deployment.pilot import impossible
 from robot_envs.robot import Robot
 from robot_envs.world_state import JointState
-from ros_utils.service_client import ServiceClient, ServiceFailed
+from ros_utils.readiness import controller_faults
+from ros_utils.service_client import ServiceFailed
 
 AHEAD = 1.0  # [s] that the stamp of a joint state may be ahead of ROS time
 ASKING = 1.0  # [s] of wall time between two questions to the controller manager
@@ -121,19 +121,16 @@ class ControllerWatch:
     """
 
     def __init__(self, robot: Robot, over: threading.Event) -> None:
-        self.stopped: list[str] = []  # loaded controllers that don't run
-        self._names = {port.name for port in robot.ports}
-        self._service = full_name(robot, "controller_manager/list_controllers")
+        self.trouble = ""  # which controller doesn't run, with the remedy
+        self._names = [port.name for port in robot.ports]
+        self._namespace = full_name(robot, "").rstrip("/")
         self._over = over
         threading.Thread(target=self._watch, name="controllers", daemon=True).start()
 
     def _watch(self) -> None:
-        client = ServiceClient(self._service, ListControllers, timeout=ASKING)
         while not self._over.wait(ASKING):
             try:
-                loaded = client().controller
+                faults = controller_faults(self._namespace, self._names, ASKING)
+                self.trouble = next(faults, "")
             except ServiceFailed:
-                loaded = []
-            self.stopped = [
-                each.name for each in loaded if each.name in self._names and each.state != "running"
-            ]
+                self.trouble = ""

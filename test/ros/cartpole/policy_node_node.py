@@ -171,7 +171,7 @@ class PolicyNode(unittest.TestCase):
         node.wait_for(BEYOND, BOUND)
         node.wait_for(AGAIN, BOUND)
         self.assertTrue(ros_controllers.stop_controllers_srv([CONTROLLER]))
-        node.wait_for(f"{CONTROLLER} doesn't run", BOUND)
+        node.wait_for(f"'/{CONTROLLER}' is stopped, not running", BOUND)
         before = node.output.count(AGAIN)
         self.assertTrue(ros_controllers.start_controllers_srv([CONTROLLER]))
         self.put(PUSHED)

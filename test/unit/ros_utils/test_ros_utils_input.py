@@ -21,6 +21,7 @@ from ros_utils import (
     ros_urdf,
 )
 from ros_utils._internal.gazebo import calls as _gazebo_calls
+from ros_utils._internal.gazebo import launch as _gazebo_launch
 
 
 @pytest.fixture
@@ -226,3 +227,22 @@ def test_a_pose_that_is_not_finite_is_refused(number):
     spawned, text = ros_gazebo.gazebo_spawn_urdf_string("<robot name='r'/>", pos_x=number)
     assert not spawned
     assert "not finite" in text
+
+
+@pytest.mark.parametrize(
+    ("asked", "passed"),
+    [({"seed": 0}, {"seed:=0"}), ({"seed": 7, "lockstep": True}, {"seed:=7", "lockstep:=True"}), ({}, set())],
+)  # fmt: skip
+def test_gazebo_gets_the_arguments_beyond_its_own_that_are_asked_for(
+    no_master, monkeypatch, asked, passed
+):
+    commands = []
+
+    def start(command, *_):
+        commands.append(command)
+        raise _gazebo_launch.CannotStart("not here")
+
+    monkeypatch.setattr(_gazebo_launch._roslaunch, "start", start)
+    assert not ros_gazebo.launch_Gazebo(**asked)
+    own = ("lockstep:=", "seed:=", "extra_gazebo_args:=")
+    assert {each for each in commands[0] if each.startswith(own)} == passed

@@ -209,13 +209,12 @@ def _at_most(texts: list[str]) -> list[str]:
 
 
 def without_comments(text: str) -> str:
-    """Returns `text` without its first XML declaration and its comments."""
+    """Returns `text` without its first XML declaration and its comments; an open comment stays."""
     before, _, after = text.partition("<?")
     _, end, rest = after.partition("?>")
     if end:
         text = before + rest
-    before, *commented = text.split("<!--")
-    return before + "".join(each.partition("-->")[2] for each in commented)
+    return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
 
 
 def _with_package_paths(text: str) -> str:

@@ -136,11 +136,10 @@ class StepService:
         with self._one_at_a_time, sim.lock:
             sim.await_holds()
             prepared = self._prepared.get(request.handle)
-            if (
-                prepared is None
-                or prepared.addresses.version != sim.version
-                or not prepared.commanded.is_ready
-            ):
+            if prepared is not None and prepared.addresses.version != sim.version:
+                del self._prepared[request.handle]  # it would keep deleted models
+                prepared = None
+            if prepared is None or not prepared.commanded.is_ready:
                 return PreparedStepResponse(False, True, sim.now, "PreparedStep: stale", [], [])
             commanded = prepared.commanded
             of_joints = request.commands[commanded.size :]

@@ -111,8 +111,12 @@ def launch_Gazebo(
         "gui_required": gui_required,
     }
     # A real gazebo_ros rejects unknown arguments, so only those asked for are passed.
-    asked = {"lockstep": lockstep, "seed": seed, "extra_gazebo_args": extra_gazebo_args}
-    switches |= {name: value for name, value in asked.items() if value not in (None, False, "")}
+    asked = {
+        "lockstep": lockstep or None,
+        "seed": seed,  # 0 is one, too
+        "extra_gazebo_args": extra_gazebo_args or None,
+    }
+    switches |= {name: value for name, value in asked.items() if value is not None}
     world = (custom_world_path, custom_world_pkg, custom_world_name)
     service = f"{gazebo_ns.rstrip('/')}/{READY}"
     answers = functools.partial(service_answers, service)

@@ -65,6 +65,7 @@ def test_a_handle_is_stale_once_its_names_may_mean_something_else(world):
         change()
         answer = world.prepared(prepared, 1, 1.0, 0.0)
         assert (answer.success, answer.stale) == (False, True)
+        assert not world.service._prepared, "it would keep models that are deleted"
     # A controller that starts or stops: the names are refused until it has its old state again.
     prepared = world.prepare(**names)
     manager.switch([], ["effort_joint"])
