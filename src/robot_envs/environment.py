@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import data_equivalence
 from bullet_gazebo.pictures.camera import Camera
 from file_access.text import did_you_mean
 from robot_envs import checks
-from robot_envs.backends import OWN, make_backend
+from robot_envs.backends import LOCKSTEP, OWN, REALTIME, make_backend
 from robot_envs.backends.backend import RobotBackend, side_by_side
 from robot_envs.pictures.drawn import HEIGHT, WIDTH, DrawnEnv
 from robot_envs.robot import Robot
@@ -168,6 +168,11 @@ class RobotEnv(DrawnEnv):
         if self.backend.shared and self.backend.deterministic:
             return {"backend": OWN}
         return {}
+
+    @property
+    def same_robot_options(self) -> dict[str, list[str]]:
+        """Values of options with which other environments move this robot, if it is shared."""
+        return {"backend": [LOCKSTEP, REALTIME]} if self.backend.shared else {}
 
     @property
     def state(self) -> WorldState | None:

@@ -340,13 +340,11 @@ def check_robot_is_free(run: Run, options: dict[str, Any]) -> None:
         options: of the episode's environment.
     """
     shared = run.config.get("shared_robot")
-    if (
-        shared is None
-        or not is_held(run.folder)
-        or shared != {each: options.get(each) for each in shared}
-    ):
+    if shared is None or not is_held(run.folder):
         return
-    names = ", ".join(f"{name}={value}" for name, value in shared.items())
+    if not all(options.get(name) in values for name, values in shared.items()):
+        return
+    names = ", ".join(f"{name}={options.get(name)}" for name in shared) or run.env_id
     raise WorkbenchError(
         f"no episodes while it trains: {names} is the training's own robot. `view --env-kwargs` with "
         "another one plays that, and so does --gui of a training with --train-env-kwargs instead of "

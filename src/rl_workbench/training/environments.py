@@ -1,7 +1,8 @@
 """The environments of a training: made by Gymnasium's id, in the form that an agent needs.
 
 Environments may have attributes that they are asked for by name: `shares_robot` (true if all copies move the
-same robot), `own_robot_options` (the options by which a copy has a robot of its own), and
+same robot), `own_robot_options` (the options by which a copy has a robot of its own), `same_robot_options`
+(the values of options with which a copy moves the same robot, lists by name; without it, any copy does), and
 `side_by_side(count)` (a context manager within which that many start, or close, at the same time).
 """
 
@@ -142,11 +143,14 @@ def shares_robot(env: gymnasium.Env[Any, Any]) -> bool:
     return bool(_attribute(env, "shares_robot"))
 
 
-def robot_options(env: gymnasium.Env[Any, Any], given: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Returns the options by which other environments would move the same robot; None if none would."""
+def robot_options(
+    env: gymnasium.Env[Any, Any], given: Mapping[str, Any]
+) -> dict[str, list[Any]] | None:
+    """Returns the values of options with which other environments move the same robot; None if none does."""
     if not shares_robot(env):
         return None
-    return {name: given.get(name) for name in _attribute(env, "own_robot_options") or given}
+    named = _attribute(env, "same_robot_options") or {}
+    return {name: [given.get(name), *values] for name, values in named.items()}
 
 
 def _attribute(env: gymnasium.Env[Any, Any], name: str) -> Any:

@@ -207,8 +207,10 @@ class Shared(Endless):
 @pytest.mark.parametrize(
     ("shared", "wanted", "played"),
     [
-        ({"backend": "ros"}, {}, None),
-        ({"backend": "ros"}, {"backend": "bullet"}, "bullet"),
+        ({"backend": ["ros", "ros-realtime"]}, {}, None),
+        ({"backend": ["ros", "ros-realtime"]}, {"backend": "ros-realtime"}, None),
+        ({"backend": ["ros", "ros-realtime"]}, {"backend": "bullet"}, "bullet"),
+        ({}, {"backend": "bullet"}, None),
         (None, {}, "ros"),
     ],
 )

@@ -112,7 +112,7 @@ def test_which_options_name_a_robot_that_is_shared(monkeypatch) -> None:
     env, given = make_environment(POLE), {"backend": "ros", "noise": 0.1}
     assert robot_options(env, given) is None
     monkeypatch.setattr(env.unwrapped, "shares_robot", True, raising=False)
-    assert robot_options(env, given) == given, "whatever it was made with"
-    own = {"backend": "ros-own"}
-    monkeypatch.setattr(env.unwrapped, "own_robot_options", own, raising=False)
-    assert robot_options(env, given) == {"backend": "ros"}
+    assert robot_options(env, given) == {}, "any other one moves it"
+    same = {"backend": ["ros", "ros-realtime"]}
+    monkeypatch.setattr(env.unwrapped, "same_robot_options", same, raising=False)
+    assert robot_options(env, given) == {"backend": ["ros", "ros", "ros-realtime"]}
