@@ -143,7 +143,8 @@ class ReinforceAgent(TwoNetworks):
             The losses before the update; None if the batch isn't full yet.
 
         Raises:
-            WorkbenchError: if a loss or a gradient isn't finite; the agent is as before then.
+            WorkbenchError: if a loss or a gradient isn't finite. The network that it belongs to is as
+                before then.
         """
         batch = [*self._batch, *episodes]
         if len(batch) < self._batch_size:

@@ -73,6 +73,7 @@ class PolicyGradientTraining(Algorithm):
     def __init__(self, agent: Agent, source: EpisodeSource, save_every: int) -> None:
         self._agent, self._source, self._save_every = agent, source, save_every
         self._episodes = self._steps = self._stride = 0
+        self._is_learning = False  # until the round's episodes are recorded, too
 
     @property
     def steps(self) -> int:
@@ -91,12 +92,14 @@ class PolicyGradientTraining(Algorithm):
             episodes = self._source.collect(frame.is_interrupted)
             if episodes is None:
                 break
+            self._is_learning = True
             losses = self._agent.learn(*episodes)
             self._stride = 0
             for episode in episodes:
                 # A batch ends with the last episode of a round, which has its losses.
                 self._record(episode, losses if episode is episodes[-1] else None, frame)
             self._source.mark()
+            self._is_learning = False
             frame.step_done()
         self._source.rewind()
 
@@ -120,9 +123,9 @@ class PolicyGradientTraining(Algorithm):
             save_tensors(folder / f"{name}{suffix}.pth", network.state_dict())
 
     def settle(self) -> bool:
-        """Takes back the draws of the round that failed."""
+        """Takes back the draws of a round that failed; a round that is learned from can't be taken back."""
         self._source.rewind()
-        return True
+        return not self._is_learning
 
     def state_dict(self) -> dict[str, Any]:
         return {

@@ -270,6 +270,18 @@ def test_a_round_of_learning_that_fails_costs_the_steps_since_the_last_checkpoin
     assert f"what was learned up to step {steps} is saved in {tmp_path}; --resume" in line
 
 
+def test_a_round_that_was_learned_from_and_not_recorded_is_played_again(
+    tmp_path: Path, monkeypatch
+) -> None:
+    options = ON_A_ROBOT | {"checkpoint_frequency": 20}
+    whole = train(tmp_path / "whole", "reinforce", **options)
+    with monkeypatch.context() as patched:
+        fails_at(patched, ScalarLogger, "on_episode", 4)
+        failure(lambda: train(tmp_path / "run", "reinforce", **options))
+    assert 0 < checkpoint(tmp_path / "run")["steps"] < summary(whole)["steps"]
+    assert_same_run(whole, resume(tmp_path / "run"))
+
+
 @pytest.mark.extras("stable_baselines3")
 def test_one_under_stable_baselines(tmp_path: Path, monkeypatch) -> None:
     """In the midst of a rollout, which is taken back."""
