@@ -214,7 +214,9 @@ def without_comments(text: str) -> str:
     _, end, rest = after.partition("?>")
     if end:
         text = before + rest
-    return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+    # Behind the last end no comment closes: looking for one there takes quadratic time.
+    before, end, rest = text.rpartition("-->")
+    return re.sub(r"<!--.*?-->", "", before + end, flags=re.DOTALL) + rest
 
 
 def _with_package_paths(text: str) -> str:
