@@ -63,8 +63,10 @@ class Simulator:
         self._robots_of: dict[Model, list[ControlledRobot]] = {}
         self._robots_version = 0
         self.applied = AppliedForces()
-        # Called with `now` before each physics step, under the lock: topics, plugins and, later, sensors.
+        # Called with `now` before each physics step, under the lock: topics, plugins and sensors.
         self.listeners: list[Callable[[int], None]] = []
+        # Called under the lock after something other than time has moved bodies, or time was reset.
+        self.moved: list[Callable[[], None]] = []
         # What sends messages after the ticks, and whether those who step the world call them.
         self.outboxes: list[Outbox] = []
         self.deliver_with_steps = False
@@ -210,6 +212,7 @@ class Simulator:
         """Puts joints of `model` at `positions` [rad, m], at rest; the caller holds the lock."""
         model.set_joint_positions(positions)
         self._joints_moved(model)
+        self._tell_of_move()
 
     def set_joint_states(
         self, model: Model, positions: Mapping[str, float], velocities: Mapping[str, float]
@@ -221,6 +224,7 @@ class Simulator:
         model.set_joint_positions(positions)
         model.set_joint_velocities(velocities)
         self._joints_moved(model)
+        self._tell_of_move()
 
     def place_model(self, model: Model, pose: Pose, twist: Twist) -> None:
         """Moves `model` rigidly, its joints at rest as in Gazebo; the caller holds the lock."""
@@ -229,6 +233,7 @@ class Simulator:
         model.rest_joints()
         if model.joint_states() != before:
             self._joints_moved(model)
+        self._tell_of_move()
 
     def place_link(self, model: Model, link: str, pose: Pose, twist: Twist) -> None:
         """Moves one link as near as the joints that carry it allow; the caller holds the lock."""
@@ -236,6 +241,7 @@ class Simulator:
         place_link(model, link, pose, twist)
         if model.joint_states() != before:
             self._joints_moved(model)
+        self._tell_of_move()
 
     def delete_model(self, model: Model) -> None:
         """Takes a model out of the world, and what acts on it; the caller holds the lock."""
@@ -265,6 +271,11 @@ class Simulator:
             self.now = 0
             for robot in self.robots:
                 robot.joints_moved(self.now, relatch=False)
+            self._tell_of_move()
+
+    def _tell_of_move(self) -> None:
+        for listener in self.moved:
+            listener()
 
     def _joints_moved(self, model: Model) -> None:
         for robot in self._robots_of.get(model, ()):
@@ -277,6 +288,7 @@ class Simulator:
         self.world.reset(joints=everything)
         for robot in self.robots:
             robot.joints_moved(self.now, self.relatch)
+        self._tell_of_move()
 
     def _update_flow(self) -> None:
         if self._paused or self.lockstep or self.holds:

@@ -82,6 +82,7 @@ class Shape:
     rgba: tuple[float, float, float, float] | None = None
     name: str = ""
     mu: float = 1.0  # coefficient of friction; Gazebo's default
+    retro: float = 0.0  # the intensity that lasers report of it
     solid: Mesh | None = None
 
 
@@ -142,6 +143,22 @@ def is_control_plugin(filename: str) -> bool:
     return os.path.basename(filename) == CONTROL_PLUGIN
 
 
+@dataclass(frozen=True)
+class Sensor:
+    """A `<sensor>` element: at `pose` in its link, which it measures from.
+
+    `rate` is in Hz of simulated time; 0 is every step. What each kind measures: `bullet_gazebo.sensors`.
+    """
+
+    name: str
+    kind: str
+    link: str
+    pose: Pose
+    rate: float
+    plugins: tuple[Plugin, ...]
+    element: Element
+
+
 @dataclass
 class Light:
     """A light. It lights nothing here; clients and windows read it."""
@@ -166,7 +183,7 @@ class ModelDescription:
         root: the link that no joint carries.
         root_pose: of the root link in the model.
         world_joints: joints that fix the root link to the world.
-        left_out: sensors and the like, which nothing simulates.
+        left_out: plugins and the like, which nothing simulates.
         islands: links of a static model that no joint connects with the root, and their poses seen from it.
         lumped: links that a fixed joint has made part of another one: that link, and their poses in it.
         initial_pose: where the file puts the model.
@@ -179,6 +196,7 @@ class ModelDescription:
     root_pose: Pose = Pose()
     world_joints: list[str] = field(default_factory=list)
     plugins: list[Plugin] = field(default_factory=list)
+    sensors: list[Sensor] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
     islands: dict[str, Pose] = field(default_factory=dict)

@@ -9,6 +9,7 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import TypeVar
+from xml.etree.ElementTree import Element, SubElement
 
 from bullet_gazebo.physics.description import (
     DescriptionError,
@@ -16,10 +17,12 @@ from bullet_gazebo.physics.description import (
     Joint,
     Link,
     ModelDescription,
+    Sensor,
     Shape,
 )
 from bullet_gazebo.physics.dynamics import combine, is_positive_definite
-from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.files.elements import numbers
+from bullet_gazebo.physics.pose import Pose, Vector, from_rpy, to_rpy
 
 MAX_LINKS = 1000  # in the file; robots have some hundreds, and lumping takes quadratic time
 
@@ -28,6 +31,8 @@ Named = TypeVar("Named", Link, Joint)
 
 WORLD = "world"
 LUMPED = "_fixed_joint_lump__"
+FRAME_TAGS = ("bodyName", "frameName")  # of plugins, where they name a link
+OFFSETS = ("xyzOffset", "rpyOffset")
 
 
 def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
@@ -87,6 +92,10 @@ def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
     _drop_free_joints(model)
     drop_massless(model)
     model.lumped = {name: at for name, at in model.lumped.items() if at[0] in model.links}
+    moved = [_lumped_sensor(model, sensor) for sensor in model.sensors]
+    model.sensors = [sensor for sensor in moved if sensor.link in model.links]
+    for plugin in model.plugins:
+        _lump_frames(model, plugin.element)
     mend_moments(model)
     for link in model.links.values():
         link.collisions = _named(link, link.collisions, "_collision")
@@ -140,6 +149,32 @@ def _moved(inertia: Inertia | None, pose: Pose) -> Inertia | None:
 def _lumped(shape: Shape, pose: Pose, link: str) -> Shape:
     name = shape.name if shape.name.startswith(LUMPED) else LUMPED + (shape.name or link)
     return replace(shape, pose=pose.compose(shape.pose), name=name)
+
+
+def _lumped_sensor(model: ModelDescription, sensor: Sensor) -> Sensor:
+    link, pose = model.lumped.get(sensor.link, (sensor.link, Pose()))
+    return replace(sensor, link=link, pose=pose.compose(sensor.pose))
+
+
+def _lump_frames(model: ModelDescription, plugin: Element) -> None:
+    """Renames lumped links in a model's plugin, and gives it their poses as offsets, as sdformat does."""
+    found = [each for each in map(plugin.find, FRAME_TAGS) if each is not None]
+    lumped = [each for each in found if (each.text or "").strip() in model.lumped]
+    for element in lumped:
+        name = (element.text or "").strip()
+        element.text, pose = model.lumped[name]
+    if lumped:
+        xyz, rpy = (_offset(plugin, tag) for tag in OFFSETS)
+        pose = pose.compose(Pose(xyz, from_rpy(*rpy)))
+        for tag, values in zip(OFFSETS, (pose.position, to_rpy(pose.orientation)), strict=True):
+            element = plugin.find(tag)
+            element = SubElement(plugin, tag) if element is None else element
+            element.text = " ".join(map(repr, values))
+
+
+def _offset(plugin: Element, tag: str) -> Vector:
+    x, y, z = numbers(plugin.findtext(tag, "0 0 0"), f"plugin: <{tag}>", 3)
+    return x, y, z
 
 
 def _drop_free_joints(model: ModelDescription) -> None:

@@ -24,6 +24,7 @@ class Model:
         self.description = description
         self.body = body
         self.initial_pose = pose
+        self.placed = pose  # where it was put last: a static model stays there
         self.time_step = 0.0  # [s], the world's
         self._damped: dict[str, float] = {}  # the engine's damping [N m s/rad, N s/m] by joint
         self.damping_added: Mapping[str, float] = {}  # [N m s/rad, N s/m] in addition to the file's
@@ -80,6 +81,7 @@ class Model:
 
     def place(self, pose: Pose, twist: Twist = AT_REST) -> None:
         """Moves the whole model rigidly to `pose`, its root link moving with `twist`; joints stay."""
+        self.placed = pose
         self.body.reset_base(pose.compose(self.description.root_pose), twist)
 
     def joint_state(self, name: str) -> tuple[float, float]:

@@ -90,9 +90,3 @@ def positive(sizes: tuple[float, ...], where: str) -> tuple[float, ...]:
 
 def read_plugin(element: Element) -> Plugin:
     return Plugin(element.get("filename", ""), element.get("name", ""), element)
-
-
-def name_sensor(element: Element, owner: str) -> str:
-    """Returns a description of a sensor that is left out."""
-    kind, name = shown(element.get("type", "unknown")), shown(element.get("name", ""))
-    return f"{kind} sensor '{name}' of {owner}"

@@ -17,11 +17,11 @@ from bullet_gazebo.physics.description import (
     Link,
     ModelDescription,
     Plugin,
+    Sensor,
 )
 from bullet_gazebo.physics.files import elements
 from bullet_gazebo.physics.files.elements import (
     files_named_by_a_model,
-    name_sensor,
     named,
     place,
     read_plugin,
@@ -37,6 +37,7 @@ from bullet_gazebo.physics.files.sdf_parts import (
     joint_end,
     read_inertia,
     read_pose,
+    read_sensors,
 )
 from bullet_gazebo.physics.lumping import (
     detach_from_world,
@@ -145,6 +146,7 @@ class _Parts:
     poses: dict[str, Pose] = field(default_factory=dict)
     joints: list[Joint] = field(default_factory=list)
     plugins: list[Plugin] = field(default_factory=list)
+    sensors: list[Sensor] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
 
@@ -219,7 +221,7 @@ def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
     model = ModelDescription(name, links, joints, roots[0], poses[roots[0]])
     model.islands = {root: poses[root].relative_to(poses[roots[0]]) for root in roots[1:]}
     model.plugins, model.warnings, model.left_out = parts.plugins, parts.warnings, parts.left_out
-    model.static = static
+    model.static, model.sensors = static, parts.sensors
     detach_from_world(model)
     mend_moments(model)
     return model
@@ -281,6 +283,7 @@ def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
     parts.links += inner.links
     parts.joints += inner.joints
     parts.plugins += inner.plugins
+    parts.sensors += [replace(each, link=f"{prefix}::{each.link}") for each in inner.sensors]
     parts.warnings += inner.warnings
     parts.left_out += inner.left_out
 
@@ -312,5 +315,5 @@ def _read_link(
     if not static and any(shape.kind == "plane" for shape in link.collisions):
         raise DescriptionError(f"{where}: a plane can only be part of a static model")
     link.gravity = truth(element.findtext("gravity"), default=True)
-    parts.left_out += [name_sensor(sensor, where) for sensor in element.findall("sensor")]
+    parts.sensors += read_sensors(element, name, parts.warnings, frames)
     return link

@@ -11,6 +11,7 @@ from bullet_gazebo.physics.description import (
     Inertia,
     Joint,
     LimitExceeded,
+    Sensor,
     Shape,
 )
 from bullet_gazebo.physics.files.elements import (
@@ -20,6 +21,7 @@ from bullet_gazebo.physics.files.elements import (
     named,
     numbers,
     positive,
+    read_plugin,
     shown,
     truth,
 )
@@ -101,6 +103,33 @@ def read_inertia(link: Element, where: str, static: bool) -> Inertia:
     return Inertia(mass=mass, com=com, **tensor)
 
 
+def read_sensors(
+    parent: Element, link: str, warnings: list[str], frames: Frames | None = None
+) -> Iterator[Sensor]:
+    """Yields the sensors of `link` that `parent` has; a faulty one is a warning.
+
+    Args:
+        parent: a `<link>`, or URDF's `<gazebo reference=LINK>`.
+        link: its name.
+        warnings: receives a line for each sensor that is left out.
+        frames: those of the model, for poses that are relative to another one than the link.
+    """
+    for element in parent.findall("sensor"):
+        where = f"link '{shown(link)}', sensor '{shown(element.get('name', ''))}'"
+        try:
+            pose, relative_to = read_pose(element, where)
+            if frames is not None and relative_to and relative_to != link:
+                pose = frames.resolve(relative_to).compose(pose).relative_to(frames.resolve(link))
+            rate = value(element, "update_rate", where, 0.0)
+            if rate < 0.0:
+                raise DescriptionError(f"{where}: <update_rate> is {rate:g}; 0 is every step")
+            plugins = tuple(map(read_plugin, element.findall("plugin")))
+            kind = element.get("type", "")
+            yield Sensor(named(element, "sensor"), kind, link, pose, rate, plugins, element)
+        except DescriptionError as error:
+            warnings.append(f"{error}; it is left out")
+
+
 @dataclass
 class ShapeReader:
     """Reads the collisions and visuals of the links of one model."""
@@ -149,7 +178,10 @@ class ShapeReader:
             positive(size, f"{where}, {solid.tag}")
         color, name = _color(element, where), element.get("name", "")
         shape = Shape(solid.tag, size, pose, mesh[0], color, name, solid=mesh[1])
-        return replace(shape, mu=_friction(element, where)) if collides else shape
+        if not collides:
+            return shape
+        retro = value(element, "laser_retro", where, 0.0)
+        return replace(shape, mu=_friction(element, where), retro=retro)
 
 
 def _submesh(mesh: Element) -> Submesh | None:

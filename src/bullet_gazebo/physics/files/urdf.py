@@ -26,7 +26,6 @@ from bullet_gazebo.physics.files.elements import (
     direction,
     files_named_by_a_model,
     finite,
-    name_sensor,
     named,
     numbers,
     positive,
@@ -34,6 +33,7 @@ from bullet_gazebo.physics.files.elements import (
     shown,
 )
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
+from bullet_gazebo.physics.files.sdf_parts import read_sensors
 from bullet_gazebo.physics.lumping import find_roots, lump_fixed_joints, unique
 from bullet_gazebo.physics.pose import Pose, from_rpy
 
@@ -297,6 +297,7 @@ def _apply_to_model(model: ModelDescription, block: Element) -> None:
 
 
 def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
+    model.sensors += read_sensors(block, link.name, model.warnings)
     for element in block:
         place = f"<gazebo reference='{shown(link.name)}'>, <{element.tag}>"
         if element.tag == "mu1":
@@ -304,6 +305,9 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
             if mu < 0.0:
                 raise DescriptionError(f"{place}: {mu} is negative")
             link.collisions = [replace(shape, mu=mu) for shape in link.collisions]
+        elif element.tag == "laserRetro":
+            retro = finite(_value(element), place)
+            link.collisions = [replace(shape, retro=retro) for shape in link.collisions]
         elif element.tag == "turnGravityOff":
             link.gravity = (
                 _value(element) in NO
@@ -312,8 +316,6 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
             link.gravity = _value(element) in ("", *YES)
         elif element.tag == "selfCollide":
             link.self_collide = _value(element) in YES
-        elif element.tag == "sensor":
-            model.left_out.append(name_sensor(element, f"link '{shown(link.name)}'"))
         elif element.tag == "plugin":
             name = shown(element.get("filename", ""))
             model.left_out.append(f"plugin {name} of link '{shown(link.name)}'")

@@ -16,9 +16,11 @@ from typing import Protocol
 
 import rospy
 
-from bullet_gazebo.physics.description import CONTROL_PLUGIN, Plugin
+from bullet_gazebo.physics.description import CONTROL_PLUGIN, DescriptionError, Plugin, Sensor
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.ros.common.publishing import Thinner
+from bullet_gazebo.sensors.schedule import Clock
+from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.simulator import Simulator
 
 # Library's file name: "module:Factory". Another one of ours is a module of this folder and a line here. A

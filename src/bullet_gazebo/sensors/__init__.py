@@ -1,0 +1,1 @@
+"""What measures the world: clock, noise, rays, and what each kind of sensor reports. No ROS."""

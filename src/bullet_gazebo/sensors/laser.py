@@ -1,0 +1,139 @@
+"""Lasers: ranges along a fan or grid of rays (docs/contract/sensors.md 2)."""
+
+import math
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from bullet_gazebo.physics.description import DescriptionError, Sensor
+from bullet_gazebo.physics.files.sdf_parts import value
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.sensors.noise import Noise, read_noise
+from bullet_gazebo.sensors.rays import RayScene, frames
+
+KINDS = ("ray", "gpu_ray", "lidar", "gpu_lidar")
+RENDERED = ("gpu_ray", "gpu_lidar")  # they see visuals, the others collisions
+MOST_RAYS = 1_000_000
+
+
+class Scan(NamedTuple):
+    """A laser's readings, lowest row first: ranges [m] and intensities, each (rows, columns)."""
+
+    ranges: np.ndarray
+    intensities: np.ndarray
+
+
+class Fan(NamedTuple):
+    """The angles of a scan in one direction."""
+
+    samples: int  # rays
+    readings: int
+    low: float  # [rad]
+    high: float  # [rad]
+
+    @property
+    def increment(self) -> float:
+        """The angle between two readings [rad]; 0 for one alone."""
+        return (self.high - self.low) / (self.readings - 1) if self.readings > 1 else 0.0
+
+    def angles(self) -> np.ndarray:
+        """Returns the angle of each ray [rad]: 0 for one alone."""
+        return np.linspace(self.low, self.high, self.samples) if self.samples > 1 else np.zeros(1)
+
+
+class Laser:
+    """A laser scanner.
+
+    Args:
+        sensor: of one of `KINDS`.
+
+    Raises:
+        DescriptionError: if it can't be simulated.
+    """
+
+    def __init__(self, sensor: Sensor) -> None:
+        where = f"sensor '{sensor.name}'"
+        ray = sensor.element.find("ray")
+        ray = sensor.element.find("lidar") if ray is None else ray
+        if ray is None:
+            raise DescriptionError(f"{where} has no <ray>")
+        self.sees_visuals = sensor.kind in RENDERED
+        self.horizontal = _fan(ray, "horizontal", where, 640)
+        self.vertical = _fan(ray, "vertical", where, 1)
+        rays = self.horizontal.samples * self.vertical.samples
+        if rays > MOST_RAYS:
+            raise DescriptionError(f"{where} has {rays} rays; up to {MOST_RAYS} are cast (MOST_RAYS)")
+        self.low = value(ray, "range/min", where, 0.0)
+        self.high = value(ray, "range/max", where, 0.0)
+        if not 0.0 <= self.low < self.high:
+            raise DescriptionError(
+                f"{where}: <range> is {self.low:g} to {self.high:g} m; it must be 0 or more, and rise"
+            )
+        self.noise: Noise | None = read_noise(ray, where)
+        yaw, pitch = np.meshgrid(self.horizontal.angles(), self.vertical.angles())
+        along = [np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)]
+        self._directions = np.stack(along, axis=-1).reshape(-1, 3)
+
+    def measure(
+        self, scene: RayScene, pose: Pose, bias: float, random: np.random.Generator
+    ) -> Scan:
+        """Measures from `pose` in the world.
+
+        Args:
+            scene: the collisions or visuals, see `sees_visuals`.
+            pose: of the sensor.
+            bias: of its noise [m].
+            random: draws the noise of this measurement.
+
+        Returns:
+            Ranges within the limits; inf for nothing within reach, -inf for something nearer than the lower
+            limit.
+        """
+        turns, places = frames([pose])
+        directions = np.einsum("ij,kj->ki", turns[0], self._directions)
+        hits = scene.cast(places[0], directions, self.low, self.high)
+        shape = self.vertical.samples, self.horizontal.samples
+        ranges, intensities = hits.distances.reshape(shape), self._retro(scene, hits.targets).reshape(shape)
+        for axis, fan in enumerate((self.vertical, self.horizontal)):
+            ranges, intensities = (_resampled(each, fan, axis) for each in (ranges, intensities))
+        beyond, before = ranges >= self.high, ranges <= self.low
+        if self.noise is not None:
+            noisy = self.noise.applied(np.minimum(ranges, self.high), bias, random)
+            ranges = np.clip(noisy, self.low, self.high)
+        ranges = np.where(beyond, np.inf, np.where(before, -np.inf, ranges))
+        return Scan(ranges, intensities)
+
+    def _retro(self, scene: RayScene, targets: np.ndarray) -> np.ndarray:
+        retro = np.array([*(target.shape.retro for target in scene.targets), 0.0])
+        return retro[targets]  # that of NONE is the last
+
+
+def _fan(ray: Element, name: str, where: str, samples: int) -> Fan:
+    scan = ray.find(f"scan/{name}")
+    where = f"{where}, <{name}>"
+    count = value(scan, "samples", where, samples)
+    resolution = value(scan, "resolution", where, 1.0)
+    low, high = (value(scan, tag, where, 0.0) for tag in ("min_angle", "max_angle"))
+    readings = round(count * resolution) if abs(count * resolution) <= MOST_RAYS else 0
+    if not 1 <= count <= MOST_RAYS or count != int(count) or readings < 1:
+        raise DescriptionError(
+            f"{where}: {count:g} samples at a resolution of {resolution:g}; 1 to {MOST_RAYS} are cast"
+        )
+    if low > high or not -2.0 * math.pi <= low <= high <= 4.0 * math.pi:
+        raise DescriptionError(f"{where}: the angles {low:g} to {high:g} rad are no scan")
+    return Fan(int(count), readings, low, high)
+
+
+def _resampled(values: np.ndarray, fan: Fan, axis: int) -> np.ndarray:
+    """Interpolates between rays where a scan has another number of readings."""
+    if fan.samples == fan.readings:
+        return values
+    at = np.linspace(0.0, fan.samples - 1, fan.readings)
+    low = at.astype(int)
+    high = np.minimum(low + 1, fan.samples - 1)
+    share = np.expand_dims(at - low, 1 - axis)
+    before, after = values.take(low, axis), values.take(high, axis)
+    with np.errstate(invalid="ignore"):  # between two rays that meet nothing: inf - inf
+        between = before + share * (after - before)
+    return np.where(share == 0.0, before, np.where(np.isnan(between), np.inf, between))

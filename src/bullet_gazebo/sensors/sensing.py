@@ -1,0 +1,40 @@
+"""What all sensors of a world share: their schedule, what rays meet, and the seed of their noise."""
+
+import numpy as np
+
+from bullet_gazebo.physics.description import Sensor
+from bullet_gazebo.physics.model import Model
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.sensors.noise import generator
+from bullet_gazebo.sensors.rays import RayScene
+from bullet_gazebo.sensors.schedule import Schedule
+from bullet_gazebo.simulator import Simulator
+
+
+class Sensing:
+    """The sensors of a simulator.
+
+    Args:
+        sim: the simulator.
+        seed: of the sensors' noise.
+    """
+
+    def __init__(self, sim: Simulator, seed: int = 0) -> None:
+        self.schedule = Schedule(sim)
+        self.collisions = RayScene(sim.world)
+        self.visuals = RayScene(sim.world, visuals=True)
+        self.schedule.prepare += [self.collisions.expire, self.visuals.expire]
+        self._seed = seed
+
+    def noise(self, model: Model, sensor: Sensor, now: int) -> np.random.Generator:
+        """Returns what draws the noise of a measurement at `now` [ns]."""
+        return generator(self._seed, model.name, sensor.name, self.schedule.moves, now)
+
+    def bias(self, model: Model, sensor: Sensor) -> np.random.Generator:
+        """Returns what draws the biases of a sensor, once."""
+        return generator(self._seed, model.name, sensor.name, "bias")
+
+
+def sensor_pose(model: Model, sensor: Sensor) -> Pose:
+    """Returns where a sensor is in the world."""
+    return model.link_state(sensor.link)[0].compose(sensor.pose)
