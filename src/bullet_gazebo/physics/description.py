@@ -138,9 +138,15 @@ class Plugin:
     element: Element
 
 
+def library_of(filename: str) -> str:
+    """Returns a library's plain file name: files write it with or without folder, `lib` and `.so`."""
+    name = os.path.basename(filename.strip())
+    return f"lib{name.removeprefix('lib').removesuffix('.so')}.so" if name else ""
+
+
 def is_control_plugin(filename: str) -> bool:
-    """Returns whether a plugin's library is the one that runs ros_control. Its folder doesn't matter."""
-    return os.path.basename(filename) == CONTROL_PLUGIN
+    """Returns whether a plugin's library is the one that runs ros_control."""
+    return library_of(filename) == CONTROL_PLUGIN
 
 
 @dataclass(frozen=True)

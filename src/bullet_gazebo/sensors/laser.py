@@ -75,6 +75,10 @@ class Laser:
         along = [np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)]
         self._directions = np.stack(along, axis=-1).reshape(-1, 3)
 
+    def draw_bias(self, random: np.random.Generator) -> float:
+        """Returns the bias of its ranges [m]."""
+        return 0.0 if self.noise is None else self.noise.draw_bias(random)
+
     def measure(
         self, scene: RayScene, pose: Pose, bias: float, random: np.random.Generator
     ) -> Scan:

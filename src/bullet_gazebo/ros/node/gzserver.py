@@ -126,6 +126,7 @@ class GazeboNode:
             rospy.set_param("/use_sim_time", True)
         world = World(engine)
         self.sim = Simulator(world, lockstep=args.lockstep, relatch=_flag("~relatch_on_reset"))
+        self._seed = args.seed or 0
         self._watchdog = Watchdog(self.sim)
         recording = _recording(args)
         fill_world(self.sim, read_world(args.world, interrupted), interrupted)
@@ -146,7 +147,7 @@ class GazeboNode:
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
-        plugins = PluginRegistry(self.sim, thinner)
+        plugins = PluginRegistry(self.sim, thinner, self._seed)
         load_plugins(self.sim, plugins)
         if not network:
             return

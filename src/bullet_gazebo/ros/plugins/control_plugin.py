@@ -15,6 +15,7 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import GAINS, RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.control.transmissions import read_description
+from bullet_gazebo.physics.description import CONTROL_PLUGIN
 from bullet_gazebo.robot import ControlledRobot, control_period_of
 from bullet_gazebo.ros.control.controller_services import ControllerServices
 from bullet_gazebo.ros.control.controller_topics import PidTopics
@@ -160,3 +161,6 @@ def find_param(namespace: str, name: str) -> object:
         if value or namespace in ("", "/"):
             return value
         namespace = namespace.rstrip("/").rpartition("/")[0] or "/"
+
+
+LIBRARIES = {CONTROL_PLUGIN: ControlPlugin}

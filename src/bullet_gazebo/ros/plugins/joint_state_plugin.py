@@ -74,3 +74,6 @@ def _period(context: PluginContext) -> int:
         rospy.logwarn("%s: updateRate '%s' is not a number; %s Hz is used", file, text, RATE)
         rate = float(RATE)
     return round(NANOSECONDS / rate) if rate > 0.0 else 0
+
+
+LIBRARIES = {"libgazebo_ros_joint_state_publisher.so": JointStatePlugin}

@@ -7,6 +7,7 @@ called, SystemExit and KeyboardInterrupt included: a Ctrl-C raises nothing in th
 
 import importlib
 import os
+import pkgutil
 import traceback
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -16,20 +17,15 @@ from typing import Protocol
 
 import rospy
 
-from bullet_gazebo.physics.description import CONTROL_PLUGIN, DescriptionError, Plugin, Sensor
+from bullet_gazebo.physics.description import DescriptionError, Plugin, Sensor, library_of
+from bullet_gazebo.physics.files.sdf_parts import value
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.ros.common.publishing import Thinner
 from bullet_gazebo.sensors.schedule import Clock
 from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.simulator import Simulator
 
-# Library's file name: "module:Factory". Another one of ours is a module of this folder and a line here. A
-# plugin within a <sensor> or a <link> never gets here: physics/files/sdf.py and urdf.py leave it out.
-BUILT_IN = {
-    CONTROL_PLUGIN: "bullet_gazebo.ros.plugins.control_plugin:ControlPlugin",
-    "libgazebo_ros_joint_state_publisher.so": "bullet_gazebo.ros.plugins.joint_state_plugin:JointStatePlugin",
-}  # fmt: skip
-PARAMETER = "~plugins"  # the same table for users' plugins
+PARAMETER = "~plugins"  # users' plugins: library: "module:Factory"
 PATIENCE = 10.0  # [s of wall time]
 Update = Callable[[int], None]
 
@@ -38,19 +34,47 @@ Update = Callable[[int], None]
 class PluginContext:
     """What a plugin gets: its element in the file, its model, and the namespace to work in.
 
-    Publish fast topics as a `ThinnedTopic` of `thinner`.
+    Publish fast topics as a `ThinnedTopic` of `thinner`, measurements by a clock of `sensing`.
+
+    Attributes:
+        namespace: its `<robotNamespace>`, else that of the spawn request, else the model's name.
+        given_namespace: the first two of these; None if there is neither.
+        sensor: the one that the plugin belongs to; None for a model's plugin.
     """
 
     sim: Simulator
     model: Model
     plugin: Plugin
     namespace: str
+    given_namespace: str | None
     thinner: Thinner
+    sensing: Sensing
+    sensor: Sensor | None = None
     _updates: list[Update] = field(default_factory=list, repr=False)
 
     def text(self, tag: str, default: str) -> str:
         """Returns the text of the plugin's child element `tag`."""
         return (self.plugin.element.findtext(tag) or "").strip() or default
+
+    def number(self, tag: str, default: float) -> float:
+        """Returns the number in the plugin's child element `tag`; a faulty one is a DescriptionError."""
+        return value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)
+
+    def clock(self, rate: float, measure: Update) -> Clock:
+        """Calls `measure` with the simulated time [ns] at a rate [Hz; 0 is every step], while it is heard.
+
+        Otherwise as `on_update`. End the clock in `shutdown`.
+        """
+
+        def guarded(now: int) -> None:
+            try:
+                measure(now)
+            except BaseException:  # noqa: BLE001 - a user's code must not stop the world
+                self.report("measures no more, because it raised")
+                clock.heard = False
+
+        clock = self.sensing.schedule.add(rate, guarded)
+        return clock
 
     def on_update(self, update: Update) -> None:
         """Calls `update` before each physics step with the simulated time after it [ns].
@@ -97,11 +121,13 @@ Factory = Callable[[PluginContext], LoadedPlugin | None]
 class PluginRegistry:
     """Starts and ends plugins by the file names of their libraries: built-in ones, then users'."""
 
-    def __init__(self, sim: Simulator, thinner: Thinner) -> None:
+    def __init__(self, sim: Simulator, thinner: Thinner, seed: int = 0) -> None:
+        """`seed` is that of the sensors' noise."""
         self._sim = sim
         self._thinner = thinner
+        self._sensing = Sensing(sim, seed)
         # Imported now, so that no spawn waits for it.
-        self._built_in = {library: _import(place) for library, place in BUILT_IN.items()}
+        self._built_in = _built_in()
         self._loaded: dict[Model, list[tuple[PluginContext, LoadedPlugin | None]]] = {}
 
     def time_held(self, models: str) -> AbstractContextManager[None]:
@@ -116,16 +142,27 @@ class PluginRegistry:
         """Starts the plugins of `model`. An unknown one and one that fails is logged and left out
         (docs/contract/gazebo.md 2.4)."""
         loaded = self._loaded.setdefault(model, [])
-        places = _registered() if model.description.plugins else {}
-        for plugin in model.description.plugins:
-            factory = self._find(plugin, model, places)
+        description = model.description
+        of_sensors = [(plugin, each) for each in description.sensors for plugin in each.plugins]
+        plugins = [*((plugin, None) for plugin in description.plugins), *of_sensors]
+        places = _registered() if plugins else {}
+        for plugin, sensor in plugins:
+            factory = self._find(plugin, sensor, model, places)
             if factory is None:
                 continue
-            own = (plugin.element.findtext("robotNamespace") or "").strip()
-            namespace = own or robot_namespace or model.name
-            context = PluginContext(self._sim, model, plugin, namespace, self._thinner)
+            own = plugin.element.findtext("robotNamespace")
+            given = own.strip() if own is not None else robot_namespace or None
+            context = PluginContext(
+                self._sim, model, plugin, given or robot_namespace or model.name, given,
+                self._thinner, self._sensing, sensor,
+            )  # fmt: skip
             try:
                 loaded.append((context, factory(context)))
+            except DescriptionError as error:
+                rospy.logerr(
+                    "Model '%s': the plugin %s is left out: %s", model.name, plugin.filename, error
+                )
+                context.release()
             except BaseException:  # noqa: BLE001 - a user's code must not leave the model half loaded
                 context.report("is left out, because it raised")
                 context.release()
@@ -140,15 +177,18 @@ class PluginRegistry:
             except BaseException:  # noqa: BLE001 - a user's code must not keep a model from going
                 context.report("raised when it was ended")
 
-    def _find(self, plugin: Plugin, model: Model, places: dict[str, object]) -> Factory | None:
+    def _find(
+        self, plugin: Plugin, sensor: Sensor | None, model: Model, places: dict[str, object]
+    ) -> Factory | None:
         """Returns the plugin's factory; None, after a message, if there is none."""
-        library = os.path.basename(plugin.filename)
+        library = library_of(plugin.filename)
         if library in self._built_in:
             return self._built_in[library]
-        place = places.get(library)
+        place = places.get(library, places.get(plugin.filename))
         if place is None:
-            # The spawn services log it together with the sensors.
+            # The spawn services log all that is left out together.
             unknown = f"plugin {plugin.filename or 'without a filename'}"
+            unknown += f" of sensor '{sensor.name}'" if sensor else ""
             model.description.left_out.append(unknown)
             return None
         try:
@@ -159,6 +199,19 @@ class PluginRegistry:
                 model.name, library, place, rospy.resolve_name(PARAMETER), error,
             )  # fmt: skip
             return None
+
+
+def _built_in() -> dict[str, Factory]:
+    """Returns the plugins of this folder: each module's LIBRARIES, file names of libraries and a factory."""
+    modules = [
+        importlib.import_module(f"{__package__}.{found.name}")
+        for found in pkgutil.iter_modules([os.path.dirname(__file__)])
+    ]
+    return {
+        library: factory
+        for module in modules
+        for library, factory in getattr(module, "LIBRARIES", {}).items()
+    }
 
 
 def _warn_late(models: str) -> None:

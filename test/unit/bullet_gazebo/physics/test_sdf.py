@@ -247,11 +247,20 @@ def test_a_model_that_includes_itself_is_refused(tmp_path):
         parse_sdf(text, resources=Resources(models=(tmp_path,)))
 
 
-def test_what_is_not_simulated_is_named():
-    sensor = '<sensor name="eye" type="camera"/>'
-    model = parse_sdf(sdf(link("a", more=sensor), '<plugin name="p" filename="libp.so"/>'))
-    assert model.left_out == ["camera sensor 'eye' of link 'a'"]
-    assert model.plugins[0].filename == "libp.so"
+def test_sensors_and_plugins_are_read():
+    sensor = (
+        '<sensor name="eye" type="camera"><pose relative_to="b">0 0 1 0 0 0</pose><update_rate>30</update_rate>'
+        '<plugin name="q" filename="libq.so"/></sensor><sensor name="odd" type="ray"><pose>1</pose></sensor>'
+    )
+    link_b = link("b", pose="2 0 0 0 0 0")
+    joints = joint("j", "fixed", "a", "b")
+    text = sdf(link("a", more=sensor), link_b, joints, '<plugin name="p" filename="libp.so"/>')
+    model = parse_sdf(text)
+    [eye] = model.sensors
+    assert (eye.name, eye.kind, eye.link, eye.rate) == ("eye", "camera", "a", 30.0)
+    assert eye.pose.position == (2.0, 0.0, 1.0)
+    assert [plugin.filename for plugin in (*model.plugins, *eye.plugins)] == ["libp.so", "libq.so"]
+    assert "sensor 'odd'" in model.warnings[0] and "left out" in model.warnings[0]
 
 
 @pytest.mark.parametrize(

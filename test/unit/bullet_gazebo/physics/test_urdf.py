@@ -307,17 +307,26 @@ def test_a_wheel_stands_still_and_rolls(world):
     assert angular[1] * 0.1 == pytest.approx(linear[0], rel=0.02)
 
 
-def test_sensors_are_left_out_and_named():
+def test_sensors_and_plugins_frames_of_lumped_links_move_to_their_parents():
+    """TurtleBot3's: see docs/contract/sensors.md 0.6."""
+    joint = '<joint name="{0}_joint" type="fixed"><parent link="{1}"/><child link="{0}"/><origin xyz="{2}"/></joint>'
     extra = (
-        '<gazebo reference="base"><sensor type="ray" name="scan"><plugin filename="l.so"/></sensor>'
-        '<sensor type="imu" name="tilt"/></gazebo>'
+        '<link name="imu_link"/>'
+        + link("body")
+        + joint.format("body", "base", "0 0 0.01")
+        + joint.format("imu_link", "body", "-0.032 0 0.068")
+        + '<gazebo reference="body"><sensor type="ray" name="scan"><pose>1 0 0 0 0 0</pose>'
+        '<update_rate>5</update_rate></sensor></gazebo><gazebo><plugin filename="libgazebo_ros_imu.so">'
+        "<bodyName>imu_link</bodyName><frameName>imu_link</frameName></plugin></gazebo>"
     )
     model = parse_urdf(robot(link("base"), extra))
-    assert model.left_out == [
-        "ray sensor 'scan' of link 'base'",
-        "imu sensor 'tilt' of link 'base'",
-    ]
-    assert model.plugins == []
+    [scan] = model.sensors
+    assert (scan.link, scan.pose.position, scan.rate) == ("base", (1.0, 0.0, 0.01), 5.0)
+    plugin = model.plugins[0].element
+    assert [plugin.findtext(tag) for tag in ("bodyName", "frameName")] == ["base", "base"]
+    offset = [float(word) for word in plugin.findtext("xyzOffset").split()]
+    assert offset == pytest.approx([-0.032, 0.0, 0.078])
+    assert plugin.findtext("rpyOffset") == "0.0 0.0 0.0"
 
 
 angles = st.floats(-3.1, 3.1)
