@@ -37,9 +37,9 @@ class Fan(NamedTuple):
         """The angle between two readings [rad]; 0 for one alone."""
         return (self.high - self.low) / (self.readings - 1) if self.readings > 1 else 0.0
 
-    def angles(self) -> np.ndarray:
-        """Returns the angle of each ray [rad]: 0 for one alone."""
-        return np.linspace(self.low, self.high, self.samples) if self.samples > 1 else np.zeros(1)
+    def angles(self, count: int) -> np.ndarray:
+        """Returns the angles of so many rays or readings [rad]: 0 for one alone."""
+        return np.linspace(self.low, self.high, count) if count > 1 else np.zeros(1)
 
 
 class Laser:
@@ -63,7 +63,9 @@ class Laser:
         self.vertical = _fan(ray, "vertical", where, 1)
         rays = self.horizontal.samples * self.vertical.samples
         if rays > MOST_RAYS:
-            raise DescriptionError(f"{where} has {rays} rays; up to {MOST_RAYS} are cast (MOST_RAYS)")
+            raise DescriptionError(
+                f"{where} has {rays} rays; up to {MOST_RAYS} are cast (MOST_RAYS)"
+            )
         self.low = value(ray, "range/min", where, 0.0)
         self.high = value(ray, "range/max", where, 0.0)
         if not 0.0 <= self.low < self.high:
@@ -71,9 +73,16 @@ class Laser:
                 f"{where}: <range> is {self.low:g} to {self.high:g} m; it must be 0 or more, and rise"
             )
         self.noise: Noise | None = read_noise(ray, where)
-        yaw, pitch = np.meshgrid(self.horizontal.angles(), self.vertical.angles())
-        along = [np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)]
-        self._directions = np.stack(along, axis=-1).reshape(-1, 3)
+        angles = (
+            self.horizontal.angles(self.horizontal.samples),
+            self.vertical.angles(self.vertical.samples),
+        )
+        self._rays = _directions(*angles).reshape(-1, 3)
+
+    def directions(self) -> np.ndarray:
+        """Returns the directions of the readings in the sensor's axes: (rows, columns, 3), of length 1."""
+        fans = self.horizontal, self.vertical
+        return _directions(*(fan.angles(fan.readings) for fan in fans))
 
     def draw_bias(self, random: np.random.Generator) -> float:
         """Returns the bias of its ranges [m]."""
@@ -95,10 +104,13 @@ class Laser:
             limit.
         """
         turns, places = frames([pose])
-        directions = np.einsum("ij,kj->ki", turns[0], self._directions)
+        directions = np.einsum("ij,kj->ki", turns[0], self._rays)
         hits = scene.cast(places[0], directions, self.low, self.high)
         shape = self.vertical.samples, self.horizontal.samples
-        ranges, intensities = hits.distances.reshape(shape), self._retro(scene, hits.targets).reshape(shape)
+        ranges, intensities = (
+            hits.distances.reshape(shape),
+            self._retro(scene, hits.targets).reshape(shape),
+        )
         for axis, fan in enumerate((self.vertical, self.horizontal)):
             ranges, intensities = (_resampled(each, fan, axis) for each in (ranges, intensities))
         beyond, before = ranges >= self.high, ranges <= self.low
@@ -111,6 +123,13 @@ class Laser:
     def _retro(self, scene: RayScene, targets: np.ndarray) -> np.ndarray:
         retro = np.array([*(target.shape.retro for target in scene.targets), 0.0])
         return retro[targets]  # that of NONE is the last
+
+
+def _directions(yaws: np.ndarray, pitches: np.ndarray) -> np.ndarray:
+    yaw, pitch = np.meshgrid(yaws, pitches)
+    return np.stack(
+        [np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)], axis=-1
+    )
 
 
 def _fan(ray: Element, name: str, where: str, samples: int) -> Fan:

@@ -33,12 +33,12 @@ class Noise:
 
     def draw_bias(self, random: np.random.Generator) -> float:
         """Returns a sensor's bias: of either sign, as in Gazebo."""
-        size = random.normal(self.bias_mean, self.bias_stddev) if self.bias_stddev else self.bias_mean
+        size = (
+            random.normal(self.bias_mean, self.bias_stddev) if self.bias_stddev else self.bias_mean
+        )
         return float(size if random.random() < 0.5 else -size)
 
-    def applied(
-        self, values: np.ndarray, bias: float, random: np.random.Generator
-    ) -> np.ndarray:
+    def applied(self, values: np.ndarray, bias: float, random: np.random.Generator) -> np.ndarray:
         """Returns `values` with bias and noise."""
         noisy = values + bias + random.normal(self.mean, self.stddev, np.shape(values))
         return np.rint(noisy / self.precision) * self.precision if self.precision else noisy

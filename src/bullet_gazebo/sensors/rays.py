@@ -91,7 +91,9 @@ class RayScene:
         targets, rays = self._pairs(origin, directions, far)
         for kind in DISTANCES:
             some = self._kinds[targets] == kind
-            distances = self._distances(kind, targets[some], starts[rays[some]], directions[rays[some]])
+            distances = self._distances(
+                kind, targets[some], starts[rays[some]], directions[rays[some]]
+            )
             _improve(found, rays[some], targets[some], distances)
         for target, triangles in self._apart_meshes.items():
             some = rays[targets == target]
@@ -120,7 +122,9 @@ class RayScene:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns which targets' bounding balls are met by which rays: two arrays of indices."""
         apart = self._apart
-        centres = self._places[apart] + np.einsum("kij,kj->ki", self._turns[apart], self._centres[apart])
+        centres = self._places[apart] + np.einsum(
+            "kij,kj->ki", self._turns[apart], self._centres[apart]
+        )
         ways = centres - origin
         radii = self._radii[apart]
         room = np.einsum("ij,ij->i", ways, ways) - radii**2
@@ -128,7 +132,10 @@ class RayScene:
         tangents = np.where(room > 0.0, np.sqrt(np.maximum(room, 0.0)), -np.inf)
         tangents[tangents > far] = np.inf
         least = (tangents - MARGIN * (1.0 + np.abs(tangents))).astype(np.float32)
-        (x, y, z), (dx, dy, dz) = ways.astype(np.float32).T[..., None], directions.astype(np.float32).T
+        (x, y, z), (dx, dy, dz) = (
+            ways.astype(np.float32).T[..., None],
+            directions.astype(np.float32).T,
+        )
         along = x * dx
         along += y * dy
         along += z * dz

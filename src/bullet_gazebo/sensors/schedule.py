@@ -15,8 +15,11 @@ Measure = Callable[[int], None]
 class Clock:
     """The clock of one sensor. `Schedule.add` makes it."""
 
-    def __init__(self, schedule: "Schedule", rate: float, measure: Measure, now: int) -> None:
+    def __init__(
+        self, schedule: "Schedule", rate: float, measure: Measure, at_once: bool, now: int
+    ) -> None:
         self._schedule = schedule
+        self.at_once = at_once
         self.period = round(NANOSECONDS / rate) if rate > 0.0 else 0  # [ns]
         self.measure = measure
         self.begin = self.last = now  # [ns]
@@ -24,7 +27,7 @@ class Clock:
         self.plan(now)
 
     def hear(self, is_heard: bool) -> None:
-        """Says whether somebody listens. One who comes after more than a period gets a measurement at once.
+        """Says whether somebody listens.
 
         The caller doesn't hold the simulator's lock.
         """
@@ -51,15 +54,17 @@ class Schedule:
         self.prepare: list[Callable[[], None]] = []  # called before the measurements of one time
         sim.moved.append(self._moved)
 
-    def add(self, rate: float, measure: Measure) -> Clock:
+    def add(self, rate: float, measure: Measure, at_once: bool = True) -> Clock:
         """Returns a clock that calls `measure` with the time [ns], under the simulator's lock.
 
         Args:
             rate: in Hz of simulated time; 0 is every step.
             measure: takes a measurement and sends it.
+            at_once: whether it measures as soon as somebody listens, if a period has passed since the last
+                measurement.
         """
         with self._sim.lock:
-            clock = Clock(self, rate, measure, self._sim.now)
+            clock = Clock(self, rate, measure, at_once, self._sim.now)
             self._clocks.append(clock)
         return clock
 
@@ -76,7 +81,7 @@ class Schedule:
             now = self._sim.now
             clock.plan(now)
             self._listen()
-            if is_heard and now - clock.last > clock.period:
+            if is_heard and clock.at_once and now - clock.last > clock.period:
                 self._take([clock])
 
     def _listen(self) -> None:

@@ -26,13 +26,13 @@ class Sensing:
         self.schedule.prepare += [self.collisions.expire, self.visuals.expire]
         self._seed = seed
 
-    def noise(self, model: Model, sensor: Sensor, now: int) -> np.random.Generator:
-        """Returns what draws the noise of a measurement at `now` [ns]."""
-        return generator(self._seed, model.name, sensor.name, self.schedule.moves, now)
+    def noise(self, model: Model, name: str, now: int) -> np.random.Generator:
+        """Returns what draws the noise of the measurement at `now` [ns] by the sensor or plugin `name`."""
+        return generator(self._seed, model.name, name, self.schedule.moves, now)
 
-    def bias(self, model: Model, sensor: Sensor) -> np.random.Generator:
-        """Returns what draws the biases of a sensor, once."""
-        return generator(self._seed, model.name, sensor.name, "bias")
+    def bias(self, model: Model, name: str) -> np.random.Generator:
+        """Returns what draws its biases, once."""
+        return generator(self._seed, model.name, name, "bias")
 
 
 def sensor_pose(model: Model, sensor: Sensor) -> Pose:

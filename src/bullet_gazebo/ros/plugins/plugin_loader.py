@@ -60,10 +60,10 @@ class PluginContext:
         """Returns the number in the plugin's child element `tag`; a faulty one is a DescriptionError."""
         return value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)
 
-    def clock(self, rate: float, measure: Update) -> Clock:
+    def clock(self, rate: float, measure: Update, at_once: bool = True) -> Clock:
         """Calls `measure` with the simulated time [ns] at a rate [Hz; 0 is every step], while it is heard.
 
-        Otherwise as `on_update`. End the clock in `shutdown`.
+        The arguments are those of `Schedule.add`, the rest is as for `on_update`. End the clock in `shutdown`.
         """
 
         def guarded(now: int) -> None:
@@ -73,7 +73,7 @@ class PluginContext:
                 self.report("measures no more, because it raised")
                 clock.heard = False
 
-        clock = self.sensing.schedule.add(rate, guarded)
+        clock = self.sensing.schedule.add(rate, guarded, at_once)
         return clock
 
     def on_update(self, update: Update) -> None:

@@ -3,12 +3,20 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 import rospy
+from geometry_msgs.msg import Quaternion, Vector3
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Header
 
 from bullet_gazebo.physics.description import DescriptionError, Sensor
+from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.common.publishing import SubscriberCount
 from bullet_gazebo.ros.plugins.control_plugin import find_param
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
+from bullet_gazebo.sensors.imu import InertialSample
+from bullet_gazebo.sensors.laser import KINDS, Laser, Scan
+from bullet_gazebo.sensors.sensing import sensor_pose
 
 MODEL = "<model>"  # where a namespace is the model's name
 
@@ -22,7 +30,9 @@ def sensor_of(context: PluginContext, kinds: Sequence[str]) -> Sensor:
     sensor = context.sensor
     if sensor is None or sensor.kind not in kinds:
         found = "a model" if sensor is None else f"the {sensor.kind} sensor '{sensor.name}'"
-        raise DescriptionError(f"it belongs to {found}, not to a sensor of type {' or '.join(kinds)}")
+        raise DescriptionError(
+            f"it belongs to {found}, not to a sensor of type {' or '.join(kinds)}"
+        )
     return sensor
 
 
@@ -60,7 +70,9 @@ class SensorTopic:
         name: the topic's full name.
         kind: the message's type.
         rate: in Hz of simulated time; 0 is every step.
-        measure: returns a message with the stamp of the given time [ns].
+        measure: returns a message with the stamp of the given time [ns]; or None, to send nothing.
+        unheard: called when the last subscriber has gone. Such a sensor compares measurements, so the first
+            one of a subscriber comes when it is due, not at once.
     """
 
     def __init__(
@@ -70,8 +82,11 @@ class SensorTopic:
         kind: type,
         rate: float,
         measure: Callable[[int], Any],
+        unheard: Callable[[], None] | None = None,
     ) -> None:
-        self._clock = context.clock(rate, lambda now: self._publisher.publish(measure(now)))
+        self._measure = measure
+        self._unheard = unheard
+        self._clock = context.clock(rate, self._send, at_once=unheard is None)
         self._subscribers = SubscriberCount(self._hear)
         self._publisher = rospy.Publisher(
             name, kind, subscriber_listener=self._subscribers, queue_size=1, tcp_nodelay=True
@@ -82,4 +97,75 @@ class SensorTopic:
         self._clock.end()
 
     def _hear(self) -> None:
+        if not self._subscribers.size and self._unheard is not None:
+            self._unheard()
         self._clock.hear(self._subscribers.size > 0)
+
+    def _send(self, now: int) -> None:
+        message = self._measure(now)
+        if message is not None:
+            self._publisher.publish(message)
+
+
+class LaserTopic:
+    """The topic of a laser's plugin, which turns scans into messages.
+
+    Args:
+        context: the plugin's.
+        kind: the message's type.
+        message: returns the message of a scan at a time [ns]; further noise is drawn from the generator.
+        name: the topic without `<topicName>`. With an empty one nothing is published.
+        empty: the namespace of an empty `<robotNamespace>`.
+        own_rate: the plugin's own [Hz]; the slower of this and the sensor's counts.
+    """
+
+    def __init__(
+        self,
+        context: PluginContext,
+        kind: type,
+        message: Callable[[Scan, int, np.random.Generator], Any],
+        name: str,
+        empty: str,
+        own_rate: float = 0.0,
+    ) -> None:
+        self._context = context
+        self._message = message
+        self._sensor = sensor = sensor_of(context, KINDS)
+        self.laser = Laser(sensor)
+        sensing = context.sensing
+        self._scene = sensing.visuals if self.laser.sees_visuals else sensing.collisions
+        self._bias = self.laser.draw_bias(sensing.bias(context.model, sensor.name))
+        namespace = namespace_of(context, absent="", empty=empty)
+        self.frame = frame_of(namespace, context.text("frameName", "/world"))
+        self._topic = None
+        topic = context.plugin.element.findtext("topicName", name).strip()
+        if topic:
+            rate = min((each for each in (own_rate, sensor.rate) if each > 0.0), default=0.0)
+            full = topic_in(namespace, topic)
+            self._topic = SensorTopic(context, full, kind, rate, self._measure)
+        else:
+            rospy.logwarn("Sensor '%s': its <topicName> is empty", sensor.name)
+
+    def close(self) -> None:
+        if self._topic is not None:
+            self._topic.close()
+
+    def _measure(self, now: int) -> Any:
+        model = self._context.model
+        random = self._context.sensing.noise(model, self._sensor.name, now)
+        pose = sensor_pose(model, self._sensor)
+        return self._message(self.laser.measure(self._scene, pose, self._bias, random), now, random)
+
+
+def to_imu(sample: InertialSample, now: int, frame: str, deviation: float) -> Imu:
+    """Returns the message of a measurement; the covariances are those of the plugin's own noise."""
+    diagonal = [deviation**2, 0.0, 0.0, 0.0, deviation**2, 0.0, 0.0, 0.0, deviation**2]
+    return Imu(
+        header=Header(stamp=to_time(now), frame_id=frame),
+        orientation=Quaternion(*sample.orientation),
+        orientation_covariance=diagonal,
+        angular_velocity=Vector3(*sample.angular_velocity),
+        angular_velocity_covariance=diagonal,
+        linear_acceleration=Vector3(*sample.linear_acceleration),
+        linear_acceleration_covariance=diagonal,
+    )
