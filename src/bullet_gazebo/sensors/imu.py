@@ -18,6 +18,7 @@ from bullet_gazebo.physics.pose import (
 )
 
 NANOSECONDS = 1_000_000_000
+HERE = Pose()
 
 
 class Motion(NamedTuple):
@@ -36,7 +37,7 @@ class InertialSample(NamedTuple):
     linear_acceleration: Vector
 
 
-def motion_of(model: Model, link: str, offset: Pose = Pose()) -> Motion:
+def motion_of(model: Model, link: str, offset: Pose = HERE) -> Motion:
     """Returns the motion of the frame at `offset` in a link."""
     pose, (linear, angular) = model.link_state(link)
     at = pose.compose(offset)
@@ -88,7 +89,7 @@ class Imu:
 def with_noise(
     sample: InertialSample, deviation: float, random: np.random.Generator
 ) -> InertialSample:
-    """Returns a sample with Gaussian noise of one deviation on all ten numbers; the quaternion keeps length 1."""
+    """Adds Gaussian noise of one deviation to all ten numbers; the quaternion keeps its length of 1."""
     if not deviation:
         return sample
     noisy = [

@@ -63,7 +63,7 @@ class PluginContext:
     def clock(self, rate: float, measure: Update, at_once: bool = True) -> Clock:
         """Calls `measure` with the simulated time [ns] at a rate [Hz; 0 is every step], while it is heard.
 
-        The arguments are those of `Schedule.add`, the rest is as for `on_update`. End the clock in `shutdown`.
+        Arguments are those of `Schedule.add`, the rest is as for `on_update`. End the clock in `shutdown`.
         """
 
         def guarded(now: int) -> None:

@@ -57,7 +57,7 @@ def topic_in(namespace: str, name: str) -> str:
 
 
 def frame_of(namespace: str, frame: str) -> str:
-    """Returns a frame's name with the `tf_prefix` found in the namespace or above; without a leading slash."""
+    """Returns a frame's name with the `tf_prefix` of the namespace or above; without a leading slash."""
     prefix = "" if frame.startswith("/") else str(find_param(f"/{namespace}", "tf_prefix") or "")
     return "/".join(filter(None, [*prefix.split("/"), *frame.split("/")]))
 

@@ -309,7 +309,10 @@ def test_a_wheel_stands_still_and_rolls(world):
 
 def test_sensors_and_plugins_frames_of_lumped_links_move_to_their_parents():
     """TurtleBot3's: see docs/contract/sensors.md 0.6."""
-    joint = '<joint name="{0}_joint" type="fixed"><parent link="{1}"/><child link="{0}"/><origin xyz="{2}"/></joint>'
+    joint = (
+        '<joint name="{0}_joint" type="fixed"><parent link="{1}"/><child link="{0}"/>'
+        '<origin xyz="{2}"/></joint>'
+    )
     extra = (
         '<link name="imu_link"/>'
         + link("body")

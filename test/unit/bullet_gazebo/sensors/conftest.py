@@ -10,6 +10,7 @@ SHAPES = {
     "cylinder": "<cylinder><radius>{}</radius><length>{}</length></cylinder>",
     "sphere": "<sphere><radius>{}</radius></sphere>",
 }
+HERE = Pose()
 MODEL = """<sdf version="1.6"><model name="m"><static>{static}</static><link name="link">
 <inertial><mass>1</mass></inertial>{shapes}{more}</link></model></sdf>"""
 
@@ -18,7 +19,7 @@ MODEL = """<sdf version="1.6"><model name="m"><static>{static}</static><link nam
 def put(world):
     """Spawn a model of one shape: `put(name, kind, size, pose, static, tag, more)`."""
 
-    def spawn(name, kind, size, at=Pose(), static=True, tag="collision", more="", retro=0.0):
+    def spawn(name, kind, size, at=HERE, static=True, tag="collision", more="", retro=0.0):
         shape = SHAPES[kind].format(*size)
         shapes = f'<{tag} name="c"><laser_retro>{retro}</laser_retro><geometry>{shape}</geometry></{tag}>'
         text = MODEL.format(static=int(static), shapes=shapes, more=more)

@@ -24,12 +24,15 @@ DEFAULTS = {
 }  # fmt: skip
 
 
+EYE = Pose((0.0, 0.0, 0.5))
+
+
 def laser(**options):
     [sensor] = parse_sdf(LASER.format(**{**DEFAULTS, **options})).sensors
     return Laser(sensor)
 
 
-def scan(laser, world, pose=Pose((0.0, 0.0, 0.5)), key=0):
+def scan(laser, world, pose=EYE, key=0):
     scene = RayScene(world, laser.sees_visuals)
     return laser.measure(scene, pose, 0.0, generator(0, key))
 
