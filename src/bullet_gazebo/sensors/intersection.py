@@ -62,8 +62,43 @@ def _first(enter: Numbers, leave: Numbers, meets: Numbers) -> Numbers:
     return np.where(meets & (leave >= 0.0), distances, np.inf)
 
 
+def box_normals(points: Numbers, sizes: Numbers) -> Numbers:
+    """Returns the outward normals (k, 3) at points of the surface of a box with edges `sizes` (3,)."""
+    shares = points / (0.5 * sizes)
+    axes = np.abs(shares).argmax(axis=1)
+    rows = np.arange(len(points))
+    normals = np.zeros_like(points)
+    normals[rows, axes] = np.sign(shares[rows, axes])
+    return normals
+
+
+def ball_normals(points: Numbers, sizes: Numbers) -> Numbers:
+    """Returns the outward normals (k, 3) of a ball of radius `sizes[0]`."""
+    return np.asarray(points / sizes[0])
+
+
+def cylinder_normals(points: Numbers, sizes: Numbers) -> Numbers:
+    """Returns the outward normals (k, 3) of a cylinder of radius `sizes[0]` and length `sizes[1]`."""
+    height = points[:, 2] / (0.5 * sizes[1])
+    on_side = np.hypot(points[:, 0], points[:, 1]) / sizes[0] >= np.abs(height)
+    side = np.column_stack([points[:, :2] / sizes[0], np.zeros(len(points))])
+    end = np.column_stack([np.zeros((len(points), 2)), np.sign(height)])
+    return np.where(on_side[:, None], side, end)
+
+
+def plane_normals(points: Numbers, sizes: Numbers) -> Numbers:
+    """Returns the normals (k, 3) of a plane through its x and y axes."""
+    return np.broadcast_to((0.0, 0.0, 1.0), points.shape)
+
+
 DISTANCES: dict[str, Distances] = {
     "box": box_distances,
     "sphere": ball_distances,
     "cylinder": cylinder_distances,
+}
+NORMALS: dict[str, Callable[[Numbers, Numbers], Numbers]] = {
+    "box": box_normals,
+    "sphere": ball_normals,
+    "cylinder": cylinder_normals,
+    "plane": plane_normals,
 }

@@ -6,19 +6,21 @@ kept, boxes, balls and cylinders analytically. So nothing is built while things 
 with shapes whose bounding ball it meets.
 """
 
+import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from bullet_gazebo.physics.description import Shape
+from bullet_gazebo.physics.description import DescriptionError, Link, Shape
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.pictures.visuals import solid_of
-from bullet_gazebo.sensors.intersection import DISTANCES
+from bullet_gazebo.pictures.visuals import Piece, pieces_of, solid_of
+from bullet_gazebo.sensors.intersection import DISTANCES, NORMALS
 
+logger = logging.getLogger(__name__)
 LARGE = 2000  # triangles of a mesh that isn't built anew with its neighbours
 CURVED = ("sphere", "cylinder")  # their triangles lie a little within them
 NONE = -1
@@ -26,18 +28,40 @@ MARGIN = 1e-5  # [m], and relative: of the comparison of rays and balls, in floa
 
 
 class Target(NamedTuple):
-    """A shape that rays meet."""
+    """A shape that rays meet; a visual mesh has a target for each of its colours and textures."""
 
     model: Model
     link: str
     shape: Shape
+    piece: Piece | None = None
+
+    def corners(self) -> np.ndarray:
+        """Returns the corners (3 n, 3) of its triangles, in the shape's frame [m]."""
+        return (self.piece.solid if self.piece else solid_of(self.shape)).corners
 
 
 class Hits(NamedTuple):
-    """What rays meet first: distances (n,) [m], inf for nothing; indices (n,) of targets, -1 for none."""
+    """What rays meet first.
+
+    Attributes:
+        distances: (n,) [m]; inf for nothing.
+        targets: (n,) indices of targets; -1 for none.
+        triangles: (n,) index of the target's triangle, where triangles were met.
+        weights: (n, 2) of its second and third corner at the point that is met.
+    """
 
     distances: np.ndarray
     targets: np.ndarray
+    triangles: np.ndarray
+    weights: np.ndarray
+
+    def improve(self, rays: np.ndarray, targets: Any, distances: np.ndarray) -> np.ndarray:
+        """Takes over nearer hits, of several of a ray the nearest one; returns which are taken."""
+        nearer = np.flatnonzero(distances < self.distances[rays])
+        order = nearer[np.argsort(-distances[nearer], kind="stable")]  # the last one assigned holds
+        self.distances[rays[order]] = distances[order]
+        self.targets[rays[order]] = np.broadcast_to(targets, distances.shape)[order]
+        return order
 
 
 class RayScene:
@@ -70,52 +94,78 @@ class RayScene:
         self._is_fresh = True
 
     def cast(
-        self, origin: np.ndarray, directions: np.ndarray, near: float = 0.0, far: float = math.inf
+        self, origin: np.ndarray, directions: np.ndarray, near: Any = 0.0, far: Any = math.inf
     ) -> Hits:
-        """Returns what rays meet first, between the distances `near` and `far` [m] from their origin.
+        """Returns what rays meet first.
 
         A ray that starts inside a shape meets it where it leaves.
 
         Args:
             origin: (3,) in the world [m].
             directions: (n, 3) of length 1, in world axes.
+            near: where rays start, as a distance from the origin [m]; of each ray (n,), or of all.
+            far: where they end.
         """
         if not self._is_fresh:
             self._refresh()
-        starts = origin + near * directions
-        found = Hits(np.full(len(directions), np.inf), np.full(len(directions), NONE))
+        count = len(directions)
+        starts = origin + np.reshape(near, (-1, 1)) * directions
+        found = Hits(
+            np.full(count, np.inf), np.full(count, NONE), np.zeros(count, int), np.zeros((count, 2))
+        )
         self._meet_still(found, starts, directions)
-        rays = np.arange(len(directions))
+        rays = np.arange(count)
         for target in self._planes:
-            _improve(found, rays, target, self._plane_distances(target, starts, directions))
-        targets, rays = self._pairs(origin, directions, far)
+            found.improve(rays, target, self._plane_distances(target, starts, directions))
+        targets, rays = self._pairs(origin, directions, np.max(far))
         for kind in DISTANCES:
             some = self._kinds[targets] == kind
             distances = self._distances(
                 kind, targets[some], starts[rays[some]], directions[rays[some]]
             )
-            _improve(found, rays[some], targets[some], distances)
+            found.improve(rays[some], targets[some], distances)
         for target, triangles in self._apart_meshes.items():
-            some = rays[targets == target]
-            if len(some):
-                turn, place = self._turns[target], self._places[target]
-                own = triangles.first((starts[some] - place) @ turn, directions[some] @ turn)[0]
-                _improve(found, some, target, own)
+            self._meet_mesh(found, target, triangles, rays[targets == target], starts, directions)
         found.distances[:] += near
         beyond = found.distances > far
         found.distances[beyond], found.targets[beyond] = np.inf, NONE
         return found
 
+    def normals(self, target: int, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+        """Returns the normals (k, 3), in world axes, of a target at points (k, 3) of its surface."""
+        turn, kind = self._turns[target], self._kinds[target]
+        if kind == "mesh":
+            corners = self.targets[target].corners().reshape(-1, 3, 3)[triangles]
+            own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            length = np.linalg.norm(own, axis=1, keepdims=True)
+            own = own / np.where(length > 0.0, length, 1.0)
+        else:
+            own = NORMALS[kind]((points - self._places[target]) @ turn, self._sizes[target])
+        return np.asarray(own @ turn.T)
+
     def _meet_still(self, found: Hits, starts: np.ndarray, directions: np.ndarray) -> None:
         if not len(self._still):
             return
-        distances, parts = self._still_triangles.first(starts, directions)
-        hit = np.flatnonzero(parts != NONE)
-        found.distances[hit], found.targets[hit] = distances[hit], self._still[parts[hit]]
+        met = self._still_triangles.first(starts, directions)
+        hit = np.flatnonzero(met.parts != NONE)
+        found.distances[hit], found.targets[hit] = met.distances[hit], self._still[met.parts[hit]]
+        found.triangles[hit], found.weights[hit] = met.triangles[hit], met.weights[hit]
         for kind in CURVED:
             some = hit[self._kinds[found.targets[hit]] == kind]
             exact = self._distances(kind, found.targets[some], starts[some], directions[some])
             found.distances[some] = np.where(exact < np.inf, exact, found.distances[some])
+
+    def _meet_mesh(
+        self, found: Hits, target: int, triangles: "_Triangles", rays: np.ndarray,
+        starts: np.ndarray, directions: np.ndarray,
+    ) -> None:  # fmt: skip
+        if not len(rays):
+            return
+        turn, place = self._turns[target], self._places[target]
+        met = triangles.first((starts[rays] - place) @ turn, directions[rays] @ turn)
+        some = found.improve(rays, target, met.distances)
+        found.triangles[rays[some]] = met.triangles[some]
+        found.weights[rays[some]] = met.weights[some]
 
     def _pairs(
         self, origin: np.ndarray, directions: np.ndarray, far: float
@@ -164,10 +214,10 @@ class RayScene:
 
     def _build(self) -> None:
         self.targets = targets = [
-            Target(model, link.name, shape)
+            target
             for model in self._world.models.values()
             for link in model.description.links.values()
-            for shape in _shapes(link.visuals, link.collisions, self._visuals)
+            for target in (_seen if self._visuals else _solid)(model, link)
         ]
         count = len(targets)
         self._kinds = np.array([*(target.shape.kind for target in targets), ""])  # of NONE, too
@@ -185,7 +235,7 @@ class RayScene:
             if shape.kind == "plane":
                 continue
             self._sizes[index, : len(shape.size)] = shape.size
-            corners = solid_of(shape).corners
+            corners = target.corners()
             is_large = shape.kind == "mesh" and len(corners) > 3 * LARGE
             if target.model.description.static and not is_large:
                 still.append(index)
@@ -194,7 +244,8 @@ class RayScene:
             apart.append(index)
             self._surround(index, corners)
             if shape.kind == "mesh":
-                key = shape.solid or shape.mesh, shape.size
+                # Pieces of a file are told apart by their triangles' place in it: it is the target's.
+                key = shape.solid or shape.mesh, shape.size, _number(targets, index)
                 self._meshes[key] = kept.get(key) or self._meshes.get(key) or _Triangles([corners])
                 self._apart_meshes[index] = self._meshes[key]
         self._still, self._apart = np.array(still, int), np.array(apart, int)
@@ -211,7 +262,7 @@ class RayScene:
         poses: dict[Model, dict[str, Pose]] = {}
         links = []
         for index in targets.tolist():
-            model, link, _ = self.targets[index]
+            model, link = self.targets[index][:2]
             if model not in poses:
                 poses[model] = model.body.link_poses()
             links.append(poses[model][link])
@@ -233,17 +284,40 @@ def frames(poses: Sequence[Pose]) -> tuple[np.ndarray, np.ndarray]:
     return np.array(rows).transpose(2, 0, 1), places
 
 
-def _shapes(visuals: list[Shape], collisions: list[Shape], visible: bool) -> list[Shape]:
-    # A plane is read as a collision only.
-    return [*visuals, *(s for s in collisions if s.kind == "plane")] if visible else collisions
+def _solid(model: Model, link: Link) -> list[Target]:
+    return [Target(model, link.name, shape) for shape in link.collisions]
 
 
-def _improve(found: Hits, rays: np.ndarray, targets: Any, distances: np.ndarray) -> None:
-    """Takes over nearer hits; of several of a ray the nearest one."""
-    nearer = np.flatnonzero(distances < found.distances[rays])
-    order = nearer[np.argsort(-distances[nearer], kind="stable")]  # the last one assigned holds
-    found.distances[rays[order]] = distances[order]
-    found.targets[rays[order]] = np.broadcast_to(targets, distances.shape)[order]
+def _seen(model: Model, link: Link) -> Iterator[Target]:
+    """Yields what is visible of a link. A plane is read as a collision only."""
+    planes = [shape for shape in link.collisions if shape.kind == "plane"]
+    for shape in [*link.visuals, *planes]:
+        if shape.kind != "mesh":
+            yield Target(model, link.name, shape)
+            continue
+        try:
+            yield from (Target(model, link.name, shape, piece) for piece in pieces_of(shape))
+        except DescriptionError as error:
+            logger.warning(
+                "model '%s', link '%s' isn't seen whole: %s", model.name, link.name, error
+            )
+
+
+def _number(targets: Sequence[Target], index: int) -> int:
+    """Returns which of its shape's targets this one is."""
+    shape, number = targets[index].shape, 0
+    while number < index and targets[index - number - 1].shape is shape:
+        number += 1
+    return number
+
+
+class _Met(NamedTuple):
+    """What Embree finds: see `Hits`; `parts` (n,) are -1 for none."""
+
+    distances: np.ndarray
+    parts: np.ndarray
+    triangles: np.ndarray
+    weights: np.ndarray
 
 
 class _Triangles:
@@ -257,11 +331,12 @@ class _Triangles:
         for corners in parts:
             TriangleMesh(self._scene, corners.reshape(-1, 3, 3).astype(np.float32))
 
-    def first(self, starts: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns distances (n,) [m] and the parts' indices (n,), -1 for none."""
+    def first(self, starts: np.ndarray, directions: np.ndarray) -> _Met:
+        """Returns what rays (n, 3) meet first."""
         found = self._scene.run(
             np.ascontiguousarray(starts, np.float32), np.ascontiguousarray(directions, np.float32),
             query="INTERSECT", output=True,
         )  # fmt: skip
         parts = found["geomID"]
-        return np.where(parts == NONE, np.inf, found["tfar"]).astype(float), parts
+        distances = np.where(parts == NONE, np.inf, found["tfar"]).astype(float)
+        return _Met(distances, parts, found["primID"], np.stack([found["u"], found["v"]], axis=1))

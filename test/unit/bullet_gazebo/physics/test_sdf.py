@@ -249,7 +249,8 @@ def test_a_model_that_includes_itself_is_refused(tmp_path):
 
 def test_sensors_and_plugins_are_read():
     sensor = (
-        '<sensor name="eye" type="camera"><pose relative_to="b">0 0 1 0 0 0</pose><update_rate>30</update_rate>'
+        '<sensor name="eye" type="camera"><pose relative_to="b">0 0 1 0 0 0</pose>'
+        "<update_rate>30</update_rate>"
         '<plugin name="q" filename="libq.so"/></sensor><sensor name="odd" type="ray"><pose>1</pose></sensor>'
     )
     link_b = link("b", pose="2 0 0 0 0 0")

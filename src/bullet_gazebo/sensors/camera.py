@@ -1,0 +1,118 @@
+"""Cameras: colours and depths of what lies before a pinhole (docs/contract/sensors.md 4)."""
+
+import math
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from bullet_gazebo.physics.description import DescriptionError, Sensor
+from bullet_gazebo.physics.files.sdf_parts import read_pose, value
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.sensors.noise import Noise, read_noise
+from bullet_gazebo.sensors.rays import RayScene, frames
+from bullet_gazebo.sensors.shading import colours
+
+MOST_PIXELS = 4_000_000
+
+
+class Picture(NamedTuple):
+    """What a camera sees.
+
+    Attributes:
+        colours: (height, width, 3) of uint8.
+        depths: (height, width) along the optical axis [m]; inf for nothing within the clips.
+    """
+
+    colours: np.ndarray
+    depths: np.ndarray
+
+
+class PinholeCamera:
+    """A camera.
+
+    Args:
+        element: a `<camera>`.
+        pose: of what holds it, in its link.
+        where: names it in errors.
+
+    Raises:
+        DescriptionError: if it can't be simulated.
+    """
+
+    def __init__(self, element: Element, pose: Pose, where: str) -> None:
+        self.pose = pose.compose(read_pose(element, f"{where}, <camera>")[0])
+        self.width, self.height = (
+            _pixels(element, f"image/{tag}", where, default)
+            for tag, default in (("width", 320), ("height", 240))
+        )
+        if self.width * self.height > MOST_PIXELS:
+            raise DescriptionError(
+                f"{where}: a picture of {self.width} x {self.height} has more than {MOST_PIXELS} pixels"
+            )
+        self.field_of_view = value(element, "horizontal_fov", where, 1.047)  # [rad]
+        if not 0.0 < self.field_of_view < math.pi:
+            raise DescriptionError(f"{where}: <horizontal_fov> is {self.field_of_view:g} rad")
+        self.format = (element.findtext("image/format") or "R8G8B8").strip()
+        self.near = value(element, "clip/near", where, 0.1)
+        self.far = value(element, "clip/far", where, 100.0)
+        if not 0.0 <= self.near < self.far:
+            raise DescriptionError(f"{where}: <clip> is {self.near:g} to {self.far:g} m")
+        self.noise: Noise | None = read_noise(element, where)
+        self.focal_length = self.width / (2.0 * math.tan(self.field_of_view / 2.0))  # [pixels]
+        right = (np.arange(self.width) + 0.5 - self.width / 2.0) / self.focal_length
+        down = (np.arange(self.height) + 0.5 - self.height / 2.0) / self.focal_length
+        x, y = np.meshgrid(right, down)
+        ahead = np.stack([np.ones_like(x), -x, -y], axis=-1).reshape(-1, 3)
+        lengths = np.linalg.norm(ahead, axis=1)
+        self._directions = ahead / lengths[:, None]
+        self._cosines = 1.0 / lengths
+
+    def picture(self, scene: RayScene, link: Pose, in_colour: bool = True) -> Picture:
+        """Returns what the camera sees, without noise; black if not `in_colour`.
+
+        Args:
+            scene: the visuals.
+            link: pose of its link in the world.
+            in_colour: whether colours are wanted.
+        """
+        turns, places = frames([link.compose(self.pose)])
+        directions = np.einsum("ij,kj->ki", turns[0], self._directions)
+        clips = self.near / self._cosines, self.far / self._cosines
+        hits = scene.cast(places[0], directions, *clips)
+        shape = self.height, self.width
+        seen = np.zeros((*shape, 3), np.uint8)
+        if in_colour:
+            found = colours(scene, hits, places[0], directions)
+            seen = np.rint(np.clip(found, 0.0, 255.0)).astype(np.uint8).reshape(*shape, 3)
+        return Picture(seen, (hits.distances * self._cosines).reshape(shape))
+
+
+def noisy(
+    picture: np.ndarray, noise: Noise | None, bias: float, random: np.random.Generator
+) -> np.ndarray:
+    """Returns a picture of uint8 with noise, whose unit is the whole range of a channel."""
+    if noise is None:
+        return picture
+    values = noise.applied(picture / 255.0, bias, random)
+    return np.rint(255.0 * np.clip(values, 0.0, 1.0)).astype(np.uint8)
+
+
+def camera_of(sensor: Sensor) -> PinholeCamera:
+    """Returns the only camera of a sensor.
+
+    Raises:
+        DescriptionError: if it has none, or it can't be simulated.
+    """
+    where = f"sensor '{sensor.name}'"
+    element = sensor.element.find("camera")
+    if element is None:
+        raise DescriptionError(f"{where} has no <camera>")
+    return PinholeCamera(element, sensor.pose, where)
+
+
+def _pixels(element: Element, path: str, where: str, default: int) -> int:
+    count = value(element, path, where, default)
+    if count != int(count) or not 1 <= count <= MOST_PIXELS:
+        raise DescriptionError(f"{where}: <{path}> is {count:g}")
+    return int(count)
