@@ -62,18 +62,76 @@ def frame_of(namespace: str, frame: str) -> str:
     return "/".join(filter(None, [*prefix.split("/"), *frame.split("/")]))
 
 
-class SensorTopic:
-    """A topic of measurements, which are taken while it has subscribers.
+class Topic:
+    """A topic of a sensor; see `SensorTopics.advertise`."""
+
+    def __init__(self, name: str, kind: type, queue: int, latch: bool, changed: Callable[[], None]):
+        self._subscribers = SubscriberCount(changed)
+        self._publisher = rospy.Publisher(
+            name, kind, subscriber_listener=self._subscribers, queue_size=queue, latch=latch,
+            tcp_nodelay=True,
+        )  # fmt: skip
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether it has subscribers."""
+        return self._subscribers.size > 0
+
+    def publish(self, message: Any) -> None:
+        self._publisher.publish(message)
+
+    def close(self) -> None:
+        self._publisher.unregister()
+
+
+class SensorTopics:
+    """The topics of one sensor, which measures while one of them has subscribers.
 
     Args:
         context: the plugin's.
-        name: the topic's full name.
-        kind: the message's type.
         rate: in Hz of simulated time; 0 is every step.
-        measure: returns a message with the stamp of the given time [ns]; or None, to send nothing.
+        measure: takes a measurement at the given time [ns] and publishes it.
         unheard: called when the last subscriber has gone. Such a sensor compares measurements, so the first
             one of a subscriber comes when it is due, not at once.
     """
+
+    def __init__(
+        self,
+        context: PluginContext,
+        rate: float,
+        measure: Callable[[int], None],
+        unheard: Callable[[], None] | None = None,
+    ) -> None:
+        self._unheard = unheard
+        self._waking: list[Topic] = []
+        self._topics: list[Topic] = []
+        self._clock = context.clock(rate, measure, at_once=unheard is None)
+
+    def advertise(
+        self, name: str, kind: type, queue: int = 1, latch: bool = False, wakes: bool = True
+    ) -> Topic:
+        """Returns a topic; its subscribers start the measurements if it `wakes` the sensor."""
+        topic = Topic(name, kind, queue, latch, self._hear)
+        self._topics.append(topic)
+        if wakes:
+            self._waking.append(topic)
+            self._hear()  # somebody may have come before it was in the list
+        return topic
+
+    def close(self) -> None:
+        for topic in self._topics:
+            topic.close()
+        self._clock.end()
+
+    def _hear(self) -> None:
+        is_heard = any(topic.is_heard for topic in self._waking)
+        if not is_heard and self._unheard is not None:
+            self._unheard()
+        self._clock.hear(is_heard)
+
+
+class SensorTopic:
+    """The only topic of a sensor, see `SensorTopics`; `measure` returns a message, or None for nothing."""
 
     def __init__(
         self,
@@ -85,26 +143,16 @@ class SensorTopic:
         unheard: Callable[[], None] | None = None,
     ) -> None:
         self._measure = measure
-        self._unheard = unheard
-        self._clock = context.clock(rate, self._send, at_once=unheard is None)
-        self._subscribers = SubscriberCount(self._hear)
-        self._publisher = rospy.Publisher(
-            name, kind, subscriber_listener=self._subscribers, queue_size=1, tcp_nodelay=True
-        )
+        self._topics = SensorTopics(context, rate, self._send, unheard)
+        self._topic = self._topics.advertise(name, kind)
 
     def close(self) -> None:
-        self._publisher.unregister()
-        self._clock.end()
-
-    def _hear(self) -> None:
-        if not self._subscribers.size and self._unheard is not None:
-            self._unheard()
-        self._clock.hear(self._subscribers.size > 0)
+        self._topics.close()
 
     def _send(self, now: int) -> None:
         message = self._measure(now)
         if message is not None:
-            self._publisher.publish(message)
+            self._topic.publish(message)
 
 
 class LaserTopic:

@@ -1,0 +1,165 @@
+"""Topics of cameras: pictures, JPEGs, camera_info (docs/contract/sensors.md 4a)."""
+
+import io
+
+import numpy as np
+import rospy
+from PIL import Image as Pillow
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.srv import SetCameraInfo, SetCameraInfoResponse
+from std_msgs.msg import Header
+
+from bullet_gazebo.physics.description import DescriptionError, Sensor
+from bullet_gazebo.ros.common.messages import to_time
+from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
+from bullet_gazebo.ros.plugins.sensor_topics import (
+    MODEL,
+    SensorTopics,
+    frame_of,
+    namespace_of,
+    topic_in,
+)
+from bullet_gazebo.sensors.camera import Picture, PinholeCamera, noisy
+
+QUEUE = 2
+MONO = {"L8": np.uint8, "L_INT8": np.uint8, "L16": np.uint16, "L_INT16": np.uint16}
+COLOUR = {
+    "R8G8B8": "rgb8", "RGB_INT8": "rgb8", "B8G8R8": "bgr8", "BGR_INT8": "bgr8", "R16G16B16": "rgb16",
+    "RGB_INT16": "rgb16",
+}  # fmt: skip
+BAYER = {  # the channel of each pixel of a two-by-two tile
+    "BAYER_RGGB8": (0, 1, 1, 2), "BAYER_BGGR8": (2, 1, 1, 0), "BAYER_GBRG8": (1, 2, 0, 1),
+    "BAYER_GRBG8": (1, 0, 2, 1),
+}  # fmt: skip
+LUMINANCE = (0.299, 0.587, 0.114)
+
+
+class CameraTopics:
+    """Image, JPEG and camera_info of one camera, all below `scope`.
+
+    Args:
+        context: the plugin's.
+        sensor: that the camera belongs to.
+        camera: what sees.
+        topics: those of the sensor.
+        scope: full name that the topics are in.
+        names: of the image and of its camera_info.
+        baseline: [m] to the camera on the left.
+    """
+
+    def __init__(
+        self,
+        context: PluginContext,
+        sensor: Sensor,
+        camera: PinholeCamera,
+        topics: SensorTopics,
+        scope: str,
+        names: tuple[str, str],
+        baseline: float,
+    ) -> None:
+        self._context, self._sensor, self._camera = context, sensor, camera
+        self._frame = frame_of(scope, context.text("frameName", ""))
+        self.info = _camera_info(context, camera, baseline)
+        image = topic_in(scope, names[0])
+        self._image = topics.advertise(image, Image, QUEUE, latch=True)
+        self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
+        self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)
+        self._service = rospy.Service(topic_in(scope, "set_camera_info"), SetCameraInfo, self._set)
+        random = context.sensing.bias(context.model, sensor.name)
+        self._bias = 0.0 if camera.noise is None else camera.noise.draw_bias(random)
+
+    @property
+    def wants_colour(self) -> bool:
+        """Whether somebody looks at its pictures."""
+        return self._image.is_heard or self._jpeg.is_heard
+
+    def header(self, now: int) -> Header:
+        return Header(stamp=to_time(now), frame_id=self._frame)
+
+    def send(self, picture: Picture, now: int) -> None:
+        """Publishes what is heard of a picture at a time [ns]."""
+        header = self.header(now)
+        if self.wants_colour:
+            random = self._context.sensing.noise(self._context.model, self._sensor.name, now)
+            seen = noisy(picture.colours, self._camera.noise, self._bias, random)
+            if self._image.is_heard:
+                self._image.publish(to_image(seen, self._camera.format, header))
+            if self._jpeg.is_heard:
+                self._jpeg.publish(_to_jpeg(seen, header))
+        if self._info.is_heard:
+            self.info.header = header
+            self._info.publish(self.info)
+
+    def close(self) -> None:
+        self._service.shutdown()
+
+    def _set(self, request: object) -> SetCameraInfoResponse:
+        """Takes over a calibration."""
+        given = request.camera_info  # type: ignore[attr-defined]
+        if (given.width, given.height) != (self._camera.width, self._camera.height):
+            return SetCameraInfoResponse(False, "the size isn't that of the camera's pictures")
+        self.info = given
+        return SetCameraInfoResponse(True, "")
+
+
+def scope_of(context: PluginContext) -> str:
+    """Returns the full name that a camera's topics are in: its namespace and `<cameraName>`."""
+    namespace = namespace_of(context, absent="", empty=MODEL)
+    return (
+        topic_in(namespace, context.text("cameraName", ""))
+        if context.text("cameraName", "")
+        else namespace
+    )
+
+
+def to_image(seen: np.ndarray, pixel_format: str, header: Header) -> Image:
+    """Returns the message of a picture (height, width, 3) of uint8 in one of SDF's pixel formats."""
+    height, width = seen.shape[:2]
+    encoding = COLOUR.get(pixel_format, "bgr8")
+    data = seen[..., ::-1] if encoding == "bgr8" else seen
+    if pixel_format in MONO:
+        kind = MONO[pixel_format]
+        encoding = "mono8" if kind is np.uint8 else "mono16"
+        grey = np.rint(seen @ LUMINANCE)
+        data = (grey if kind is np.uint8 else grey * 257.0).astype(kind)
+    elif encoding == "rgb16":
+        data = seen.astype(np.uint16) * 257
+    elif pixel_format in BAYER:
+        encoding = pixel_format.lower()
+        rows, columns = np.indices((height, width)) % 2
+        channels = np.array(BAYER[pixel_format])[2 * rows + columns]
+        data = np.take_along_axis(seen, channels[..., None], axis=2)[..., 0]
+    content = np.ascontiguousarray(data)
+    return Image(header, height, width, encoding, 0, content.nbytes // height, content.tobytes())
+
+
+def _to_jpeg(seen: np.ndarray, header: Header) -> CompressedImage:
+    memory = io.BytesIO()
+    Pillow.fromarray(seen).save(memory, "JPEG", quality=80)
+    return CompressedImage(header, "rgb8; jpeg compressed bgr8", memory.getvalue())
+
+
+def _camera_info(context: PluginContext, camera: PinholeCamera, baseline: float) -> CameraInfo:
+    f = context.number("focalLength", 0.0) or camera.focal_length
+    cx = context.number("Cx", 0.0) or (camera.width + 1.0) / 2.0
+    cy = context.number("Cy", 0.0) or (camera.height + 1.0) / 2.0
+    k1, k2, k3, t1, t2 = (
+        context.number(f"distortion{name}", 0.0) for name in ("K1", "K2", "K3", "T1", "T2")
+    )
+    return CameraInfo(
+        height=camera.height,
+        width=camera.width,
+        distortion_model="plumb_bob",
+        D=[k1, k2, t1, t2, k3],
+        K=[f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0],
+        R=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        P=[f, 0.0, cx, -f * baseline, 0.0, f, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+    )
+
+
+def rate_of(context: PluginContext, sensor: Sensor) -> float:
+    """Returns the slower one of a plugin's `<updateRate>` and the sensor's rate [Hz]; 0 is every step."""
+    own = context.number("updateRate", 0.0)
+    if own < 0.0:
+        raise DescriptionError(f"<updateRate> is {own:g}")
+    return min((each for each in (own, sensor.rate) if each > 0.0), default=0.0)

@@ -1,0 +1,126 @@
+"""libgazebo_ros_depth_camera.so and libgazebo_ros_openni_kinect.so (docs/contract/sensors.md 4b).
+
+As the camera's plugin, with pictures at ir/image_raw, and `depthImageTopicName` (depth/image_raw),
+`depthImageCameraInfoTopicName` (depth/camera_info), `pointCloudTopicName` (points), `pointCloudCutoff`
+(0.4 m), `useDepth16UC1Format` (false), and `pointCloudCutoffMax` (5 m), which only the second one reads.
+"""
+
+import math
+
+import numpy as np
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
+from std_msgs.msg import Header
+
+from bullet_gazebo.physics.files.elements import truth
+from bullet_gazebo.ros.plugins.camera_topics import QUEUE, CameraTopics, rate_of, scope_of
+from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
+from bullet_gazebo.ros.plugins.sensor_topics import SensorTopics, sensor_of, topic_in
+from bullet_gazebo.sensors.camera import camera_of
+
+KINDS = ("depth", "depth_camera", "rgbd_camera")
+POINT_STEP = 32
+FIELDS = {"x": 0, "y": 4, "z": 8, "rgb": 16}
+POINT = np.dtype(
+    {
+        "names": [*FIELDS], "formats": ["<f4", "<f4", "<f4", "<u4"], "offsets": [*FIELDS.values()],
+        "itemsize": POINT_STEP,
+    }
+)  # fmt: skip
+
+
+class DepthCameraPlugin:
+    """Publishes depths along the optical axis [m], and clouds in optical axes: x right, y down, z ahead."""
+
+    is_organised = False  # whether a cloud has the picture's rows
+
+    def __init__(self, context: PluginContext) -> None:
+        self._context = context
+        self._sensor = sensor = sensor_of(context, KINDS)
+        self._camera = camera = camera_of(sensor)
+        scope = scope_of(context)
+        self._topics = topics = SensorTopics(context, rate_of(context, sensor), self._measure)
+        names = (
+            context.text("imageTopicName", "ir/image_raw"),
+            context.text("cameraInfoTopicName", "ir/camera_info"),
+        )
+        baseline = context.number("hackBaseline", 0.0)
+        self._pictures = CameraTopics(context, sensor, camera, topics, scope, names, baseline)
+
+        def named(tag: str, default: str) -> str:
+            return topic_in(scope, context.text(tag, default))
+
+        self._depth = topics.advertise(named("depthImageTopicName", "depth/image_raw"), Image)
+        self._cloud = topics.advertise(named("pointCloudTopicName", "points"), PointCloud2)
+        self._depth_info = topics.advertise(
+            named("depthImageCameraInfoTopicName", "depth/camera_info"),
+            CameraInfo,
+            QUEUE,
+            wakes=False,
+        )
+        self._low = context.number("pointCloudCutoff", 0.4)
+        self._high = context.number("pointCloudCutoffMax", 5.0) if self.is_organised else math.inf
+        self._in_millimetres = truth(context.text("useDepth16UC1Format", "false"))
+        rows, columns = np.indices((camera.height, camera.width))
+        self._across = (columns - (camera.width - 1) / 2.0) / camera.focal_length
+        self._down = (rows - (camera.height - 1) / 2.0) / camera.focal_length
+
+    def shutdown(self) -> None:
+        self._pictures.close()
+        self._topics.close()
+
+    def _measure(self, now: int) -> None:
+        link = self._context.model.link_state(self._sensor.link)[0]
+        in_colour = self._pictures.wants_colour or self._cloud.is_heard
+        picture = self._camera.picture(self._context.sensing.visuals, link, in_colour)
+        self._pictures.send(picture, now)
+        header = self._pictures.header(now)
+        depths = np.minimum(picture.depths, self._camera.far)
+        depths[(depths <= self._low) | (depths > self._high)] = np.nan
+        if self._depth.is_heard:
+            self._depth.publish(self._to_image(depths, header))
+        if self._depth_info.is_heard:
+            info = self._pictures.info
+            info.header = header
+            self._depth_info.publish(info)
+        if self._cloud.is_heard:
+            self._cloud.publish(self._to_cloud(depths, picture.colours, header))
+
+    def _to_image(self, depths: np.ndarray, header: Header) -> Image:
+        height, width = depths.shape
+        if self._in_millimetres:
+            whole = np.nan_to_num(np.rint(1000.0 * depths), nan=0.0)
+            data = np.where(whole <= np.iinfo(np.uint16).max, whole, 0.0).astype("<u2")
+            return Image(header, height, width, "16UC1", 0, 2 * width, data.tobytes())
+        data = depths.astype("<f4")
+        return Image(header, height, width, "32FC1", 0, 4 * width, data.tobytes())
+
+    def _to_cloud(self, depths: np.ndarray, colours: np.ndarray, header: Header) -> PointCloud2:
+        height, width = depths.shape
+        points = np.zeros((height, width), POINT)
+        points["x"], points["y"], points["z"] = depths * self._across, depths * self._down, depths
+        red, green, blue = np.moveaxis(colours.astype(np.uint32), 2, 0)
+        points["rgb"] = red << 16 | green << 8 | blue
+        if not self.is_organised:
+            height, width = 1, height * width
+        return PointCloud2(
+            header=header,
+            height=height,
+            width=width,
+            fields=[PointField(name, at, PointField.FLOAT32, 1) for name, at in FIELDS.items()],
+            point_step=POINT_STEP,
+            row_step=POINT_STEP * width,
+            data=points.tobytes(),
+            is_dense=not bool(np.isnan(depths).any()),
+        )
+
+
+class KinectPlugin(DepthCameraPlugin):
+    """As the depth camera, with organised clouds that end at `pointCloudCutoffMax`."""
+
+    is_organised = True
+
+
+LIBRARIES = {
+    "libgazebo_ros_depth_camera.so": DepthCameraPlugin,
+    "libgazebo_ros_openni_kinect.so": KinectPlugin,
+}
