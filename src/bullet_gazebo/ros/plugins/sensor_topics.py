@@ -18,6 +18,7 @@ from bullet_gazebo.sensors.imu import InertialSample
 from bullet_gazebo.sensors.laser import KINDS, Laser, Scan
 from bullet_gazebo.sensors.sensing import sensor_pose
 
+LOCKSTEP_QUEUE = 100  # messages of a sensor
 MODEL = "<model>"  # where a namespace is the model's name
 
 
@@ -106,12 +107,14 @@ class SensorTopics:
         self._waking: list[Topic] = []
         self._topics: list[Topic] = []
         self._clock = context.clock(rate, measure, at_once=unheard is None)
+        # A step of many ticks makes several messages before rospy's threads send one.
+        self._least = LOCKSTEP_QUEUE if context.sim.lockstep else 0
 
     def advertise(
         self, name: str, kind: type, queue: int = 1, latch: bool = False, wakes: bool = True
     ) -> Topic:
         """Returns a topic; its subscribers start the measurements if it `wakes` the sensor."""
-        topic = Topic(name, kind, queue, latch, self._hear)
+        topic = Topic(name, kind, max(queue, self._least), latch, self._hear)
         self._topics.append(topic)
         if wakes:
             self._waking.append(topic)

@@ -1,0 +1,67 @@
+"""libgazebo_ros_bumper.so: contacts of a link's collisions (docs/contract/sensors.md 5).
+
+`bumperTopicName` (bumper_states) and `frameName` (world) are read. The frame is only in the header: all
+values are in world axes.
+"""
+
+import rospy
+from gazebo_msgs.msg import ContactsState
+from std_msgs.msg import Header
+
+from bullet_gazebo.physics.lumping import LUMPED
+from bullet_gazebo.ros.common.messages import to_contact_state, to_time
+from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
+from bullet_gazebo.ros.plugins.sensor_topics import (
+    SensorTopic,
+    frame_of,
+    namespace_of,
+    sensor_of,
+    topic_in,
+)
+from bullet_gazebo.state import contact_pairs
+
+
+class BumperPlugin:
+    """Publishes what the collisions of `<contact>` touched in the last step, also if that is nothing."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self._context = context
+        sensor = sensor_of(context, ("contact",))
+        names = [(each.text or "").strip() for each in sensor.element.findall("contact/collision")]
+        model, link = context.model, sensor.link
+        found = [_collision(name, link, list(model.collisions(link))) for name in names]
+        for name, taken in zip(names, found, strict=True):
+            if taken is None:
+                rospy.logwarn(
+                    "Sensor '%s': link '%s' has no collision '%s'", sensor.name, link, name
+                )
+            elif taken != name:
+                rospy.loginfo("Sensor '%s': collision '%s' is '%s' here", sensor.name, name, taken)
+        self._collisions = {(model.name, link, each) for each in found if each is not None}
+        namespace = namespace_of(context, absent="", empty="/")
+        self._frame = frame_of(namespace, context.text("frameName", "world"))
+        topic = topic_in(namespace, context.text("bumperTopicName", "bumper_states"))
+        self._topic = SensorTopic(context, topic, ContactsState, sensor.rate, self._measure)
+
+    def shutdown(self) -> None:
+        self._topic.close()
+
+    def _measure(self, now: int) -> ContactsState:
+        pairs = contact_pairs(self._context.sim.world, self._collisions) if self._collisions else []
+        header = Header(stamp=to_time(now), frame_id=self._frame)
+        return ContactsState(header, [to_contact_state(pair) for pair in pairs])
+
+
+def _collision(name: str, link: str, collisions: list[str]) -> str | None:
+    """Returns the collision that is meant, whichever way a lumped link's is written."""
+    child = name.removeprefix(f"{link}_collision_")
+    spellings = (name, f"{link}{LUMPED}{name}", f"{link}{LUMPED}{child}_collision")
+    for spelling in spellings:
+        # Lumping numbers all but the first collision of a link.
+        for each in collisions:
+            if each == spelling or each.rpartition("_")[0] == spelling:
+                return each
+    return None
+
+
+LIBRARIES = {"libgazebo_ros_bumper.so": BumperPlugin}

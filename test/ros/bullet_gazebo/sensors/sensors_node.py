@@ -1,0 +1,211 @@
+#!/usr/bin/env python3
+"""Sensors over ROS: each kind's message, its times, resets, and equal bits (docs/contract/sensors.md)."""
+
+import math
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
+from gazebo_msgs.msg import ContactsState, ModelState
+from gazebo_msgs.srv import DeleteModel, SetModelState, SpawnModel, SpawnModelRequest
+from geometry_msgs.msg import Point, Pose, Quaternion
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import (
+    CameraInfo,
+    CompressedImage,
+    Image,
+    Imu,
+    LaserScan,
+    PointCloud,
+    PointCloud2,
+    Range,
+)
+from std_msgs.msg import Empty as EmptyMsg
+from std_srvs.srv import Empty
+from support.ros.calls import call, wait_until
+from support.ros.subscribed import wait_until_heard
+
+SHAPE = "<geometry><box><size>1 1 1</size></box></geometry>"
+RED = "<material><ambient>1 0 0 1</ambient><diffuse>1 0 0 1</diffuse></material>"
+WALL = (
+    f'<sdf version="1.6"><model name="w"><static>1</static><link name="l"><collision name="c">{SHAPE}'
+    f'<laser_retro>5</laser_retro></collision><visual name="v">{SHAPE}{RED}</visual></link></model></sdf>'
+)
+MS = 1_000_000
+
+
+class Heard:
+    """The messages of a topic."""
+
+    def __init__(self, name, kind):
+        self.messages = []
+        self._subscriber = rospy.Subscriber(name, kind, self.messages.append, tcp_nodelay=True)
+        wait_until_heard(name)
+
+    def after(self, count):
+        """Returns the messages when there are as many."""
+        assert wait_until(lambda: len(self.messages) >= count), (
+            self._subscriber.name,
+            self.messages,
+        )
+        return self.messages
+
+    def stamps(self, count):
+        return [message.header.stamp.to_nsec() for message in self.after(count)]
+
+    def close(self):
+        self._subscriber.unregister()
+
+
+class Sensors(unittest.TestCase):
+    def setUp(self):
+        self.spawn("wall", WALL, x=2.0, z=0.5)
+        self.spawn("bot", rospy.get_param("~model"))
+        call("/gazebo/reset_simulation", Empty)
+
+    def tearDown(self):
+        for name in ("bot", "wall"):
+            self.assertTrue(call("/gazebo/delete_model", DeleteModel, name).success)
+
+    def spawn(self, name, xml, x=0.0, z=0.0):
+        pose = Pose(Point(x, 0.0, z), Quaternion(0.0, 0.0, 0.0, 1.0))
+        request = SpawnModelRequest(model_name=name, model_xml=xml, initial_pose=pose)
+        request.robot_namespace = "/"
+        self.assertTrue(call("/gazebo/spawn_sdf_model", SpawnModel, request).success)
+
+    def hear(self, name, kind):
+        heard = Heard(name, kind)
+        self.addCleanup(heard.close)
+        return heard
+
+    def step(self, ticks):
+        answer = call("/gazebo/step_world", StepWorld, StepWorldRequest(ticks=ticks))
+        self.assertTrue(answer.success, answer.status_message)
+
+    def newest(self, name, kind, ticks=300):
+        heard = self.hear(name, kind)
+        self.step(ticks)
+        return heard.after(1)[-1]
+
+    def test_a_scan_comes_every_hundred_ticks(self):
+        heard = self.hear("/scan", LaserScan)
+        self.step(250)
+        self.step(50)
+        self.assertEqual(heard.stamps(3), [100 * MS, 200 * MS, 300 * MS])
+        scan = heard.messages[-1]
+        self.assertEqual(scan.header.frame_id, "base_scan")
+        self.assertAlmostEqual(scan.ranges[0], 1.5, delta=0.05)
+        self.assertEqual(list(scan.ranges[1:]), [math.inf] * 3)
+        self.assertEqual(scan.intensities[0], 5.0)
+        self.assertAlmostEqual(scan.angle_increment, math.pi / 2.0, places=6)
+        self.assertEqual((scan.time_increment, scan.scan_time), (0.0, 0.0))
+
+    def test_all_subscribers_get_the_same_noise(self):
+        heard = [self.hear("/scan", LaserScan) for _ in range(2)]
+        self.step(300)
+        first, second = ([message.ranges for message in each.after(3)] for each in heard)
+        self.assertEqual(first, second)
+        self.assertEqual(len({ranges[0] for ranges in first}), 3)
+
+    def test_resets_and_moves_bring_a_fresh_scan_at_once(self):
+        heard = self.hear("/scan", LaserScan)
+        self.step(150)
+        heard.after(1)
+        state = ModelState(model_name="bot", reference_frame="world")
+        state.pose = Pose(Point(0.5, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
+        self.assertTrue(call("/gazebo/set_model_state", SetModelState, state).success)
+        self.assertEqual(heard.stamps(2)[1], 150 * MS)
+        self.assertAlmostEqual(heard.messages[1].ranges[0], 1.0, delta=0.05)
+        call("/gazebo/reset_simulation", Empty)
+        self.assertEqual(heard.stamps(3)[2], 0)
+        self.assertAlmostEqual(heard.messages[2].ranges[0], 1.5, delta=0.05)
+        self.step(100)
+        self.assertEqual(heard.stamps(4)[3], 100 * MS)
+
+    def test_clouds_and_ranges_of_a_laser(self):
+        cloud = self.newest("/cloud", PointCloud2)
+        self.assertEqual((cloud.width, cloud.height, cloud.point_step), (1, 1, 22))
+        self.assertEqual([field.offset for field in cloud.fields], [0, 4, 8, 12, 16, 18])
+        x, y, z, intensity = np.frombuffer(cloud.data[:16], "<f4")
+        np.testing.assert_allclose((x, y, z, intensity), (1.5, 0.0, 0.0, 5.0), atol=0.05)
+        block = self.newest("/block", PointCloud)
+        self.assertEqual(len(block.points), 4)
+        self.assertAlmostEqual(block.points[0].x, 1.5, delta=0.05)
+        self.assertAlmostEqual(self.newest("/range", Range).range, 1.5, delta=0.05)
+
+    def test_a_box_of_ten_kilograms_presses_on_its_bumper(self):
+        state = self.newest("/bumper_states", ContactsState, 2000).states
+        self.assertEqual(state[0].collision1_name, "bot::base::shell")
+        self.assertIn("ground_plane", state[0].collision2_name)
+        self.assertAlmostEqual(state[0].total_wrench.force.z, 98.0, delta=0.3)
+
+    def test_one_imu_feels_gravity_and_the_older_one_does_not(self):
+        heard = self.hear("/imu_data", Imu)
+        self.step(1000)
+        first = heard.stamps(1)[0]
+        self.assertEqual(first, 40 * MS)  # the first one has none to compare with
+        acceleration = heard.messages[-1].linear_acceleration
+        self.assertAlmostEqual(acceleration.z, 9.8, delta=0.01)
+        self.assertEqual(heard.messages[-1].header.frame_id, "imu")
+        older = self.newest("/old_imu", Imu).linear_acceleration
+        self.assertAlmostEqual(older.z, 0.0, delta=0.01)
+
+    def test_truth_is_the_links_pose(self):
+        truth = self.newest("/truth", Odometry)
+        self.assertEqual((truth.header.frame_id, truth.child_frame_id), ("world", "base"))
+        self.assertAlmostEqual(truth.pose.pose.position.z, 0.05, delta=2e-3)
+
+    def test_a_camera_sees_the_wall(self):
+        image = self.newest("/eye/image_raw", Image)
+        self.assertEqual((image.encoding, image.step), ("rgb8", 3 * 64))
+        pixels = np.frombuffer(image.data, np.uint8).reshape(48, 64, 3)
+        red, green, blue = pixels[24, 32]
+        self.assertTrue(red > 50 and green == blue == 0)
+        # The wall is 1 m wide, 1.5 m away: a third of a metre for each 18.5 pixels.
+        columns = np.flatnonzero(pixels[24, :, 1] == 0)
+        f = 64 / (2.0 * math.tan(1.047 / 2.0))
+        self.assertAlmostEqual(columns[0], 32 - 0.5 * f / 1.5, delta=1.0)
+        self.assertAlmostEqual(columns[-1] + 1, 32 + 0.5 * f / 1.5, delta=1.0)
+        info = self.newest("/eye/camera_info", CameraInfo)
+        self.assertAlmostEqual(info.K[0], f, places=12)
+        self.assertEqual((info.K[2], info.header.frame_id), (32.5, "eye_optical"))
+        jpeg = self.newest("/eye/image_raw/compressed", CompressedImage)
+        self.assertEqual(jpeg.data[:2], b"\xff\xd8")
+
+    def test_each_trigger_takes_one_picture(self):
+        heard = self.hear("/shot/image_raw", Image)
+        trigger = rospy.Publisher("/shot/image_trigger", EmptyMsg, queue_size=5)
+        self.addCleanup(trigger.unregister)
+        self.assertTrue(wait_until(trigger.get_num_connections))
+        self.step(50)
+        self.assertEqual(heard.messages, [])
+        for count in (1, 3):
+            while len(heard.messages) < count:
+                trigger.publish()
+                before = len(heard.messages)
+                wait_until(lambda before=before: self.step(1) or len(heard.messages) > before)
+        self.assertEqual(len(heard.messages), 3)
+
+    def test_depths_of_both_depth_cameras(self):
+        for name, organised in (("kinect", True), ("depth", False)):
+            image = self.newest(f"/{name}/depth/image_raw", Image)
+            self.assertEqual(image.encoding, "32FC1")
+            depths = np.frombuffer(image.data, "<f4").reshape(48, 64)
+            self.assertAlmostEqual(depths[24, 32], 1.5, delta=5e-3)
+            sky = depths[0, 0]
+            self.assertTrue(math.isnan(sky) if organised else sky == 100.0)
+            cloud = self.newest(f"/{name}/points", PointCloud2)
+            self.assertEqual((cloud.height, cloud.width), (48, 64) if organised else (1, 48 * 64))
+            self.assertEqual(cloud.point_step, 32)
+
+    def test_an_impossible_sensor_is_left_out_and_the_model_stands(self):
+        topics = [name for name, _ in rospy.get_published_topics()]
+        self.assertNotIn("/odd", topics)
+        self.assertIn("/scan", topics)
+
+
+if __name__ == "__main__":
+    rospy.init_node("sensors_test")
+    rostest.rosrun("cartpole", "sensors", Sensors)
