@@ -20,7 +20,7 @@ from gymnasium import spaces
 from torch import nn
 
 from file_access.content import open_file
-from rl_workbench.agents.greedy import SingleChoice
+from rl_workbench.agents.greedy import Choice
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.policies import TEST_SEED, LearnedPolicy
 from rl_workbench.tools.runs import Run
@@ -247,7 +247,9 @@ def _compare(
     equal = np.logical_and(*(same for same, _ in results))
     distances = np.maximum(*(distance for _, distance in results))
     is_continuous = isinstance(space, spaces.Box)
-    wrong = distances > ROUNDING if is_continuous else ~equal & ~_tied(policy, observations)
+    wrong = distances > ROUNDING if is_continuous else ~equal
+    if wrong.any() and not is_continuous:
+        wrong &= ~_tied(policy, observations)
     if wrong.any():
         raise WorkbenchError(
             f"not written: in {wrong.sum()} of {len(wanted)} observations the file acts otherwise than "
@@ -257,14 +259,14 @@ def _compare(
 
 
 def _tied(policy: LearnedPolicy, observations: list[Observation]) -> np.ndarray:
-    """Returns where the two best scores are equal but for rounding, which may pick either, (N,)."""
-    if not isinstance(policy.network, SingleChoice):
+    """Returns where scores choose so narrowly that rounding may choose otherwise, (N,)."""
+    network = policy.network
+    if not isinstance(network, Choice):
         return np.zeros(len(observations), bool)
-    module = _module(policy.network.scores, policy.env.observation_space, "")
+    module = _module(network.scores, policy.env.observation_space, "")
     with torch.no_grad():
         scores = module(batch(observations))
-    best = scores.topk(min(2, scores.shape[1])).values
-    return (best[:, 0] - best[:, -1] <= ROUNDING * scores.abs().amax(1).clamp_min(1.0)).numpy()
+    return (network.margins(scores) <= ROUNDING * scores.abs().amax(1).clamp_min(1.0)).numpy()
 
 
 def _differences(

@@ -68,10 +68,6 @@ class DQNTraining(Algorithm):
     def learn(self, frame: Training) -> None:
         while not frame.is_over():
             self._step(frame)
-            if self._last is not None and self.steps % self._log_frequency == 0:
-                td_loss, q_values = self._last
-                losses = {"losses/td_loss": td_loss, "losses/q_values": q_values}
-                frame.log.add(self.steps, losses)
             frame.step_done()
 
     def _step(self, frame: Training) -> None:
@@ -93,6 +89,10 @@ class DQNTraining(Algorithm):
             self._last = agent.learn()
             self._is_learning = False
         self._observation = following
+        if self._last is not None and self.steps % self._log_frequency == 0:
+            td_loss, q_values = self._last
+            losses = {"losses/td_loss": td_loss, "losses/q_values": q_values}
+            frame.log.add(self.steps, losses)
         if terminated or truncated:
             agent.episode_done()
             total, self._reward, self._observation = self._reward, 0.0, None
