@@ -53,12 +53,14 @@ class Mesh:
         hulls: points (k, 3) of the convex bodies that a moving mesh collides by: one for each object of the
             file.
         digest: of the arrays.
+        in_pieces: whether `hulls` are solid pieces of a concave mesh.
     """
 
     vertices: np.ndarray
     faces: np.ndarray
     hulls: tuple[np.ndarray, ...]
     digest: str
+    in_pieces: bool = False
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Mesh) and self.digest == other.digest

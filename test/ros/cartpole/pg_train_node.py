@@ -9,7 +9,7 @@ import unittest
 
 import rostest
 import torch
-from support.ros.pg_train_runs import NETWORKS, Place
+from support.ros.programs import NETWORKS, Place
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from cartpole import pg_train

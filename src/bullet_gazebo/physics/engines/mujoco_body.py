@@ -8,9 +8,9 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription
+from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription, Shape
 from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Body, Contact, Side, Twist
-from bullet_gazebo.physics.engines.mujoco_model import Elements, priority, wxyz, xyzw
+from bullet_gazebo.physics.engines.mujoco_model import Elements, geoms_of, priority, wxyz, xyzw
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, conjugate, rotate, scale
 
 FREE = 6  # degrees of freedom of a body without joints
@@ -188,7 +188,7 @@ class MujocoBody(Body):
         self.touching = {}  # links and collisions by MuJoCo's shape: a link's follow one another in order
         for link, index in self._ids.items():
             first = int(model.body_geomadr[index])
-            for place, shape in enumerate(self.description.links[link].collisions):
+            for place, shape in enumerate(self._geoms(link)):
                 self.touching[first + place] = (link, (shape.name,))
         self._indices = [elements.joints[name].id for name in self.joint_names]
         self._q = model.jnt_qposadr[self._indices].tolist()
@@ -262,9 +262,14 @@ class MujocoBody(Body):
     def set_friction(self, link: str, factor: float) -> None:
         self._frictions[link] = factor
         model, first = self._state.model, int(self._state.model.body_geomadr[self._ids[link]])
-        for place, shape in enumerate(self.description.links[link].collisions):
+        for place, shape in enumerate(self._geoms(link)):
             model.geom_friction[first + place, 0] = factor * shape.mu
             model.geom_priority[first + place] = priority(factor * shape.mu)
+
+    def _geoms(self, link: str) -> list[Shape]:
+        """Returns the shape that each geom of a link stands for."""
+        shapes = self.description.links[link].collisions
+        return [shape for shape in shapes for _ in range(geoms_of(shape))]
 
     def set_limits(self, index: int, lower: float, upper: float) -> None:
         joint, model = self._joints[index], self._state.model

@@ -101,29 +101,32 @@ class ModelWriter:
         )
 
     def _add_shape(self, body: mujoco.MjsBody, shape: Shape) -> None:
-        geom = body.add_geom(
-            type=GEOMS[shape.kind], pos=shape.pose.position, quat=wxyz(shape.pose.orientation),
-            condim=3,
-        )  # fmt: skip
-        geom.friction[0] = shape.mu
-        geom.priority = priority(shape.mu)
-        if shape.kind == "mesh":
-            geom.meshname = self._add_mesh(shape)
-        elif shape.kind == "box":
-            geom.size = [length / 2.0 for length in shape.size]
-        elif shape.kind == "cylinder":
-            geom.size = [shape.size[0], shape.size[1] / 2.0, 0.0]
-        elif shape.kind == "sphere":
-            geom.size = [shape.size[0], 0.0, 0.0]
-        else:
-            geom.size = [0.0, 0.0, 1.0]  # infinite
+        for number in range(geoms_of(shape)):
+            geom = body.add_geom(
+                type=GEOMS[shape.kind], pos=shape.pose.position, quat=wxyz(shape.pose.orientation),
+                condim=3,
+            )  # fmt: skip
+            geom.friction[0] = shape.mu
+            geom.priority = priority(shape.mu)
+            if shape.kind == "mesh":
+                geom.meshname = self._add_mesh(shape, number)
+            elif shape.kind == "box":
+                geom.size = [length / 2.0 for length in shape.size]
+            elif shape.kind == "cylinder":
+                geom.size = [shape.size[0], shape.size[1] / 2.0, 0.0]
+            elif shape.kind == "sphere":
+                geom.size = [shape.size[0], 0.0, 0.0]
+            else:
+                geom.size = [0.0, 0.0, 1.0]  # infinite
 
-    def _add_mesh(self, shape: Shape) -> str:
-        """Adds the points of a mesh, once for each scale; returns their name."""
-        assert shape.solid is not None  # collisions are read
-        name = f"{shape.mesh}:{shape.solid.digest}:{shape.size}"  # MuJoCo's errors show it
+    def _add_mesh(self, shape: Shape, piece: int) -> str:
+        """Adds the points of a mesh or of a piece of it, once for each scale; returns their name."""
+        mesh = shape.solid
+        assert mesh is not None  # collisions are read
+        name = f"{shape.mesh}:{mesh.digest}:{shape.size}:{piece}"  # MuJoCo's errors show it
         if self.spec.mesh(name) is None:
-            points = np.unique(np.concatenate(shape.solid.hulls), axis=0) * np.array(shape.size)
+            hull = mesh.hulls[piece] if mesh.in_pieces else np.concatenate(mesh.hulls)
+            points = np.unique(hull, axis=0) * np.array(shape.size)
             self.spec.add_mesh(
                 name=name, uservert=points.ravel().tolist(),
                 inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
@@ -141,6 +144,11 @@ class ModelWriter:
                 self.spec.add_exclude(
                     bodyname1=f"{self.key}:{a.name}", bodyname2=f"{self.key}:{b.name}"
                 )
+
+
+def geoms_of(shape: Shape) -> int:
+    """Returns how many geoms stand for a shape: one, or one for each of its pieces."""
+    return len(shape.solid.hulls) if shape.solid is not None and shape.solid.in_pieces else 1
 
 
 def principal(inertia: Inertia) -> tuple[Quaternion, Vector]:

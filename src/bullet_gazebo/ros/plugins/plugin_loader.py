@@ -106,7 +106,7 @@ class PluginRegistry:
         """Holds time while a model comes and its plugins start: as in Gazebo, it has its drives before its
         first step.
 
-        If a plugin waits for time to pass, time goes on after PATIENCE.
+        If a plugin waits for time to pass, the hold ends after PATIENCE.
         """
         return self._sim.holds.hold(PATIENCE, partial(_warn_late, models))
 
@@ -161,12 +161,14 @@ class PluginRegistry:
 
 def _warn_late(models: str) -> None:
     rospy.logwarn(
-        "The plugins of %s have been loading for %g s; time goes on without them", models, PATIENCE
+        "The plugins of %s have been loading for %g s; time passes without them from now on",
+        models,
+        PATIENCE,
     )
 
 
 def _registered() -> dict[str, object]:
-    """Reads users' plugins, for each model anew, so that one can be added while the simulator runs."""
+    """Reads users' plugins, again for each model, so that one can be added while the simulator runs."""
     try:
         places = rospy.get_param(PARAMETER, {})
     except OSError as error:  # the master; the model is in the world already

@@ -61,13 +61,16 @@ class SpawnServices:
         self._one_at_a_time = threading.Lock()
         self._services = [
             rospy.Service("~spawn_urdf_model", srv.SpawnModel, self._spawn_urdf),
-            rospy.Service("~spawn_sdf_model", srv.SpawnModel, self._spawn),
+            rospy.Service("~spawn_sdf_model", srv.SpawnModel, self._spawn_sdf),
             offer("~delete_model", srv.DeleteModel, self._delete),
         ]
 
+    def _spawn_sdf(self, request: srv.SpawnModelRequest) -> srv.SpawnModelResponse:
+        return self._spawn(request, request.model_xml)
+
     def _spawn_urdf(self, request: srv.SpawnModelRequest) -> srv.SpawnModelResponse:
         if len(request.model_xml) > MAX_BYTES:
-            return self._spawn(request)  # refuses it before anything parses it
+            return self._spawn_sdf(request)  # refuses it before anything parses it
         text = without_comments(request.model_xml)
         root = ROOT_TAG.search(text)
         if root is None or root.group(1) != "robot":
@@ -75,14 +78,12 @@ class SpawnServices:
             raise _refused(f"entity format is invalid: {found} instead of a URDF's <robot>.")
         return self._spawn(request, _with_package_paths(text))
 
-    def _spawn(self, request: srv.SpawnModelRequest, text: str = "") -> srv.SpawnModelResponse:
+    def _spawn(self, request: srv.SpawnModelRequest, text: str) -> srv.SpawnModelResponse:
         try:
             self._checked_pose(request)  # before anything takes time
             # Reading may take long; others spawn meanwhile.
             reading = Reading(cancelled=rospy.is_shutdown)
-            entity = read_entity(
-                text or request.model_xml, request.model_name, resources(), reading
-            )
+            entity = read_entity(text, request.model_name, resources(), reading)
             own = entity.pose if isinstance(entity, Light) else entity.initial_pose
             with self._one_at_a_time:
                 self._add(request, entity, self._checked_pose(request).compose(own))

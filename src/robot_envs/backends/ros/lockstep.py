@@ -12,14 +12,14 @@ from geometry_msgs.msg import Pose as PoseMsg
 from bullet_gazebo.physics.pose import Pose, Vector
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.ros.bringup import full_name, ready
-from robot_envs.backends.ros.gazebo import (
+from robot_envs.backends.ros.properties import RosVariation
+from robot_envs.backends.ros.running import (
     STEP_SERVICE,
     JointStateReader,
     RunningSimulator,
     SharedWorld,
     SimulatorService,
 )
-from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation

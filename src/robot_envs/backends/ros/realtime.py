@@ -18,14 +18,14 @@ from std_srvs.srv import Empty
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.ros.bringup import full_name, ready
-from robot_envs.backends.ros.gazebo import (
+from robot_envs.backends.ros.properties import RosVariation
+from robot_envs.backends.ros.running import (
     JointStateReader,
     RunningSimulator,
     SharedWorld,
     SimulatorService,
     check_success,
 )
-from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
