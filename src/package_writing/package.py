@@ -17,7 +17,7 @@ import yaml
 
 from bullet_gazebo.physics.files.reading import Resources
 from package_writing import CannotWrite, contents
-from package_writing.survey import Survey, height_note, look_at, root_link, standing_height
+from package_writing.survey import Survey, feet, height_note, look_at, root_link, standing_height
 from package_writing.urdf_files import Copied, copy_urdf, expanded
 from robot_envs import Robot, RobotEnvError, controllers, files
 
@@ -258,6 +258,9 @@ def _report(
         yield f"continuous joints of a free base get a velocity controller, as wheels: {', '.join(wheels)}"
     if not survey.model.fixed_base:
         yield height_note(request.height or 0.0, stands)
+        on = feet(survey.model)
+        if on:
+            yield f"gains are for a robot that stands on its feet: {', '.join(on)}"
     if survey.passive:
         yield f"joints that move without a motor, and that tasks don't see: {', '.join(survey.passive)}"
     held = [each.joint for each in survey.motors if not each.limited]
