@@ -147,6 +147,8 @@ def fill(folder: Path, package: str, values: Mapping[str, str]) -> None:
         target.parent.mkdir(parents=True, exist_ok=True)
         text = Filled(source.read_text(encoding="utf-8")).substitute(values)
         target.write_text(text, encoding="utf-8")
+        if text.startswith("#!"):
+            target.chmod(target.stat().st_mode | 0o111)
 
 
 def literal(text: str) -> str:
