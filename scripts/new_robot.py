@@ -11,6 +11,7 @@ if __name__ == "__main__":
 
         require(ALL)
         from package_writing.cli import main
+    code = 0  # of a package that was written, and no one reads on
     with reader_may_go():
         code = main()
     sys.exit(code)

@@ -19,6 +19,7 @@ from support.robots.new_robots import (
     LINK,
     MOTOR,
     PLUGIN,
+    SWING,
     reaches,
     robot,
 )
@@ -179,7 +180,8 @@ def test_its_options_are_those_of_trainings(new, algo, tmp_path):
 def test_its_test_holds_for_a_task_that_takes_the_place_of_reach_in_a_clone(new, tmp_path):
     """Who follows the README's list of what goes together has a package that works, for others, too."""
     (tmp_path / "parts").mkdir()
-    (tmp_path / "parts/rod.xacro").write_text(robot(LINK.format("rod", "")))
+    seen = '<visual><geometry><box size="0.1 0.1 0.4"/></geometry></visual>'
+    (tmp_path / "parts/rod.xacro").write_text(robot(LINK.format("rod", seen)))
     parts = robot(BARE[0], FIXED, SWING, '<xacro:include filename="parts/../parts/rod.xacro"/>')
     folder, *_ = new("my_other", parts)
     (folder / "src/my_other/tasks.py").write_text(
