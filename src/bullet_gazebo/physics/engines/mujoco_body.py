@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription, Shape
-from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Body, Contact, Side, Twist
+from bullet_gazebo.physics.engine import FASTEST, FURTHEST, OVERLAP, Body, Contact, Side, Twist
 from bullet_gazebo.physics.engines.mujoco_model import Elements, geoms_of, priority, wxyz, xyzw
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, conjugate, rotate, scale
 
@@ -115,6 +115,19 @@ class MujocoState:
         x, y, z = data.xpos[index].tolist()
         ax, ay, az, vx, vy, vz = speed.tolist()
         return Pose((x, y, z), xyzw(data.xquat[index])), ((vx, vy, vz), (ax, ay, az))
+
+    def overlapping(
+        self, touching: Mapping[int, tuple[str, tuple[str, ...]]]
+    ) -> frozenset[frozenset[str]]:
+        """Returns pairs of links that overlap with all joints at zero, of a model with these geoms."""
+        data = mujoco.MjData(self.model)
+        mujoco.mj_fwdPosition(self.model, data)
+        pairs = [contact.geom.tolist() for contact in data.contact if contact.dist < -OVERLAP]
+        return frozenset(
+            frozenset((touching[a][0], touching[b][0]))
+            for a, b in pairs
+            if a in touching and b in touching
+        )
 
     def contacts(self, sides: Mapping[int, Side]) -> list[Contact]:
         """Returns where bodies touched in the last step, without those that were only near."""

@@ -46,6 +46,7 @@ class ModelWriter:
     key: str  # begins names, which are unique in the world
     model: ModelDescription
     inertias: Mapping[str, Inertia | None]  # of links, which replace those of the description
+    overlapping: frozenset[frozenset[str]]  # pairs of links that never meet
     _elements: Elements = field(default_factory=Elements)
 
     def write(self, pose: Pose) -> Elements:
@@ -134,16 +135,12 @@ class ModelWriter:
         return name
 
     def _keep_apart(self) -> None:
-        """Excludes contacts of links unless one wants self-collision and no joint connects them (SDF)."""
-        model = self.model
-        joined = {frozenset((joint.parent, joint.child)) for joint in model.joints.values()}
-        solid = [link for link in model.links.values() if link.collisions]
+        """Excludes contacts of links but those that can meet and didn't overlap at first."""
+        meet = {frozenset((a.name, b.name)) for a, b in self.model.pairs_that_collide()}
+        solid = [name for name, link in self.model.links.items() if link.collisions]
         for a, b in combinations(solid, 2):
-            meet = (a.self_collide or b.self_collide) and frozenset((a.name, b.name)) not in joined
-            if not meet:
-                self.spec.add_exclude(
-                    bodyname1=f"{self.key}:{a.name}", bodyname2=f"{self.key}:{b.name}"
-                )
+            if frozenset((a, b)) not in meet - self.overlapping:
+                self.spec.add_exclude(bodyname1=f"{self.key}:{a}", bodyname2=f"{self.key}:{b}")
 
 
 def geoms_of(shape: Shape) -> int:

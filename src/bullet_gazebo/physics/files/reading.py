@@ -149,7 +149,7 @@ class Reading:
 
         By their hulls alone, links would meet that don't. What can't be split keeps its hull, with a warning.
         """
-        if model.static or not any(link.self_collide for link in model.links.values()):
+        if not model.collides_with_itself:
             return
         found: dict[Mesh, Mesh] = {}
         for link in model.links.values():

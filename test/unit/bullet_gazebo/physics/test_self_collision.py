@@ -120,3 +120,16 @@ def test_convex_meshes_and_robots_without_self_collision_stay_whole(tmp_path, st
     text = ARM.replace("<self_collide>true", "<self_collide>false")
     parse_urdf(text.format(mesh=stand, reach=0.6, limit=LIMIT, inertial=INERTIAL))
     assert calls == []
+
+
+def test_links_that_overlap_from_the_start_do_not_collide(make_world, stand):
+    """The fore arm begins within the post: it goes where it likes, and one line says so."""
+    world = make_world(gravity=(0.0, 0.0, 0.0))
+    text = ARM.replace('xyz="0.05 0 1.1"', 'xyz="-0.6 0 0.5"')
+    text = text.format(mesh=stand, reach=0.6, limit=LIMIT, inertial=INERTIAL)
+    for name in ("one", "another"):  # at the same place
+        model = world.spawn(name, parse_urdf(text), Pose((0.0, float(len(world.models)), 0.0)))
+        (warning,) = model.description.warnings
+        assert warning.startswith("links that overlap in the initial pose don't collide")
+        assert warning.endswith(": fore and stand")
+        assert lowered(world, model) == pytest.approx(LIMIT, abs=0.01)
