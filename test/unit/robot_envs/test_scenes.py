@@ -6,9 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gymnasium.spaces import Box
-from support.scenes.rover import ROVER, Push
+from support.robots.fake_plant import FakePlant
+from support.scenes.rover import ROVER, Push, Roll
 from support.scenes.two_arms import LEFT, RIGHT, SKIN, Volley
 
+from cartpole.robot import ROBOT
+from cartpole.tasks import BalanceTask
 from robot_envs import (
     InitialState,
     LinkQuery,
@@ -20,6 +23,35 @@ from robot_envs import (
     StateQuery,
 )
 from robot_envs.testing import differences, rollout
+
+
+class Peeking(Roll):
+    """What it observes isn't there where it is deployed."""
+
+    def observe(self, state):
+        return super().observe(state) * state.links["hull"].pose.position[2]
+
+
+def test_what_a_reward_sees_the_policy_does_not(make) -> None:
+    env = make("rover", Roll())
+    env.reset(seed=0)
+    for _ in range(20):
+        _, reward, terminated, _, info = env.step(np.ones(2, np.float32))
+    assert reward > 0.3 and not terminated and info["contacts"] >= 1
+    with pytest.raises(KeyError, match="no link 'hull'; there are: none; the task's query names"):
+        make("rover", Peeking()).reset(seed=0)
+
+
+def test_a_world_of_joints_alone_rewards_nothing_and_says_so(make, caplog) -> None:
+    plant = FakePlant()
+    plant.complete = False
+    task = BalanceTask()
+    task.reward_query = StateQuery(links=(LinkQuery("pole"),))
+    env = RobotEnv(ROBOT, task, plant)
+    assert "rewards of BalanceTask are 0, and nothing terminates" in caplog.text
+    env.reset(seed=0)
+    assert env.step(1)[1:3] == (0.0, False)
+
 
 BOX3 = Box(-np.inf, np.inf, (3,), np.float64)
 HIT = np.array(

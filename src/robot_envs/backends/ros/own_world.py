@@ -122,7 +122,7 @@ class OwnWorld(RobotBackend):
             brought up.
     """
 
-    deterministic, shared = True, False
+    deterministic, complete, shared = True, True, False
 
     def __init__(self, scene: Scene, control_period: float, deadline: float | None = None) -> None:
         self.scene = scene
