@@ -32,9 +32,8 @@ EFFORT, POSITION, VELOCITY = (
 SHARE = 0.6  # of a joint's range, about its middle, from which postures to reach are drawn
 WIDEST = 1.8  # [rad, m], largest half-width of that range
 FASTEST = 5.0  # [rad/s], of wheels
-FOOT = (
-    0.05  # of the height at which a robot stands: how much higher than its lowest link feet may be
-)
+# Of the height at which a robot stands: how much higher than its lowest link feet may be.
+FOOT = 0.05
 
 
 @dataclass(frozen=True)

@@ -259,8 +259,7 @@ class RobotEnv(DrawnEnv):
         measured = state if self._sensor is None else self._sensor.begin(state, self.np_random)
         observation = self._observe(measured)
         self._steps = 0
-        if self.render_mode == "human":
-            self._show()
+        self._show()
         return observation, {
             **checks.checked(self.task, "info", self._judge.info(state), dict),
             **info,
@@ -351,8 +350,7 @@ class RobotEnv(DrawnEnv):
         if terminated or truncated:
             self._steps = None
         measured = state if self._sensor is None else self._sensor.measure(state, self.np_random)
-        if self.render_mode == "human":
-            self._show()
+        self._show()
         reward: Any = judge.reward(state, action)
         if type(reward) is not float or not math.isfinite(reward):
             reward = checks.checked_number(task, "reward", reward)

@@ -45,16 +45,12 @@ class CommandLimits:
 
     def __call__(self, command: Command, held: Command) -> tuple[Command, list[str]]:
         """Returns the nearest command that is allowed after the present one, and the joints out of bounds."""
-        exceeded, numbers = [], []
         wanted, before = self._numbers(command), self._numbers(held)
-        for joint, value, start, (lower, upper), way in zip(
-            self._port.joints, wanted, before, self._bounds, self._ways, strict=True
-        ):
-            if not lower <= value <= upper:
-                exceeded.append(joint)
-            near = min(max(value, start - way), start + way)
-            numbers.append(min(max(near, lower), upper))  # last, whatever it starts from
-        return numbers[0] if self._port.single else tuple(numbers), exceeded
+        named = zip(self._port.joints, wanted, self._bounds, strict=True)
+        exceeded = [joint for joint, value, (low, high) in named if not low <= value <= high]
+        moves = zip(wanted, before, self._ways, strict=True)
+        near = [min(max(value, start - way), start + way) for value, start, way in moves]
+        return self._bounded(near), exceeded  # last, whatever it starts from
 
     def _numbers(self, command: Command) -> list[float]:
         return [command] if self._port.single else list(command)  # type: ignore[list-item, arg-type]
@@ -65,9 +61,13 @@ class CommandLimits:
         A joint beyond a stop is commanded to the stop.
         """
         command = self._port.at_start({name: each.position for name, each in joints.items()})
-        bounds = zip(self._numbers(command), self._bounds, strict=True)
-        numbers = [min(max(value, lower), upper) for value, (lower, upper) in bounds]
-        return numbers[0] if self._port.single else tuple(numbers)
+        return self._bounded(self._numbers(command))
+
+    def _bounded(self, numbers: list[float]) -> Command:
+        """Returns the nearest command within the bounds."""
+        bounds = zip(numbers, self._bounds, strict=True)
+        found = tuple(min(max(value, lower), upper) for value, (lower, upper) in bounds)
+        return found[0] if self._port.single else found
 
 
 def _bounds(limits: JointLimits, quantity: str) -> tuple[float, float]:
