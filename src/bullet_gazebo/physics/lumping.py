@@ -95,7 +95,10 @@ def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
     moved = [_lumped_sensor(model, sensor) for sensor in model.sensors]
     model.sensors = [sensor for sensor in moved if sensor.link in model.links]
     for plugin in model.plugins:
-        _lump_frames(model, plugin.element)
+        try:
+            _lump_frames(model, plugin.element)
+        except DescriptionError as error:
+            model.warnings.append(f"plugin {plugin.filename}: {error}")
     mend_moments(model)
     for link in model.links.values():
         link.collisions = _named(link, link.collisions, "_collision")
@@ -167,13 +170,13 @@ def _lump_frames(model: ModelDescription, plugin: Element) -> None:
         xyz, rpy = (_offset(plugin, tag) for tag in OFFSETS)
         pose = pose.compose(Pose(xyz, from_rpy(*rpy)))
         for tag, values in zip(OFFSETS, (pose.position, to_rpy(pose.orientation)), strict=True):
-            element = plugin.find(tag)
-            element = SubElement(plugin, tag) if element is None else element
-            element.text = " ".join(map(repr, values))
+            given = plugin.find(tag)
+            offset = SubElement(plugin, tag) if given is None else given
+            offset.text = " ".join(map(repr, values))
 
 
 def _offset(plugin: Element, tag: str) -> Vector:
-    x, y, z = numbers(plugin.findtext(tag, "0 0 0"), f"plugin: <{tag}>", 3)
+    x, y, z = numbers(plugin.findtext(tag, "0 0 0"), f"<{tag}>", 3)
     return x, y, z
 
 

@@ -1,4 +1,4 @@
-"""What rays of light or sound meet first in a world, by Embree.
+"""What rays of light or sound meet first in a world, by Embree where it is installed.
 
 All shapes that never move are one Embree scene, which is built when one comes, goes or is moved. What moves,
 and large meshes, are met in their own frames, into which rays are brought: meshes by Embree scenes that are
@@ -6,6 +6,7 @@ kept, boxes, balls and cylinders analytically. So nothing is built while things 
 with shapes whose bounding ball it meets.
 """
 
+import importlib.util
 import logging
 import math
 from collections.abc import Iterator, Sequence
@@ -78,7 +79,7 @@ class RayScene:
         self.targets: list[Target] = []
         self._key: object = None
         self._is_fresh = False
-        self._meshes: dict[object, _Triangles] = {}
+        self._meshes: dict[object, Any] = {}
 
     def expire(self) -> None:
         """Says that things may have moved: the next cast looks where they are."""
@@ -156,7 +157,7 @@ class RayScene:
             found.distances[some] = np.where(exact < np.inf, exact, found.distances[some])
 
     def _meet_mesh(
-        self, found: Hits, target: int, triangles: "_Triangles", rays: np.ndarray,
+        self, found: Hits, target: int, triangles: Any, rays: np.ndarray,
         starts: np.ndarray, directions: np.ndarray,
     ) -> None:  # fmt: skip
         if not len(rays):
@@ -246,10 +247,10 @@ class RayScene:
             if shape.kind == "mesh":
                 # Pieces of a file are told apart by their triangles' place in it: it is the target's.
                 key = shape.solid or shape.mesh, shape.size, _number(targets, index)
-                self._meshes[key] = kept.get(key) or self._meshes.get(key) or _Triangles([corners])
+                self._meshes[key] = kept.get(key) or self._meshes.get(key) or Triangles([corners])
                 self._apart_meshes[index] = self._meshes[key]
         self._still, self._apart = np.array(still, int), np.array(apart, int)
-        self._still_triangles = _Triangles(triangles)
+        self._still_triangles = Triangles(triangles)
 
     def _surround(self, index: int, corners: np.ndarray) -> None:
         """Sets the ball around a target, in the target's frame."""
@@ -320,8 +321,8 @@ class _Met(NamedTuple):
     weights: np.ndarray
 
 
-class _Triangles:
-    """An Embree scene of parts, each given by the corners (3 n, 3) of its triangles."""
+class _Embree:
+    """The triangles of some parts, each given by their corners (3 n, 3)."""
 
     def __init__(self, parts: list[np.ndarray]) -> None:
         from embreex.mesh_construction import TriangleMesh
@@ -340,3 +341,41 @@ class _Triangles:
         parts = found["geomID"]
         distances = np.where(parts == NONE, np.inf, found["tfar"]).astype(float)
         return _Met(distances, parts, found["primID"], np.stack([found["u"], found["v"]], axis=1))
+
+
+class _EachTriangle:
+    """As `_Embree`, where it has no wheels: every ray is compared with every triangle."""
+
+    def __init__(self, parts: list[np.ndarray]) -> None:
+        triangles = [corners.reshape(-1, 3, 3) for corners in parts]
+        counts = [len(each) for each in triangles]
+        self._parts = np.repeat(np.arange(len(parts)), counts)
+        self._indices = np.concatenate([np.arange(count) for count in counts] or [np.zeros(0, int)])
+        self._corners = np.concatenate(triangles or [np.zeros((0, 3, 3))])
+
+    def first(self, starts: np.ndarray, directions: np.ndarray) -> _Met:
+        """Returns what rays (n, 3) meet first, by the method of Möller and Trumbore (1997)."""
+        found = _Met(
+            np.full(len(starts), np.inf), np.full(len(starts), NONE), np.zeros(len(starts), int),
+            np.zeros((len(starts), 2)),
+        )  # fmt: skip
+        origin, *ends = self._corners.transpose(1, 0, 2)
+        first, second = (end - origin for end in ends)
+        for ray, (start, way) in enumerate(zip(starts, directions, strict=True)):
+            across = np.cross(way, second)
+            to_start = start - origin
+            turned = np.cross(to_start, first)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                scale = 1.0 / np.einsum("ij,ij->i", first, across)
+                u = scale * np.einsum("ij,ij->i", to_start, across)
+                v = scale * (turned @ way)
+                distance = scale * np.einsum("ij,ij->i", second, turned)
+                hit = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance >= 0.0)
+            if hit.any():
+                best = int(np.where(hit, distance, np.inf).argmin())
+                found.distances[ray], found.parts[ray] = distance[best], self._parts[best]
+                found.triangles[ray], found.weights[ray] = self._indices[best], (u[best], v[best])
+        return found
+
+
+Triangles = _Embree if importlib.util.find_spec("embreex") else _EachTriangle

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bullet_gazebo.physics.pose import Pose, from_rpy
+from bullet_gazebo.sensors import rays
 from bullet_gazebo.sensors.intersection import DISTANCES
 from bullet_gazebo.sensors.rays import NONE, RayScene
 
@@ -112,3 +113,37 @@ def test_equal_rays_give_equal_bits(world, put):
         hits = again.cast(np.array([0.0, 0.0, 0.4]), fan(360), 0.1, 10.0)
         assert hits.distances.tobytes() == first.distances.tobytes()
         assert hits.targets.tobytes() == first.targets.tobytes()
+
+
+def test_without_embree_rays_meet_the_same(world, put, monkeypatch):
+    for index, kind in enumerate(SIZES):
+        put(
+            f"thing{index}",
+            kind,
+            SIZES[kind],
+            Pose((1.5, index - 1.0, 0.4), from_rpy(index, 0.0, 0.3)),
+        )
+    origin, ways = np.array([0.0, 0.0, 0.4]), fan(180)
+    expected = RayScene(world).cast(origin, ways, 0.1, 10.0)
+    monkeypatch.setattr(rays, "Triangles", rays._EachTriangle)
+    found = RayScene(world).cast(origin, ways, 0.1, 10.0)
+    assert found.targets.tolist() == expected.targets.tolist()
+    np.testing.assert_allclose(found.distances, expected.distances, atol=1e-5)
+
+
+def test_the_engines_own_rays_agree(world, put):
+    """PyBullet's rays are less exact: within a millimetre."""
+    if type(world.engine).__name__ != "BulletEngine":
+        pytest.skip("an oracle is enough")
+    import pybullet
+
+    put("box", "box", SIZES["box"], Pose((1.5, 0.3, 0.4), from_rpy(0.3, 0.1, 0.7)))
+    put("ball", "sphere", SIZES["sphere"], Pose((-1.0, 0.8, 0.4)), static=False)
+    origin, ways = np.array([0.0, 0.0, 0.4]), fan(180)
+    found = RayScene(world).cast(origin, ways, far=10.0).distances
+    ends = (origin + 10.0 * ways).tolist()
+    met = pybullet.rayTestBatch([origin.tolist()] * 180, ends)
+    expected = np.array([10.0 * each[2] if each[0] >= 0 else math.inf for each in met])
+    both = np.isfinite(expected) & np.isfinite(found)
+    assert both.sum() > 20 and (np.isfinite(expected) != np.isfinite(found)).sum() <= 4
+    assert np.median(np.abs(found - expected)[both]) < 1e-3
