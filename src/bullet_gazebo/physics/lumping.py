@@ -9,7 +9,6 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import TypeVar
-from xml.etree.ElementTree import Element, SubElement
 
 from bullet_gazebo.physics.description import (
     DescriptionError,
@@ -21,8 +20,7 @@ from bullet_gazebo.physics.description import (
     Shape,
 )
 from bullet_gazebo.physics.dynamics import combine, is_positive_definite
-from bullet_gazebo.physics.files.elements import numbers
-from bullet_gazebo.physics.pose import Pose, Vector, from_rpy, to_rpy
+from bullet_gazebo.physics.pose import Pose
 
 MAX_LINKS = 1000  # in the file; robots have some hundreds, and lumping takes quadratic time
 
@@ -31,8 +29,6 @@ Named = TypeVar("Named", Link, Joint)
 
 WORLD = "world"
 LUMPED = "_fixed_joint_lump__"
-FRAME_TAGS = ("bodyName", "frameName")  # of plugins, where they name a link
-OFFSETS = ("xyzOffset", "rpyOffset")
 
 
 def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
@@ -94,11 +90,6 @@ def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
     model.lumped = {name: at for name, at in model.lumped.items() if at[0] in model.links}
     moved = [_lumped_sensor(model, sensor) for sensor in model.sensors]
     model.sensors = [sensor for sensor in moved if sensor.link in model.links]
-    for plugin in model.plugins:
-        try:
-            _lump_frames(model, plugin.element)
-        except DescriptionError as error:
-            model.warnings.append(f"plugin {plugin.filename}: {error}")
     mend_moments(model)
     for link in model.links.values():
         link.collisions = _named(link, link.collisions, "_collision")
@@ -157,27 +148,6 @@ def _lumped(shape: Shape, pose: Pose, link: str) -> Shape:
 def _lumped_sensor(model: ModelDescription, sensor: Sensor) -> Sensor:
     link, pose = model.lumped.get(sensor.link, (sensor.link, Pose()))
     return replace(sensor, link=link, pose=pose.compose(sensor.pose))
-
-
-def _lump_frames(model: ModelDescription, plugin: Element) -> None:
-    """Renames lumped links in a model's plugin, and gives it their poses as offsets, as sdformat does."""
-    found = [each for each in map(plugin.find, FRAME_TAGS) if each is not None]
-    lumped = [each for each in found if (each.text or "").strip() in model.lumped]
-    for element in lumped:
-        name = (element.text or "").strip()
-        element.text, pose = model.lumped[name]
-    if lumped:
-        xyz, rpy = (_offset(plugin, tag) for tag in OFFSETS)
-        pose = pose.compose(Pose(xyz, from_rpy(*rpy)))
-        for tag, values in zip(OFFSETS, (pose.position, to_rpy(pose.orientation)), strict=True):
-            given = plugin.find(tag)
-            offset = SubElement(plugin, tag) if given is None else given
-            offset.text = " ".join(map(repr, values))
-
-
-def _offset(plugin: Element, tag: str) -> Vector:
-    x, y, z = numbers(plugin.findtext(tag, "0 0 0"), f"<{tag}>", 3)
-    return x, y, z
 
 
 def _drop_free_joints(model: ModelDescription) -> None:

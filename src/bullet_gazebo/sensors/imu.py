@@ -21,7 +21,7 @@ NANOSECONDS = 1_000_000_000
 HERE = Pose()
 
 
-class Motion(NamedTuple):
+class LinkMotion(NamedTuple):
     """Where a frame is in the world, and how fast [m/s], [rad/s], in world axes."""
 
     pose: Pose
@@ -37,12 +37,12 @@ class InertialSample(NamedTuple):
     linear_acceleration: Vector
 
 
-def motion_of(model: Model, link: str, offset: Pose = HERE) -> Motion:
+def motion_of(model: Model, link: str, offset: Pose = HERE) -> LinkMotion:
     """Returns the motion of the frame at `offset` in a link."""
     pose, (linear, angular) = model.link_state(link)
     at = pose.compose(offset)
     lever = subtract(at.position, pose.position)
-    return Motion(at, add(linear, cross(angular, lever)), angular)
+    return LinkMotion(at, add(linear, cross(angular, lever)), angular)
 
 
 class Imu:
@@ -57,7 +57,7 @@ class Imu:
         self._last: tuple[int, int, Vector] | None = None  # time [ns], moves, velocity [m/s]
 
     def measure(
-        self, now: int, moves: int, motion: Motion, gravity: Vector
+        self, now: int, moves: int, motion: LinkMotion, gravity: Vector
     ) -> InertialSample | None:
         """Returns a measurement; None for the first one, which has none to compare with.
 

@@ -12,7 +12,7 @@ from bullet_gazebo.simulator import NANOSECONDS, Simulator
 Measure = Callable[[int], None]
 
 
-class Clock:
+class SensorClock:
     """The clock of one sensor. `Schedule.add` makes it."""
 
     def __init__(
@@ -48,13 +48,13 @@ class Schedule:
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
-        self._clocks: list[Clock] = []
+        self._clocks: list[SensorClock] = []
         self._due = 0
         self.moves = 0  # how often something other than time has moved bodies
         self.prepare: list[Callable[[], None]] = []  # called before the measurements of one time
         sim.moved.append(self._moved)
 
-    def add(self, rate: float, measure: Measure, at_once: bool = True) -> Clock:
+    def add(self, rate: float, measure: Measure, at_once: bool = True) -> SensorClock:
         """Returns a clock that calls `measure` with the time [ns], under the simulator's lock.
 
         Args:
@@ -64,16 +64,16 @@ class Schedule:
                 measurement.
         """
         with self._sim.lock:
-            clock = Clock(self, rate, measure, at_once, self._sim.now)
+            clock = SensorClock(self, rate, measure, at_once, self._sim.now)
             self._clocks.append(clock)
         return clock
 
-    def remove(self, clock: Clock) -> None:
+    def remove(self, clock: SensorClock) -> None:
         with self._sim.lock:
             self._clocks.remove(clock)
             self._listen()
 
-    def hear(self, clock: Clock, is_heard: bool) -> None:
+    def hear(self, clock: SensorClock, is_heard: bool) -> None:
         with self._sim.lock:
             if clock not in self._clocks or clock.heard == is_heard:
                 return
@@ -97,7 +97,7 @@ class Schedule:
             return
         self._take([clock for clock in self._clocks if clock.heard and now >= clock.due])
 
-    def _take(self, clocks: list[Clock]) -> None:
+    def _take(self, clocks: list[SensorClock]) -> None:
         for prepare in self.prepare:
             prepare()
         now = self._sim.now

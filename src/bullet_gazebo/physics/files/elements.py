@@ -1,13 +1,15 @@
 """Numbers and names in XML model files; errors name the place."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 from bullet_gazebo.physics.description import DescriptionError, Plugin
-from bullet_gazebo.physics.pose import Vector
+from bullet_gazebo.physics.pose import Pose, Vector, from_rpy, to_rpy
 
+FRAME_TAGS = ("bodyName", "frameName")  # of plugins, where they name a link
+OFFSETS = ("xyzOffset", "rpyOffset")
 SHOWN = 80  # characters of a faulty value that an error quotes
 
 
@@ -90,3 +92,21 @@ def positive(sizes: tuple[float, ...], where: str) -> tuple[float, ...]:
 
 def read_plugin(element: Element) -> Plugin:
     return Plugin(element.get("filename", ""), element.get("name", ""), element)
+
+
+def rename_lumped(plugin: Element, lumped: Mapping[str, tuple[str, Pose]]) -> None:
+    """Renames lumped links in a model's plugin, and gives it their poses as offsets, as sdformat does.
+
+    See docs/contract/sensors.md 0.6.
+    """
+    found = [each for each in map(plugin.find, FRAME_TAGS) if each is not None]
+    renamed = [each for each in found if (each.text or "").strip() in lumped]
+    for element in renamed:
+        element.text, pose = lumped[(element.text or "").strip()]
+    if renamed:
+        xyz, rpy = (numbers(plugin.findtext(tag, "0 0 0"), f"<{tag}>", 3) for tag in OFFSETS)
+        pose = pose.compose(Pose((xyz[0], xyz[1], xyz[2]), from_rpy(*rpy)))
+        for tag, values in zip(OFFSETS, (pose.position, to_rpy(pose.orientation)), strict=True):
+            given = plugin.find(tag)
+            offset = SubElement(plugin, tag) if given is None else given
+            offset.text = " ".join(map(repr, values))

@@ -30,6 +30,7 @@ from bullet_gazebo.physics.files.elements import (
     numbers,
     positive,
     read_plugin,
+    rename_lumped,
     shown,
 )
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
@@ -382,5 +383,10 @@ def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDe
             raise
         # A root without mass is the consequence of an inertial that was left out.
         raise DescriptionError(f"{error}. Before that: {warnings[0]}") from error
+    for plugin in model.plugins:
+        try:
+            rename_lumped(plugin.element, model.lumped)
+        except DescriptionError as error:
+            warnings.append(f"plugin {shown(plugin.filename)}: {error}")
     reading.split_meshes(lumped)
     return lumped

@@ -11,7 +11,7 @@ from std_msgs.msg import Empty
 from bullet_gazebo.ros.plugins.camera_topics import CameraTopics, rate_of, scope_of
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import SensorTopics, sensor_of, topic_in
-from bullet_gazebo.sensors.camera import camera_of
+from bullet_gazebo.sensors.pinhole import camera_of
 
 KINDS = ("camera",)
 

@@ -19,7 +19,7 @@ from bullet_gazebo.ros.plugins.sensor_topics import (
     namespace_of,
     topic_in,
 )
-from bullet_gazebo.sensors.camera import Picture, PinholeCamera, noisy
+from bullet_gazebo.sensors.pinhole import CameraView, PinholeCamera, noisy
 
 QUEUE = 2
 MONO = {"L8": np.uint8, "L_INT8": np.uint8, "L16": np.uint16, "L_INT16": np.uint16}
@@ -76,7 +76,7 @@ class CameraTopics:
     def header(self, now: int) -> Header:
         return Header(stamp=to_time(now), frame_id=self._frame)
 
-    def send(self, picture: Picture, now: int) -> None:
+    def send(self, picture: CameraView, now: int) -> None:
         """Publishes what is heard of a picture at a time [ns]."""
         header = self.header(now)
         if self.wants_colour:

@@ -15,7 +15,7 @@ from bullet_gazebo.physics.files.elements import truth
 from bullet_gazebo.ros.plugins.camera_topics import QUEUE, CameraTopics, rate_of, scope_of
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import SensorTopics, sensor_of, topic_in
-from bullet_gazebo.sensors.camera import camera_of
+from bullet_gazebo.sensors.pinhole import camera_of
 
 KINDS = ("depth", "depth_camera", "rgbd_camera")
 POINT_STEP = 32

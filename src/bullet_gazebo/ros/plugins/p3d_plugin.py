@@ -22,7 +22,7 @@ from bullet_gazebo.physics.pose import (
 from bullet_gazebo.ros.common.messages import to_time, to_twist_msg
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import SensorTopic, frame_of, namespace_of, topic_in
-from bullet_gazebo.sensors.imu import Motion, motion_of
+from bullet_gazebo.sensors.imu import LinkMotion, motion_of
 
 WORLDS = ("world", "/world", "map", "/map")
 
@@ -75,7 +75,7 @@ class P3dPlugin:
             TwistWithCovariance(to_twist_msg((linear, angular)), covariance),
         )
 
-    def _relative(self, motion: Motion) -> Motion:
+    def _relative(self, motion: LinkMotion) -> LinkMotion:
         """Returns a motion as seen from the link `frameName`, in the way of the original."""
         if self._reference is None:
             return motion
@@ -87,7 +87,7 @@ class P3dPlugin:
         )
         turn = frame.pose.orientation
         linear = rotate(turn, subtract(motion.linear, frame.linear))
-        return Motion(pose, linear, rotate(turn, subtract(motion.angular, frame.angular)))
+        return LinkMotion(pose, linear, rotate(turn, subtract(motion.angular, frame.angular)))
 
 
 LIBRARIES = {"libgazebo_ros_p3d.so": P3dPlugin}

@@ -21,7 +21,7 @@ from bullet_gazebo.physics.description import DescriptionError, Plugin, Sensor, 
 from bullet_gazebo.physics.files.sdf_parts import value
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.ros.common.publishing import Thinner
-from bullet_gazebo.sensors.schedule import Clock
+from bullet_gazebo.sensors.schedule import SensorClock
 from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.simulator import Simulator
 
@@ -60,7 +60,7 @@ class PluginContext:
         """Returns the number in the plugin's child element `tag`; a faulty one is a DescriptionError."""
         return value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)
 
-    def clock(self, rate: float, measure: Update, at_once: bool = True) -> Clock:
+    def clock(self, rate: float, measure: Update, at_once: bool = True) -> SensorClock:
         """Calls `measure` with the simulated time [ns] at a rate [Hz; 0 is every step], while it is heard.
 
         Arguments are those of `Schedule.add`, the rest is as for `on_update`. End the clock in `shutdown`.

@@ -25,7 +25,14 @@ POINT = np.dtype(
         ("time", "<f4"),
     ]
 )
-KINDS = {"<f4": PointField.FLOAT32, "<u2": PointField.UINT16}
+FIELDS = [
+    PointField("x", 0, PointField.FLOAT32, 1),
+    PointField("y", 4, PointField.FLOAT32, 1),
+    PointField("z", 8, PointField.FLOAT32, 1),
+    PointField("intensity", 12, PointField.FLOAT32, 1),
+    PointField("ring", 16, PointField.UINT16, 1),
+    PointField("time", 18, PointField.FLOAT32, 1),
+]
 
 
 class VelodynePlugin:
@@ -60,10 +67,7 @@ class VelodynePlugin:
             header=Header(stamp=to_time(now), frame_id=self._topic.frame),
             height=1,
             width=len(points),
-            fields=[
-                PointField(name, offset, KINDS[kind.str], 1)
-                for name, (kind, offset) in (POINT.fields or {}).items()
-            ],
+            fields=FIELDS,
             point_step=POINT.itemsize,
             row_step=points.nbytes,
             data=points.tobytes(),

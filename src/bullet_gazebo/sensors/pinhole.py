@@ -16,7 +16,7 @@ from bullet_gazebo.sensors.shading import colours
 MOST_PIXELS = 4_000_000
 
 
-class Picture(NamedTuple):
+class CameraView(NamedTuple):
     """What a camera sees.
 
     Attributes:
@@ -68,7 +68,7 @@ class PinholeCamera:
         self._directions = ahead / lengths[:, None]
         self._cosines = 1.0 / lengths
 
-    def picture(self, scene: RayScene, link: Pose, in_colour: bool = True) -> Picture:
+    def picture(self, scene: RayScene, link: Pose, in_colour: bool = True) -> CameraView:
         """Returns what the camera sees, without noise; black if not `in_colour`.
 
         Args:
@@ -85,7 +85,7 @@ class PinholeCamera:
         if in_colour:
             found = colours(scene, hits, places[0], directions)
             seen = np.rint(np.clip(found, 0.0, 255.0)).astype(np.uint8).reshape(*shape, 3)
-        return Picture(seen, (hits.distances * self._cosines).reshape(shape))
+        return CameraView(seen, (hits.distances * self._cosines).reshape(shape))
 
 
 def noisy(
