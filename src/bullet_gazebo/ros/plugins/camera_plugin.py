@@ -5,6 +5,8 @@
 `triggerTopicName` (image_trigger), whose every message takes one picture.
 """
 
+from collections.abc import Callable
+
 import rospy
 from std_msgs.msg import Empty
 
@@ -16,30 +18,69 @@ from bullet_gazebo.sensors.pinhole import camera_of
 KINDS = ("camera",)
 
 
+class Triggers:
+    """Takes one picture for each message of a topic, at the next step.
+
+    Args:
+        context: the plugin's.
+        topic: its full name.
+        take: takes a picture at a time [ns].
+    """
+
+    def __init__(self, context: PluginContext, topic: str, take: Callable[[int], None]) -> None:
+        self._context = context
+        self._take = take
+        self._waiting = 0
+        self._subscriber = rospy.Subscriber(topic, Empty, self._on_message, tcp_nodelay=True)
+        context.on_update(self._update)
+
+    def close(self) -> None:
+        self._subscriber.unregister()
+
+    def _on_message(self, _: Empty) -> None:
+        with self._context.sim.lock:
+            self._waiting += 1
+
+    def _update(self, now: int) -> None:
+        if self._waiting:
+            self._waiting -= 1
+            self._context.sensing.visuals.expire()
+            self._take(now)
+
+
 class CameraPlugin:
     """Publishes pictures while somebody looks at them."""
+
+    is_triggered = False
 
     def __init__(self, context: PluginContext) -> None:
         self._context = context
         self._sensor = sensor = sensor_of(context, KINDS)
         self._camera = camera_of(sensor)
-        self._scope = scope_of(context)
+        scope = scope_of(context)
         self._topics = SensorTopics(context, rate_of(context, sensor), self._on_clock)
         names = (
             context.text("imageTopicName", "image_raw"),
             context.text("cameraInfoTopicName", "camera_info"),
         )
+        baseline = context.number("hackBaseline", 0.0)
         self._outputs = CameraTopics(
-            context, sensor, self._camera, self._topics, self._scope, names,
-            context.number("hackBaseline", 0.0),
-        )  # fmt: skip
+            context, sensor, self._camera, self._topics, scope, names, baseline
+        )
+        self._triggers = None
+        if self.is_triggered:
+            topic = topic_in(scope, context.text("triggerTopicName", "image_trigger"))
+            self._triggers = Triggers(context, topic, self._take)
 
     def shutdown(self) -> None:
+        if self._triggers is not None:
+            self._triggers.close()
         self._outputs.close()
         self._topics.close()
 
     def _on_clock(self, now: int) -> None:
-        self._take(now)
+        if self._triggers is None:
+            self._take(now)
 
     def _take(self, now: int) -> None:
         link = self._context.model.link_state(self._sensor.link)[0]
@@ -48,31 +89,9 @@ class CameraPlugin:
 
 
 class TriggeredCameraPlugin(CameraPlugin):
-    """Publishes one picture for each trigger, at the next step."""
+    """Publishes one picture for each trigger."""
 
-    def __init__(self, context: PluginContext) -> None:
-        super().__init__(context)
-        self._waiting = 0
-        name = topic_in(self._scope, context.text("triggerTopicName", "image_trigger"))
-        self._trigger = rospy.Subscriber(name, Empty, self._on_trigger, tcp_nodelay=True)
-        context.on_update(self._update)
-
-    def shutdown(self) -> None:
-        self._trigger.unregister()
-        super().shutdown()
-
-    def _on_trigger(self, _: Empty) -> None:
-        with self._context.sim.lock:
-            self._waiting += 1
-
-    def _on_clock(self, now: int) -> None:
-        """Triggers take pictures, not the clock."""
-
-    def _update(self, now: int) -> None:
-        if self._waiting:
-            self._waiting -= 1
-            self._context.sensing.visuals.expire()
-            self._take(now)
+    is_triggered = True
 
 
 LIBRARIES = {

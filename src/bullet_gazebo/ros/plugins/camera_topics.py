@@ -45,6 +45,7 @@ class CameraTopics:
         scope: full name that the topics are in.
         names: of the image and of its camera_info.
         baseline: [m] to the camera on the left.
+        own: prefix of its service, if the sensor has several cameras.
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class CameraTopics:
         scope: str,
         names: tuple[str, str],
         baseline: float,
+        own: str = "",
     ) -> None:
         self._context, self._sensor, self._camera = context, sensor, camera
         self._frame = frame_of(scope, context.text("frameName", ""))
@@ -64,7 +66,9 @@ class CameraTopics:
         self._image = topics.advertise(image, Image, QUEUE, latch=True)
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
         self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)
-        self._service = rospy.Service(topic_in(scope, "set_camera_info"), SetCameraInfo, self._set)
+        self._service = rospy.Service(
+            topic_in(scope, f"{own}set_camera_info"), SetCameraInfo, self._set
+        )
         random = context.sensing.bias(context.model, sensor.name)
         self._bias = 0.0 if camera.noise is None else camera.noise.draw_bias(random)
 

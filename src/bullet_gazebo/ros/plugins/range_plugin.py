@@ -1,7 +1,7 @@
-"""libgazebo_ros_range.so and libhector_gazebo_ros_sonar.so: the nearest of a laser's rays.
+"""libgazebo_ros_range.so: the nearest of a laser's rays (docs/contract/sensors.md 6f).
 
-See docs/contract/sensors.md 6f and 12.1. `topicName`, `frameName`, `gaussianNoise` (0) and `updateRate` are
-read; by the first also `radiation` (ultrasound, else infrared) and `fov` (0.05 rad).
+`topicName` (/range), `frameName` (/world), `gaussianNoise` (0), `updateRate` (0), `radiation` (ultrasound,
+else infrared) and `fov` (0.05 rad) are read.
 """
 
 import numpy as np

@@ -10,7 +10,7 @@ import rostest
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from gazebo_msgs.msg import ContactsState, ModelState
 from gazebo_msgs.srv import DeleteModel, SetModelState, SpawnModel, SpawnModelRequest
-from geometry_msgs.msg import Point, Pose, Quaternion
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3Stamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import (
     CameraInfo,
@@ -18,6 +18,7 @@ from sensor_msgs.msg import (
     Image,
     Imu,
     LaserScan,
+    NavSatFix,
     PointCloud,
     PointCloud2,
     Range,
@@ -199,6 +200,32 @@ class Sensors(unittest.TestCase):
             cloud = self.newest(f"/{name}/points", PointCloud2)
             self.assertEqual((cloud.height, cloud.width), (48, 64) if organised else (1, 48 * 64))
             self.assertEqual(cloud.point_step, 32)
+
+    def test_both_eyes_of_a_multicamera_look_at_one_time(self):
+        left, right = (self.hear(f"/pair/{side}/image_raw", Image) for side in ("left", "right"))
+        self.step(100)
+        self.assertEqual(left.stamps(1), right.stamps(1))
+        edges = []
+        for heard in (left, right):
+            pixels = np.frombuffer(heard.messages[0].data, np.uint8).reshape(48, 64, 3)
+            edges.append(np.flatnonzero(pixels[24, :, 1] == 0)[0])
+        f = 64 / (2.0 * math.tan(1.047 / 2.0))
+        self.assertAlmostEqual(edges[0] - edges[1], 0.2 * f / 1.5, delta=1.0)
+        info = self.newest("/pair/right/camera_info", CameraInfo)
+        self.assertAlmostEqual(info.P[3], -0.2 * f, places=9)
+
+    def test_hectors_sensors(self):
+        self.assertAlmostEqual(self.newest("/hector", Imu).linear_acceleration.z, 9.8, delta=0.01)
+        state = ModelState(model_name="bot", reference_frame="world")
+        state.pose = Pose(Point(0.0, 0.5, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
+        self.assertTrue(call("/gazebo/set_model_state", SetModelState, state).success)
+        fix = self.newest("/fix", NavSatFix)
+        # x points east, so y points north.
+        self.assertAlmostEqual((fix.latitude - 49.9) * 111_229.0, 0.5, delta=0.01)
+        self.assertAlmostEqual((fix.longitude - 8.9) * 71_800.0, 0.0, delta=0.01)
+        field = self.newest("/magnetic", Vector3Stamped).vector
+        self.assertAlmostEqual(math.hypot(field.x, field.y, field.z), 1.0, places=6)
+        self.assertAlmostEqual(field.z, -math.sin(math.radians(60.0)), delta=1e-3)
 
     def test_an_impossible_sensor_is_left_out_and_the_model_stands(self):
         topics = [name for name, _ in rospy.get_published_topics()]

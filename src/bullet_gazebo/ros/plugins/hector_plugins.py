@@ -1,0 +1,242 @@
+"""hector_gazebo_plugins' IMU, GPS and magnetometer (docs/contract/sensors.md 12.1).
+
+They publish without subscribers, at `updateRate` (absent: every step), and have errors that drift.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Quaternion, Vector3, Vector3Stamped
+from sensor_msgs.msg import Imu as ImuMsg
+from sensor_msgs.msg import MagneticField, NavSatFix, NavSatStatus
+from std_msgs.msg import Header
+from std_srvs.srv import Empty, EmptyResponse
+
+from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.files.elements import numbers, truth
+from bullet_gazebo.physics.pose import conjugate, from_rpy, multiply, rotate
+from bullet_gazebo.ros.common.messages import NANOSECONDS, to_time
+from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
+from bullet_gazebo.ros.plugins.sensor_topics import namespace_of, topic_in
+from bullet_gazebo.sensors.drift import DriftingError
+from bullet_gazebo.sensors.imu import Imu, LinkMotion, motion_of
+
+EQUATOR = 6378137.0  # [m], radius of WGS84
+FLATTENING = 1.0 / 298.257223563
+GPS_RATE = 4.0  # [Hz]
+GRAVITY = 9.8065  # [m/s²]
+
+
+class HectorSensor:
+    """What the three have in common: a link, a clock that is always heard, a topic.
+
+    Args:
+        context: the plugin's.
+        default: rate [Hz] without `<updateRate>`; 0 is every step.
+        send: publishes the measurement of a motion at a time [ns], some time [s] after the last one.
+    """
+
+    def __init__(
+        self,
+        context: PluginContext,
+        default: float,
+        send: Callable[[LinkMotion, int, float], None],
+    ) -> None:
+        self._context = context
+        self._send = send
+        self.link = context.text("bodyName", context.model.link_names[0])
+        if self.link not in context.model.link_names:
+            raise DescriptionError(f"<bodyName>: the model has no link '{self.link}'")
+        self.namespace = namespace_of(context, absent="", empty="")
+        self._last = context.sim.now
+        self._clock = context.clock(context.number("updateRate", default), self._measure)
+
+    def start(self) -> None:
+        """Begins to measure."""
+        self._clock.hear(True)
+
+    def random(self, now: int) -> np.random.Generator:
+        """Returns what draws the errors of a measurement at a time [ns]."""
+        return self._context.sensing.noise(self._context.model, self._context.plugin.name, now)
+
+    def close(self) -> None:
+        self._clock.end()
+
+    def _measure(self, now: int) -> None:
+        seconds = max(now - self._last, 0) / NANOSECONDS
+        self._last = now
+        self._send(motion_of(self._context.model, self.link), now, seconds)
+
+
+class HectorImuPlugin:
+    """Feels gravity: +9.8 m/s² upwards at rest."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self._context = context
+        self._accel, self._rate, self._yaw = (
+            DriftingError(_reader(context), prefix) for prefix in ("accel", "rate", "yaw")
+        )
+        self._turn = from_rpy(*numbers(context.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
+        self._imu = Imu(feels_gravity=True)
+        self._sensor = sensor = HectorSensor(context, 0.0, self._publish)
+        self._frame = context.text("frameId", sensor.link).lstrip("/")
+        topic = topic_in(sensor.namespace, context.text("topicName", "imu"))
+        self._publisher = rospy.Publisher(topic, ImuMsg, queue_size=10, tcp_nodelay=True)
+        service = context.text("serviceName", f"{topic}/calibrate")
+        self._service = rospy.Service(topic_in(sensor.namespace, service), Empty, self._calibrate)
+        sensor.start()
+
+    def shutdown(self) -> None:
+        self._service.shutdown()
+        self._publisher.unregister()
+        self._sensor.close()
+
+    def _calibrate(self, _: object) -> EmptyResponse:
+        with self._context.sim.lock:
+            self._rate.restart()
+        return EmptyResponse()
+
+    def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
+        sim, moves = self._context.sim, self._context.sensing.schedule.moves
+        sample = self._imu.measure(now, moves, motion, sim.world.gravity)
+        if sample is None:
+            return
+        random = self._sensor.random(now)
+        acceleration = self._accel.applied(np.array(sample.linear_acceleration), seconds, random)
+        rate = self._rate.applied(np.array(sample.angular_velocity), seconds, random)
+        yaw = float(self._yaw.applied(np.zeros(3), seconds, random)[2])
+        turned = multiply(self._turn, sample.orientation)
+        turned = multiply(from_rpy(0.0, 0.0, yaw), turned)
+        tilt = self._accel.noise[:2] ** 2 / GRAVITY**2
+        self._publisher.publish(
+            ImuMsg(
+                header=Header(stamp=to_time(now), frame_id=self._frame),
+                orientation=Quaternion(*turned),
+                orientation_covariance=_diagonal([*tilt, self._yaw.noise[2] ** 2]),
+                angular_velocity=Vector3(*rate),
+                angular_velocity_covariance=_diagonal(self._rate.noise**2),
+                linear_acceleration=Vector3(*acceleration),
+                linear_acceleration_covariance=_diagonal(self._accel.noise**2),
+            )
+        )
+
+
+class HectorGpsPlugin:
+    """Latitude, longitude [degrees] and altitude [m] on WGS84; velocities north, west and up [m/s]."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self._latitude, self._longitude, heading, self._altitude = (
+            context.number(f"reference{name}", default)
+            for name, default in (
+                ("Latitude", 49.9), ("Longitude", 8.9), ("Heading", 0.0), ("Altitude", 0.0),
+            )
+        )  # fmt: skip
+        self._heading = math.radians(heading)
+        sine = math.sin(math.radians(self._latitude))
+        squared = FLATTENING * (2.0 - FLATTENING)
+        share = 1.0 - squared * sine**2
+        self._north = EQUATOR * (1.0 - squared) / share**1.5  # [m/rad]
+        self._east = EQUATOR / math.sqrt(share) * math.cos(math.radians(self._latitude))
+        self._error = DriftingError(_reader(context), "")
+        self._velocity_error = DriftingError(_reader(context), "velocity")
+        self._sensor = sensor = HectorSensor(context, GPS_RATE, self._publish)
+        self._frame = context.text("frameId", "/world")
+        fix = topic_in(sensor.namespace, context.text("topicName", "fix"))
+        self._fix = rospy.Publisher(fix, NavSatFix, queue_size=10, tcp_nodelay=True)
+        velocity = topic_in(sensor.namespace, context.text("velocityTopicName", "fix_velocity"))
+        self._velocity = rospy.Publisher(velocity, Vector3Stamped, queue_size=10, tcp_nodelay=True)
+        sensor.start()
+
+    def shutdown(self) -> None:
+        self._fix.unregister()
+        self._velocity.unregister()
+        self._sensor.close()
+
+    def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
+        random = self._sensor.random(now)
+        place = self._error.applied(np.array(motion.pose.position), seconds, random)
+        speed = self._velocity_error.applied(np.array(motion.linear), seconds, random)
+        north, west = self._turned(place)
+        header = Header(stamp=to_time(now), frame_id=self._frame)
+        self._fix.publish(
+            NavSatFix(
+                header=header,
+                status=NavSatStatus(NavSatStatus.STATUS_FIX, 0),
+                latitude=self._latitude + math.degrees(north / self._north),
+                longitude=self._longitude - math.degrees(west / self._east),
+                altitude=self._altitude + float(place[2]),
+                position_covariance=_diagonal(self._error.drift**2 + self._error.noise**2),
+                position_covariance_type=NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN,
+            )
+        )
+        self._velocity.publish(
+            Vector3Stamped(header, Vector3(*self._turned(speed), float(speed[2])))
+        )
+
+    def _turned(self, values: np.ndarray) -> tuple[float, float]:
+        """Returns the parts to the north and to the west."""
+        x, y = float(values[0]), float(values[1])
+        cosine, sine = math.cos(self._heading), math.sin(self._heading)
+        return x * cosine + y * sine, -x * sine + y * cosine
+
+
+class HectorMagneticPlugin:
+    """The magnetic field of the earth in the sensor's axes, scaled to `magnitude`."""
+
+    def __init__(self, context: PluginContext) -> None:
+        def angle(tag: str, default: float) -> float:
+            return math.radians(context.number(tag, default))
+
+        declination, inclination = angle("declination", 0.0), angle("inclination", 60.0)
+        heading = angle("referenceHeading", 0.0)
+        across = context.number("magnitude", 1.0) * math.cos(inclination)
+        down = -context.number("magnitude", 1.0) * math.sin(inclination)
+        turn = heading - declination
+        self._field = (across * math.cos(turn), across * math.sin(turn), down)
+        self._error = DriftingError(_reader(context), "")
+        self._sensor = sensor = HectorSensor(context, 0.0, self._publish)
+        self._frame = context.text("frameId", sensor.link).lstrip("/")
+        self._is_field = truth(context.text("useMagneticFieldMsgs", "false"))
+        topic = topic_in(sensor.namespace, context.text("topicName", "magnetic"))
+        kind = MagneticField if self._is_field else Vector3Stamped
+        self._publisher = rospy.Publisher(topic, kind, queue_size=1, tcp_nodelay=True)
+        sensor.start()
+
+    def shutdown(self) -> None:
+        self._publisher.unregister()
+        self._sensor.close()
+
+    def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
+        field = rotate(conjugate(motion.pose.orientation), self._field)
+        seen = Vector3(*self._error.applied(np.array(field), seconds, self._sensor.random(now)))
+        header = Header(stamp=to_time(now), frame_id=self._frame)
+        message = (
+            MagneticField(header, seen, [0.0] * 9)
+            if self._is_field
+            else Vector3Stamped(header, seen)
+        )
+        self._publisher.publish(message)
+
+
+def _reader(context: PluginContext) -> Callable[[str, float], np.ndarray]:
+    """Returns a reader of elements with one number or three."""
+
+    def read(tag: str, default: float) -> np.ndarray:
+        words = context.text(tag, str(default)).split()
+        count = 1 if len(words) == 1 else 3
+        return np.broadcast_to(numbers(" ".join(words), f"<{tag}>", count), 3)
+
+    return read
+
+
+def _diagonal(values: np.ndarray | list[float]) -> list[float]:
+    return [float(each) for each in np.diag(values).ravel()]
+
+
+LIBRARIES = {
+    "libhector_gazebo_ros_imu.so": HectorImuPlugin,
+    "libhector_gazebo_ros_gps.so": HectorGpsPlugin,
+    "libhector_gazebo_ros_magnetic.so": HectorMagneticPlugin,
+}
