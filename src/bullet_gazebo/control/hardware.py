@@ -219,15 +219,19 @@ class RobotHardware:
 
     def joint(self, interface: str, name: str) -> JointHandle:
         """Returns joint `name` of `interface`."""
-        joints = self.interfaces.get(interface)
-        if joints is None:
-            raise ControlError(f"the robot has no hardware_interface::{interface}")
-        if name not in joints:
-            known = ", ".join(sorted(joints)) or "none"
+        joints = self.interfaces.get(interface, {})
+        if name in joints:
+            return joints[name]
+        own = [each for each, others in self.interfaces.items() if name in others]
+        if own:
             raise ControlError(
-                f"joint '{name}' is not in hardware_interface::{interface} (it has: {known})"
+                f"joint '{name}' has hardware_interface::{own[0]}, and the controller needs "
+                f"hardware_interface::{interface}: its type and the joint's <transmission> must agree"
             )
-        return joints[name]
+        known = ", ".join(sorted(joints)) or "none"
+        raise ControlError(
+            f"joint '{name}' is not in hardware_interface::{interface} (it has: {known})"
+        )
 
     def relatch(self, names: Iterable[str] | None = None) -> None:
         """Forgets the commands of joints (default: all).
