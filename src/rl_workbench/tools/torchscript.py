@@ -144,7 +144,7 @@ def described(space: spaces.Space[Any]) -> dict[str, Any]:
 
 
 class OfVectors(nn.Module):
-    """Maps observations (N, D) of any number type to greedy actions (N, ...)."""
+    """Maps observations (N, D), or images, of any number type to greedy actions (N, ...)."""
 
     def __init__(self, network: nn.Module) -> None:
         super().__init__()
@@ -178,6 +178,11 @@ def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement
         WorkbenchError: if the environment fails, its observations can't be exported, or the file
             would act differently.
     """
+    if policy.network is None:
+        raise WorkbenchError(
+            f"a policy of {run.folder} can't be exported: only Stable-Baselines3 computes it "
+            "(--policy, --policy-kwargs, or a Dict with images)"
+        )
     space, original = policy.env.observation_space, policy.env.unwrapped.observation_space
     module = _module(policy.network, space, run.env_id)
     # Read back, because the file's content is what must agree.
@@ -186,6 +191,7 @@ def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement
         "format": FORMAT,
         "env_id": run.env_id,
         "env_kwargs": run.env_kwargs,
+        "wrapper": run.wrapper,
         "algorithm": run.algorithm,
         "experiment": run.experiment,
         "seed": run.seed,

@@ -107,7 +107,10 @@ class Policy(NamedTuple):
     """A learned policy."""
 
     act: Callable[[Any], Any]  # greedily, for one observation: (D,), or a dict as it learned from
-    network: nn.Module  # for TorchScript: of (N, D), float32, a Dict's parts side by side: (N, ...)
+    network: (
+        nn.Module | None
+    )  # for TorchScript: of (N, D), float32, a Dict's parts side by side, or of
+    # images as they were observed: (N, ...); None if only the library computes it
 
 
 def load_policy(

@@ -2,11 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rl_workbench import errors
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
+from rl_workbench.option import imported
 from rl_workbench.storage import write_atomically
 from rl_workbench.training.scalar_log import CONFIRMED, EVAL_SUCCESS, EVALUATION, RETURN, SUCCESS
 
@@ -125,15 +124,9 @@ def load_callbacks(names: str) -> list[Callback]:
 
 
 def _load(name: str) -> Callback:
-    module, _, class_name = name.partition(":")
-    if not module or not class_name:
-        raise WorkbenchError(f"--callback must be module:Class, not {name!r}")
+    make = imported(name, "--callback")
     try:
-        made = getattr(import_module(module), class_name)()
-    except ModuleNotFoundError as error:
-        raise WorkbenchError(
-            f"--callback {name}: {error}; {errors.hints.finding_modules()}"
-        ) from error
+        made = make()
     except Exception as error:
         raise WorkbenchError(f"--callback {name}: {error_line(error)}") from error
     if not isinstance(made, Callback):

@@ -9,6 +9,7 @@ from rl_workbench.agents.dqn_agent import DQNAgent, Learned
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import mark_random_states, rewind_random_states
 from rl_workbench.training.algorithm import Algorithm, Policy, Say
+from rl_workbench.training.checked import CURVES
 from rl_workbench.training.checkpoints import fitting
 from rl_workbench.training.environments import as_vector, discrete_actions, succeeded
 from rl_workbench.training.options import TrainingOptions
@@ -96,7 +97,8 @@ class DQNTraining(Algorithm):
         if terminated or truncated:
             agent.episode_done()
             total, self._reward, self._observation = self._reward, 0.0, None
-            scalars, note = {"charts/epsilon": agent.epsilon}, f"ε: {agent.epsilon:.3f}"
+            scalars = {"charts/epsilon": agent.epsilon, **info.get(CURVES, {})}
+            note = f"ε: {agent.epsilon:.3f}"
             frame.episode_done(total, env.length, scalars, note, succeeded(info))
 
     def _set_mark(self) -> None:

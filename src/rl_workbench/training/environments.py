@@ -17,6 +17,7 @@ from gymnasium import spaces
 from rl_workbench import errors
 from rl_workbench.env_ids import FORM, import_module_of, module_of
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
+from rl_workbench.option import imported
 from rl_workbench.training.checked import CheckedEnvironment
 from rl_workbench.training.options import TrainingOptions
 
@@ -30,18 +31,21 @@ def make_environment(
     *,
     keep_dict: bool = False,
     which: str = "",
+    wrapper: str = "",
 ) -> CheckedEnvironment:
     """Makes an environment that refuses observations and rewards that aren't finite.
 
     Args:
         env_id: Gymnasium's, also as module:id.
         options: Of the environment.
-        keep_dict: Leave a Dict of arrays as it is. Other observations are flattened to a vector (D,).
+        keep_dict: Leave a Dict of arrays, and images, as they are. Other observations are flattened to a
+            vector (D,).
         which: Begins the errors while it runs, as "environment 2 of 3: ".
+        wrapper: A function that wraps it, as module:function.
 
     Raises:
-        WorkbenchError: If there is no such environment, something that it needs isn't installed, or its
-            options make no sense.
+        WorkbenchError: If there is no such environment, something that it needs isn't installed, its options
+            make no sense, or it observes images that can't be learned from.
     """
     import_module_of(env_id)
     try:
@@ -58,12 +62,16 @@ def make_environment(
         raise WorkbenchError(f"can't make {env_id}: {reason}") from error
     except (Exception, SystemExit) as error:
         raise EnvironmentFailure(f"can't make {env_id}: {error_line(error)}") from error
+    if wrapper:
+        env = _wrapped(env, wrapper)
     space = env.observation_space
-    if (
-        keep_dict
-        and isinstance(space, spaces.Dict)
-        and all(isinstance(part, spaces.Box) for part in space.values())
-    ):
+    parts = list(space.values()) if isinstance(space, spaces.Dict) else [space]
+    keeps = keep_dict and all(isinstance(part, spaces.Box) for part in parts)
+    for part in filter(is_image, parts):
+        if not (keeps and suits_cnn(part)):
+            env.close()
+            raise WorkbenchError(_unsuitable(env_id, part, keeps))
+    if keeps and (isinstance(space, spaces.Dict) or is_image(space)):
         return CheckedEnvironment(env, env_id, which)
     if not (isinstance(space, spaces.Box) and len(space.shape) == 1):
         if not space.is_np_flattenable:
@@ -75,13 +83,29 @@ def make_environment(
     return CheckedEnvironment(env, env_id, which)
 
 
+def _wrapped(env: gymnasium.Env[Any, Any], wrapper: str) -> gymnasium.Env[Any, Any]:
+    """Wraps an environment by the user's function, module:function."""
+    try:
+        made = imported(wrapper, "--wrapper")(env)
+        if not isinstance(made, gymnasium.Env):
+            raise TypeError(f"it must return a gymnasium.Env, not {made!r}")
+    except WorkbenchError:
+        env.close()
+        raise
+    except (Exception, SystemExit) as error:
+        env.close()
+        raise EnvironmentFailure(f"--wrapper {wrapper}: {error_line(error)}") from error
+    return made
+
+
 def environment_for(
     options: TrainingOptions, given: Mapping[str, Any], which: str = ""
 ) -> CheckedEnvironment:
     """Makes an environment as a training's algorithm observes it."""
     return make_environment(
-        options.run.env_id, given, keep_dict=options.kind.keeps_dict, which=which
-    )
+        options.run.env_id, given, keep_dict=options.kind.keeps_dict, which=which,
+        wrapper=options.run.wrapper,
+    )  # fmt: skip
 
 
 def training_environments(options: TrainingOptions) -> list[CheckedEnvironment]:
@@ -158,6 +182,34 @@ def _attribute(env: gymnasium.Env[Any, Any], name: str) -> Any:
 
 
 # --- spaces -------------------------------------------------------------------------------------
+
+
+SMALLEST_IMAGE = 36  # [pixels], of each side, as Stable-Baselines3's CNN needs
+
+
+def is_image(space: gymnasium.Space[Any]) -> TypeGuard[spaces.Box]:
+    """Returns whether observations are images, or a stack of them; smaller arrays are numbers."""
+    if not isinstance(space, spaces.Box) or len(space.shape) < 2:
+        return False
+    is_large = sorted(space.shape)[-2] >= SMALLEST_IMAGE
+    return is_large and (len(space.shape) > 2 or space.dtype == np.uint8)
+
+
+def suits_cnn(space: spaces.Box) -> bool:
+    """Returns whether images have the form that Stable-Baselines3's CNN takes."""
+    is_full = bool(np.all(space.low == 0) and np.all(space.high == 255))
+    return space.dtype == np.uint8 and len(space.shape) == 3 and is_full
+
+
+def _unsuitable(env_id: str, image: spaces.Box, keeps: bool) -> str:
+    """Returns why images can't be learned from, and what to do."""
+    text = f"{env_id} observes images, {image.dtype} of {image.shape}: "
+    if keeps:
+        return f"{text}a CNN takes uint8 from 0 to 255 of (height, width, channels); --wrapper may make them"
+    return (
+        f"{text}this algorithm learns from vectors. Stable-Baselines3's have a CNN: --algo ppo, a2c or "
+        "dqn-sb3, for continuous actions sac, td3 or ddpg"
+    )
 
 
 def has_goal(space: gymnasium.Space[Any]) -> bool:

@@ -15,7 +15,7 @@ from bullet_gazebo.state import SCOPE
 from file_access.text import did_you_mean
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
-from robot_envs.world_state import JointState, Motion, StateQuery, link_keys
+from robot_envs.world_state import ONLY_REWARDED, JointState, Motion, StateQuery, link_keys
 
 INSTANT = 1e-5  # [s] either way, over which poses are differentiated
 AT_REST = Motion(Pose())  # the world
@@ -88,11 +88,12 @@ def _check(robot: Robot, query: StateQuery) -> None:
         if asked:
             raise RobotEnvError(
                 f"the task asks for {what}, which aren't known of a robot that isn't simulated"
+                f"{ONLY_REWARDED}"
             )
     if query.links and not robot.links.fixed_base:
         raise RobotEnvError(
             f"the task asks for links, and '{robot.model}' isn't fixed to the world: its joints "
-            "don't determine where it is"
+            f"don't determine where it is{ONLY_REWARDED}"
         )
 
 

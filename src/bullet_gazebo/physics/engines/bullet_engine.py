@@ -14,7 +14,6 @@ from bullet_gazebo.physics.engine_form import at_joints, parents_first
 from bullet_gazebo.physics.engines.bullet_body import (
     BASE,
     BulletBody,
-    collides_with_itself,
     contacts,
     is_plane,
 )
@@ -82,7 +81,7 @@ class BulletClient:
             return self._load_plane(description, pose)
         engine_form, offsets = at_joints(description)
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_MAINTAIN_LINK_ORDER
-        if collides_with_itself(description):
+        if description.collides_with_itself:
             flags |= (
                 pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
             )

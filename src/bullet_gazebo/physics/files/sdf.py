@@ -203,6 +203,7 @@ def read_model(element: Element, context: FileContext) -> ModelDescription:
             parts.warnings.append("written for a newer SDF than 1.7: what is new in it is ignored")
         model = _assemble(name, parts, static)
         model.initial_pose = read_pose(element, "model")[0]
+        context.reading.split_meshes(model)
         return model
 
 

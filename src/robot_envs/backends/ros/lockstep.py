@@ -51,7 +51,7 @@ class LockstepWorld(RobotBackend):
         timeout: wall time [s] that an answer may take, on top of 10 ms for each tick.
     """
 
-    deterministic = shared = True
+    deterministic = complete = shared = True
 
     def __init__(
         self, scene: Scene, ticks: int, world: SharedWorld, timeout: float = TIMEOUT

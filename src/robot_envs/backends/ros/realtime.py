@@ -30,6 +30,7 @@ from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.world_state import (
+    ONLY_REWARDED,
     Commands,
     InitialState,
     JointState,
@@ -180,7 +181,7 @@ class RealtimeWorld(RobotBackend):
         RobotEnvError: for several robots.
     """
 
-    deterministic, shared = False, True
+    deterministic, complete, shared = False, False, True
 
     def __init__(self, scene: Scene, control_period: float, world: SharedWorld) -> None:
         if scene.several:
@@ -260,7 +261,9 @@ class RealtimeWorld(RobotBackend):
 
     def look(self, query: StateQuery) -> None:
         if query != StateQuery():
-            raise RobotEnvError(f"{_ONLY_JOINTS}: it has no links, models and contacts")
+            raise RobotEnvError(
+                f"{_ONLY_JOINTS}: it has no links, models and contacts{ONLY_REWARDED}"
+            )
 
     def vary(self, variation: Variation) -> None:
         with self._simulator:

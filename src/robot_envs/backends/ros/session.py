@@ -5,6 +5,7 @@ import contextlib
 import os
 import re
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import rospy
@@ -100,6 +101,10 @@ class RosSession:
         self._become_node()
         self._check_mode()
         running.check_world(robot)
+        if robot.physics_step:
+            before, step = RunningSimulator(), running.physics_step()
+            running.set_physics_step(robot.physics_step)
+            self._undo.callback(_undo_if_running, before, partial(running.set_physics_step, step))
         if self._curves is not None:
             self._undo.callback(windows.show_curves(self._curves))
         changes = bring_up(self._scene, say)

@@ -5,11 +5,12 @@ import random
 import numpy as np
 import pytest
 
-from bullet_gazebo.ros.clients import gz, gzclient, spawn_model
+from bullet_gazebo.ros.clients import gz, gzclient, spawn_model, spawner
 from bullet_gazebo.ros.clients.spawn_model import parse
 from bullet_gazebo.ros.common.node_process import seed_random_numbers
 from bullet_gazebo.ros.node.gzserver import parse_args
 from bullet_gazebo.ros.services.spawn_services import model_paths
+from ros_calls.service import ServiceFailed, ServiceGone
 
 
 def test_options_stand_in_any_order():
@@ -113,3 +114,25 @@ def test_another_window_keeps_its_name(line, dead, living, anonymous, master, mo
     monkeypatch.setattr(gzclient, "init_node", lambda name, _, anonymous: taken.append(anonymous))
     gzclient.become_node(["gzclient", *line.split()])
     assert taken == [anonymous]
+
+
+@pytest.mark.parametrize(("fault", "warns"), [(ServiceGone, False), (ServiceFailed, True)])
+def test_a_spawner_that_ends_with_the_simulator_has_nothing_to_complain_of(
+    monkeypatch, fault, warns
+):
+    """roslaunch and rostest end both at the same time."""
+
+    class Manager:
+        def load(self, name):
+            return True
+
+        def running(self, timeout):
+            raise fault("gone")
+
+    told, leave = [], []
+    monkeypatch.setattr(spawner.rospy, "logwarn", lambda *text: told.append(text))
+    monkeypatch.setattr(spawner.rospy, "on_shutdown", leave.append)
+    monkeypatch.setattr(spawner.rospy, "spin", lambda: None)
+    spawner._Spawner(Manager()).run(["arm_controller"], stopped=True)
+    leave[0]()
+    assert bool(told) == warns

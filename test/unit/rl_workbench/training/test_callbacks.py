@@ -136,7 +136,7 @@ def test_a_loss_is_logged_at_the_step_at_which_one_fails(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("my_callbacks", "must be module:Class"),
+        ("my_callbacks", "must be module:name"),
         ("my_callback:Failing", "No module named 'my_callback'"),
         ("my_callbacks:Missing", "has no attribute 'Missing'"),
         ("my_callbacks:NoCallback", "must be a subclass of rl_workbench.Callback"),
