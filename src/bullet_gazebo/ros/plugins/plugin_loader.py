@@ -8,6 +8,7 @@ called, SystemExit and KeyboardInterrupt included: a Ctrl-C raises nothing in th
 import importlib
 import os
 import pkgutil
+import re
 import traceback
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -17,7 +18,13 @@ from typing import Protocol
 
 import rospy
 
-from bullet_gazebo.physics.description import DescriptionError, Plugin, Sensor, library_of
+from bullet_gazebo.physics.description import (
+    CONTROL_PLUGIN,
+    DescriptionError,
+    Plugin,
+    Sensor,
+    library_of,
+)
 from bullet_gazebo.physics.files.sdf_parts import value
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.ros.common.publishing import Thinner
@@ -25,6 +32,7 @@ from bullet_gazebo.sensors.schedule import SensorClock
 from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.simulator import Simulator
 
+CONTROL = re.compile("control|drive|steer|planar_move|hw_sim", re.IGNORECASE)  # foreign libraries
 PARAMETER = "~plugins"  # users' plugins: library: "module:Factory"
 PATIENCE = 10.0  # [s of wall time]
 Update = Callable[[int], None]
@@ -186,10 +194,8 @@ class PluginRegistry:
             return self._built_in[library]
         place = places.get(library, places.get(plugin.filename))
         if place is None:
-            # The spawn services log all that is left out together.
-            unknown = f"plugin {plugin.filename or 'without a filename'}"
-            unknown += f" of sensor '{sensor.name}'" if sensor else ""
-            model.description.left_out.append(unknown)
+            name = plugin.filename or "without a filename"
+            _leave_out(f"{name} of sensor '{sensor.name}'" if sensor else name, model)
             return None
         try:
             return _import(place)
@@ -212,6 +218,17 @@ def _built_in() -> dict[str, Factory]:
         for module in modules
         for library, factory in getattr(module, "LIBRARIES", {}).items()
     }
+
+
+def _leave_out(name: str, model: Model) -> None:
+    libraries = {library_of(each.filename) for each in model.description.plugins}
+    if CONTROL.search(name) and CONTROL_PLUGIN not in libraries:
+        rospy.logwarn(
+            "Model '%s': the plugin %s is not simulated: this robot has no control here (docs/plugins.md)",
+            model.name, name,
+        )  # fmt: skip
+    else:  # the spawn services log all that is left out together
+        model.description.left_out.append(f"plugin {name}")
 
 
 def _warn_late(models: str) -> None:
