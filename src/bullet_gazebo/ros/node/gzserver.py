@@ -126,17 +126,16 @@ class GazeboNode:
             rospy.set_param("/use_sim_time", True)
         world = World(engine)
         self.sim = Simulator(world, lockstep=args.lockstep, relatch=_flag("~relatch_on_reset"))
-        self._seed = args.seed or 0
         self._watchdog = Watchdog(self.sim)
         recording = _recording(args)
         fill_world(self.sim, read_world(args.world, interrupted), interrupted)
         if args.paused:
             self.sim.pause()
-        self._advertise(_flag("~enable_ros_network"))
+        self._advertise(_flag("~enable_ros_network"), args.seed or 0)
         self._recorder = None if recording is None else SimulationRecorder(self.sim, recording)
         MasterWatch().start()
 
-    def _advertise(self, network: bool) -> None:
+    def _advertise(self, network: bool, seed: int) -> None:
         scene = SceneOffer(self.sim)
         control = WorldControl(self.sim, self._watchdog, scene.show if network else None)
         answer_xmlrpc(METHOD, control.answer)
@@ -147,7 +146,7 @@ class GazeboNode:
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
-        plugins = PluginRegistry(self.sim, thinner, self._seed)
+        plugins = PluginRegistry(self.sim, thinner, seed)
         load_plugins(self.sim, plugins)
         if not network:
             return
