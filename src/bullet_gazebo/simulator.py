@@ -68,6 +68,8 @@ class Simulator:
         self.listeners: list[Callable[[int], None]] = []
         # Called under the lock after something other than time has moved bodies, or time was reset.
         self.moved: list[Callable[[], None]] = []
+        # Called under the lock with a seed from which all random numbers start again.
+        self.reseeded: list[Callable[[int], None]] = []
         # What sends messages after the ticks, and whether those who step the world call them.
         self.outboxes: list[Outbox] = []
         self.deliver_with_steps = False
@@ -273,6 +275,11 @@ class Simulator:
             for robot in self.robots:
                 robot.joints_moved(self.now, relatch=False)
             self._tell_of_move()
+
+    def reseed(self, seed: int) -> None:
+        """Lets what draws random numbers start from `seed`; the caller holds the lock."""
+        for listener in self.reseeded:
+            listener(seed)
 
     def _tell_of_move(self) -> None:
         for listener in self.moved:

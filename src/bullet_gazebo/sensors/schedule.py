@@ -51,6 +51,7 @@ class Schedule:
         self._clocks: list[SensorClock] = []
         self._due = 0
         self.moves = 0  # how often something other than time has moved bodies
+        self.moved_at = -1  # when it did so last [ns]
         self.prepare: list[Callable[[], None]] = []  # called before the measurements of one time
         sim.moved.append(self._moved)
 
@@ -111,7 +112,7 @@ class Schedule:
     def _moved(self) -> None:
         """Measures afresh all that is heard, after a service has moved bodies or reset time."""
         self.moves += 1
-        now = self._sim.now
+        now = self.moved_at = self._sim.now
         for clock in self._clocks:
             if now < clock.last:
                 clock.begin = clock.last = now

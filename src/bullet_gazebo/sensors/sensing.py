@@ -25,6 +25,12 @@ class Sensing:
         self.visuals = RayScene(sim.world, visuals=True)
         self.schedule.prepare += [self.collisions.expire, self.visuals.expire]
         self._seed = seed
+        sim.reseeded.append(self._reseed)
+
+    def _reseed(self, seed: int) -> None:
+        """Draws the same noise from now on as after any other time with this seed."""
+        self._seed = seed
+        self.schedule.moves = 0
 
     def noise(self, model: Model, name: str, now: int) -> np.random.Generator:
         """Returns what draws the noise of the measurement at `now` [ns] by the sensor or plugin `name`."""

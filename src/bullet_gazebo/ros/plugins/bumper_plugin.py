@@ -29,7 +29,7 @@ class BumperPlugin:
         sensor = sensor_of(context, ("contact",))
         names = [(each.text or "").strip() for each in sensor.element.findall("contact/collision")]
         model, link = context.model, sensor.link
-        found = [_collision(name, link, list(model.collisions(link))) for name in names]
+        found = [collision_named(name, link, list(model.collisions(link))) for name in names]
         for name, taken in zip(names, found, strict=True):
             if taken is None:
                 rospy.logwarn(
@@ -47,21 +47,28 @@ class BumperPlugin:
         self._topic.close()
 
     def _measure(self, now: int) -> ContactsState:
-        pairs = contact_pairs(self._context.sim.world, self._collisions) if self._collisions else []
+        # What a service has just moved has touched nothing where it is now.
+        is_stale = self._context.sensing.schedule.moved_at == now
+        pairs = []
+        if self._collisions and not is_stale:
+            pairs = contact_pairs(self._context.sim.world, self._collisions)
         header = Header(stamp=to_time(now), frame_id=self._frame)
         return ContactsState(header, [to_contact_state(pair) for pair in pairs])
 
 
-def _collision(name: str, link: str, collisions: list[str]) -> str | None:
+def collision_named(name: str, link: str, collisions: list[str]) -> str | None:
     """Returns the collision that is meant, whichever way a lumped link's is written."""
     child = name.removeprefix(f"{link}_collision_")
     spellings = (name, f"{link}{LUMPED}{name}", f"{link}{LUMPED}{child}_collision")
-    for spelling in spellings:
-        # Lumping numbers all but the first collision of a link.
-        for each in collisions:
-            if each == spelling or each.rpartition("_")[0] == spelling:
-                return each
-    return None
+    exact = [each for each in spellings if each in collisions]
+    # Lumping numbers all but the first collision of a link.
+    numbered = [
+        each
+        for spelling in spellings
+        for each in collisions
+        if each.startswith(f"{spelling}_") and each.removeprefix(f"{spelling}_").isdigit()
+    ]
+    return next(iter([*exact, *numbered]), None)
 
 
 LIBRARIES = {"libgazebo_ros_bumper.so": BumperPlugin}

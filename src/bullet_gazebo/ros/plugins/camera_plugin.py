@@ -64,9 +64,7 @@ class CameraPlugin:
             context.text("cameraInfoTopicName", "camera_info"),
         )
         baseline = context.number("hackBaseline", 0.0)
-        self._outputs = CameraTopics(
-            context, sensor, self._camera, self._topics, scope, names, baseline
-        )
+        self._outputs = CameraTopics(context, self._camera, self._topics, scope, names, baseline)
         self._triggers = None
         if self.is_triggered:
             topic = topic_in(scope, context.text("triggerTopicName", "image_trigger"))

@@ -1,6 +1,7 @@
 """Topics of cameras: pictures, JPEGs, camera_info (docs/contract/sensors.md 4a)."""
 
 import io
+from contextlib import suppress
 
 import numpy as np
 import rospy
@@ -39,7 +40,6 @@ class CameraTopics:
 
     Args:
         context: the plugin's.
-        sensor: that the camera belongs to.
         camera: what sees.
         topics: those of the sensor.
         scope: full name that the topics are in.
@@ -51,7 +51,6 @@ class CameraTopics:
     def __init__(
         self,
         context: PluginContext,
-        sensor: Sensor,
         camera: PinholeCamera,
         topics: SensorTopics,
         scope: str,
@@ -59,17 +58,18 @@ class CameraTopics:
         baseline: float,
         own: str = "",
     ) -> None:
-        self._context, self._sensor, self._camera = context, sensor, camera
+        self._context, self._camera = context, camera
         self._frame = frame_of(scope, context.text("frameName", ""))
         self.info = _camera_info(context, camera, baseline)
         image = topic_in(scope, names[0])
         self._image = topics.advertise(image, Image, QUEUE, latch=True)
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
         self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)
-        self._service = rospy.Service(
-            topic_in(scope, f"{own}set_camera_info"), SetCameraInfo, self._set
-        )
-        random = context.sensing.bias(context.model, sensor.name)
+        service = topic_in(scope, f"{own}set_camera_info")
+        self._service = None
+        with suppress(rospy.ServiceException):  # another camera below the same name offers it
+            self._service = rospy.Service(service, SetCameraInfo, self._set)
+        random = context.sensing.bias(context.model, context.key)
         self._bias = 0.0 if camera.noise is None else camera.noise.draw_bias(random)
 
     @property
@@ -84,7 +84,7 @@ class CameraTopics:
         """Publishes what is heard of a picture at a time [ns]."""
         header = self.header(now)
         if self.wants_colour:
-            random = self._context.sensing.noise(self._context.model, self._sensor.name, now)
+            random = self._context.sensing.noise(self._context.model, self._context.key, now)
             seen = noisy(picture.colours, self._camera.noise, self._bias, random)
             if self._image.is_heard:
                 self._image.publish(to_image(seen, self._camera.format, header))
@@ -95,7 +95,8 @@ class CameraTopics:
             self._info.publish(self.info)
 
     def close(self) -> None:
-        self._service.shutdown()
+        if self._service is not None:
+            self._service.shutdown()
 
     def _set(self, request: object) -> SetCameraInfoResponse:
         """Takes over a calibration."""

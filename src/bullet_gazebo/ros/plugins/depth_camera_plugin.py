@@ -44,7 +44,7 @@ class DepthCameraPlugin:
             context.text("cameraInfoTopicName", "ir/camera_info"),
         )
         baseline = context.number("hackBaseline", 0.0)
-        self._pictures = CameraTopics(context, sensor, camera, topics, scope, names, baseline)
+        self._pictures = CameraTopics(context, camera, topics, scope, names, baseline)
 
         def named(tag: str, default: str) -> str:
             return topic_in(scope, context.text(tag, default))

@@ -19,7 +19,7 @@ from bullet_gazebo.physics.files.elements import numbers, truth
 from bullet_gazebo.physics.pose import conjugate, from_rpy, multiply, rotate
 from bullet_gazebo.ros.common.messages import NANOSECONDS, to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import namespace_of, topic_in
+from bullet_gazebo.ros.plugins.sensor_topics import namespace_of, queue_of, topic_in
 from bullet_gazebo.sensors.drift import DriftingError
 from bullet_gazebo.sensors.imu import Imu, LinkMotion, motion_of
 
@@ -59,7 +59,7 @@ class HectorSensor:
 
     def random(self, now: int) -> np.random.Generator:
         """Returns what draws the errors of a measurement at a time [ns]."""
-        return self._context.sensing.noise(self._context.model, self._context.plugin.name, now)
+        return self._context.sensing.noise(self._context.model, self._context.key, now)
 
     def close(self) -> None:
         self._clock.end()
@@ -83,7 +83,9 @@ class HectorImuPlugin:
         self._sensor = sensor = HectorSensor(context, 0.0, self._publish)
         self._frame = context.text("frameId", sensor.link).lstrip("/")
         topic = topic_in(sensor.namespace, context.text("topicName", "imu"))
-        self._publisher = rospy.Publisher(topic, ImuMsg, queue_size=10, tcp_nodelay=True)
+        self._publisher = rospy.Publisher(
+            topic, ImuMsg, queue_size=queue_of(context, 10), tcp_nodelay=True
+        )
         service = context.text("serviceName", f"{topic}/calibrate")
         self._service = rospy.Service(topic_in(sensor.namespace, service), Empty, self._calibrate)
         sensor.start()
@@ -144,9 +146,13 @@ class HectorGpsPlugin:
         self._sensor = sensor = HectorSensor(context, GPS_RATE, self._publish)
         self._frame = context.text("frameId", "/world")
         fix = topic_in(sensor.namespace, context.text("topicName", "fix"))
-        self._fix = rospy.Publisher(fix, NavSatFix, queue_size=10, tcp_nodelay=True)
+        self._fix = rospy.Publisher(
+            fix, NavSatFix, queue_size=queue_of(context, 10), tcp_nodelay=True
+        )
         velocity = topic_in(sensor.namespace, context.text("velocityTopicName", "fix_velocity"))
-        self._velocity = rospy.Publisher(velocity, Vector3Stamped, queue_size=10, tcp_nodelay=True)
+        self._velocity = rospy.Publisher(
+            velocity, Vector3Stamped, queue_size=queue_of(context, 10), tcp_nodelay=True
+        )
         sensor.start()
 
     def shutdown(self) -> None:
@@ -201,7 +207,9 @@ class HectorMagneticPlugin:
         self._is_field = truth(context.text("useMagneticFieldMsgs", "false"))
         topic = topic_in(sensor.namespace, context.text("topicName", "magnetic"))
         kind = MagneticField if self._is_field else Vector3Stamped
-        self._publisher = rospy.Publisher(topic, kind, queue_size=1, tcp_nodelay=True)
+        self._publisher = rospy.Publisher(
+            topic, kind, queue_size=queue_of(context, 1), tcp_nodelay=True
+        )
         sensor.start()
 
     def shutdown(self) -> None:

@@ -47,7 +47,7 @@ class ImuPlugin:
         if sample is None:
             return None
         sample = sample._replace(orientation=multiply(self._turn, sample.orientation))
-        random = context.sensing.noise(context.model, context.plugin.name, now)
+        random = context.sensing.noise(context.model, context.key, now)
         return to_imu(
             with_noise(sample, self._deviation, random), now, self._frame, self._deviation
         )

@@ -39,7 +39,7 @@ class ImuSensorPlugin:
         if truth(context.text("initialOrientationAsReference", "false")):
             start = motion_of(context.model, sensor.link, sensor.pose).pose.orientation
             self._turn = multiply(self._turn, conjugate(start))
-        random = context.sensing.bias(context.model, sensor.name)
+        random = context.sensing.bias(context.model, context.key)
         self._noise = [
             (part, axis, noise, noise.draw_bias(random))
             for part in PARTS
@@ -63,7 +63,7 @@ class ImuSensorPlugin:
         sample = self._imu.measure(now, moves, motion, gravity)
         if sample is None:
             return None
-        random = context.sensing.noise(context.model, sensor.name, now)
+        random = context.sensing.noise(context.model, context.key, now)
         sample = sample._replace(orientation=multiply(self._turn, sample.orientation))
         for part, axis, noise, bias in self._noise:
             values = list(getattr(sample, part))

@@ -41,7 +41,7 @@ class MulticameraPlugin:
             )  # fmt: skip
             baseline = context.number("hackBaseline", 0.0) if side == SIDES[1] else 0.0
             self._eyes.append((camera, CameraTopics(
-                context, sensor, camera, self._topics, scope, (names[0], names[1]), baseline, f"{side}/",
+                context, camera, self._topics, scope, (names[0], names[1]), baseline, f"{side}/",
             )))  # fmt: skip
         if not self._eyes:
             self._topics.close()

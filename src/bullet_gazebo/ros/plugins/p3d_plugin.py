@@ -60,9 +60,7 @@ class P3dPlugin:
         x, y, z = self._xyz
         place, turn = add(pose.position, (x, y, z)), multiply(self._turn, pose.orientation)
         if self._deviation:
-            random = self._context.sensing.noise(
-                self._context.model, self._context.plugin.name, now
-            )
+            random = self._context.sensing.noise(self._context.model, self._context.key, now)
             draws = random.normal(0.0, self._deviation, 6).tolist()
             linear = add(linear, (draws[0], draws[1], draws[2]))
             angular = add(angular, (draws[3], draws[4], draws[5]))

@@ -59,6 +59,14 @@ class PluginContext:
     sensing: Sensing
     sensor: Sensor | None = None
     _updates: list[Update] = field(default_factory=list, repr=False)
+    _clocks: list[SensorClock] = field(default_factory=list, repr=False)
+
+    @property
+    def key(self) -> str:
+        """What its random numbers are drawn by: the same for all plugins of a sensor."""
+        if self.sensor is not None:
+            return f"{self.sensor.link}::{self.sensor.name}"
+        return f"plugin {self.model.description.plugins.index(self.plugin)}"
 
     def text(self, tag: str, default: str) -> str:
         """Returns the text of the plugin's child element `tag`."""
@@ -71,7 +79,7 @@ class PluginContext:
     def clock(self, rate: float, measure: Update, at_once: bool = True) -> SensorClock:
         """Calls `measure` with the simulated time [ns] at a rate [Hz; 0 is every step], while it is heard.
 
-        Arguments are those of `Schedule.add`, the rest is as for `on_update`. End the clock in `shutdown`.
+        Arguments are those of `Schedule.add`, the rest is as for `on_update`.
         """
 
         def guarded(now: int) -> None:
@@ -82,6 +90,7 @@ class PluginContext:
                 clock.heard = False
 
         clock = self.sensing.schedule.add(rate, guarded, at_once)
+        self._clocks.append(clock)
         return clock
 
     def on_update(self, update: Update) -> None:
@@ -104,7 +113,9 @@ class PluginContext:
             self.sim.listeners = [*self.sim.listeners, guarded]
 
     def release(self) -> None:
-        """Ends the updates."""
+        """Ends the updates and clocks."""
+        for clock in self._clocks:
+            clock.end()
         with self.sim.lock:
             self.sim.listeners = [each for each in self.sim.listeners if each not in self._updates]
 

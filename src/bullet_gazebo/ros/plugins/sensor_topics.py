@@ -63,6 +63,11 @@ def frame_of(namespace: str, frame: str) -> str:
     return "/".join(filter(None, [*prefix.split("/"), *frame.split("/")]))
 
 
+def queue_of(context: PluginContext, size: int) -> int:
+    """Returns a topic's queue size: a long step makes many messages before rospy's threads send one."""
+    return max(size, LOCKSTEP_QUEUE) if context.sim.lockstep else size
+
+
 class Topic:
     """A topic of a sensor; see `SensorTopics.advertise`."""
 
@@ -107,14 +112,13 @@ class SensorTopics:
         self._waking: list[Topic] = []
         self._topics: list[Topic] = []
         self._clock = context.clock(rate, measure, at_once=unheard is None)
-        # A step of many ticks makes several messages before rospy's threads send one.
-        self._least = LOCKSTEP_QUEUE if context.sim.lockstep else 0
+        self._context = context
 
     def advertise(
         self, name: str, kind: type, queue: int = 1, latch: bool = False, wakes: bool = True
     ) -> Topic:
         """Returns a topic; its subscribers start the measurements if it `wakes` the sensor."""
-        topic = Topic(name, kind, max(queue, self._least), latch, self._hear)
+        topic = Topic(name, kind, queue_of(self._context, queue), latch, self._hear)
         self._topics.append(topic)
         if wakes:
             self._waking.append(topic)
@@ -124,7 +128,6 @@ class SensorTopics:
     def close(self) -> None:
         for topic in self._topics:
             topic.close()
-        self._clock.end()
 
     def _hear(self) -> None:
         is_heard = any(topic.is_heard for topic in self._waking)
@@ -185,7 +188,7 @@ class LaserTopic:
         self.laser = Laser(sensor)
         sensing = context.sensing
         self._scene = sensing.visuals if self.laser.sees_visuals else sensing.collisions
-        self._bias = self.laser.draw_bias(sensing.bias(context.model, sensor.name))
+        self._bias = self.laser.draw_bias(sensing.bias(context.model, context.key))
         namespace = namespace_of(context, absent="", empty=empty)
         self.frame = frame_of(namespace, context.text("frameName", "/world"))
         self._topic = None
@@ -203,7 +206,7 @@ class LaserTopic:
 
     def _measure(self, now: int) -> Any:
         model = self._context.model
-        random = self._context.sensing.noise(model, self._sensor.name, now)
+        random = self._context.sensing.noise(model, self._context.key, now)
         pose = sensor_pose(model, self._sensor)
         return self._message(self.laser.measure(self._scene, pose, self._bias, random), now, random)
 

@@ -165,6 +165,8 @@ class AdvanceService:
             self._sim.deliver_with_steps = True
             if request.reseed:
                 seed_random_numbers(request.seed, tell=False)
+                with self._sim.lock:
+                    self._sim.reseed(request.seed)
             faults = self._deliver(request)
             if request.physics == AdvanceWorldRequest.PAUSE_PHYSICS:
                 self._sim.pause()

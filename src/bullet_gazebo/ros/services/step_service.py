@@ -215,6 +215,7 @@ class StepService:
         if request.reset != StepWorldRequest.NONE:
             if request.seed:
                 seed_random_numbers(request.seed, tell=False)
+                sim.reseed(request.seed)
             sim.reset(everything=request.reset == StepWorldRequest.SIMULATION)
         for model, pose, twist in plan.placed_models:
             sim.place_model(model, pose, twist)

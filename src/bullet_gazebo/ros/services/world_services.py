@@ -105,7 +105,7 @@ class PhysicsServices:
             return srv.GetWorldPropertiesResponse(
                 sim_time=self._sim.sim_time,
                 model_names=list(self._sim.world.models),
-                rendering_enabled=False,  # no cameras here: clients must not wait for their pictures
+                rendering_enabled=False,  # cameras cast rays
                 success=True,
                 status_message="GetWorldProperties: got properties",
             )

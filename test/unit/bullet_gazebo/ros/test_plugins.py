@@ -11,6 +11,7 @@ import rospy
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.ros.plugins.bumper_plugin import collision_named
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.simulator import Simulator
 
@@ -175,3 +176,17 @@ def test_an_update_that_would_wait_for_itself_is_told(setting, call: str) -> Non
     assert len(sys.modules["good"].seen) == 3
     (error,) = setting.errors
     assert "is not called any more" in error and "holds the simulator's lock already" in error
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("left", "left"), ("left_collision", "base_fixed_joint_lump__left_collision_1"),
+        ("base_collision_left", "base_fixed_joint_lump__left_collision_1"),
+        ("base_fixed_joint_lump__left_collision_1", "base_fixed_joint_lump__left_collision_1"),
+        ("right", None),
+    ],
+)  # fmt: skip
+def test_a_bumper_finds_its_collision_in_every_spelling(name, found):
+    collisions = ["left_pad", "left", "base_fixed_joint_lump__left_collision_1"]
+    assert collision_named(name, "base", collisions) == found
