@@ -1,14 +1,12 @@
-#!/usr/bin/env python3
 """The controller manager's six services, case by case (docs/contract/ros_control.md 1.2 to 1.7).
 
-The world is paused, and no call may need it to run. switch_controller: controller_switch_node.py.
+The world is paused, and no call may need it to run. switch_controller: controller_switch_cases.py.
 """
 
 import threading
 import unittest
 
 import rospy
-import rostest
 from controller_client import CONTROLLERS, POSITION, WEAK, PausedRobot
 from gazebo_msgs.srv import GetWorldProperties
 from std_msgs.msg import Float64
@@ -150,8 +148,3 @@ class ControllerManagerTest(PausedRobot, unittest.TestCase):
         self.assertFalse(any(thread.is_alive() for thread in threads))
         self.assertEqual(sorted(self.manager.states()), ["cart", "pole"])
         rospy.ServiceProxy("/gazebo/get_world_properties", GetWorldProperties)()
-
-
-if __name__ == "__main__":
-    rospy.init_node("controller_manager_test")
-    rostest.rosrun("cartpole", "controller_manager", ControllerManagerTest)

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Controllers over ROS: parameters, command topics, control laws, states.
 
 See docs/contract/ros_control.md 3.
@@ -6,8 +5,6 @@ See docs/contract/ros_control.md 3.
 
 import math
 
-import rospy
-import rostest
 from geometry_msgs.msg import Vector3
 from sensor_msgs.msg import JointState
 from slides_client import SlidesTest, listen
@@ -151,8 +148,3 @@ class ControllersTest(SlidesTest):
         joints = self.step(100)
         self.assertAlmostEqual(joints["position_a"][0], held["position_a"][0], places=6)
         self.assertAlmostEqual(joints["velocity_a"][1], 0.0, places=6)
-
-
-if __name__ == "__main__":
-    rospy.init_node("controllers_test")
-    rostest.rosrun("cartpole", "controllers", ControllersTest)

@@ -1,10 +1,8 @@
-#!/usr/bin/env python3
 """Controller managers in a world that moves: namespaces, several robots, resets, latched efforts."""
 
 import unittest
 
 import rospy
-import rostest
 from controller_client import spawn
 from controller_manager_msgs.utils import (
     ControllerLister,
@@ -16,7 +14,7 @@ from controller_manager_msgs.utils import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
-from support.ros.calls import BOUND, call, delete_model, wait_until
+from support.ros.calls import call, delete_model, wait_until
 from support.ros.manager import BEST_EFFORT, STRICT, Manager
 from support.ros.subscribed import Listener
 
@@ -142,9 +140,3 @@ class RobotsTest(unittest.TestCase):
             self.assertCountEqual(get_rosparam_controller_names(namespace), ["one", "two"])
         self.assertIn("some", get_rosparam_controller_names())
         self.assertEqual(get_rosparam_controller_names("/none"), [])
-
-
-if __name__ == "__main__":
-    rospy.init_node("controller_robots_test")
-    rospy.wait_for_service("/gazebo/get_world_properties", BOUND)
-    rostest.rosrun("cartpole", "controller_robots", RobotsTest)

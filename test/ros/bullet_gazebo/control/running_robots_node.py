@@ -1,0 +1,15 @@
+#!/usr/bin/env python3
+"""Trajectories and several robots, case by case, in one world."""
+
+import rospy
+import rostest
+from controller_robots_cases import RobotsTest
+from support.ros.calls import BOUND
+from trajectory_cases import TrajectoryTest
+
+__all__ = ["RobotsTest", "TrajectoryTest"]
+
+if __name__ == "__main__":
+    rospy.init_node("running_robots")
+    rospy.wait_for_service("/gazebo/spawn_urdf_model", BOUND)
+    rostest.rosrun("cartpole", "running_robots", "__main__")
