@@ -1,10 +1,8 @@
-#!/usr/bin/env python3
 """The bundled robots over ROS in lock-step: the bits of the in-process world, and the conformance suite."""
 
 import unittest
 
 import gymnasium
-import rostest
 
 import robot_envs.robots  # noqa: F401 - registers the environments
 from robot_envs.testing import check_robot_env, differences, rollout
@@ -30,7 +28,3 @@ class Robots(unittest.TestCase):
                 over_ros.close()
                 here.close()
                 check_robot_env(identifier, ("ros",), steps=30)
-
-
-if __name__ == "__main__":
-    rostest.rosrun("cartpole", "robots", Robots)

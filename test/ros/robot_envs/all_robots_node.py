@@ -1,0 +1,12 @@
+#!/usr/bin/env python3
+"""Bundled robots, a robot that falls, and scenes, one after the other."""
+
+import rostest
+from free_robot_cases import FreeRobot
+from robots_cases import Robots
+from scenes_cases import Arms, Rover
+
+__all__ = ["Arms", "FreeRobot", "Robots", "Rover"]
+
+if __name__ == "__main__":
+    rostest.rosrun("cartpole", "all_robots", "__main__")
