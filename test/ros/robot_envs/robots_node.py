@@ -9,4 +9,4 @@ from scenes_cases import Arms, Rover
 __all__ = ["Arms", "FreeRobot", "Robots", "Rover"]
 
 if __name__ == "__main__":
-    rostest.rosrun("cartpole", "all_robots", "__main__")
+    rostest.rosrun("cartpole", "robots", "__main__")

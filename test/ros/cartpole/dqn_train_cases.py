@@ -1,10 +1,8 @@
-#!/usr/bin/env python3
 """dqn_train.py as a ROS node, and without ROS."""
 
 import json
 import unittest
 
-import rostest
 from support.ros.pg_train_runs import Place
 
 from cartpole import dqn_train
@@ -66,7 +64,3 @@ class DqnTrain(unittest.TestCase):
         self.assertEqual(training.end(), 0, training.output)
         self.assertEqual(place.processes(), {})
         self.assertIn("last.pt", place.files())
-
-
-if __name__ == "__main__":
-    rostest.rosrun("cartpole", "dqn_train", DqnTrain)

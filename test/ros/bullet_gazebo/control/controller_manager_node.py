@@ -12,6 +12,6 @@ from support.ros.calls import BOUND
 __all__ = ["ControllerManagerTest", "ScriptsTest", "SpawnerTest", "SwitchTest"]
 
 if __name__ == "__main__":
-    rospy.init_node("managers")
+    rospy.init_node("controller_manager")
     rospy.wait_for_service("/gazebo/get_world_properties", BOUND)
-    rostest.rosrun("cartpole", "managers", "__main__")
+    rostest.rosrun("cartpole", "controller_manager", "__main__")

@@ -10,5 +10,5 @@ from gains_cases import GainsTest
 __all__ = ["ControllersTest", "GainsTest", "HardwareTest"]
 
 if __name__ == "__main__":
-    rospy.init_node("types")
-    rostest.rosrun("cartpole", "types", "__main__")
+    rospy.init_node("controllers")
+    rostest.rosrun("cartpole", "controllers", "__main__")

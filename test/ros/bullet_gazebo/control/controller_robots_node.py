@@ -10,6 +10,6 @@ from trajectory_cases import TrajectoryTest
 __all__ = ["RobotsTest", "TrajectoryTest"]
 
 if __name__ == "__main__":
-    rospy.init_node("running_robots")
+    rospy.init_node("controller_robots")
     rospy.wait_for_service("/gazebo/spawn_urdf_model", BOUND)
-    rostest.rosrun("cartpole", "running_robots", "__main__")
+    rostest.rosrun("cartpole", "controller_robots", "__main__")
