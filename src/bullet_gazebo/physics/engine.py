@@ -49,6 +49,8 @@ class Body(ABC):
 
     implicit_damping: ClassVar[bool]
     """Whether joint damping acts on the velocity after the step, instead of before it."""
+    bears_any_motor: ClassVar[bool]
+    """Whether joints stand still that motors of any force press against something."""
     joint_names: tuple[str, ...]
     link_names: tuple[str, ...]
     overlapping: frozenset[frozenset[str]] = frozenset()

@@ -80,6 +80,8 @@ class InProcessWorld(RobotBackend):
         self._closed = False
         try:
             fill(self._sim, scene.robots[0].world)
+            if step := scene.robots[0].physics_step:
+                self._sim.set_time_step(step)
             self._ticks = ticks_per_action(control_period, world.time_step)
             self._robots = {robot.model: self._add(robot) for robot in scene.robots}
             for each in scene.objects:
@@ -185,8 +187,8 @@ class InProcessWorld(RobotBackend):
             passed / NANOSECONDS,
             joints,
             self._held,
-            Links(zip(self._links, starmap(Motion, answer.links), strict=True)),
-            Models((name, Motion(*state)) for name, state in answer.models.items()),
+            Links(zip(self._links, starmap(Motion.of, answer.links), strict=True)),
+            Models((name, Motion.of(*state)) for name, state in answer.models.items()),
             answer.contacts,
         )
 

@@ -37,6 +37,7 @@ class BulletBody(Body):
     """A multi-body of PyBullet, without PyBullet's default motors and damping."""
 
     implicit_damping = False
+    bears_any_motor = False
 
     def __init__(
         self,

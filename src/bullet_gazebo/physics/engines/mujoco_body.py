@@ -170,6 +170,7 @@ class MujocoBody(Body):
     """The bodies and joints of one model. `bind` finds them again after the world was recompiled."""
 
     implicit_damping = True
+    bears_any_motor = True
 
     def __init__(
         self,

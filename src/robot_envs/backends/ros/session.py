@@ -5,11 +5,12 @@ import contextlib
 import os
 import re
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import rospy
 
+from file_access.locks import scratch_folder
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.ros import node, running, windows
 from robot_envs.backends.ros.bringup import Say, bring_up
@@ -100,6 +101,10 @@ class RosSession:
         self._become_node()
         self._check_mode()
         running.check_world(robot)
+        if robot.physics_step:
+            before, step = RunningSimulator(), running.physics_step()
+            running.set_physics_step(robot.physics_step)
+            self._undo.callback(_undo_if_running, before, partial(running.set_physics_step, step))
         if self._curves is not None:
             self._undo.callback(windows.show_curves(self._curves))
         changes = bring_up(self._scene, say)
@@ -117,10 +122,10 @@ class RosSession:
 
     def _start_simulator(self) -> None:
         """Starts the simulator, and the master if there is none."""
-        folder = self._undo.enter_context(TemporaryDirectory())
+        folder = self._undo.enter_context(scratch_folder())
         started = ros_gazebo.launch_Gazebo(
             paused=True, gui=self._gui, output="log", launch_new_term=False,
-            custom_world_path=running.world_path(self._scene.robots[0].world, Path(folder)),
+            custom_world_path=running.world_path(self._scene.robots[0].world, folder),
             lockstep=not self._realtime, seed=self._seed, timeout=START_TIMEOUT,
         )  # fmt: skip
         if isinstance(started, bool):
