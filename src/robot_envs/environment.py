@@ -1,6 +1,5 @@
 """The Gymnasium environment: it passes commands to robots, and lets the task judge the state."""
 
-import logging
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -29,8 +28,6 @@ from robot_envs.world_state import (
     both,
     part_of,
 )
-
-logger = logging.getLogger(__name__)
 
 RESET_OPTIONS = ("initial_state", "goal")
 
@@ -162,9 +159,9 @@ class RobotEnv(DrawnEnv):
             backend.look(both(task.query, task.reward_query))
             return task
         backend.look(task.query)
-        logger.warning(
-            "rewards of %s are 0, and nothing terminates: this world can't tell its reward_query",
-            type(task).__name__,
+        name = type(task).__name__
+        gymnasium.logger.warn(
+            f"rewards of {name} are 0, and nothing terminates: this world can't tell its reward_query"
         )
         return Unjudged()
 

@@ -45,30 +45,23 @@ class Twist(NamedTuple):
     angular: Vector = ZERO
 
 
-class _Motion(NamedTuple):
+class Motion(NamedTuple):
+    """The pose of a link or model, and its velocity."""
+
     pose: Pose
-    twist: Twist
+    twist: Twist = Twist()
 
-
-class Motion(_Motion):
-    """The pose of a link or model, and its velocity.
-
-    Args:
-        pose: position [m] and orientation.
-        twist: linear [m/s] and angular [rad/s] velocity, also as a pair of vectors.
-    """
-
-    __slots__ = ()
-
-    def __new__(cls, pose: Pose, twist: tuple[Vector, Vector] = (ZERO, ZERO)) -> "Motion":
-        return super().__new__(cls, pose, Twist(*twist))
+    @classmethod
+    def of(cls, pose: Pose, twist: tuple[Vector, Vector]) -> "Motion":
+        """Returns a motion with a velocity that is a pair of vectors."""
+        return cls(pose, Twist(*twist))
 
     def seen_from(self, frame: "Motion") -> "Motion":
         """Returns the same, seen from the frame of another motion, both given in one frame.
 
         Velocities are differences in the other's axes; its rotation adds nothing.
         """
-        return Motion(*seen_from(self, frame))
+        return Motion.of(*seen_from(self, frame))
 
 
 class UnknownEntry(KeyError):

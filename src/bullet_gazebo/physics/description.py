@@ -175,6 +175,7 @@ class ModelDescription:
         root_pose: of the root link in the model.
         world_joints: joints that fix the root link to the world.
         left_out: sensors and the like, which nothing simulates.
+        stand_ins: models of Gazebo's database that aren't installed, in whose place simpler ones stand.
         islands: links of a static model that no joint connects with the root, and their poses seen from it.
         lumped: links that a fixed joint has made part of another one: that link, and their poses in it.
         initial_pose: where the file puts the model.
@@ -189,6 +190,7 @@ class ModelDescription:
     plugins: list[Plugin] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+    stand_ins: list[str] = field(default_factory=list)
     islands: dict[str, Pose] = field(default_factory=dict)
     lumped: dict[str, tuple[str, Pose]] = field(default_factory=dict)
     initial_pose: Pose = Pose()

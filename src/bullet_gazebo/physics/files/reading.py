@@ -56,6 +56,9 @@ class Resources:
                     return path
             except (OSError, ValueError) as error:  # a name that is too long, or no permission
                 reason = f"; {getattr(error, 'strerror', None) or error}"
+        scheme, _, rest = uri.strip().partition("://")
+        if scheme in ("model", "package") and not self._in_package(rest):
+            reason += f"; there is no package '{shown(rest.partition('/')[0])}'"
         where = ", ".join(str(path) for path in tried[:5]) or "no folder to look in"
         raise DescriptionError(f"'{uri[:200]}' is not found (looked for: {where[:1000]}{reason})")
 

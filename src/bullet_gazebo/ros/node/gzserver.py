@@ -158,11 +158,13 @@ class GazeboNode:
                 StepService(self.sim, self._watchdog, one_at_a_time),
                 AdvanceService(self.sim, self._watchdog, thinner, one_at_a_time),
             ]
-        self._services = [
-            *stepping,
-            SpawnServices(self.sim, plugins),
-            *advertise_world_services(self.sim),
-        ]
+        spawning = threading.Lock()
+        with spawning:  # once a model is there, clients use all other services without a wait
+            self._services = [
+                *stepping,
+                SpawnServices(self.sim, plugins, spawning),
+                *advertise_world_services(self.sim),
+            ]
 
     def run(self, signals: SignalHandler) -> int:
         """Simulates until the node is shut down; returns the exit code."""

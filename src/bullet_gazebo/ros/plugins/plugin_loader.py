@@ -7,6 +7,7 @@ called, SystemExit and KeyboardInterrupt included: a Ctrl-C raises nothing in th
 
 import importlib
 import os
+import re
 import traceback
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -27,6 +28,7 @@ BUILT_IN = {
     CONTROL_PLUGIN: "bullet_gazebo.ros.plugins.control_plugin:ControlPlugin",
     "libgazebo_ros_joint_state_publisher.so": "bullet_gazebo.ros.plugins.joint_state_plugin:JointStatePlugin",
 }  # fmt: skip
+CONTROL = re.compile("control|drive|steer|planar_move|hw_sim", re.IGNORECASE)  # foreign libraries
 PARAMETER = "~plugins"  # the same table for users' plugins
 PATIENCE = 10.0  # [s of wall time]
 Update = Callable[[int], None]
@@ -145,9 +147,7 @@ class PluginRegistry:
             return self._built_in[library]
         place = places.get(library)
         if place is None:
-            # The spawn services log it together with the sensors.
-            unknown = f"plugin {plugin.filename or 'without a filename'}"
-            model.description.left_out.append(unknown)
+            _leave_out(plugin.filename or "without a filename", model)
             return None
         try:
             return _import(place)
@@ -157,6 +157,17 @@ class PluginRegistry:
                 model.name, library, place, rospy.resolve_name(PARAMETER), error,
             )  # fmt: skip
             return None
+
+
+def _leave_out(name: str, model: Model) -> None:
+    libraries = {os.path.basename(each.filename) for each in model.description.plugins}
+    if CONTROL.search(name) and CONTROL_PLUGIN not in libraries:
+        rospy.logwarn(
+            "Model '%s': the plugin %s is not simulated: this robot has no control here (docs/plugins.md)",
+            model.name, name,
+        )  # fmt: skip
+    else:  # the spawn services log it together with the sensors
+        model.description.left_out.append(f"plugin {name}")
 
 
 def _warn_late(models: str) -> None:

@@ -8,6 +8,7 @@ import functools
 import os
 import re
 import threading
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -53,12 +54,15 @@ HOME_MODELS = "~/.gazebo/models"
 class SpawnServices:
     """Services that bring models and lights into the world, and take models out."""
 
-    def __init__(self, sim: Simulator, plugins: PluginRegistry) -> None:
+    def __init__(
+        self, sim: Simulator, plugins: PluginRegistry, one_at_a_time: threading.Lock
+    ) -> None:
+        """While someone else holds `one_at_a_time`, requests wait."""
         self._sim = sim
         self._plugins = plugins
         # Spawning and deleting take several steps, with plugins between them: one at a time, as Gazebo
         # serialises all its services (docs/contract/gazebo.md 1.1).
-        self._one_at_a_time = threading.Lock()
+        self._one_at_a_time = one_at_a_time
         self._services = [
             rospy.Service("~spawn_urdf_model", srv.SpawnModel, self._spawn_urdf),
             rospy.Service("~spawn_sdf_model", srv.SpawnModel, self._spawn_sdf),
@@ -197,16 +201,28 @@ def load_plugins(sim: Simulator, plugins: PluginRegistry) -> None:
 
 def _log(what: str, found: WorldDescription | ModelDescription) -> None:
     """Logs a file's warnings, and what was left out of the world."""
-    for warning in _at_most(found.warnings):
+    for warning in _listed(found.warnings):
         rospy.logwarn("%s: %s", what, warning)
+    for name in found.stand_ins if isinstance(found, ModelDescription) else ():
+        _tell_stand_in(name)
     if found.left_out:
-        text = ", ".join(_at_most(found.left_out))
+        text = ", ".join(_listed(found.left_out))
         rospy.logwarn("%s: not simulated here, so left out: %s", what, text)
 
 
-def _at_most(texts: list[str]) -> list[str]:
-    rest = len(texts) - MOST_WARNINGS
-    return texts if rest <= 0 else [*texts[:MOST_WARNINGS], f"and {rest} more of the kind"]
+@functools.cache
+def _tell_stand_in(name: str) -> None:
+    rospy.logwarn(
+        "model://%s is not installed: a simple shape of its size and mass stands in for it", name
+    )
+
+
+def _listed(texts: list[str]) -> list[str]:
+    """Returns each text once, with how often it is there, and at most MOST_WARNINGS of them."""
+    counts = Counter(texts)
+    once = [text if count == 1 else f"{text} ({count} times)" for text, count in counts.items()]
+    rest = len(once) - MOST_WARNINGS
+    return once if rest <= 0 else [*once[:MOST_WARNINGS], f"and {rest} more of the kind"]
 
 
 def without_comments(text: str) -> str:

@@ -131,7 +131,7 @@ def _model_in(
     if "net_arch" in network:
         network["net_arch"] = _layers(network["net_arch"])
     network |= {
-        name: _class(value, f"--policy-kwargs {name}=") if is_name(value) else value
+        name: _named(value, f"--policy-kwargs {name}=")
         for name, value in options.hyperparameters.policy_kwargs.items()
     }
     if options.hyperparameters.lr_schedule == "linear":
@@ -146,7 +146,7 @@ def _model_in(
     try:
         torch.empty(0, device=run.device)  # where there is none, the model would take the CPU
         model = made_class(
-            _class(policy, "--policy") if is_name(policy) else policy, vector, seed=run.seed,
+            _named(policy, "--policy"), vector, seed=run.seed,
             device=run.device, policy_kwargs=network or None, **arguments,
         )  # fmt: skip
     except WorkbenchError:
@@ -158,16 +158,13 @@ def _model_in(
     return model
 
 
-def is_name(value: Any) -> bool:
-    """Returns whether an option's value names a class, as module:Class."""
-    return isinstance(value, str) and ":" in value
-
-
-def _class(name: str, flag: str) -> type:
-    """Returns a class of networks or optimizers: a foreign record mustn't have anything else called."""
-    found = imported(name, flag)
+def _named(value: Any, flag: str) -> Any:
+    """Returns the class that a text names as module:Class; other values as they are."""
+    if not isinstance(value, str) or ":" not in value:
+        return value
+    found = imported(value, flag)  # a foreign record mustn't have anything else called
     if not (isinstance(found, type) and issubclass(found, torch.nn.Module | torch.optim.Optimizer)):
-        raise WorkbenchError(f"{flag} {name}: it is neither a torch Module nor an Optimizer")
+        raise WorkbenchError(f"{flag} {value}: it is neither a torch Module nor an Optimizer")
     return found
 
 

@@ -7,10 +7,10 @@ import re
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import rospy
 
+from file_access.locks import scratch_folder
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.ros import node, running, windows
 from robot_envs.backends.ros.bringup import Say, bring_up
@@ -122,10 +122,10 @@ class RosSession:
 
     def _start_simulator(self) -> None:
         """Starts the simulator, and the master if there is none."""
-        folder = self._undo.enter_context(TemporaryDirectory())
+        folder = self._undo.enter_context(scratch_folder())
         started = ros_gazebo.launch_Gazebo(
             paused=True, gui=self._gui, output="log", launch_new_term=False,
-            custom_world_path=running.world_path(self._scene.robots[0].world, Path(folder)),
+            custom_world_path=running.world_path(self._scene.robots[0].world, folder),
             lockstep=not self._realtime, seed=self._seed, timeout=START_TIMEOUT,
         )  # fmt: skip
         if isinstance(started, bool):

@@ -5,7 +5,7 @@ import random
 import numpy as np
 import pytest
 
-from bullet_gazebo.ros.clients import gz, gzclient, spawner
+from bullet_gazebo.ros.clients import gz, gzclient, spawn_model, spawner
 from bullet_gazebo.ros.clients.spawn_model import parse
 from bullet_gazebo.ros.common.node_process import seed_random_numbers
 from bullet_gazebo.ros.node.gzserver import parse_args
@@ -44,6 +44,18 @@ def test_negative_numbers_of_spawn_model():
     line = "-urdf -param p -model m -x -1e-05 -R -1.5 -J hinge -2e-1"
     options = parse(line.split())
     assert (options.x, options.R, options.joints) == (-1e-05, -1.5, [("hinge", -0.2)])
+
+
+def test_spawn_model_waits_for_the_service_that_unpauses(monkeypatch):
+    done = []
+    monkeypatch.setattr(spawn_model, "wait_for_service", lambda name: done.append(f"wait {name}"))
+    monkeypatch.setattr(spawn_model, "_call", lambda name, kind: done.append(name))
+    monkeypatch.setattr(spawn_model, "_read", lambda *_: "<robot/>")
+    monkeypatch.setattr(spawn_model, "_spawn", lambda *_: done.append("spawn"))
+    options = spawn_model.parse(["-urdf", "-param", "r", "-model", "m", "-unpause"])
+    assert spawn_model._run(options, b"") == 0
+    unpause = "/gazebo/unpause_physics"
+    assert done == ["wait /gazebo/spawn_urdf_model", "spawn", f"wait {unpause}", unpause]
 
 
 @pytest.mark.parametrize(

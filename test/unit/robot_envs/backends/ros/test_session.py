@@ -38,7 +38,14 @@ def test_one_that_it_started_is_replaced_once(monkeypatch, deaths, running, star
     monkeypatch.setattr(f"{RUNNING}.check_world", lambda robot: None)
     monkeypatch.setattr(session, "bring_up", bring_up)
     monkeypatch.setattr(session, "Scene", lambda robots: SimpleNamespace(robots=robots))
-    made = RosSession([SimpleNamespace(world=None)], "/a", [], realtime=False, gui=False, seed=0)
+    made = RosSession(
+        [SimpleNamespace(world=None, physics_step=None)],
+        "/a",
+        [],
+        realtime=False,
+        gui=False,
+        seed=0,
+    )
     for name, does in (
         ("_start_simulator", start),
         ("_become_node", lambda: None),
