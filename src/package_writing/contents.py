@@ -51,12 +51,15 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
         sag = min(SAG, SHARE * (joint.upper - joint.lower)) if joint.bounded else SAG
         frequency = min(max(FREQUENCY, math.sqrt(weight / sag / moved)), HIGHEST / ratio)
         p, d = moved * frequency**2, 2.0 * moved * frequency
+        stable = math.inf  # the largest i with which joint and load don't shake
         if name in stances:
             load, standing = stances[name]
             p = max(p, min(load / sag, own[name] * HIGHEST**2))
             d = max(d, min(2.0 * math.sqrt(p * standing), 2.0 * own[name] * HIGHEST))
             weight = max(weight, load)
-        found[name] = _rounded({"p": p, "i": 2.0 * p, "d": d, "i_clamp": weight})
+            stable = p * d / standing if standing else math.inf
+        i = min(2.0 * p, stable / 2.0)
+        found[name] = _rounded({"p": p, "i": i, "d": d, "i_clamp": weight})
     return found
 
 
