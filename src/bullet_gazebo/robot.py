@@ -1,14 +1,14 @@
 """A controlled robot: the seam between a model of the physics world and its ros_control hardware."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import ceil, isfinite
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.physics.description import Plugin
-from bullet_gazebo.physics.engine import FURTHEST
+from bullet_gazebo.physics.engine import FURTHEST, Contact
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.stability import Log, StabilityWatch
 
@@ -98,6 +98,14 @@ class ControlledRobot:
         self._slow = -self._fast
         self._read_ahead = False
         self._watch.review(self._control_period / NANOSECONDS)
+        shares = self._watch.shares
+        self._softened = [
+            (joint, shares[joint.name])
+            for joint in self.hardware.effort_joints
+            if joint.name in shares
+        ]
+        for drive in self.hardware.drives:
+            drive.share = shares.get(drive.joint.name, 1.0)
 
     def read(self) -> None:
         """Copies positions and velocities from the engine, and contains what has blown up."""
@@ -133,7 +141,17 @@ class ControlledRobot:
         if self._control_period:
             self._update_in_time(now, round(dt * NANOSECONDS))
         else:
-            self.manager.update(now, dt)
+            self._control(now, dt)
+
+    def _control(self, now: int, dt: float) -> None:
+        """Updates the controllers, and softens efforts of gains that are too high for the step."""
+        self.manager.update(now, dt)
+        for joint, share in self._softened:
+            joint.command *= share
+
+    def report_stalls(self, now: int, contacts: Callable[[], list[Contact]]) -> None:
+        """Logs, once for each joint, that a contact has stalled its motor for a second; `now` [ns]."""
+        self._watch.report_stalls(now, contacts)
 
     def _contain(self, states: JointStates) -> None:
         """Removes energy that came from nowhere, as ODE's solver loses it, and reads the new state."""
@@ -142,7 +160,7 @@ class ControlledRobot:
         self._watch.blown_up(blown, self._fast)
         # A shaking joint keeps half of its speed, which its gains brake in the next step. At rest it would
         # be pushed the same way forever.
-        self.model.calm({name: 0.5 if name in self._watch.shaking else 0.0 for name in blown})
+        self.model.calm({name: 0.5 if name in self._watch.shares else 0.0 for name in blown})
         states = self.model.body.joint_states()
         for joint, index in self._joints:
             joint.position, joint.velocity = states[index][:2]
@@ -153,7 +171,7 @@ class ControlledRobot:
         self._waited = period if self._waited is None else self._waited + step
         if self._waited >= period:
             self._waited = 0
-            self.manager.update(now, period / NANOSECONDS)
+            self._control(now, period / NANOSECONDS)
 
     def write(self, dt: float) -> None:
         """Clips the commands to the joints' limits and applies them for the next step of `dt` [s].
@@ -181,14 +199,23 @@ class ControlledRobot:
             drive.hold()
 
     def _drive(self, dt: float) -> None:
-        """Moves the joints with position and velocity interfaces."""
+        """Moves the joints with position and velocity interfaces.
+
+        Between motors of any force and a wall an engine may find no solution: joints would jump in each
+        step. So while something pushes one off its command, all motors keep to their effort limits.
+        """
+        motors = []
         for drive, index in self._drives:
             drive.limit(dt)
             if drive.pid is not None:
                 drive.joint.effort = self._efforts[index] = drive.effort(dt)
             else:
-                speed, most = drive.motor(dt)
-                self.model.body.set_motor(index, speed, min(most, STRONGEST))
+                motors.append((drive, index, *drive.motor(dt)))
+        body = self.model.body
+        yields = not body.bears_any_motor and any(drive.pushed for drive, *_ in motors)
+        for drive, index, speed, most in motors:
+            strongest = drive.strongest if yields else STRONGEST
+            body.set_motor(index, speed, min(most, strongest, STRONGEST))
 
     def joints_moved(self, now: int, relatch: bool) -> None:
         """Reads a state that something other than time has changed; `now` [ns].
@@ -197,6 +224,8 @@ class ControlledRobot:
         """
         self.read()
         self._waited = None
+        for drive, _ in self._drives:
+            drive.joints_moved()
         if relatch:
             for joint, _ in self._joints:
                 joint.effort = 0.0

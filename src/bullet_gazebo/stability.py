@@ -2,12 +2,13 @@
 
 The engines step semi-implicitly, v' = v - dt/M (p x + d v), x' = x + dt v', with the effort of the state
 before the step. Such a loop diverges, alternating from step to step, if an eigenvalue of
-M^-1 (p dt² + 2 d dt) exceeds 4; a loop on velocity diverges if one of M^-1 (2 p dt + 4 d) does.
+M^-1 (p dt² + 2 d dt) exceeds 4; a loop on velocity diverges if one of M^-1 (2 p dt + 4 d) does. The effort of
+a loop that does is divided by 1 + (p dt² + d dt) / M or 1 + (p dt + 2 d) / M, as an implicit step would do.
 """
 
 import logging
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from bullet_gazebo.control.manager import RUNNING, ControllerManager
 from bullet_gazebo.control.pid import Loop
 from bullet_gazebo.physics.description import is_control_plugin
 from bullet_gazebo.physics.dynamics import mobility, most_inertias, poses_at_zero
+from bullet_gazebo.physics.engine import Contact
 from bullet_gazebo.physics.model import Model
 
 Log = Callable[[int, str], None]
@@ -27,6 +29,8 @@ Log = Callable[[int, str], None]
 MOST = 4.0  # of the eigenvalue
 P_ONLY_DAMPING = 0.05  # of critical damping
 P_ONLY_TAG = "pOnlyDamping"
+STILL = 1e-3  # [rad, m] by which a stalled joint may move
+STALLED = 1_000_000_000  # [ns]
 
 
 class OwnedLoop(NamedTuple):
@@ -34,6 +38,14 @@ class OwnedLoop(NamedTuple):
 
     owner: str
     loop: Loop
+
+
+class TooHigh(NamedTuple):
+    """A loop with the factor by which its gains are too high, and the share of its effort that is taken."""
+
+    each: OwnedLoop
+    excess: float
+    share: float
 
 
 class StabilityWatch:
@@ -46,13 +58,14 @@ class StabilityWatch:
         Raises:
             ControlError: if the model's `<pOnlyDamping>` isn't a number from 0 to 1.
         """
-        self.shaking: set[str] = set()  # joints that gains drive which are too high
+        self.shares: dict[str, float] = {}  # of efforts, for joints whose gains are too high
         self._model = model
         self._hardware = hardware
         self._manager = manager
         self._log = log
         self._damping_ratio = p_only_damping(model)
         self._logged: set[object] = set()
+        self._pushing: dict[str, tuple[int, float]] = {}  # since when [ns] and where [rad, m]
 
     def review(self, period: float) -> None:
         """Warns of gains that are too high, and damps joints that a P gain alone drives.
@@ -62,11 +75,11 @@ class StabilityWatch:
         dt = max(period, self._model.time_step)
         acting = self._acting()
         found = too_high(self._model, acting, dt)
-        self.shaking = {each.loop.joint for each, _ in found}
+        self.shares = {each.loop.joint: share for each, _, share in found}
         for controller in self._manager.loaded:
             if controller.state != RUNNING:
                 found += too_high(self._model, _owned([controller]), dt)
-        for each, excess in found:
+        for each, excess, _ in found:
             self._warn_of(each, excess, dt)
         self._damp(acting)
 
@@ -88,6 +101,42 @@ class StabilityWatch:
                 f"{driver}. Lower gains, a shorter step or heavier links help.",
             )
 
+    def report_stalls(self, now: int, contacts: Callable[[], list[Contact]]) -> None:
+        """Logs, once for each joint, that a contact has stalled its motor for a second; `now` [ns].
+
+        A motor may well press on another model, as a gripper does, so that is no warning.
+        """
+        pushing = {}
+        for joint in self._hardware.at_their_limits():
+            since, place = self._pushing.get(joint.name, (now, joint.position))
+            if now < since or abs(joint.position - place) > STILL:
+                since, place = now, joint.position
+            pushing[joint.name] = since, place
+            if now - since < STALLED or ("stalled", joint.name) in self._logged:
+                continue
+            for own, text in self._stops(joint.name, contacts()):
+                self._logged.add(("stalled", joint.name))
+                self._log(logging.WARNING if own else logging.INFO, text)
+                break
+        self._pushing = pushing
+
+    def _stops(self, joint: str, contacts: list[Contact]) -> Iterator[tuple[bool, str]]:
+        """Yields for each contact that stops a joint whether it is of two links of the model, and a text."""
+        model = self._model
+        carried = {link for link in model.link_names if joint in model.carriers(link)}
+        for contact in contacts:
+            sides = (contact.first, contact.second)
+            moved = [side.body is model.body and side.link in carried for side in sides]
+            if sum(moved) == 1:
+                link, other = sides if moved[0] else sides[::-1]
+                own = other.body is model.body
+                yield (
+                    own,
+                    f"joint '{joint}' of model '{model.name}' has been stalled for a second, its motor at "
+                    f"the limit: link '{link.link}' touches link '{other.link}' of "
+                    f"{'its own' if own else 'another'} model",
+                )
+
     def _acting(self) -> list[OwnedLoop]:
         drives = [OwnedLoop(f"drive '{GAINS}/{each.joint}'", each) for each in self._hardware.loops]
         return drives + _owned(c for c in self._manager.loaded if c.state == RUNNING)
@@ -104,7 +153,7 @@ class StabilityWatch:
             logging.WARNING,
             f"{owner} drives joint '{loop.joint}' of model '{self._model.name}' with {gain} = {value:g}, "
             f"{excess:.3g} times what a step of {dt:g} s can follow (about {value / excess:.3g}): "
-            "it will shake. Lower the gain, or take a shorter step.",
+            "it would shake, so its effort is softened. Lower the gain, or take a shorter step.",
         )
 
     def _damp(self, acting: list[OwnedLoop]) -> None:
@@ -126,10 +175,10 @@ class StabilityWatch:
         self._model.add_damping(added)
 
 
-def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[tuple[OwnedLoop, float]]:
+def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[TooHigh]:
     """Returns the loops whose gains are too high for steps of `dt` [s], the worst first.
 
-    Each comes with the factor by which it is too high. Inertias are those with all joints at zero.
+    Inertias are those with all joints at zero.
     """
     left = {each.loop.joint: each for each in loops if sum(_stiffness(each.loop, dt)) > 0.0}
     order = [joint.name for joint in model.description.movable_joints]
@@ -153,7 +202,12 @@ def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[tuple[Owne
         if not values[-1] >= MOST:
             break
         worst = list(left)[int(np.argmax(np.abs(vectors[:, -1])))]
-        found.append((left.pop(worst), float(values[-1]) / MOST))
+        each = left.pop(worst)
+        p, d = _stiffness(each.loop, dt)
+        own_part = (p + d) / 2.0 if each.loop.of_velocity else p + d / 2.0
+        place = order.index(worst)
+        share = 1.0 / (1.0 + own_part * float(matrix[place, place]))
+        found.append(TooHigh(each, float(values[-1]) / MOST, share))
     return found
 
 

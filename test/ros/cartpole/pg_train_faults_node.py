@@ -6,7 +6,7 @@ import signal
 import unittest
 
 import rostest
-from support.ros.pg_train_runs import NETWORKS, Place, Process
+from support.ros.programs import NETWORKS, Place, Process
 
 ENDLESS = ("--episodes=100000", "--stop-at-length=0")
 

@@ -4,7 +4,7 @@ import importlib.util
 import unittest
 from pathlib import Path
 
-from support.ros.pg_train_runs import Place
+from support.ros.programs import Place
 
 
 @unittest.skipUnless(importlib.util.find_spec("stable_baselines3"), "./ws extras isn't installed")

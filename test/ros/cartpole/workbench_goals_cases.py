@@ -9,7 +9,7 @@ import json
 import unittest
 from pathlib import Path
 
-from support.ros.pg_train_runs import Place
+from support.ros.programs import Place
 
 from cartpole import workbench
 

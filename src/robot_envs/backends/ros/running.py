@@ -144,8 +144,14 @@ def world_path(source: Source | None, folder: Path) -> str | None:
     return str(path)
 
 
-def physics_step() -> float:
-    """Returns the simulator's physics step [s]; raises RobotEnvError if it doesn't answer."""
+def physics_step(wanted: float | None = None) -> float:
+    """Returns the simulator's physics step [s], once the one that is wanted is set.
+
+    Raises:
+        RobotEnvError: if the simulator refuses, or doesn't answer.
+    """
+    if wanted and not ros_gazebo.gazebo_set_time_step(wanted):
+        raise RobotEnvError(f"the physics step can't be {wanted:g} s; see the messages above")
     step = ros_gazebo.gazebo_get_time_step()
     if not step > 0.0:
         raise RobotEnvError("the simulator doesn't report its time step; see the messages above")
