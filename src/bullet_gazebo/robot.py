@@ -98,6 +98,14 @@ class ControlledRobot:
         self._slow = -self._fast
         self._read_ahead = False
         self._watch.review(self._control_period / NANOSECONDS)
+        shares = self._watch.shares
+        self._softened = [
+            (joint, shares[joint.name])
+            for joint in self.hardware.effort_joints
+            if joint.name in shares
+        ]
+        for drive in self.hardware.drives:
+            drive.share = shares.get(drive.joint.name, 1.0)
 
     def read(self) -> None:
         """Copies positions and velocities from the engine, and contains what has blown up."""
@@ -133,7 +141,13 @@ class ControlledRobot:
         if self._control_period:
             self._update_in_time(now, round(dt * NANOSECONDS))
         else:
-            self.manager.update(now, dt)
+            self._control(now, dt)
+
+    def _control(self, now: int, dt: float) -> None:
+        """Updates the controllers, and softens efforts of gains that are too high for the step."""
+        self.manager.update(now, dt)
+        for joint, share in self._softened:
+            joint.command *= share
 
     def report_stalls(self, now: int, contacts: Callable[[], list[Contact]]) -> None:
         """Logs, once for each joint, that a contact has stalled its motor for a second; `now` [ns]."""
@@ -146,7 +160,7 @@ class ControlledRobot:
         self._watch.blown_up(blown, self._fast)
         # A shaking joint keeps half of its speed, which its gains brake in the next step. At rest it would
         # be pushed the same way forever.
-        self.model.calm({name: 0.5 if name in self._watch.shaking else 0.0 for name in blown})
+        self.model.calm({name: 0.5 if name in self._watch.shares else 0.0 for name in blown})
         states = self.model.body.joint_states()
         for joint, index in self._joints:
             joint.position, joint.velocity = states[index][:2]
@@ -157,7 +171,7 @@ class ControlledRobot:
         self._waited = period if self._waited is None else self._waited + step
         if self._waited >= period:
             self._waited = 0
-            self.manager.update(now, period / NANOSECONDS)
+            self._control(now, period / NANOSECONDS)
 
     def write(self, dt: float) -> None:
         """Clips the commands to the joints' limits and applies them for the next step of `dt` [s].

@@ -30,10 +30,12 @@ class Drive(ABC):
     """Moves one joint with a position or velocity interface (docs/contract/gazebo_ros_control.md 6.4).
 
     `pid` turns commands into efforts; without one, a motor drives the joint to the commanded state.
-    `strongest` [N m, N] is its effort limit, `pushed` whether something pushes it off its command.
+    `strongest` [N m, N] is its effort limit, `pushed` whether something pushes it off its command, `share`
+    what is taken of the PID's effort.
     """
 
     pushed = False
+    share = 1.0
 
     def __init__(self, joint: JointHandle, pid: Pid | None) -> None:
         self.joint = joint
@@ -78,7 +80,7 @@ class Drive(ABC):
     def _clipped(self, error: float, dt: float) -> float:
         """Returns the PID's effort within its limit; 0 if it would exceed the velocity limit further."""
         assert self.pid is not None
-        effort = clamp(self.pid.compute(error, dt), -self._most, self._most)
+        effort = clamp(self.share * self.pid.compute(error, dt), -self._most, self._most)
         speed = self.joint.velocity
         return 0.0 if abs(speed) > self._fastest and speed * effort > 0.0 else effort
 

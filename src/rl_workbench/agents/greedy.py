@@ -90,25 +90,12 @@ class Choice(nn.Module):
         super().__init__()
         self.scores = scores
 
-    def margins(self, scores: torch.Tensor) -> torch.Tensor:
-        """Returns how far the scores (N, A) are from another choice, (N,)."""
-        raise NotImplementedError
-
-
-def _lead(scores: torch.Tensor) -> torch.Tensor:
-    """Returns how far the best scores (N, A) lead, (N,)."""
-    best = scores.topk(min(2, scores.shape[1])).values
-    return best[:, 0] - best[:, -1]
-
 
 class SingleChoice(Choice):
     """Chooses the action with the highest score, (N,)."""
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         return self.scores(observations).argmax(dim=1)
-
-    def margins(self, scores: torch.Tensor) -> torch.Tensor:
-        return _lead(scores)
 
 
 class SeveralChoices(Choice):
@@ -127,15 +114,9 @@ class SeveralChoices(Choice):
         groups = self.scores(observations).split(self.sizes, dim=1)
         return torch.stack([group.argmax(dim=1) for group in groups], dim=1)
 
-    def margins(self, scores: torch.Tensor) -> torch.Tensor:
-        return torch.stack([_lead(group) for group in scores.split(self.sizes, dim=1)]).amin(0)
-
 
 class Switches(Choice):
     """Whether each score is positive: 0 or 1, (N, A)."""
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         return (self.scores(observations) > 0.0).long()
-
-    def margins(self, scores: torch.Tensor) -> torch.Tensor:
-        return scores.abs().amin(1)

@@ -291,11 +291,9 @@ def _examine(planned: list[_Planned], episodes: int) -> "tuple[list[Run], list[R
     from rl_workbench.tools.results import RunResult, examine
 
     runs, results = [], []
-    for name, seed, job in planned:
-        number = f"{len(results) + 1} of {len(planned)}"
-        tell(
-            f"evaluating {number}: {episodes} episodes each by the best and the last policy of {job.name}"
-        )
+    for count, (name, seed, job) in enumerate(planned, 1):
+        each = f"{episodes} episodes each by the best and the last policy"
+        tell(f"evaluating {count} of {len(planned)}: {each} of {job.name}")
         try:
             runs.append(open_run(job.folder))
         except WorkbenchError as error:

@@ -36,9 +36,7 @@ class LearnedPolicy(NamedTuple):
     """A learned policy and an environment of the kind it learned in, which the caller closes."""
 
     act: Act  # greedily, for one observation: (D,), or a dict as in the training
-    network: (
-        nn.Module | None
-    )  # observations (N, ...) to actions; None if only the library computes it
+    network: nn.Module | None  # observations (N, D) to actions; a choice of N has `scores`, too
     env: gymnasium.Env[Any, Any]
     checkpoint: Path
     steps: int  # of the training up to this checkpoint

@@ -35,7 +35,7 @@ class Run:
     @property
     def wrapper(self) -> str:
         """What wraps its environments, as module:function; empty for nothing."""
-        return str(self.config["run"].get("wrapper", ""))
+        return str(self.config.get("run", {}).get("wrapper", ""))
 
     @property
     def name(self) -> str:

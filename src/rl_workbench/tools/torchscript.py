@@ -20,7 +20,7 @@ from gymnasium import spaces
 from torch import nn
 
 from file_access.content import open_file
-from rl_workbench.agents.greedy import Choice
+from rl_workbench.agents.greedy import Choice, SeveralChoices, Switches
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.policies import TEST_SEED, LearnedPolicy
 from rl_workbench.tools.runs import Run
@@ -144,7 +144,7 @@ def described(space: spaces.Space[Any]) -> dict[str, Any]:
 
 
 class OfVectors(nn.Module):
-    """Maps observations (N, D), or images, of any number type to greedy actions (N, ...)."""
+    """Maps observations (N, D) of any number type to greedy actions (N, ...)."""
 
     def __init__(self, network: nn.Module) -> None:
         super().__init__()
@@ -181,7 +181,7 @@ def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement
     if policy.network is None:
         raise WorkbenchError(
             f"a policy of {run.folder} can't be exported: only Stable-Baselines3 computes it "
-            "(--policy, --policy-kwargs, or a Dict with images)"
+            "(images, or a --policy of your own)"
         )
     space, original = policy.env.observation_space, policy.env.unwrapped.observation_space
     module = _module(policy.network, space, run.env_id)
@@ -272,7 +272,16 @@ def _tied(policy: LearnedPolicy, observations: list[Observation]) -> np.ndarray:
     module = _module(network.scores, policy.env.observation_space, "")
     with torch.no_grad():
         scores = module(batch(observations))
-    return (network.margins(scores) <= ROUNDING * scores.abs().amax(1).clamp_min(1.0)).numpy()
+    return (margins(network, scores) <= ROUNDING * scores.abs().amax(1).clamp_min(1.0)).numpy()
+
+
+def margins(network: Choice, scores: torch.Tensor) -> torch.Tensor:
+    """Returns how far scores (N, A) are from another choice, (N,)."""
+    if isinstance(network, Switches):
+        return scores.abs().amin(1)
+    sizes = network.sizes if isinstance(network, SeveralChoices) else [scores.shape[1]]
+    best = [each.topk(min(2, each.shape[1])).values for each in scores.split(sizes, dim=1)]
+    return torch.stack([each[:, 0] - each[:, -1] for each in best]).amin(0)
 
 
 def _differences(

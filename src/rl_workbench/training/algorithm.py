@@ -107,10 +107,8 @@ class Policy(NamedTuple):
     """A learned policy."""
 
     act: Callable[[Any], Any]  # greedily, for one observation: (D,), or a dict as it learned from
-    network: (
-        nn.Module | None
-    )  # for TorchScript: of (N, D), float32, a Dict's parts side by side, or of
-    # images as they were observed: (N, ...); None if only the library computes it
+    # For TorchScript: of (N, D), float32, a Dict's parts side by side: (N, ...); None if it can't be.
+    network: nn.Module | None
 
 
 def load_policy(

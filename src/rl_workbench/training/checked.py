@@ -37,9 +37,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     def __init__(self, env: gymnasium.Env[Any, Any], env_id: str, which: str = "") -> None:
         super().__init__(env)
         self._id, self._which, self._begin_step = env_id, which, _begin_method(env)
-        self._sums: dict[
-            str, tuple[float, int]
-        ] = {}  # and counts, of the numbers in an episode's infos
+        self._sums: dict[str, tuple[float, int]] = {}  # and counts, of an episode's info
 
     def begin_step(self, action: Any) -> None:
         """Begins a step, where the environment can. The next `step`, by the same action, waits for it."""

@@ -48,8 +48,11 @@ def make_environment(
             make no sense, or it observes images that can't be learned from.
     """
     import_module_of(env_id)
+    wrap = imported(wrapper, "--wrapper") if wrapper else lambda env: env
     try:
-        env: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **(options or {}))
+        env: gymnasium.Env[Any, Any] = wrap(gymnasium.make(env_id, **(options or {})))
+        if not isinstance(env, gymnasium.Env):
+            raise TypeError(f"--wrapper {wrapper} returns {env!r}, which is no gymnasium.Env")
     except gymnasium.error.DependencyNotInstalled as error:
         extras = errors.hints.extras  # else Gymnasium's own text names the command
         hint = f" ({extras} may install them)" if extras else ""
@@ -62,40 +65,26 @@ def make_environment(
         raise WorkbenchError(f"can't make {env_id}: {reason}") from error
     except (Exception, SystemExit) as error:
         raise EnvironmentFailure(f"can't make {env_id}: {error_line(error)}") from error
-    if wrapper:
-        env = _wrapped(env, wrapper)
+    return CheckedEnvironment(_suited(env, env_id, keep_dict), env_id, which)
+
+
+def _suited(env: gymnasium.Env[Any, Any], env_id: str, keep_dict: bool) -> gymnasium.Env[Any, Any]:
+    """Returns an environment whose observations are vectors, or in a form that is to be kept."""
     space = env.observation_space
     parts = list(space.values()) if isinstance(space, spaces.Dict) else [space]
     keeps = keep_dict and all(isinstance(part, spaces.Box) for part in parts)
     for part in filter(is_image, parts):
-        if not (keeps and suits_cnn(part)):
-            env.close()
-            raise WorkbenchError(_unsuitable(env_id, part, keeps))
+        _check_image(env_id, part, keeps)
+    if isinstance(space, spaces.Box) and len(space.shape) == 1:
+        return env
     if keeps and (isinstance(space, spaces.Dict) or is_image(space)):
-        return CheckedEnvironment(env, env_id, which)
-    if not (isinstance(space, spaces.Box) and len(space.shape) == 1):
-        if not space.is_np_flattenable:
-            env.close()
-            raise WorkbenchError(
-                f"{env_id} observes {space}; agents learn only from vectors of numbers"
-            )
-        env = gymnasium.wrappers.FlattenObservation(env)
-    return CheckedEnvironment(env, env_id, which)
-
-
-def _wrapped(env: gymnasium.Env[Any, Any], wrapper: str) -> gymnasium.Env[Any, Any]:
-    """Wraps an environment by the user's function, module:function."""
-    try:
-        made = imported(wrapper, "--wrapper")(env)
-        if not isinstance(made, gymnasium.Env):
-            raise TypeError(f"it must return a gymnasium.Env, not {made!r}")
-    except WorkbenchError:
+        return env
+    if not space.is_np_flattenable:
         env.close()
-        raise
-    except (Exception, SystemExit) as error:
-        env.close()
-        raise EnvironmentFailure(f"--wrapper {wrapper}: {error_line(error)}") from error
-    return made
+        raise WorkbenchError(
+            f"{env_id} observes {space}; agents learn only from vectors of numbers"
+        )
+    return gymnasium.wrappers.FlattenObservation(env)
 
 
 def environment_for(
@@ -195,21 +184,16 @@ def is_image(space: gymnasium.Space[Any]) -> TypeGuard[spaces.Box]:
     return is_large and (len(space.shape) > 2 or space.dtype == np.uint8)
 
 
-def suits_cnn(space: spaces.Box) -> bool:
-    """Returns whether images have the form that Stable-Baselines3's CNN takes."""
-    is_full = bool(np.all(space.low == 0) and np.all(space.high == 255))
-    return space.dtype == np.uint8 and len(space.shape) == 3 and is_full
-
-
-def _unsuitable(env_id: str, image: spaces.Box, keeps: bool) -> str:
-    """Returns why images can't be learned from, and what to do."""
-    text = f"{env_id} observes images, {image.dtype} of {image.shape}: "
-    if keeps:
-        return f"{text}a CNN takes uint8 from 0 to 255 of (height, width, channels); --wrapper may make them"
-    return (
-        f"{text}this algorithm learns from vectors. Stable-Baselines3's have a CNN: --algo ppo, a2c or "
-        "dqn-sb3, for continuous actions sac, td3 or ddpg"
-    )
+def _check_image(env_id: str, image: spaces.Box, keeps: bool) -> None:
+    """Refuses images that would be learned as a vector, or that Stable-Baselines3's CNN doesn't take."""
+    is_full = bool(np.all(image.low == 0) and np.all(image.high == 255))
+    if keeps and image.dtype == np.uint8 and len(image.shape) == 3 and is_full:
+        return
+    hint = "a CNN takes uint8 from 0 to 255 of (height, width, channels); --wrapper may make them"
+    if not keeps:
+        hint = "this algorithm learns from vectors. Stable-Baselines3's have a CNN: --algo ppo, a2c or "
+        hint += "dqn-sb3, for continuous actions sac, td3 or ddpg"
+    raise WorkbenchError(f"{env_id} observes images, {image.dtype} of {image.shape}: {hint}")
 
 
 def has_goal(space: gymnasium.Space[Any]) -> bool:

@@ -187,8 +187,8 @@ class InProcessWorld(RobotBackend):
             passed / NANOSECONDS,
             joints,
             self._held,
-            Links(zip(self._links, starmap(Motion, answer.links), strict=True)),
-            Models((name, Motion(*state)) for name, state in answer.models.items()),
+            Links(zip(self._links, starmap(Motion.of, answer.links), strict=True)),
+            Models((name, Motion.of(*state)) for name, state in answer.models.items()),
             answer.contacts,
         )
 

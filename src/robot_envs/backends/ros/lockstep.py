@@ -6,8 +6,9 @@ from typing import Any
 
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from gazebo_msgs.msg import ContactState
-from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
+from geometry_msgs.msg import Point, Quaternion, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
+from geometry_msgs.msg import Twist as TwistMsg
 
 from bullet_gazebo.physics.pose import Pose, Vector
 from robot_envs.backends.backend import RobotBackend
@@ -32,6 +33,7 @@ from robot_envs.world_state import (
     Models,
     Motion,
     StateQuery,
+    Twist,
     WorldState,
     link_keys,
 )
@@ -97,7 +99,7 @@ class LockstepWorld(RobotBackend):
         request.models = list(placed)
         for (place, turn), (line, spin) in placed.values():
             request.poses.append(PoseMsg(Point(*place), Quaternion(*turn)))
-            request.twists.append(Twist(Vector3(*line), Vector3(*spin)))
+            request.twists.append(TwistMsg(Vector3(*line), Vector3(*spin)))
         with self._simulator:
             self._world.claim(self)
         answer = self._call(self._reset, request)
@@ -239,7 +241,7 @@ def _motions_of(numbers: Sequence[float]) -> Iterator[Motion]:
     """Reads links and models from the numbers of a prepared step."""
     for i in range(0, len(numbers), MOTION):
         x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz = numbers[i : i + MOTION]
-        yield Motion(Pose((x, y, z), (qx, qy, qz, qw)), ((vx, vy, vz), (wx, wy, wz)))
+        yield Motion(Pose((x, y, z), (qx, qy, qz, qw)), Twist((vx, vy, vz), (wx, wy, wz)))
 
 
 def _contact_of(state: ContactState) -> ContactPair:

@@ -23,7 +23,6 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import Options
 from rl_workbench.tools.policies import load_learned
 from rl_workbench.tools.runs import open_run
-from rl_workbench.tools.torchscript import open_exported
 from rl_workbench.training.environments import make_environment
 from rl_workbench.training.options import RunOptions
 from rl_workbench.training.sb3.models import make_learning_model
@@ -95,7 +94,7 @@ def policy_of(monkeypatch: pytest.MonkeyPatch, kind: type[Dot], **changed: objec
 
 
 @pytest.mark.slow
-def test_images_are_learned_by_a_cnn_that_resumes_evaluates_and_is_exported(
+def test_images_are_learned_by_a_cnn_that_resumes_and_is_evaluated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     env_id = register_with(monkeypatch, Dot)
@@ -106,9 +105,11 @@ def test_images_are_learned_by_a_cnn_that_resumes_evaluates_and_is_exported(
     assert_same_run(whole, resume(part))
     learned, out = load_learned(open_run(whole)), tmp_path / "policy.pt"
     assert type(learned.env.observation_space) is spaces.Box
-    assert cli.main(["export", str(whole), f"--out={out}"]) == 0, capsys.readouterr().err
-    image, _ = learned.env.reset(seed=3)
-    assert open_exported(out).act(image.astype(np.float32)) == learned.act(image)
+    assert cli.main(["eval", str(whole), "--episodes=2"]) == 0
+    assert cli.main(["export", str(whole), f"--out={out}"]) == 1
+    assert (
+        "can't be exported: only Stable-Baselines3 computes it (images" in capsys.readouterr().err
+    )
 
 
 def test_the_policy_is_chosen_by_the_observations(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,7 +156,7 @@ def test_images_of_another_form_are_refused_unless_a_wrapper_mends_them(
         make_environment(env_id, keep_dict=True)
     env = make_environment(env_id, keep_dict=True, wrapper=WRAPPER)
     assert env.reset(seed=0)[0].max() == 255
-    with pytest.raises(WorkbenchError, match="^--wrapper .*: TypeError: it must return a gymnas"):
+    with pytest.raises(WorkbenchError, match="--wrapper builtins:str returns .*, which is no gymn"):
         make_environment(env_id, wrapper="builtins:str")
     with pytest.raises(WorkbenchError, match="^--wrapper no_module:f: No module named"):
         make_environment(env_id, wrapper="no_module:f")
