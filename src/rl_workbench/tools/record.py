@@ -111,8 +111,11 @@ def _policy(
     options = {**env_options(arguments), "render_mode": "rgb_array"}
     if arguments.size:
         sized = dict(zip(("width", "height"), arguments.size, strict=True))
-        with contextlib.suppress(WorkbenchError):  # without such options pictures are scaled later
+        try:
             return load_any(run, which, {**options, **sized}, arguments.seed)
+        except WorkbenchError as error:
+            if not isinstance(error.__cause__, TypeError):  # no such options: pictures are scaled
+                raise
     return load_any(run, which, options, arguments.seed)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from support.pages import viser_recording
+from support.training.workbench_runs import record as bare_run
 
 import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli
@@ -158,6 +159,31 @@ def test_a_page_holds_all_that_it_shows(tmp_path: Path):
     assert levels == pytest.approx([0, 40, 80, 120, 160], abs=3)
     assert "const rate = 12.5;" in text and 'width="30" height="20"' in text
     assert "@" not in re.sub(r'"[A-Za-z0-9+/=]+"', "", text) and "http" not in text
+
+
+class Narrow(Counter):
+    """One with a size of its own choice."""
+
+    def __init__(self, width: int = 400, height: int = 60, render_mode: str = "rgb_array") -> None:
+        if width > 500:
+            raise ValueError(f"{width} pixels are too wide for this one")
+        super().__init__(3, render_mode)
+
+
+def test_a_size_that_an_environment_refuses_is_said(tmp_path: Path, capsys):
+    gymnasium.register("Narrow-v0", Narrow)
+    run = bare_run(tmp_path / "run", [1.0], env_id="Narrow-v0")
+    words = ("--checkpoint", "random", "--size", "600x60")
+    assert record(run, tmp_path / "a.gif", *words) == 1
+    assert "600 pixels are too wide for this one" in capsys.readouterr().err
+
+
+def test_an_environment_without_a_size_has_its_pictures_scaled(tmp_path: Path):
+    gymnasium.register("Counter-v0", Counter)
+    run = bare_run(tmp_path / "run", [1.0], env_id="Counter-v0")
+    assert record(run, tmp_path / "a.gif", "--checkpoint", "random", "--size", "100x30") == 0
+    with Image.open(tmp_path / "a.gif") as video:
+        assert video.size == (100, 30 + 8)
 
 
 # In 3-D. That a browser plays the file: test_record_played.py.
