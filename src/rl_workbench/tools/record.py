@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
-from rl_workbench.tools.flags import POLICIES, add_policy_flags, env_options, number
+from rl_workbench.tools.flags import POLICIES, add_policy_flags, env_options, key_values, number
 from rl_workbench.training.progress import tell
 
 if TYPE_CHECKING:
@@ -51,6 +51,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
         help="cut the episode off after N steps; 0: never (default)")  # fmt: skip
     add("--size", type=_size, metavar="WIDTHxHEIGHT",
         help="size of the pictures [pixels] (default: the environment's)")  # fmt: skip
+    add("--camera", nargs="+", default=[], metavar="KEY=VALUE",
+        help="fields of the environment's camera, e.g. distance=2.5 yaw=90 target=[0,0,0.3]")  # fmt: skip
     add("--fps", type=_rate, metavar="HZ",
         help="frames per second of simulated time (default 25; 50 for an MP4)")  # fmt: skip
     add("--no-captions", action="store_true", help="no line with step, return and action")
@@ -109,6 +111,8 @@ def _policy(
     from rl_workbench.tools.policies import load_any
 
     options = {**env_options(arguments), "render_mode": "rgb_array"}
+    if arguments.camera:
+        options["camera"] = key_values(arguments.camera, "--camera")
     if arguments.size:
         sized = dict(zip(("width", "height"), arguments.size, strict=True))
         try:

@@ -12,7 +12,7 @@ import viser
 from bullet_gazebo.physics.description import Link, Shape
 from bullet_gazebo.physics.files.world_file import empty_world
 from bullet_gazebo.physics.pose import IDENTITY, ZERO
-from bullet_gazebo.pictures.camera import Camera, overview
+from bullet_gazebo.pictures.camera import CameraLike, overview
 from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.visuals import VisibleModel, visible_model
 from robot_envs.pictures.placement import Placement
@@ -34,9 +34,9 @@ class Placed(NamedTuple):
 
 
 class RobotOnPage:
-    """A robot on a page; the first one brings a ground, lights and the initial camera.
+    """A robot on a page; the first one brings ground, lights, initial camera and a switch to follow it.
 
-    The first robot stays in place on the page, and the world moves instead. So all cameras follow it, however
+    A followed robot stays in place on the page, and the world moves instead. So all cameras follow, however
     a viewer has turned them, and so does a recording's.
 
     Args:
@@ -56,7 +56,7 @@ class RobotOnPage:
         server: viser.ViserServer,
         placement: Placement,
         positions: Callable[[], Mapping[str, float]],
-        camera: Camera | None,
+        camera: CameraLike,
         size: tuple[int, int],
         beside: int,
     ) -> None:
@@ -78,9 +78,13 @@ class RobotOnPage:
         server.initial_camera.fov = float(np.radians(looking.view))
         self._foot = low + beside * aside
         scene = server.scene
+        self._follow: viser.GuiCheckboxHandle | None = None
+        self._travelled = np.zeros(3)
         if self._is_first:
             self._world = scene.add_frame(WORLD, show_axes=False)
             _draw_ground(server)
+            self._follow = server.gui.add_checkbox("Follow", looking.follows)
+            self._follow.on_update(lambda _: self._move_world())
         scene.add_frame(self._node, show_axes=False, position=beside * aside)
         self._seen = _seen(placement)
         self._picture = Picture(server, logger.warning, below=self._node)
@@ -107,10 +111,20 @@ class RobotOnPage:
         """Moves it to where it was at another moment."""
         with self._server.atomic():
             self._picture.move(placed.links)
-            if self._is_first:
-                self._world.position = -placed.travelled
+            self._travelled = placed.travelled
+            self._move_world()
             if caption:
                 self._write(caption)
+
+    def _move_world(self) -> None:
+        if self._follow is not None:
+            self._world.position = -self._travelled * self._follow.value
+
+    def close(self) -> None:
+        """Takes the switch off the page; may be called twice."""
+        if self._follow is not None:
+            self._follow.remove()
+            self._follow = None
 
     def _write(self, caption: str) -> None:
         if self._caption is None:

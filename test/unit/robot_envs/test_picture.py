@@ -2,11 +2,13 @@
 
 import dataclasses
 
+import gymnasium
 import numpy as np
 import pytest
 from support.robots.bodies import ROVER_ROBOT
 from support.robots.pendulum import PENDULUM
 
+import cartpole  # noqa: F401 - registers its environments
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
 from robot_envs.errors import RobotEnvError
@@ -82,6 +84,34 @@ def test_a_camera_that_stays_sees_the_robot_drive():
     right = where(picture({"neck": 0.0}), 0)
     picture.close()
     assert right[0] > left[0] + 20
+
+
+@pytest.mark.parametrize("size", [(320, 160), (160, 160), (100, 200)])
+def test_a_robot_that_drives_is_a_third_of_the_picture(size):
+    picture = RobotPicture(ROVER_ROBOT, *size)
+    drawn = picture({"neck": 0.0}).astype(int)
+    picture.close()
+    rows, columns = np.nonzero(np.ptp(drawn, axis=-1) > 40)  # ground and sky have no colour
+    share = max(np.ptp(columns) / size[0], np.ptp(rows) / size[1])
+    assert share == pytest.approx(1.0 / 3.0, abs=0.05)
+
+
+def test_a_camera_is_changed_by_its_fields():
+    env = gymnasium.make("cartpole/Balance-v0", render_mode="rgb_array", camera={"yaw": 104.0})
+    env.reset(seed=0)
+    (turned,) = [env.render()]
+    env.close()
+    assert np.ptp(np.nonzero(np.ptp(turned.astype(int), axis=-1) > 40)[1]) < 0.2 * turned.shape[1]
+    whole, far = (
+        RobotPicture(ROVER_ROBOT, 160, 120, camera=camera)
+        for camera in ({"pitch": -90.0}, {"pitch": -90.0, "distance": 9.0})
+    )
+    areas = [(np.ptp(each({"neck": 0.0}).astype(int), axis=-1) > 40).sum() for each in (whole, far)]
+    assert areas[0] > 4 * areas[1] > 0
+    for each in (whole, far):
+        each.close()
+    with pytest.raises(ValueError, match="a camera has no 'jaw'"):
+        gymnasium.make("cartpole/Balance-v0", camera={"jaw": 3})
 
 
 @pytest.mark.parametrize("size", [(0, 10), (10, 5000), (10.5, 10), (-1, 10)])

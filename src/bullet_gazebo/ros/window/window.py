@@ -15,6 +15,7 @@ import viser
 from bullet_gazebo_msgs.msg import SceneContacts, ScenePoses
 from PIL import Image
 
+from bullet_gazebo.pictures.camera import THIRD, Camera, overview
 from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.page_batches import NUMBERS
 from bullet_gazebo.ros.clients.gz import ControlFailed
@@ -28,7 +29,10 @@ from web_viewer.curves import Curves
 from web_viewer.server import open_browser, serve, stop
 
 TITLE = "gzclient"
-CAMERA, LOOK_AT = (1.4, -1.9, 1.1), (0.0, 0.0, 0.35)  # [m]
+CAMERA, LOOK_AT = (1.4, -1.9, 1.1), (0.0, 0.0, 0.35)  # [m], until there is something that moves
+LOOKING = Camera(yaw=36.4, pitch=-17.6, view=75.0)  # the same way
+ASPECT = 4.0 / 3.0  # of a browser's window, beside the panel
+UNTOUCHED = 1e-3  # [m]
 ADVICE = "~window"  # parameter: the lines that say where the page is
 CURVES = "~curves"  # parameter: a run folder, or the table of one
 TRAINED = "/gazebo_gui/curves"  # the same; a training sets it, for windows of any name
@@ -55,6 +59,7 @@ class Window:
         self._version: int | None = None  # of the scene on the page
         self._redraw = threading.Event()  # everything, with other options
         self._newest: ScenePoses | None = None
+        self._aimed = False  # at what moves
         commands = Commands(self._scene.node)
         self._controllers = Controllers()
         gui = server.gui
@@ -124,6 +129,26 @@ class Window:
             with self._server.atomic():
                 self._picture.move(np.array(poses.poses, dtype=float).reshape(-1, NUMBERS))
                 self._models.follow(self._picture.links)
+                self._aim()
+
+    def _aim(self) -> None:
+        """Has the first models that move fill a third of the page, where nobody has moved the camera."""
+        links, models = self._picture.links, self._picture.models.values()
+        moving = [each for each in models if not each.static]
+        if self._aimed or not moving or not all(each.name in links for each in moving):
+            self._aimed = self._aimed and bool(moving)
+            return
+        self._aimed = True
+        points = np.concatenate([each.corners(links[each.name]) for each in moving])
+        points = points[np.isfinite(points).all(axis=1)]
+        if not len(points):
+            return
+        start = self._server.initial_camera
+        before, camera = np.array(start.position), framing(points)
+        start.position, start.look_at = camera.eye, camera.target
+        for client in self._server.get_clients().values():
+            if np.abs(client.camera.position - before).max() < UNTOUCHED:
+                client.camera.position, client.camera.look_at = camera.eye, camera.target
 
     def _touch(self, message: SceneContacts | None) -> None:
         """Shows contact points; None leaves the old ones."""
@@ -166,6 +191,11 @@ class Window:
         paper = Image.new("RGBA", seen.size, "white")  # the background is transparent
         Image.alpha_composite(paper, seen).convert("RGB").save(content, "PNG")
         client.send_file_download("gzclient.png", content.getvalue(), save_immediately=True)
+
+
+def framing(points: np.ndarray) -> Camera:
+    """Returns the page's camera for a robot at these points (n, 3) [m], which fills a third of the page."""
+    return overview(points, ASPECT, LOOKING, THIRD)
 
 
 class TrainingTab:

@@ -83,6 +83,36 @@ def test_models_are_chosen_while_another_thread_shows_them(server, interleaved):
         assert sorted(handles(server, viser.GuiSliderHandle)) == sorted(names.get(name, []))
 
 
+def test_the_only_one_that_moves_is_followed_unless_another_is_chosen(server):
+    world = server.scene.add_frame("/world")
+    panel = ModelPanel(server, world, None, NoControllers(), None, lambda: True)
+    fixed = VisibleModel(1, "ground", [Link("base")], static=True)
+    models = [fixed, VisibleModel(2, "walker", [Link("base")])]
+    switch = handles(server, viser.GuiCheckboxHandle)["Follow"]
+
+    def seen(place):
+        panel.set_models(models)
+        places = {"ground": 0.0, "walker": place, "other": 0.0}
+        panel.follow(
+            {
+                each.name: np.array([[places[each.name], 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
+                for each in models
+            }
+        )
+        return float(world.position[0])
+
+    assert [seen(1.0), seen(3.0), seen(-4.0)] == [0.0, -2.0, 5.0]
+    switch.value = False
+    assert seen(3.0) == 0.0
+    switch.value = True
+    models.append(VisibleModel(3, "other", [Link("base")]))
+    assert [seen(1.0), seen(3.0)] == [0.0, 0.0]  # which of them?
+    handles(server, viser.GuiDropdownHandle)["Model"].value = "walker"
+    assert [seen(1.0), seen(3.0)] == [0.0, -2.0]
+    del models[1:]
+    assert seen(1.0) == 0.0
+
+
 def test_a_slider_that_is_dragged_leaves_its_joint_where_it_was_left(server):
     """The first command waits for a controller to listen, and the rest of the way is gone meanwhile."""
     listens, commanded = threading.Event(), []

@@ -129,6 +129,18 @@ def test_best_last_and_random_side_by_side(robot_run: Path, tmp_path: Path, caps
     assert [line.split(":")[0] for line in told] == ["best", "last", "random", str(out)]
 
 
+def test_the_camera_is_placed_by_its_fields(robot_run: Path, tmp_path: Path, capsys):
+    words = ("--max-steps", "1", "--size", "64x48", "--camera")
+    seen = []
+    for name, fields in (("a.gif", ("distance=2",)), ("b.gif", ("yaw=104", "target=[0,0,0.3]"))):
+        assert record(robot_run, tmp_path / name, *words, *fields) == 0
+        with Image.open(tmp_path / name) as video:
+            seen.append(np.asarray(video.convert("RGB"))[:48])
+    assert (seen[0] != seen[1]).any()
+    assert record(robot_run, tmp_path / "a.gif", *words, "jaw=104") == 1
+    assert "a camera has no 'jaw'; it has target, distance, yaw" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [
