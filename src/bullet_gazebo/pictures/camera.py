@@ -12,12 +12,13 @@ from bullet_gazebo.physics.pose import Vector
 NEAR, FAR = 0.02, 100.0  # clipping planes, as multiples of the camera's distance
 MARGIN = 1.1  # factor on the width and height that an overview must show
 THIRD = 2.8  # the same, for a robot that fills a third of the picture
-RANGES = {  # of fields that a user names
+RANGES = {  # of each number of a field that a user names
     "target": (-1e6, 1e6), "distance": (1e-3, 1e6), "yaw": (-360.0, 360.0), "pitch": (-90.0, 90.0),
-    "view": (1.0, 170.0), "follows": (False, True),
+    "view": (1.0, 170.0), "follows": (0, 1),
 }  # fmt: skip
-SKY = (238, 242, 247)
-TILES = ((222, 225, 230), (203, 207, 213))
+# Neither white, grey nor black, so that robots stand out.
+SKY = (228, 235, 243)
+TILES = ((134, 153, 174), (117, 137, 159))
 TILES_IN_SIGHT = 8.0  # within the camera's distance
 FADING = 3.0  # of the camera's distance, until a third of the colour is left
 
@@ -52,22 +53,19 @@ class Camera:
         Raises:
             ValueError: for an unknown field, or a value that it can't have.
         """
+        given = dict(fields)
         for name, value in fields.items():
             if name not in RANGES:
                 raise ValueError(f"a camera has no {name!r}; it has {', '.join(RANGES)}")
             low, high = RANGES[name]
-            numbers = value if name == "target" and isinstance(value, (list, tuple)) else [value]
-            are_numbers = all(isinstance(each, (int, float)) for each in numbers)
-            count = 3 if name == "target" else 1
-            if (
-                not are_numbers
-                or len(numbers) != count
-                or not all(low <= n <= high for n in numbers)
-            ):
-                what = "three numbers" if count == 3 else "a number"
-                what = "true or false" if name == "follows" else f"{what} in [{low:g}, {high:g}]"
-                raise ValueError(f"a camera's {name} is {what}, not {value!r}")
-        given = {name: tuple(v) if name == "target" else v for name, v in fields.items()}
+            kind, shape = ("three numbers", (3,)) if name == "target" else ("a number", ())
+            found = np.array(value)
+            fits = found.shape == shape and found.dtype.kind in "bif"
+            if not (fits and (low <= found).all() and (found <= high).all()):
+                raise ValueError(
+                    f"a camera's {name} is {kind} in [{low:g}, {high:g}], not {value!r}"
+                )
+            given[name] = tuple(value) if shape else value
         return replace(self, **given)
 
     @property

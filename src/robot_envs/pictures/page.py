@@ -20,6 +20,7 @@ from web_viewer.address import LOOPBACK, find_address
 from web_viewer.server import serve, stop
 
 WORLD = "/world"  # node
+ASPECT = 4.0 / 3.0  # of what a browser's window shows beside the panel
 GAP = 0.15  # between robots, as a share of what one of them can reach
 LOW = 0.9  # of a caption, from the middle of what the camera sees to its lower edge
 
@@ -64,7 +65,7 @@ class RobotOnPage:
         self._is_first, self._node = not beside, f"{WORLD}/{beside}"
         self._caption_node = f"/caption{beside}"
         self._caption: viser.LabelHandle | None = None
-        reach, aspect = placement.reach(), size[0] / size[1]
+        reach, aspect = placement.reach(), min(size[0] / size[1], ASPECT)
         looking = placement.camera(camera, aspect)
         right, up, _ = looking.axes
         low = looking.target - LOW * looking.slope * looking.distance * up

@@ -29,8 +29,7 @@ from web_viewer.curves import Curves
 from web_viewer.server import open_browser, serve, stop
 
 TITLE = "gzclient"
-CAMERA, LOOK_AT = (1.4, -1.9, 1.1), (0.0, 0.0, 0.35)  # [m], until there is something that moves
-LOOKING = Camera(yaw=36.4, pitch=-17.6, view=75.0)  # the same way
+CAMERA = Camera((0.0, 0.0, 0.35), 2.5, yaw=36.0, pitch=-18.0, view=75.0)  # while nothing moves
 ASPECT = 4.0 / 3.0  # of a browser's window, beside the panel
 UNTOUCHED = 1e-3  # [m]
 ADVICE = "~window"  # parameter: the lines that say where the page is
@@ -140,11 +139,9 @@ class Window:
             return
         self._aimed = True
         points = np.concatenate([each.corners(links[each.name]) for each in moving])
-        points = points[np.isfinite(points).all(axis=1)]
-        if not len(points):
-            return
         start = self._server.initial_camera
-        before, camera = np.array(start.position), framing(points)
+        before = np.array(start.position)
+        camera = framing(points[np.isfinite(points).all(axis=1)])
         start.position, start.look_at = camera.eye, camera.target
         for client in self._server.get_clients().values():
             if np.abs(client.camera.position - before).max() < UNTOUCHED:
@@ -195,7 +192,7 @@ class Window:
 
 def framing(points: np.ndarray) -> Camera:
     """Returns the page's camera for a robot at these points (n, 3) [m], which fills a third of the page."""
-    return overview(points, ASPECT, LOOKING, THIRD)
+    return overview(points, ASPECT, CAMERA, THIRD)
 
 
 class TrainingTab:
@@ -240,7 +237,7 @@ def show(address: Address, browser: bool) -> None:
     Raises:
         PortInUse: another process was quicker.
     """
-    server = serve(address, TITLE, CAMERA, LOOK_AT)
+    server = serve(address, TITLE, tuple(CAMERA.eye.tolist()), CAMERA.target)
     try:
         window = Window(server)
         advice = address.advice("the window", "moves the simulation")

@@ -56,7 +56,7 @@ def test_fields_are_changed_by_their_names():
         ({"view": 180.0}, "view is a number in [1, 170]"),
         ({"target": [0.0, 1.0]}, "target is three numbers in"),
         ({"target": 1.0}, "target is three numbers in"),
-        ({"follows": 2}, "follows is true or false, not 2"),
+        ({"follows": 2}, "follows is a number in [0, 1], not 2"),
     ],
 )
 def test_fields_that_no_camera_has_are_refused(fields, text):
