@@ -4,6 +4,7 @@ import contextlib
 import io
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -59,6 +60,7 @@ class Window:
         self._redraw = threading.Event()  # everything, with other options
         self._newest: ScenePoses | None = None
         self._aimed = False  # at what moves
+        self._aims: deque[np.ndarray] = deque([CAMERA.eye], 10)  # [m] positions of the camera
         commands = Commands(self._scene.node)
         self._controllers = Controllers()
         gui = server.gui
@@ -139,13 +141,15 @@ class Window:
             return
         self._aimed = True
         points = np.concatenate([each.corners(links[each.name]) for each in moving])
-        start = self._server.initial_camera
-        before = np.array(start.position)
         camera = framing(points[np.isfinite(points).all(axis=1)])
+        start = self._server.initial_camera
         start.position, start.look_at = camera.eye, camera.target
         for client in self._server.get_clients().values():
-            if np.abs(client.camera.position - before).max() < UNTOUCHED:
+            # Browsers may still report an aim before the last one.
+            ways = [np.abs(client.camera.position - each).max() for each in self._aims]
+            if min(ways) < UNTOUCHED:
                 client.camera.position, client.camera.look_at = camera.eye, camera.target
+        self._aims.append(camera.eye)
 
     def _touch(self, message: SceneContacts | None) -> None:
         """Shows contact points; None leaves the old ones."""
