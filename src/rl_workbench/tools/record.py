@@ -30,6 +30,7 @@ GIF_TICK = 10  # [ms], the format's own
 COLOURS = 96  # of a GIF; drawings have few
 PAGE = Path(__file__).with_name("page.html")
 TEXT, PAPER = (40, 44, 52), (255, 255, 255)
+FADED = 0.4  # share of white in the picture of an episode that has ended
 LINES = 14.0  # lines of text that fit into a picture's height
 END = 1.0  # [s] for which a 3-D recording shows its last frame before it restarts
 
@@ -194,6 +195,8 @@ class SideBySide(Sequence["np.ndarray"]):
         for film in self._films:
             frame = film.frames[min(index, len(film.frames) - 1)]
             picture = Image.open(BytesIO(frame.seen))
+            if frame.ended:
+                picture = Image.blend(picture, Image.new("RGB", picture.size, PAPER), FADED)
             pictures.append(
                 _captioned(picture, frame.caption(film.title)) if self._captions else picture
             )

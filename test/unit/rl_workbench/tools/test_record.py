@@ -62,7 +62,8 @@ def film(length: int, title: str = "", stride: float = 1.0, max_steps: int = 0) 
 def test_frames_come_at_the_stride_that_was_asked_for(stride, steps):
     made = film(8, stride=stride)
     assert [frame.step for frame in made.frames] == steps
-    assert [int(frame[0, 0, 0]) // 10 for frame in SideBySide([made], captions=False)] == steps
+    sheets = SideBySide([made], captions=False)
+    assert [int(frame[0, 0, 0]) // 10 for frame in sheets][:-1] == steps[:-1]
     assert made.frames[-1].total_reward == 4.0
 
 
@@ -71,10 +72,19 @@ def test_an_episode_is_cut_off_where_one_wants():
 
 
 def test_episodes_side_by_side_wait_for_the_longest():
-    sheets = SideBySide([film(2), film(5)], captions=False)
+    sheets = SideBySide([film(9, max_steps=2), film(9, max_steps=5)], captions=False)
     assert len(sheets) == 6
     assert [frame[0, 0, 0] for frame in sheets] == [0, 10, 20, 20, 20, 20]
     assert [frame[0, 400, 0] for frame in sheets] == [0, 10, 20, 30, 40, 50]
+
+
+def test_an_episode_that_has_ended_is_marked_and_one_that_is_cut_off_is_not():
+    whole, cut = film(3), film(8, max_steps=3)
+    assert [each.frames[-1].ended for each in (whole, cut)] == [True, False]
+    assert not any(each.ended for each in whole.frames[:-1])
+    paled, plain = (SideBySide([each], captions=False)[3] for each in (whole, cut))
+    assert plain.max() == 30 < paled.min()
+    assert cut.frames[-1].caption() == "step 3   return 1.5   action +0.00 +0.00 +0.00 ..."
 
 
 def test_captions_stand_below_the_picture_and_change_with_it():
@@ -97,7 +107,7 @@ def test_actions_of_any_kind_are_told(action, text):
 
     env = Constant(2)
     *_, last = record_episode(env, lambda _: action, PictureView(env), 0)
-    assert last.caption("best") == f"best   step 2   return 1.0   action {text}"
+    assert last.caption("best") == f"best   step 2   return 1.0   action {text}   ended"
     assert EpisodeFrame(0, b"", 0.0, "").caption() == "step 0   return 0.0"
 
 

@@ -31,7 +31,7 @@ DATA = """Object.values((window.__viserTestpoints || {}).uplots || {})
 SIZE = (900, 650)  # [pixels]: it is drawn without a graphics card
 BLUE, ORANGE = (20, 90, 190), (230, 140, 40)  # cart and pole of our robot
 BLACK, BROWN = (0, 0, 0), (202, 152, 101)  # and of the pictures of CartPole-v1
-HOSTILE = "<img src=x onerror='window.hurt=1'>né🤖"
+HOSTILE = "<img src=x onerror='hurt=1'>né🤖"
 CANVASES = "document.querySelectorAll('.uplot canvas').length"
 
 
@@ -117,7 +117,7 @@ def is_served(url: str) -> bool:
 def test_a_run_is_seen_and_played(start, tmp_path) -> None:
     run = policy_gradient(tmp_path / HOSTILE, env_id="cartpole/Balance-v0", episodes=30, seed=1)
     with (run / "scalars.csv").open("a") as table:
-        table.write(f"100000,losses/{HOSTILE},{20 * '9'},0\n")
+        table.write(f"100000,losses/{HOSTILE},1,0\n100000,losses/value,{20 * '9'},0\n")
     viewing = start("view", str(run), "--port", "0", "--checkpoint", "best", "random")
     with Browser(viewing.url(), size=SIZE) as page:
         page.wait_for_text("30 episodes")
@@ -125,6 +125,7 @@ def test_a_run_is_seen_and_played(start, tmp_path) -> None:
         assert 30 in page.run(DATA)
         page.wait_for_text("best, of step")
         page.wait_for_text(f"losses/{HOSTILE}")
+        page.wait_for_text("losses/value, in 10¹⁸")
         pause(page)
         wait_for(lambda: is_seen(page, BLUE, ORANGE), "robot in 3-D")
         page.press_keys("[role=slider]", "Home", 1)
