@@ -53,19 +53,16 @@ class Camera:
         Raises:
             ValueError: for an unknown field, or a value that it can't have.
         """
-        given = dict(fields)
         for name, value in fields.items():
             if name not in RANGES:
                 raise ValueError(f"a camera has no {name!r}; it has {', '.join(RANGES)}")
-            low, high = RANGES[name]
-            kind, shape = ("three numbers", (3,)) if name == "target" else ("a number", ())
-            found = np.array(value)
-            fits = found.shape == shape and found.dtype.kind in "bif"
-            if not (fits and (low <= found).all() and (found <= high).all()):
+            (low, high), like, found = RANGES[name], getattr(self, name), np.array(value)
+            fits = found.shape == np.shape(like) and found.dtype.kind in "bif"
+            if not fits or (np.clip(found, low, high) != found).any():
                 raise ValueError(
-                    f"a camera's {name} is {kind} in [{low:g}, {high:g}], not {value!r}"
+                    f"a camera's {name} is like {like}, in [{low:g}, {high:g}]: {value!r}"
                 )
-            given[name] = tuple(value) if shape else value
+        given = {name: tuple(v) if name == "target" else v for name, v in fields.items()}
         return replace(self, **given)
 
     @property

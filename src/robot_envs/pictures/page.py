@@ -79,7 +79,6 @@ class RobotOnPage:
         server.initial_camera.fov = float(np.radians(looking.view))
         self._foot = low + beside * aside
         scene = server.scene
-        self._follow: viser.GuiCheckboxHandle | None = None
         self._travelled = np.zeros(3)
         if self._is_first:
             self._world = scene.add_frame(WORLD, show_axes=False)
@@ -118,14 +117,13 @@ class RobotOnPage:
                 self._write(caption)
 
     def _move_world(self) -> None:
-        if self._follow is not None:
+        if self._is_first:
             self._world.position = -self._travelled * self._follow.value
 
     def close(self) -> None:
-        """Takes the switch off the page; may be called twice."""
-        if self._follow is not None:
+        """Takes the switch off the page."""
+        if self._is_first:
             self._follow.remove()
-            self._follow = None
 
     def _write(self, caption: str) -> None:
         if self._caption is None:

@@ -59,9 +59,7 @@ class ModelPanel:
         self._touched: dict[str, float] = {}  # [s] when someone moved a joint's slider
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._choice = server.gui.add_dropdown("Model", [NONE], initial_value=NONE)
-        self._follow = server.gui.add_checkbox(
-            "Follow", True, hint="the chosen model, or the only one that isn't fixed"
-        )
+        self._follow = server.gui.add_checkbox("Follow", True)
         self._joints = server.gui.add_folder("Joints", visible=False)
         self._unmoved = server.gui.add_html("", visible=False)  # joints whose sliders move nothing
         self._list = server.gui.add_html("")

@@ -4,7 +4,6 @@ import contextlib
 import io
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -60,7 +59,6 @@ class Window:
         self._redraw = threading.Event()  # everything, with other options
         self._newest: ScenePoses | None = None
         self._aimed = False  # at what moves
-        self._aims: deque[np.ndarray] = deque([CAMERA.eye], 10)  # [m] positions of the camera
         commands = Commands(self._scene.node)
         self._controllers = Controllers()
         gui = server.gui
@@ -141,15 +139,14 @@ class Window:
             return
         self._aimed = True
         points = np.concatenate([each.corners(links[each.name]) for each in moving])
-        camera = framing(points[np.isfinite(points).all(axis=1)])
+        points = points[np.isfinite(points).all(axis=1)]
+        camera = overview(points, ASPECT, CAMERA, THIRD)
         start = self._server.initial_camera
+        before = np.array(start.position)
         start.position, start.look_at = camera.eye, camera.target
         for client in self._server.get_clients().values():
-            # Browsers may still report an aim before the last one.
-            ways = [np.abs(client.camera.position - each).max() for each in self._aims]
-            if min(ways) < UNTOUCHED:
+            if np.abs(client.camera.position - before).max() < UNTOUCHED:
                 client.camera.position, client.camera.look_at = camera.eye, camera.target
-        self._aims.append(camera.eye)
 
     def _touch(self, message: SceneContacts | None) -> None:
         """Shows contact points; None leaves the old ones."""
@@ -192,11 +189,6 @@ class Window:
         paper = Image.new("RGBA", seen.size, "white")  # the background is transparent
         Image.alpha_composite(paper, seen).convert("RGB").save(content, "PNG")
         client.send_file_download("gzclient.png", content.getvalue(), save_immediately=True)
-
-
-def framing(points: np.ndarray) -> Camera:
-    """Returns the page's camera for a robot at these points (n, 3) [m], which fills a third of the page."""
-    return overview(points, ASPECT, CAMERA, THIRD)
 
 
 class TrainingTab:

@@ -15,10 +15,11 @@ from support.pages.browser import wait_for
 from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count, proxy
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.pictures.camera import THIRD, overview
 from bullet_gazebo.pictures.renderer import Renderer
 from bullet_gazebo.pictures.visuals import visible_shapes
 from bullet_gazebo.ros.common.messages import from_pose_msg
-from bullet_gazebo.ros.window.window import framing
+from bullet_gazebo.ros.window.window import ASPECT, CAMERA
 
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>
@@ -168,6 +169,8 @@ class WindowTest(WindowCase):
         self.assertEqual(picture[0, 0].tolist(), [255, 255, 255])  # the sky
         red = count(picture.reshape(-1, 3).T, RED)
         self.assertAlmostEqual(red / count(self.view(), RED), 1.0, delta=0.1)
+        rows = np.nonzero((picture[..., 0] > 100) & (picture[..., 1] < 50))[0]
+        self.assertAlmostEqual(np.ptp(rows) / height, 1.0 / 3.0, delta=0.08)  # at first
 
     def test_the_curves_of_a_training_beside_the_robot(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -195,7 +198,7 @@ class WindowTest(WindowCase):
         self.addCleanup(scene.close)
         scene.add("cartpole", visible_shapes(parse_urdf(xml)))
         self.place_links(scene)
-        camera = framing(scene.corners("cartpole"))  # of the first moment
+        camera = overview(scene.corners("cartpole"), ASPECT, CAMERA, THIRD)  # of the first moment
         self.assertTrue(place("cartpole", "", ["stand_cart", "cart_pole"], [0.2, 0.4]).success)
         self.place_links(scene)
         width, height = self.page.run(CANVAS)
@@ -224,7 +227,7 @@ def boxes(picture):
     edges = []
     for part in (
         (red > green + 20) & (green > blue + 20),
-        (blue > green + 20) & (green > red + 20),
+        (blue > green + 20) & (blue > 2 * red),  # the ground is a pale blue
     ):
         rows, columns = np.nonzero(part)
         edges += [columns.min(), rows.min(), columns.max(), rows.max()] if len(rows) else [0] * 4
