@@ -83,7 +83,7 @@ class RobotOnPage:
         if self._is_first:
             self._world = scene.add_frame(WORLD, show_axes=False)
             _draw_ground(server)
-            self._follow = server.gui.add_checkbox("Follow", looking.follows)
+            self._follow = server.gui.add_checkbox("Follow", looking.follows, order=-1.0)
             self._follow.on_update(lambda _: self._move_world())
         scene.add_frame(self._node, show_axes=False, position=beside * aside)
         self._seen = _seen(placement)

@@ -58,7 +58,7 @@ class Window:
         self._version: int | None = None  # of the scene on the page
         self._redraw = threading.Event()  # everything, with other options
         self._newest: ScenePoses | None = None
-        self._aimed = False  # at what moves
+        self._aimed: set[int] = set()  # numbers of models
         commands = Commands(self._scene.node)
         self._controllers = Controllers()
         gui = server.gui
@@ -131,13 +131,13 @@ class Window:
                 self._aim()
 
     def _aim(self) -> None:
-        """Has the first models that move fill a third of the page, where nobody has moved the camera."""
+        """Has new models that move fill a third of the page, where nobody has moved the camera."""
         links, models = self._picture.links, self._picture.models.values()
         moving = [each for each in models if not each.static]
-        if self._aimed or not moving or not all(each.name in links for each in moving):
-            self._aimed = self._aimed and bool(moving)
+        numbers = {each.number for each in moving}
+        if not moving or self._aimed & numbers or not all(each.name in links for each in moving):
             return
-        self._aimed = True
+        self._aimed = numbers
         points = np.concatenate([each.corners(links[each.name]) for each in moving])
         points = points[np.isfinite(points).all(axis=1)]
         camera = overview(points, ASPECT, CAMERA, THIRD)
