@@ -31,7 +31,7 @@ from web_viewer.server import open_browser, serve, stop
 TITLE = "gzclient"
 CAMERA = Camera((0.0, 0.0, 0.35), 2.5, yaw=36.0, pitch=-18.0, view=75.0)  # while nothing moves
 ASPECT = 4.0 / 3.0  # of a browser's window, beside the panel
-UNTOUCHED = 1e-3  # [m]
+UNTOUCHED, UNKNOWN = 1e-3, (3.0, 3.0, 3.0)  # [m]; viser's, before a browser has told its camera
 ADVICE = "~window"  # parameter: the lines that say where the page is
 CURVES = "~curves"  # parameter: a run folder, or the table of one
 TRAINED = "/gazebo_gui/curves"  # the same; a training sets it, for windows of any name
@@ -145,7 +145,8 @@ class Window:
         before = np.array(start.position)
         start.position, start.look_at = camera.eye, camera.target
         for client in self._server.get_clients().values():
-            if np.abs(client.camera.position - before).max() < UNTOUCHED:
+            ways = np.abs(client.camera.position - np.array([before, UNKNOWN])).max(axis=1)
+            if ways.min() < UNTOUCHED:
                 client.camera.position, client.camera.look_at = camera.eye, camera.target
 
     def _touch(self, message: SceneContacts | None) -> None:
