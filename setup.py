@@ -38,6 +38,7 @@ setup(
     packages=find_packages("src"),
     package_dir={"": "src"},
     package_data={
+        "bullet_gazebo.physics.files": ["models.sdf"],
         "package_writing": ["parts/*", "template/**/*"],
         "rl_workbench.tools": ["page.html"],
     },

@@ -67,6 +67,7 @@ usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
        ws shell              open an interactive bash in the workspace, with roscd and completion
        ws extras [CMD...]    install requirements/extras.txt too, then run CMD, if any
        ws rviz [CMD...]      install Debian's RViz too, then run CMD, if any
+       ws foreign [CMD...]   install what other people's packages commonly build against, then run CMD, if any
        ws clean              remove everything that ws made
        ws --help             show this text
 
@@ -114,7 +115,7 @@ interactive_shell() {
 # What to do next, once the workspace is ready.
 next_thing() {
     case ${COMMAND%% *} in
-        true | extras | rviz | :) echo ". Next: ./ws rosrun cartpole pg_train.py, or ./ws --help" ;;
+        true | extras | rviz | foreign | :) echo ". Next: ./ws rosrun cartpole pg_train.py, or ./ws --help" ;;
         *) echo ". Now: $COMMAND" ;;
     esac
 }
@@ -155,7 +156,7 @@ main() {
             ;;
         check) steps=(debian venv test_tools companions build) ;;
         extras) steps=(debian venv extras companions build) ;;
-        rviz) steps=(debian rviz venv companions build) ;;
+        rviz | foreign) steps=(debian "$1" venv companions build) ;;
     esac
     choose_place "${steps[@]}"
     make_ready "${steps[@]}"
@@ -164,7 +165,7 @@ main() {
         test) run_tests "${@:2}" ;;
         check) check "${@:2}" ;;
         shell) interactive_shell ;;
-        extras | rviz) [[ $# -eq 1 ]] || exec -- "${@:2}" ;;
+        extras | rviz | foreign) [[ $# -eq 1 ]] || exec -- "${@:2}" ;;
         *) run "$@" ;;
     esac
 }

@@ -24,8 +24,8 @@ from std_srvs.srv import Empty
 from cartpole.environment import CartPoleEnv
 from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
-from robot_envs.backends.ros.gazebo import SharedWorld
 from robot_envs.backends.ros.lockstep import LockstepWorld
+from robot_envs.backends.ros.running import SharedWorld
 from robot_envs.scene import Scene
 from ros_utils.simulation import Simulation
 from ros_utils.step_client import StepClient

@@ -59,10 +59,10 @@ make_step() {  # step, title
     watcher=$!
     # shellcheck disable=SC2064  # this watcher
     trap "kill $watcher 2>/dev/null" EXIT
-    # The lock stays with ws: a process that a step leaves behind must not keep it. The status is
+    # The lock is the step's, too: pip or catkin_make may outlive a ws that is killed. The status is
     # asked for afterwards, because `set -e` is off in a function that is tested with ||.
     set +e
-    (set -e; "make_$1") >"$log" 2>&1 {LOCK}>&-
+    (set -e; "make_$1") >"$log" 2>&1
     status=$?
     kill "$watcher" 2>/dev/null
     wait "$watcher" 2>/dev/null
@@ -90,13 +90,14 @@ reason_in() {  # log
         tail -n 1 -- "$1" | grep . || echo "it said nothing"
 }
 
-# Tells now and then how far a step is, until it is killed or ws is gone.
+# Tells now and then how far a step is, until it is killed or ws is gone. That pip leaves Debian's NumPy
+# where it is ("Can't uninstall 'numpy'") is no matter.
 watch_step() {  # log, begin
     local last
     # Reading from a pipe into which no one writes waits without a process of its own.
     exec {silence}<> <(:)
     while ! read -rt "$PERIOD" -u "$silence" && kill -0 $$ 2>/dev/null; do
-        last=$(tail -c 2000 -- "$1" | tr '\r' '\n' | grep -a '[[:alnum:]]' | tail -n 1 | cut -c 1-100) || true
+        last=$(tail -c 2000 -- "$1" | tr '\r' '\n' | grep -a '[[:alnum:]]' | grep -av uninstall | tail -n 1 | cut -c 1-100) || true
         last=${last#"${last%%[![:space:]]*}"}
         say "    $(duration $((SECONDS - $2))): ${last:-nothing said so far}"
     done

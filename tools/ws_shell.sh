@@ -34,7 +34,7 @@ fi
 unset _ws_rosbash
 
 _ws_complete() {
-    local word=${COMP_WORDS[COMP_CWORD]} commands=(test check shell extras rviz clean --with --help)
+    local word=${COMP_WORDS[COMP_CWORD]} commands=(test check shell extras rviz foreign clean --with --help)
     COMPREPLY=()
     if [[ $COMP_CWORD -eq 1 ]]; then
         mapfile -t COMPREPLY < <(compgen -W "${commands[*]}" -- "$word"; compgen -c -- "$word")

@@ -9,6 +9,7 @@
 declare -A TITLE=(
     [debian]="Debian packages"
     [rviz]="Debian packages for RViz"
+    [foreign]="Debian packages that others build against"
     [venv]="Python packages"
     [test_tools]="tools for test and check"
     [extras]="extra Python packages"
@@ -20,7 +21,7 @@ COMPILER="mend what the compiler or CMake complains of; if that is nothing of yo
 # shellcheck disable=SC2034
 declare -A REMEDY=(
     [debian]="$NETWORK; on other systems than Debian 12 see docs/catkin.md"
-    [rviz]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [extras]=$NETWORK
+    [rviz]=$NETWORK [foreign]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [extras]=$NETWORK
     [companions]=$COMPILER [build]=$COMPILER
 )
 
@@ -38,6 +39,7 @@ debian_missing() {  # file
 # The key is what is missing, which is nothing when ready: a package removed later is noticed.
 key_debian() { debian_missing debian.txt; }
 key_rviz() { debian_missing rviz.txt; }
+key_foreign() { debian_missing foreign.txt; }
 
 AS_ROOT=()
 become_root() {
@@ -46,12 +48,14 @@ become_root() {
     AS_ROOT=(sudo)
 }
 
+# Not with the lock: a package may start a service that stays. dpkg has a lock of its own.
 apt() {
-    "${AS_ROOT[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=600 "$@"
+    "${AS_ROOT[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=600 "$@" {LOCK}>&-
 }
 
 plan_debian() { plan_packages debian.txt; }
 plan_rviz() { plan_packages rviz.txt; }
+plan_foreign() { plan_packages foreign.txt; }
 plan_packages() {  # file
     local missing
     mapfile -t missing < <(debian_missing "$1")
@@ -80,6 +84,7 @@ sizes_of_debian() {  # package...
 
 make_debian() { make_packages debian.txt; }
 make_rviz() { make_packages rviz.txt; }
+make_foreign() { make_packages foreign.txt; }
 make_packages() {  # file
     local missing
     mapfile -t missing < <(debian_missing "$1")

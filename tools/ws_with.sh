@@ -23,13 +23,14 @@ add_folders_of_the_environment() {
 # Looks through the folders, and builds what has to be built.
 make_theirs_ready() {  # ROS_PACKAGE_PATH
     [[ ${#WITH[@]} -gt 0 || -n $1 ]] || return 0
-    local lines line
+    local lines line hint=''
+    is_ready foreign || hint="./ws foreign installs what is common ($(size_of foreign.txt))"
     # The lists of the stamps tell whether what their packages are built on has changed.
     lines=$(PYTHONPATH=$ROOT "$SYSTEM_PYTHON" -P -m tools.user_packages \
         --root "$CHECKOUT" --place "$STATE/with" --python "$VENV/bin/python3" \
         --prefixes "${CALLER[CMAKE_PREFIX_PATH]:+${CALLER[CMAKE_PREFIX_PATH]}:}$WS/devel:$COMPANIONS/devel" \
         --state "$(cat -- "$WS/stamp/companions" "$WS/stamp/build")" \
-        --also "$1" -- "${WITH[@]}") || exit
+        --hint "$hint" --also "$1" -- "${WITH[@]}") || exit
     while IFS= read -r line; do
         [[ -z $line ]] || THEIRS[${line%%=*}]=${line#*=}
     done <<<"$lines"

@@ -8,17 +8,33 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bullet_gazebo.control.controllers.base import Controller, Input, Output
+    from bullet_gazebo.control.controllers.base import (
+        Controller,
+        Input,
+        Output,
+        joint_param,
+        number_param,
+    )
     from bullet_gazebo.control.errors import ControlError
     from bullet_gazebo.physics.model import Model
 
-__all__ = ["ControlError", "Controller", "Input", "Model", "Output"]
+__all__ = [
+    "ControlError",
+    "Controller",
+    "Input",
+    "Model",
+    "Output",
+    "joint_param",
+    "number_param",
+]
 _MODULES = {
     "ControlError": "control.errors",
     "Controller": "control.controllers.base",
     "Input": "control.controllers.base",
     "Model": "physics.model",
     "Output": "control.controllers.base",
+    "joint_param": "control.controllers.base",
+    "number_param": "control.controllers.base",
 }
 
 

@@ -1,14 +1,14 @@
 """A controlled robot: the seam between a model of the physics world and its ros_control hardware."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import ceil, isfinite
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.physics.description import Plugin
-from bullet_gazebo.physics.engine import FURTHEST
+from bullet_gazebo.physics.engine import FURTHEST, Contact
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.stability import Log, StabilityWatch
 
@@ -135,6 +135,10 @@ class ControlledRobot:
         else:
             self.manager.update(now, dt)
 
+    def report_stalls(self, now: int, contacts: Callable[[], list[Contact]]) -> None:
+        """Logs, once for each joint, that a contact has stalled its motor for a second; `now` [ns]."""
+        self._watch.report_stalls(now, contacts)
+
     def _contain(self, states: JointStates) -> None:
         """Removes energy that came from nowhere, as ODE's solver loses it, and reads the new state."""
         names = self.model.joint_names
@@ -181,14 +185,23 @@ class ControlledRobot:
             drive.hold()
 
     def _drive(self, dt: float) -> None:
-        """Moves the joints with position and velocity interfaces."""
+        """Moves the joints with position and velocity interfaces.
+
+        Between motors of any force and a wall an engine may find no solution: joints would jump in each
+        step. So while something pushes one off its command, all motors keep to their effort limits.
+        """
+        motors = []
         for drive, index in self._drives:
             drive.limit(dt)
             if drive.pid is not None:
                 drive.joint.effort = self._efforts[index] = drive.effort(dt)
             else:
-                speed, most = drive.motor(dt)
-                self.model.body.set_motor(index, speed, min(most, STRONGEST))
+                motors.append((drive, index, *drive.motor(dt)))
+        body = self.model.body
+        yields = not body.bears_any_motor and any(drive.pushed for drive, *_ in motors)
+        for drive, index, speed, most in motors:
+            strongest = drive.strongest if yields else STRONGEST
+            body.set_motor(index, speed, min(most, strongest, STRONGEST))
 
     def joints_moved(self, now: int, relatch: bool) -> None:
         """Reads a state that something other than time has changed; `now` [ns].
@@ -197,6 +210,8 @@ class ControlledRobot:
         """
         self.read()
         self._waited = None
+        for drive, _ in self._drives:
+            drive.joints_moved()
         if relatch:
             for joint, _ in self._joints:
                 joint.effort = 0.0

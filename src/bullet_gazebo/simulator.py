@@ -14,6 +14,7 @@ from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.timing import FairLock, Holds, Pacer
 
 NANOSECONDS = 1_000_000_000
+STALL_CHECK = 100_000_000  # [ns]
 IDLE_POLL = 0.2  # [s]; how soon an idle run() notices stop()
 
 
@@ -293,6 +294,8 @@ class Simulator:
             applied.apply(now)
         for robot in self.robots:
             robot.update(now, dt)
+            if now % STALL_CHECK < self._period:
+                robot.report_stalls(now, self.world.engine.contacts)
         for listener in self.listeners:
             listener(now)
         for robot in self.robots:

@@ -7,7 +7,7 @@ M^-1 (p dt² + 2 d dt) exceeds 4; a loop on velocity diverges if one of M^-1 (2 
 
 import logging
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from bullet_gazebo.control.manager import RUNNING, ControllerManager
 from bullet_gazebo.control.pid import Loop
 from bullet_gazebo.physics.description import is_control_plugin
 from bullet_gazebo.physics.dynamics import mobility, most_inertias, poses_at_zero
+from bullet_gazebo.physics.engine import Contact
 from bullet_gazebo.physics.model import Model
 
 Log = Callable[[int, str], None]
@@ -27,6 +28,8 @@ Log = Callable[[int, str], None]
 MOST = 4.0  # of the eigenvalue
 P_ONLY_DAMPING = 0.05  # of critical damping
 P_ONLY_TAG = "pOnlyDamping"
+STILL = 1e-3  # [rad, m] by which a stalled joint may move
+STALLED = 1_000_000_000  # [ns]
 
 
 class OwnedLoop(NamedTuple):
@@ -53,6 +56,7 @@ class StabilityWatch:
         self._log = log
         self._damping_ratio = p_only_damping(model)
         self._logged: set[object] = set()
+        self._pushing: dict[str, tuple[int, float]] = {}  # since when [ns] and where [rad, m]
 
     def review(self, period: float) -> None:
         """Warns of gains that are too high, and damps joints that a P gain alone drives.
@@ -87,6 +91,42 @@ class StabilityWatch:
                 f"({speed:.0f} rad/s or m/s; the step is {self._model.time_step:g} s). It was slowed down. "
                 f"{driver}. Lower gains, a shorter step or heavier links help.",
             )
+
+    def report_stalls(self, now: int, contacts: Callable[[], list[Contact]]) -> None:
+        """Logs, once for each joint, that a contact has stalled its motor for a second; `now` [ns].
+
+        A motor may well press on another model, as a gripper does, so that is no warning.
+        """
+        pushing = {}
+        for joint in self._hardware.at_their_limits():
+            since, place = self._pushing.get(joint.name, (now, joint.position))
+            if now < since or abs(joint.position - place) > STILL:
+                since, place = now, joint.position
+            pushing[joint.name] = since, place
+            if now - since < STALLED or ("stalled", joint.name) in self._logged:
+                continue
+            for own, text in self._stops(joint.name, contacts()):
+                self._logged.add(("stalled", joint.name))
+                self._log(logging.WARNING if own else logging.INFO, text)
+                break
+        self._pushing = pushing
+
+    def _stops(self, joint: str, contacts: list[Contact]) -> Iterator[tuple[bool, str]]:
+        """Yields for each contact that stops a joint whether it is of two links of the model, and a text."""
+        model = self._model
+        carried = {link for link in model.link_names if joint in model.carriers(link)}
+        for contact in contacts:
+            sides = (contact.first, contact.second)
+            moved = [side.body is model.body and side.link in carried for side in sides]
+            if sum(moved) == 1:
+                link, other = sides if moved[0] else sides[::-1]
+                own = other.body is model.body
+                yield (
+                    own,
+                    f"joint '{joint}' of model '{model.name}' has been stalled for a second, its motor at "
+                    f"the limit: link '{link.link}' touches link '{other.link}' of "
+                    f"{'its own' if own else 'another'} model",
+                )
 
     def _acting(self) -> list[OwnedLoop]:
         drives = [OwnedLoop(f"drive '{GAINS}/{each.joint}'", each) for each in self._hardware.loops]

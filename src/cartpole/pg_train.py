@@ -76,6 +76,7 @@ def main(argv: list[str] | None = None) -> int:
         # A single robot over ROS is shown in its simulator's window.
         in_window = over_ros and options.run.num_envs == 1
         callbacks = [] if in_window else page_of(options, PROGRAM)
+        # Left before an error is printed: that line comes last, below what ends with the session.
         with contextlib.ExitStack() as beside:
 
             def begin(folder: Path) -> None:

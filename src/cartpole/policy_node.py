@@ -151,16 +151,22 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
     """
     if path.is_dir():
         run = open_run(path)
+        wrapper = run.wrapper
         learned = load_learned(run, which, _in_process({**run.env_kwargs, **options}))
         env, env_id, act = learned.env, run.env_id, learned.act
     else:
         exported = open_exported(path)
+        wrapper = exported.metadata.get("wrapper")
         env_id, act = exported.metadata["env_id"], exported.act
         recorded = {**exported.metadata["env_kwargs"], **options}
         sees_dict = exported.metadata["observation_space"].get("kind") == "Dict"
         env = make_environment(env_id, _in_process(recorded), keep_dict=sees_dict)
         _check_same(path, exported.metadata, env)
     try:
+        if wrapper:
+            raise RobotEnvError(
+                f"{path} learned through the wrapper {wrapper}, which a robot hasn't"
+            )
         base = env.unwrapped
         if not isinstance(base, RobotEnv):
             raise RobotEnvError(

@@ -63,7 +63,7 @@ def _free_port() -> int:
     for port in random.SystemRandom().sample(MASTER_PORTS, len(MASTER_PORTS)):
         with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
             return port
-    raise RobotEnvError("no port is free for the training's own simulation")
+    sys.exit("workbench.py: no port is free for the training's own simulation")
 
 
 def ros_options(argv: list[str], default_name: str) -> tuple[list[str], dict[str, Any], str]:

@@ -184,6 +184,8 @@ def _what_went_wrong(xacro: Any, path: str, fault: Exception) -> str:
         if isinstance(missing, OSError) and missing.filename and missing.strerror:
             own = missing.filename == files[0]
             fault = Exception(missing.strerror + ("" if own else f": {missing.filename}"))
+        if missing is not None and type(missing).__name__ == "PackageNotFoundError":
+            fault = Exception(missing.args[0])  # of $(find ...); xacro repeats it, with the class
         text = " ".join(str(fault.args[0] if isinstance(fault, KeyError) else fault).split())
         reason = text[:MAX_REASON] or type(fault).__name__
     return f"{', '.join([*files[:1], *through])}: {reason}"

@@ -1,10 +1,18 @@
-"""The lock of a folder: one process at a time; the kernel releases it when its holder ends."""
+"""The lock of a folder: one process at a time; the kernel releases it when its holder ends.
+
+Temporary folders are locked, too: so those of killed processes are known.
+"""
 
 import fcntl
+import functools
 import os
+import shutil
+import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+
+SCRATCH = ("cartpole_", ".tmp")  # begin and end of a temporary folder's name
 
 
 @contextmanager
@@ -42,3 +50,34 @@ def is_locked(folder: Path) -> bool:
     finally:
         os.close(descriptor)
     return False
+
+
+@contextmanager
+def scratch_folder(parent: str | None = None) -> Iterator[Path]:
+    """Makes a temporary folder for the block; a process's first one also removes those of killed processes.
+
+    Args:
+        parent: where it is made; None for the system's folder of temporary files.
+
+    Raises:
+        OSError: if it can't be made.
+    """
+    place = Path(parent or tempfile.gettempdir())
+    _sweep(place)
+    with ExitStack() as stack:
+        folder = None
+        while folder is None:
+            made = Path(tempfile.mkdtemp(SCRATCH[1], SCRATCH[0], place))
+            with suppress(BlockingIOError, FileNotFoundError):  # another process has just swept it
+                stack.enter_context(locked_folder(made))
+                folder = made
+        stack.callback(shutil.rmtree, folder, ignore_errors=True)
+        yield folder
+
+
+@functools.cache
+def _sweep(place: Path) -> None:
+    """Removes the temporary folders that no process holds; others' users can't be opened."""
+    for folder in place.glob("*".join(SCRATCH)):
+        with suppress(OSError), locked_folder(folder):
+            shutil.rmtree(folder, ignore_errors=True)

@@ -38,6 +38,7 @@ class Sleeper:
     wake: float  # [ns] on the scale of Clock.passed
     until: Condition | None
     order: int
+    skips_pauses: bool
     came: bool = False
     resting: threading.Lock = field(default_factory=threading.Lock)
 
@@ -98,7 +99,11 @@ class Clock:
             return any(each.thread == ident for each in self._sleepers)
 
     def wait(
-        self, seconds: float, until: Condition | None = None, topics: Collection[str] = ()
+        self,
+        seconds: float,
+        until: Condition | None = None,
+        topics: Collection[str] = (),
+        skips_pauses: bool = False,
     ) -> bool:
         """Blocks the calling thread in simulated time.
 
@@ -106,6 +111,7 @@ class Clock:
             seconds: longest wait [s of simulated time]; may be infinity.
             until: ends the wait once true; checked after messages, callbacks and other threads' turns.
             topics: topics whose messages may make it true.
+            skips_pauses: whether a paused world ends the wait of a thread other than the main one, too.
 
         Returns:
             Whether `until` became true.
@@ -113,7 +119,7 @@ class Clock:
         # Whole nanoseconds: no tick would reach a fraction, and the thread would never wake.
         span = seconds if seconds == math.inf else round(max(0.0, seconds) * NANOSECONDS)
         if threading.current_thread() is not threading.main_thread():
-            return self._rest(span, until)
+            return self._rest(span, until, skips_pauses)
         self.driving = True
         try:
             return self._drive(span, until, topics)
@@ -155,14 +161,14 @@ class Clock:
         for sleeper in sleepers:
             sleeper.resting.release()
 
-    def _rest(self, span: float, until: Condition | None) -> bool:
+    def _rest(self, span: float, until: Condition | None, skips_pauses: bool) -> bool:
         """Blocks a thread until the main one wakes it; returns whether `until` became true."""
         with self._guard:
             if self._released:
                 return False
             self._order += 1
             ident = threading.get_ident()
-            sleeper = Sleeper(ident, self.passed + span, until, self._order)
+            sleeper = Sleeper(ident, self.passed + span, until, self._order, skips_pauses)
             self._sleepers.append(sleeper)
             self._running.pop(ident, None)
             self._guard.notify_all()
@@ -228,6 +234,7 @@ class Clock:
 
     def _wait_paused(self, end: float, until: Condition | None) -> bool:
         """Ends a plain sleep in a paused world at once; other waits last in wall time, as others may act."""
+        self._end_sleeps()
         if until is None and end < math.inf:
             return False
         look, longest = PAUSED_LOOKS
@@ -236,11 +243,20 @@ class Clock:
             originals.sleep(look)
             look = min(look * 1.5, longest)
             self.exchange()
+            self._end_sleeps()
             if until is not None and until():
                 return True
             if not self.world.paused:
                 return self._drive(end - self.passed, until, ())
         return False
+
+    def _end_sleeps(self) -> None:
+        """Wakes the threads that a paused world doesn't keep, each once."""
+        with self._guard:
+            for sleeper in self._sleepers:
+                if sleeper.skips_pauses:
+                    sleeper.wake = self.passed
+        self._wake_the_due()
 
     def _wake_the_due(self) -> None:
         while True:

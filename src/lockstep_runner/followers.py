@@ -4,12 +4,12 @@ Nodes that follow the clock rest while the script computes and wake when they ar
 passes until the processes that the script has started are at rest.
 """
 
+import atexit
 import contextlib
 import math
 import os
 import socket
 import subprocess
-import tempfile
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -18,6 +18,7 @@ from typing import Any
 
 import psutil
 
+from file_access.locks import scratch_folder
 from lockstep_runner import originals
 from lockstep_runner.clock import Others
 from lockstep_runner.line import ADDRESS, Line, LineEnded
@@ -115,8 +116,9 @@ class Followers(Others):
         self.starting = StartedProcesses()
         self._guard = originals.Condition()
         self._nodes: dict[str, _Node] = {}
-        self._folder = tempfile.TemporaryDirectory(prefix="lockstep_")
-        address = str(Path(self._folder.name, "clock"))
+        folder = contextlib.ExitStack()
+        address = str(folder.enter_context(scratch_folder()) / "clock")
+        atexit.register(folder.close)
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._listener.bind(address)
         self._listener.listen(64)

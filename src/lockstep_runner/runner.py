@@ -109,13 +109,17 @@ class ScriptRunner:
 
     @_ends_with_the_world(False)
     def wait(
-        self, seconds: float, until: Condition | None = None, topics: Collection[str] = ()
+        self,
+        seconds: float,
+        until: Condition | None = None,
+        topics: Collection[str] = (),
+        skips_pauses: bool = False,
     ) -> bool:
         """As Clock.wait."""
         self._settle()
         before = self.clock.waits
         try:
-            return self.clock.wait(seconds, until, topics)
+            return self.clock.wait(seconds, until, topics, skips_pauses)
         finally:
             if self.clock.waits != before:
                 self.triggers.waited()

@@ -12,6 +12,7 @@ from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldRequest, AdvanceWor
 from lockstep_runner import originals
 from lockstep_runner.line import Line, LineEnded
 from ros_calls import master
+from ros_calls.absence import is_offered
 from ros_calls.service import ServiceClient, ServiceGone, ServiceHangs
 
 NODE = "/gazebo"
@@ -244,10 +245,9 @@ def is_running() -> bool:
 def _is_registered(service: str) -> bool:
     """Returns whether a service is registered; those of a simulator that ended properly aren't."""
     try:
-        master.call("lookupService", service)
-    except (master.Refused, master.NoAnswer):
+        return is_offered(service)
+    except master.NoAnswer:
         return False
-    return True
 
 
 def _lives() -> bool:

@@ -50,8 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = _parser().parse_intermixed_args(argv)  # arguments may follow options
     try:
         parent = package.PARENT if args.to is None else args.to.expanduser()
-        print("\n".join(_write(args, parent)))
-        return 0
+        lines = _write(args, parent)
     except CannotWrite as error:
         print(f"new_robot: {error}", file=sys.stderr)
         return EXIT_REFUSED
@@ -61,6 +60,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("new_robot: interrupted", file=sys.stderr)
         return INTERRUPTED
+    print("\n".join(lines))
+    return 0
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -82,6 +83,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--to", type=Path, metavar="FOLDER",
         help=f"folder in which the package is created (default: {package.PARENT})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--standalone", action="store_true",
+        help="write the robot's URDF expanded, with all its meshes, so that it needs no other package",
     )  # fmt: skip
     _add_robot_options(parser)
     return parser
@@ -124,7 +129,7 @@ def _write(args: argparse.Namespace, parent: Path) -> list[str]:
         )
     request = package.PackageRequest(
         args.name, folder, args.urdf, package.read_arguments(args.arguments), args.base, args.height,
-        args.interface, tuple(args.passive),
+        args.interface, tuple(args.passive), args.standalone,
     )  # fmt: skip
     made = parent / f".{args.name}.{secrets.token_hex(4)}"
     try:

@@ -14,8 +14,9 @@ from bullet_gazebo.physics.dynamics import (
     most_inertias,
     poses_at_zero,
 )
+from bullet_gazebo.physics.pose import rotate
 from package_writing import CannotWrite
-from package_writing.survey import EFFORT, POSITION, Motor, Survey
+from package_writing.survey import EFFORT, POSITION, Motor, Survey, feet
 
 # [rad/s], at least, of a joint on its p and d with all that it carries stretched out
 FREQUENCY = 12.0
@@ -35,11 +36,12 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
     """Returns gains of position controllers with an effort as output, by joint.
 
     p and d make joint and load a critically damped spring, stiff enough for their weight; i, within its
-    clamp, compensates gravity.
+    clamp, compensates gravity. The joints of legs carry the body, too.
     """
     carried = most_inertias(model)
     own = effective_inertias(model, poses_at_zero(model))
     below = _masses(model)
+    stances = _stances(model, below)
     found = {}
     for name, inertia in carried.items():
         ratio = min(inertia / own[name], MOST) if own[name] > 0.0 else 1.0
@@ -48,11 +50,48 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
         joint = model.joints[name]
         sag = min(SAG, SHARE * (joint.upper - joint.lower)) if joint.bounded else SAG
         frequency = min(max(FREQUENCY, math.sqrt(weight / sag / moved)), HIGHEST / ratio)
-        p = moved * frequency**2
-        found[name] = _rounded(
-            {"p": p, "i": 2.0 * p, "d": 2.0 * moved * frequency, "i_clamp": weight}
-        )
+        p, d = moved * frequency**2, 2.0 * moved * frequency
+        stable = math.inf  # the largest i with which joint and load don't shake
+        if name in stances:
+            load, standing = stances[name]
+            p = max(p, min(load / sag, own[name] * HIGHEST**2))
+            d = max(d, min(2.0 * math.sqrt(p * standing), 2.0 * own[name] * HIGHEST))
+            weight = max(weight, load)
+            stable = p * d / standing if standing else math.inf
+        i = min(2.0 * p, stable / 2.0)
+        found[name] = _rounded({"p": p, "i": i, "d": d, "i_clamp": weight})
     return found
+
+
+def _stances(model: ModelDescription, below: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """Returns what the joints of legs carry if half the feet are on the ground.
+
+    Args:
+        model: the robot.
+        below: the mass that each joint carries with its foot in the air [kg].
+
+    Returns:
+        Upper bounds of load [N m, N] and inertia [kg m², kg], by joint.
+    """
+    poses, on = poses_at_zero(model), feet(model)
+    total = sum(each.inertia.mass for each in model.links.values() if each.inertia is not None)
+    found = {}
+    for foot in on:
+        for joint in (each for each in model.carriers(foot) if each.movable):
+            frame = poses[joint.child].compose(joint.anchor)
+            x, y, z = rotate(frame.orientation, joint.axis)
+            mass = (total - below[joint.name]) / max(1, len(on) // 2)
+            if joint.kind == "prismatic":
+                found[joint.name] = (GRAVITY * mass * abs(z), mass)
+            else:
+                arm = math.dist(frame.position, poses[foot].position) + _reach(model, foot)
+                found[joint.name] = (GRAVITY * mass * arm * math.hypot(x, y), mass * arm**2)
+    return found
+
+
+def _reach(model: ModelDescription, link: str) -> float:
+    """Returns how far a link's collisions lie from its frame [m]."""
+    return max(math.hypot(*shape.pose.position) for shape in model.links[link].collisions)
 
 
 def wheel_gains(model: ModelDescription) -> dict[str, Gains]:
@@ -111,6 +150,8 @@ def fill(folder: Path, package: str, values: Mapping[str, str]) -> None:
         target.parent.mkdir(parents=True, exist_ok=True)
         text = Filled(source.read_text(encoding="utf-8")).substitute(values)
         target.write_text(text, encoding="utf-8")
+        if text.startswith("#!"):
+            target.chmod(target.stat().st_mode | 0o111)
 
 
 def literal(text: str) -> str:

@@ -17,8 +17,8 @@ import yaml
 
 from bullet_gazebo.physics.files.reading import Resources
 from package_writing import CannotWrite, contents
-from package_writing.survey import Survey, height_note, look_at, root_link, standing_height
-from package_writing.urdf_files import Copied, copy_urdf, expanded
+from package_writing.survey import Survey, feet, height_note, look_at, root_link, standing_height
+from package_writing.urdf_files import Copied, copy_urdf, expanded, write_expanded
 from robot_envs import Robot, RobotEnvError, controllers, files
 
 TREE = Path(__file__).resolve().parents[2]  # the source tree
@@ -53,6 +53,7 @@ class PackageRequest:
         height: where to spawn it [m]; None for 0, or so that a free base stands on the ground.
         interface: of joints without transmissions; None for velocity on wheels and effort on others.
         passive: joints that get no motor, if none has a transmission.
+        standalone: whether its URDF is written expanded, with all meshes.
     """
 
     name: str
@@ -63,6 +64,7 @@ class PackageRequest:
     height: float | None
     interface: str | None
     passive: tuple[str, ...] = ()
+    standalone: bool = False
 
 
 def read_arguments(texts: Sequence[str]) -> dict[str, str]:
@@ -87,7 +89,10 @@ def write(request: PackageRequest, made: Path) -> list[str]:
     """
     if request.height is not None and not math.isfinite(request.height):
         raise CannotWrite(f"--height is a number of metres, not {request.height}")
-    copied = copy_urdf(request.urdf or ARM, request.arguments, request.name, made)
+    taken = write_expanded if request.standalone else copy_urdf
+    copied = taken(request.urdf or ARM, request.arguments, request.name, made)
+    if request.standalone:
+        request = replace(request, arguments={})
     if not re.fullmatch(r"[\w .+@,=/-]+", copied.place):  # it stands in launch files and in Python
         raise CannotWrite(
             f"rename the file {copied.place!r}: letters, digits, blanks and . + @ , = - only"
@@ -258,6 +263,9 @@ def _report(
         yield f"continuous joints of a free base get a velocity controller, as wheels: {', '.join(wheels)}"
     if not survey.model.fixed_base:
         yield height_note(request.height or 0.0, stands)
+        on = feet(survey.model)
+        if on:
+            yield f"gains are for a robot that stands on its feet: {', '.join(on)}"
     if survey.passive:
         yield f"joints that move without a motor, and that tasks don't see: {', '.join(survey.passive)}"
     held = [each.joint for each in survey.motors if not each.limited]
@@ -266,6 +274,9 @@ def _report(
             f"limits of effort and velocity that are 0 would hold {', '.join(held)}: config/controllers.yaml "
             "lifts them; the true ones belong into the URDF"
         )
+    others = ", ".join(each for each in copied.packages if each not in OURS)
+    if others:
+        yield f"it takes files from other packages (--standalone copies them): {others}"
     for path in copied.outside:
         yield f"not copied, and read from where it is: {path}"
     warnings = survey.model.warnings
@@ -289,6 +300,7 @@ def _commands(request: PackageRequest, copied: Copied) -> list[str]:
     return [
         f"{ws} roslaunch {request.name} simulation.launch    # look at it; Ctrl-C ends it",
         f"{ws} test {here}",
+        f"{ws} rostest {request.name} simulation.test",
         "./ws extras true    # once: Stable-Baselines3",
         f"{run} train --algo ppo --env-id {request.name}.environment:{request.name}/Reach-v0 "
         f"--config {here}/config/ppo.yaml --run-dir {runs}",

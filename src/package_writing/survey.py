@@ -32,6 +32,8 @@ EFFORT, POSITION, VELOCITY = (
 SHARE = 0.6  # of a joint's range, about its middle, from which postures to reach are drawn
 WIDEST = 1.8  # [rad, m], largest half-width of that range
 FASTEST = 5.0  # [rad/s], of wheels
+# Of the height at which a robot stands: how much higher than its lowest link feet may be.
+FOOT = 0.05
 
 
 @dataclass(frozen=True)
@@ -185,14 +187,28 @@ def standing_height(model: ModelDescription) -> float | None:
 
     None if there are no collisions.
     """
-    lows = [
-        _low(shape, pose.compose(shape.pose))
-        for name, pose in poses_at_zero(model).items()
-        for shape in model.links[name].collisions
-    ]
+    lows = _lows(model)
     if not lows:
         return None
-    return max(0.0, math.ceil(round(-min(lows) * 1000.0, 6)) / 1000.0)  # 0.1 stays 0.1
+    return max(0.0, math.ceil(round(-min(lows.values()) * 1000.0, 6)) / 1000.0)  # 0.1 stays 0.1
+
+
+def feet(model: ModelDescription) -> list[str]:
+    """Returns the links on which a robot stands, joints at zero; none on wheels, or on its base."""
+    lows = {} if model.fixed_base else _lows(model)
+    ground = min(lows.values(), default=0.0)
+    found = [name for name, low in lows.items() if low <= (1.0 - FOOT) * ground]
+    kinds = {joint.kind for name in found for joint in model.carriers(name)}
+    return [] if model.root in found or "continuous" in kinds else found
+
+
+def _lows(model: ModelDescription) -> dict[str, float]:
+    """Returns how low each link with a collision reaches, joints at zero, seen from the root [m]."""
+    return {
+        name: min(_low(shape, pose.compose(shape.pose)) for shape in model.links[name].collisions)
+        for name, pose in poses_at_zero(model).items()
+        if model.links[name].collisions
+    }
 
 
 def height_note(height: float, stands: float | None) -> str:

@@ -35,6 +35,26 @@ class Copied:
     outside: tuple[Path, ...]
 
 
+def write_expanded(path: Path, arguments: Mapping[str, str], package: str, folder: Path) -> Copied:
+    """Writes a file's URDF, expanded, with all its meshes, so that it needs no other package.
+
+    Args and errors are those of `copy_urdf`.
+    """
+    path = Path(os.path.abspath(path.expanduser()))
+    xml = expanded(path, arguments)
+    copy = folder / "urdf" / f"{path.name.partition('.')[0]}.urdf"
+    try:
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        text = _with_meshes(xml, path, package, folder, every=True)
+        text = text.replace("${", "$${").replace("$(", "$$(")  # xacro will read it
+        copy.write_text(text, encoding="utf-8", errors="surrogateescape")
+    except OSError as error:
+        raise CannotWrite(f"can't copy {error.filename}: {error.strerror}") from error
+    xml = expanded(copy, {})
+    needed = sorted(set(NAMED.findall(xml)) - {package})
+    return Copied(copy.name, xml, tuple(needed), ())
+
+
 def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Path) -> Copied:
     """Copies a file and those that it includes by relative paths; the paths stay the same.
 
@@ -64,7 +84,11 @@ def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Pa
     except OSError as error:
         raise CannotWrite(f"can't copy {error.filename}: {error.strerror}") from error
     text = "".join(texts)
-    packages = {found[1] for found in FOUND.finditer(text)} | set(NAMED.findall(xml))
+    # What only a false <xacro:if> asks for need not be there.
+    there = {
+        found[1] for found in FOUND.finditer(text) if _is_found(f"{PACKAGE}{found[1]}/package.xml")
+    }
+    packages = there | set(NAMED.findall(xml))
     outside = [
         each
         for each in others
@@ -103,26 +127,36 @@ def _copy(source: Path, target: Path, package: str, folder: Path) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(source, target)
     text = target.read_text(encoding="utf-8", errors="surrogateescape")
+    changed = _with_meshes(text, source, package, folder)
+    if changed != text:
+        target.write_text(changed, encoding="utf-8", errors="surrogateescape")
+
+
+def _with_meshes(
+    text: str, source: Path, package: str, folder: Path, *, every: bool = False
+) -> str:
+    """Copies a text's meshes, also those of other packages if `every`; returns it with their new places."""
 
     def moved(match: re.Match[str]) -> str:
-        mesh = _mesh(source, match[3])
+        mesh = _mesh(source, match[3], every)
         if mesh is None:
             return match[0]
-        place = PurePath(match[3].removeprefix(PACKAGE))
-        parts = [part for part in place.parts if part not in ("..", "meshes")]
+        place = PurePath(match[3].removeprefix(PACKAGE).removeprefix("file://"))
+        last = place.parts[-2:] if place.is_absolute() else place.parts
+        parts = [part for part in last if part not in ("..", "meshes")]
         copy = Path("meshes", *parts)
         (folder / copy).parent.mkdir(parents=True, exist_ok=True)
         for each in mesh.parent.glob(f"{glob.escape(mesh.stem)}.*"):  # also its material file
             shutil.copyfile(each, (folder / copy).with_name(each.name))
         return f"{match[1]}{match[2]}{PACKAGE}{package}/{copy}{match[2]}"
 
-    changed = MESH.sub(moved, text)
-    if changed != text:
-        target.write_text(changed, encoding="utf-8", errors="surrogateescape")
+    return MESH.sub(moved, text)
 
 
-def _mesh(source: Path, name: str) -> Path | None:
-    """Returns a mesh that is found only relative to the file that names it, else None."""
+def _mesh(source: Path, name: str, every: bool) -> Path | None:
+    """Returns a mesh that is found only relative to the file that names it, or any if `every`; else None."""
+    if every and _is_found(name.removeprefix("file://")):
+        return locate(name.removeprefix("file://"))
     if not name.startswith(PACKAGE):
         found = [] if ":" in name else [source.parent / name]
     elif _is_found(name):

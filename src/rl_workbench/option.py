@@ -11,11 +11,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, field, fields
 from difflib import get_close_matches
 from functools import partial
+from importlib import import_module
 from types import NoneType
 from typing import Any, get_args, get_origin, get_type_hints
 
 import yaml
 
+from rl_workbench import errors
 from rl_workbench.errors import WorkbenchError
 
 _TOKEN = re.compile(r"(?P<open>[\[{])|(?P<close>[\]}])|(?P<between>[\s,]+)|.", re.DOTALL)
@@ -159,6 +161,19 @@ def key_values(texts: list[str], origin: str) -> dict[str, str]:
             raise WorkbenchError(f"{origin}: {text!r} isn't KEY=VALUE")
         pairs[name.strip().replace("-", "_")] = value.strip()
     return pairs
+
+
+def imported(name: str, flag: str) -> Any:
+    """Returns what a flag names as module:attribute."""
+    module, _, attribute = name.partition(":")
+    if not module or not attribute:
+        raise WorkbenchError(f"{flag} must be module:name, not {name!r}")
+    try:
+        return getattr(import_module(module), attribute)
+    except ModuleNotFoundError as error:
+        raise WorkbenchError(f"{flag} {name}: {error}; {errors.hints.finding_modules()}") from error
+    except Exception as error:
+        raise WorkbenchError(f"{flag} {name}: {errors.error_line(error)}") from error
 
 
 def is_plain(value: Any) -> bool:

@@ -119,18 +119,23 @@ def check_task(task: Any) -> None:
         raise TaskError(f"a task is an object, {task.__name__}(...), and not the class")
     if not isinstance(task, Task):
         raise TaskError(f"a task is an object of a class of robot_envs.Task, not {task!r}")
-    name, query = type(task).__name__, task.query
+    name = type(task).__name__
     if not isinstance(task.objects, Iterable):
         raise TaskError(f"{name}.objects lists objects: (Object(...),), not {short(task.objects)}")
+    _check_query(f"{name}.query", task.query)
+    _check_query(f"{name}.reward_query", task.reward_query)
+
+
+def _check_query(where: str, query: Any) -> None:
     if not isinstance(query, StateQuery):
-        raise TaskError(f"{name}.query is a StateQuery(...), not {query!r}")
+        raise TaskError(f"{where} is a StateQuery(...), not {query!r}")
     for each in query.links:
         if not isinstance(each, LinkQuery):
-            raise TaskError(f'{name}.query: links lists LinkQuery("NAME"), not {each!r}')
+            raise TaskError(f'{where}: links lists LinkQuery("NAME"), not {each!r}')
     for what in ("models", "contacts_of"):
         names = getattr(query, what)
         if isinstance(names, str):
-            raise TaskError(f"{name}.query: {what} lists names: ({names!r},), and not {names!r}")
+            raise TaskError(f"{where}: {what} lists names: ({names!r},), and not {names!r}")
 
 
 def checked_steps(most: Any) -> int | None:

@@ -16,11 +16,18 @@ from robot_envs.backends.backend import RobotBackend, side_by_side
 from robot_envs.pictures.drawn import HEIGHT, WIDTH, DrawnEnv
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.task import GoalTask, Task
+from robot_envs.task import GoalTask, Task, Unjudged
 from robot_envs.variation import Randomisation
 from robot_envs.variation.imperfections import Actuator, Noise, Sensor
 from robot_envs.variation.randomisation import UniformRandomisation
-from robot_envs.world_state import Commands, InitialState, WorldState
+from robot_envs.world_state import (
+    Commands,
+    InitialState,
+    StateQuery,
+    WorldState,
+    both,
+    part_of,
+)
 
 RESET_OPTIONS = ("initial_state", "goal")
 
@@ -141,14 +148,28 @@ class RobotEnv(DrawnEnv):
         self.backend: RobotBackend = backend
         self._closed = False
         try:
-            backend.look(task.query)
+            self._judge = self._judge_in(backend)
         except BaseException:
             self.close()
             raise
 
+    def _judge_in(self, backend: RobotBackend) -> Task | Unjudged:
+        """Lets the backend tell what the task sees; returns what judges its states."""
+        task = self.task
+        if backend.complete or not self._hides:
+            backend.look(both(task.query, task.reward_query))
+            return task
+        backend.look(task.query)
+        name = type(task).__name__
+        gymnasium.logger.warn(
+            f"rewards of {name} are 0, and nothing terminates: this world can't tell its reward_query"
+        )
+        return Unjudged()
+
     def _adopt(self, task: Task) -> None:
         """Takes the task's spaces, and what checks actions and observations against them."""
         self.task = task
+        self._hides = task.reward_query != StateQuery()  # from `apply` and `observe`
         self.action_space = checks.made_space(task, "action_space")
         self.observation_space = space = checks.made_space(task, "observation_space")
         self._read_action = checks.action_reader(self.action_space)
@@ -230,14 +251,15 @@ class RobotEnv(DrawnEnv):
         if self._actuator is not None:
             self._actuator.begin(state.commands)
         if self._goal_task is not None:
-            checks.set_goal(self._goal_task, state, self.np_random, options.get("goal"))
+            checks.set_goal(
+                self._goal_task, self._shown(state), self.np_random, options.get("goal")
+            )
         measured = state if self._sensor is None else self._sensor.begin(state, self.np_random)
         observation = self._observe(measured)
         self._steps = 0
-        if self.render_mode == "human":
-            self._show()
+        self._show()
         return observation, {
-            **checks.checked(self.task, "info", self.task.info(state), dict),
+            **checks.checked(self.task, "info", self._judge.info(state), dict),
             **info,
         }
 
@@ -253,7 +275,12 @@ class RobotEnv(DrawnEnv):
             raise ValueError(f"initial_state is an InitialState, not {options['initial_state']!r}")
         return options
 
+    def _shown(self, state: WorldState) -> WorldState:
+        """Returns what `apply` and `observe` see of a state: as much as where the policy is deployed."""
+        return part_of(state, self.task.query) if self._hides else state
+
     def _observe(self, measured: WorldState) -> Any:
+        measured = self._shown(measured)
         seen = self._read(self.task.observe(measured))
         return (
             seen if self._goal_task is None else checks.with_goals(self._goal_task, seen, measured)
@@ -278,7 +305,7 @@ class RobotEnv(DrawnEnv):
             self._check_open()
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         action = self._read_action(action)
-        commands = self.scene.commands(self.task.apply(action, self._state))
+        commands = self.scene.commands(self.task.apply(action, self._shown(self._state)))
         if self._first:
             commands = {**self._first, **commands}
             self._first = {}
@@ -308,26 +335,25 @@ class RobotEnv(DrawnEnv):
                 of the task returns something impossible.
             SimulatorError: if the backend doesn't answer.
         """
-        task = self.task
+        task, judge = self.task, self._judge
         number, action, arriving, sent = self._taken(action)
         state = self.backend.act(arriving)
         if sent is not None:
             state = state._replace(commands=sent)
         self._state, self._steps = state, number
-        terminated: Any = task.is_terminal(state)
+        terminated: Any = judge.is_terminal(state)
         if type(terminated) is not bool:
             terminated = bool(checks.checked(task, "is_terminal", terminated, checks.FLAGS))
         truncated = not terminated and number == self.max_steps
         if terminated or truncated:
             self._steps = None
         measured = state if self._sensor is None else self._sensor.measure(state, self.np_random)
-        if self.render_mode == "human":
-            self._show()
-        reward: Any = task.reward(state, action)
+        self._show()
+        reward: Any = judge.reward(state, action)
         if type(reward) is not float or not math.isfinite(reward):
             reward = checks.checked_number(task, "reward", reward)
         observation = self._observe(measured)
-        info: Any = task.info(state)
+        info: Any = judge.info(state)
         if type(info) is not dict:
             info = checks.checked(task, "info", info, dict)
         return observation, reward, terminated, truncated, info

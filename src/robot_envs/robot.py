@@ -52,6 +52,8 @@ class Robot:
             this process, and over ROS gzserver's default.
         engine: of the physics in this process: "bullet", or "mujoco".
         control_period: simulated time of one action [s]; whole physics steps.
+        physics_step: of the world [s]: a longer one computes faster and less exactly; None: that of the world
+            file, or 0.001.
         namespace: of its topics, services and controllers over ROS; each robot of a world with several
             needs its own.
         description: the parameter that holds the URDF over ROS, in the namespace.
@@ -69,6 +71,7 @@ class Robot:
     world: Source | None = EMPTY
     engine: str = "bullet"
     control_period: float = CONTROL_PERIOD
+    physics_step: float | None = None
     namespace: str = ""
     description: str = "robot_description"
     publisher: str = "joint_state_controller"
@@ -181,6 +184,8 @@ class Robot:
         """Yields what is wrong with control period, world and namespace."""
         if not 0.0 < self.control_period < math.inf:
             yield f"control_period must be a time above 0 [s], not {self.control_period}"
+        if self.physics_step is not None and not 1e-6 <= self.physics_step <= 1.0:
+            yield f"physics_step must be a time between 1e-06 and 1 [s], not {self.physics_step}"
         if self.world is not None and self.world != EMPTY and not files.is_text(self.world):
             try:
                 files.need_file(files.locate(self.world))

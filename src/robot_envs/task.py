@@ -39,15 +39,18 @@ class Task(ABC):
     |---|---|
     | `max_steps` | after how many steps an episode is truncated; None: never |
     | `query` | links, models and contacts that a `state` has besides joints; others cost nothing |
+    | `reward_query` | further ones that only `reward`, `is_terminal` and `info` see |
     | `objects` | what is spawned besides the robots |
 
     Names of joints in states and of controllers in commands are plain in a world with one robot; see
-    `WorldState` for several. A task may store data between calls, if `initial_state`, which begins an
-    episode, resets it.
+    `WorldState` for several. A world of joints alone, as a real robot's, can't tell what the `reward_query`
+    names: there those three methods aren't called, nothing is rewarded, and nothing terminates. A task may
+    store data between calls, if `initial_state`, which begins an episode, resets it.
     """
 
     max_steps: int | None = None
     query: StateQuery = StateQuery()
+    reward_query: StateQuery = StateQuery()
     objects: Sequence[Object] = ()
 
     @abstractmethod
@@ -88,6 +91,19 @@ class Task(ABC):
 
     def info(self, state: WorldState) -> dict[str, Any]:
         """Returns the info dict of a state."""
+        return {}
+
+
+class Unjudged:
+    """In the place of a task whose `reward_query` the world can't answer."""
+
+    def is_terminal(self, state: WorldState) -> bool:
+        return False
+
+    def reward(self, state: WorldState, action: Any) -> float:
+        return 0.0
+
+    def info(self, state: WorldState) -> dict[str, Any]:
         return {}
 
 

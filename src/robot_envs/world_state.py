@@ -4,9 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
-from bullet_gazebo.physics.engine import Twist
-from bullet_gazebo.physics.model import AT_REST
-from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector
 from bullet_gazebo.physics.world import seen_from
 from bullet_gazebo.state import ContactPair, LinkQuery, StateQuery
 from file_access.text import did_you_mean
@@ -21,6 +19,7 @@ __all__ = [
     "Motion",
     "Pose",
     "StateQuery",
+    "Twist",
     "WorldState",
 ]
 
@@ -39,18 +38,30 @@ class JointState(NamedTuple):
     effort: float
 
 
+class Twist(NamedTuple):
+    """Linear [m/s] and angular [rad/s] velocity."""
+
+    linear: Vector = ZERO
+    angular: Vector = ZERO
+
+
 class Motion(NamedTuple):
-    """The pose of a link or model, and its linear [m/s] and angular [rad/s] velocity."""
+    """The pose of a link or model, and its velocity."""
 
     pose: Pose
-    twist: Twist = AT_REST
+    twist: Twist = Twist()
+
+    @classmethod
+    def of(cls, pose: Pose, twist: tuple[Vector, Vector]) -> "Motion":
+        """Returns a motion with a velocity that is a pair of vectors."""
+        return cls(pose, Twist(*twist))
 
     def seen_from(self, frame: "Motion") -> "Motion":
         """Returns the same, seen from the frame of another motion, both given in one frame.
 
         Velocities are differences in the other's axes; its rotation adds nothing.
         """
-        return Motion(*seen_from(self, frame))
+        return Motion.of(*seen_from(self, frame))
 
 
 class UnknownEntry(KeyError):
@@ -129,6 +140,32 @@ class InitialState:
     joints: Mapping[str, float | tuple[float, float]] = field(default_factory=dict)
     models: Mapping[str, Motion | Pose] = field(default_factory=dict)
     commands: Commands = field(default_factory=dict)
+
+
+ONLY_REWARDED = "; what only the reward needs belongs into the task's reward_query"
+
+
+def both(first: StateQuery, second: StateQuery) -> StateQuery:
+    """Returns a query for what either of two asks for."""
+    return StateQuery(
+        models=tuple(dict.fromkeys([*first.models, *second.models])),
+        all_models=first.all_models or second.all_models,
+        links=tuple(dict.fromkeys([*first.links, *second.links])),
+        contacts_of=tuple(dict.fromkeys([*first.contacts_of, *second.contacts_of])),
+        all_contacts=first.all_contacts or second.all_contacts,
+    )
+
+
+def part_of(state: WorldState, query: StateQuery) -> WorldState:
+    """Returns a state without the links and models that a query doesn't name; contacts stay all, or none."""
+    links = Links((name, state.links[name]) for name in link_keys(query))
+    models = Models((name, state.models[name]) for name in query.models)
+    touches = query.all_contacts or query.contacts_of
+    return state._replace(
+        links=links,
+        models=state.models if query.all_models else models,
+        contacts=state.contacts if touches else (),
+    )
 
 
 def link_keys(query: StateQuery) -> list[str]:

@@ -96,7 +96,7 @@ def ros_launch_from_path(
         if not wait:
             return Started(handle)
         return await_start(
-            handle, lambda: _roslaunch.has_started(handle), "nothing runs", timeout, ready
+            handle, lambda: _roslaunch.await_nodes(handle), "nothing runs", timeout, ready
         )
 
 

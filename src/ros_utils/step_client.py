@@ -179,7 +179,7 @@ class StepClient:
     ) -> StepWorldResponse:
         """Commands controllers and joints, lets `ticks` physics steps pass, and returns the new state.
 
-        Beside the joints, the answer holds only what is asked for; the rest costs nothing.
+        Besides the joints, the answer holds only what is asked for; the rest costs nothing.
 
         Args:
             ticks: at least 1; 0 if models, links or contacts are asked for, which only reports.

@@ -13,7 +13,7 @@ from viser import uplot
 from web_viewer.table import GrowingTable, TableUpdate
 
 EPISODES, LENGTHS, SPEED = "charts/episodic_return", "charts/episodic_length", "charts/SPS"
-# The tags of trainings, in the order of the charts. Further losses follow as they come.
+# The tags of trainings, in the order of the charts; those that begin as EXTRA follow as they come.
 TITLES = {
     EPISODES: "return",
     "eval/mean_reward": "return of greedy episodes",
@@ -23,8 +23,8 @@ TITLES = {
     "charts/epsilon": "epsilon",
     SPEED: "steps/s",
 }
-LOSSES = "losses/"
-SMOOTHED = (EPISODES, LENGTHS)  # and losses
+EXTRA = ("losses/", "info/")
+SMOOTHED = (EPISODES, LENGTHS)  # and what begins as EXTRA
 MAX_CHARTS = 16
 HEIGHT = 150  # [pixels]
 # Mantissas of the axes' ends. We set the range of steps ourselves, and seldom: when viser fits it to the
@@ -91,7 +91,7 @@ class Curves:
         for step, tag, value in update.points:
             series = self._series.get(tag)
             if series is None:
-                is_extra = tag.startswith(LOSSES) and len(self._series) < MAX_CHARTS
+                is_extra = tag.startswith(EXTRA) and len(self._series) < MAX_CHARTS
                 if tag not in TITLES and not is_extra:
                     continue
                 series = self._series[tag] = Series()
@@ -104,7 +104,7 @@ class Curves:
             x, values, averages = self._series[tag].arrays()
             title, unit = _title(tag, values)
             values, averages = values / unit, averages / unit
-            smooth = tag in SMOOTHED or tag.startswith(LOSSES)
+            smooth = tag in SMOOTHED or tag.startswith(EXTRA)
             data = (x, values, averages) if smooth else (x, values)
             if tag in self._charts:
                 self._charts[tag].data, self._charts[tag].title = data, title

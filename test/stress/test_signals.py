@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from support.ros.pg_train_runs import NETWORKS
+from support.ros.programs import NETWORKS
 from support.stress.places import launch, leftovers, no_traceback, pid_of, place, send, waits
 from support.stress.scenario import Scenario
 from support.stress.trainings import BOUND, forked, new, wait_for_newer_checkpoint

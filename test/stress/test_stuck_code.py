@@ -7,7 +7,7 @@ import signal
 import pytest
 from gazebo_msgs.srv import GetWorldProperties, SpawnModel
 from geometry_msgs.msg import Pose
-from support.ros.pg_train_runs import Place, Process
+from support.ros.programs import Place, Process
 from support.stress.places import BOUND, place, waits
 from support.stress.scenario import Scenario
 

@@ -11,10 +11,8 @@ import os
 import sys
 from pathlib import Path
 
-from tools.user_packages.build import Overlay, Tools, say
+from tools.user_packages.build import NOT_THERE, Overlay, Tools, say
 from tools.user_packages.find import PLAIN, clashes, look_through
-
-REMEDY = "mend it, or put an empty file CATKIN_IGNORE beside its package.xml"
 
 
 def main() -> int:
@@ -25,6 +23,7 @@ def main() -> int:
     parser.add_argument("--python", required=True, help="the interpreter of built scripts")
     parser.add_argument("--prefixes", required=True, help="CMAKE_PREFIX_PATH")
     parser.add_argument("--state", required=True, help="changes when those are made again")
+    parser.add_argument("--hint", default="", help="where Debian packages come from")
     parser.add_argument("--also", default="", help="ROS_PACKAGE_PATH")
     parser.add_argument("folders", nargs="*", type=Path, help="the user's folders")
     args = parser.parse_args()
@@ -48,10 +47,11 @@ def main() -> int:
             modules.append(each.path / "src")
     for folder in modules:
         found.problems += clashes(folder, args.root)
-    found.problems += [
-        f"your package {name} isn't built: {reason} (log: {overlay.log(name)}); {REMEDY}"
-        for name, reason in failed.items()
-    ]
+    ros2 = [name for name, each in found.packages.items() if each.is_ros2]
+    if ros2:
+        found.notes.append(f"for ROS 2, used for their files (URDF, meshes): {', '.join(ros2)}")
+    if failed:
+        found.notes.append(f"{not_built(failed, args.hint)} (logs: {overlay.logs})")
     for problem in found.problems:
         say(problem)
     if not overlay.told(found.notes):
@@ -65,6 +65,13 @@ def main() -> int:
     print(f"LD_LIBRARY_PATH={overlay.devel / 'lib'}")
     print(f"CARTPOLE_WITH={':'.join(map(links.plain, found.folders))}")
     return 0
+
+
+def not_built(failed: dict[str, str], hint: str) -> str:
+    """What a person is told of packages that couldn't be built, each with its reason, in one line."""
+    each = ", ".join(f"{name} ({reason})" for name, reason in failed.items())
+    more = f"; {hint}" if hint and NOT_THERE in each else ""
+    return f"not built: {each}; their C++ code and messages can't be used here: docs/controllers.md{more}"
 
 
 class Links:

@@ -16,13 +16,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from tools.user_packages.find import Found, Package
+from tools.user_packages.find import Found, Package, source_files
 
-MAKEFILES = ("CMakeLists.txt", "package.xml", "setup.py")
-SOURCES = {
-    *(".msg", ".srv", ".action", ".cfg", ".cmake", ".in", ".em"),
-    *(".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx"),
-}
+DEBIAN = Path("/var/lib/dpkg/status")
+NOT_THERE = "isn't installed"
+PROVIDED = re.compile(r'configuration file provided by "([^"]+)"')
+DESCRIPTION = "a description"  # in place of the key of what is built
 REASON = re.compile(r"^(CMake Error|.*(\berror:|Error:|ERROR|fatal))")
 
 
@@ -50,6 +49,7 @@ class Overlay:
         self._tools = tools
         self.devel = self._place / "devel"
         self.links = self._place / "links"
+        self.logs = self._place / "log"
         self._place.mkdir(parents=True, exist_ok=True)
         (self._place / "folders").write_bytes(names)
 
@@ -60,27 +60,49 @@ class Overlay:
             The packages that couldn't be built, with the reason.
         """
         order = _in_order(found)
-        self._sweep({each.name for each in order})
+        built = {each.name for each in order}
+        described = {name for name, each in found.packages.items() if each.has_cmake} - built
+        self._sweep(built | described)
+        for name in sorted(described):
+            self._describe(name)
         failed: dict[str, str] = {}
         keys: dict[str, str] = {}
+        installed = str(DEBIAN.stat().st_mtime_ns) if DEBIAN.is_file() else ""
         for package in order:
             missing = sorted(package.depends & failed.keys())
             if missing:
                 failed[package.name] = f"it needs {', '.join(missing)}"
                 continue
             keys[package.name] = key = self._key(package, keys)
-            before = self._record(package.name)
-            if before != (key, ""):  # what has failed may work now, with a library installed
-                with self._locked():
-                    tried = self._record(package.name)
-                    if tried == before or tried[0] != key:  # nor has another ws tried it meanwhile
+            tried = self._record(package.name)
+            if not self._holds(tried, key, installed):
+                with self._locked() as lock:
+                    tried = self._record(package.name)  # another ws may have tried it meanwhile
+                    if not self._holds(tried, key, installed):
                         self._sweep_others()
-                        tried = key, self._build(package)
-                        self._stamps.mkdir(parents=True, exist_ok=True)
-                        (self._stamps / package.name).write_text("\n".join(tried))
-                if tried[1]:
-                    failed[package.name] = tried[1]
+                        reason = self._build(package, lock)
+                        tried = (f"{key} {installed}" if reason else key), reason
+                        self._keep(package.name, tried)
+            if tried[1]:
+                failed[package.name] = tried[1]
         return failed
+
+    @staticmethod
+    def _holds(tried: tuple[str, str], key: str, installed: str) -> bool:
+        """Whether a build needn't be tried again; one that failed may work with other Debian packages."""
+        return tried[0] == (f"{key} {installed}" if tried[1] else key)
+
+    def _describe(self, name: str) -> None:
+        """Lets CMake find a package in which there is nothing to make."""
+        if self._record(name)[0] != DESCRIPTION:
+            config = self.devel / "share" / name / "cmake" / f"{name}Config.cmake"
+            config.parent.mkdir(parents=True, exist_ok=True)
+            config.write_text(f"set({name}_FOUND_CATKIN_PROJECT TRUE)\n")
+            self._keep(name, (DESCRIPTION, ""))
+
+    def _keep(self, name: str, tried: tuple[str, str]) -> None:
+        self._stamps.mkdir(parents=True, exist_ok=True)
+        (self._stamps / name).write_text("\n".join(tried))
 
     def _record(self, name: str) -> tuple[str, str]:
         """Of a package's last build: what it was made of, and why it failed, if it did."""
@@ -102,10 +124,6 @@ class Overlay:
         record.write_text(text)
         return before == text
 
-    def log(self, name: str) -> Path:
-        """Where the output of a package's build goes."""
-        return self._place / "log" / f"{name}.log"
-
     def _sweep(self, names: set[str]) -> None:
         """Starts over where a package has gone: what was made of it would still be found."""
         if self._stamps.is_dir() and not {each.name for each in self._stamps.iterdir()} <= names:
@@ -125,29 +143,26 @@ class Overlay:
         parts = [str(package.path), repr(self._tools), repr(sorted(package.depends))]
         parts += [keys[name] for name in sorted(package.depends & keys.keys())]
         content = hashlib.sha256("\n".join(parts).encode())
-        for name, below, files in os.walk(package.path):
-            below[:] = sorted(each for each in below if each[0] != "." and each != "__pycache__")
-            for path in (Path(name, each) for each in sorted(files)):
-                if path.suffix in SOURCES or path.name in MAKEFILES:
-                    content.update(bytes(path) + b"\0")
-                    with contextlib.suppress(OSError):  # a link to nothing
-                        content.update(path.read_bytes())
+        for path in source_files(package.path):
+            content.update(bytes(path) + b"\0")
+            with contextlib.suppress(OSError):  # a link to nothing
+                content.update(path.read_bytes())
         return content.hexdigest()
 
     @contextlib.contextmanager
-    def _locked(self) -> Iterator[None]:
+    def _locked(self) -> Iterator[int]:
         with (self._place / "lock").open("w") as lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 say("waiting for another ws that builds your packages")
                 fcntl.flock(lock, fcntl.LOCK_EX)
-            yield
+            yield lock.fileno()
 
-    def _build(self, package: Package) -> str:
-        """Builds a package; returns why that didn't work, or nothing."""
+    def _build(self, package: Package, lock: int) -> str:
+        """Builds a package; returns why that didn't work, or nothing. The builders have the lock, too."""
         log, build, begin = (
-            self.log(package.name),
+            self.logs / f"{package.name}.log",
             self._place / "build" / package.name,
             time.time(),
         )
@@ -168,7 +183,7 @@ class Overlay:
             for command in commands:
                 done = subprocess.run(
                     command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, check=False,
-                    env={**os.environ, "CMAKE_PREFIX_PATH": prefixes},
+                    env={**os.environ, "CMAKE_PREFIX_PATH": prefixes}, pass_fds=(lock,),
                 )  # fmt: skip
                 if done.returncode != 0:
                     return _reason(log)
@@ -178,7 +193,7 @@ class Overlay:
 
 def _in_order(found: Found) -> list[Package]:
     """The packages that have to be built, each behind those that it depends on."""
-    known = {name: each for name, each in found.packages.items() if each.has_cmake}
+    known = {name: each for name, each in found.packages.items() if each.has_sources}
     wanted = [name for name, each in known.items() if each.is_made]
     graph: dict[str, set[str]] = {}
     while wanted:
@@ -205,5 +220,7 @@ def _reason(log: Path) -> str:
                 if not more and len(text) > 1:
                     break
                 text.append(more)
-            return " ".join(" ".join(text).split())[:300]
+            reason = " ".join(" ".join(text).split())
+            lacking = PROVIDED.search(reason)
+            return f"it needs {lacking[1]}, which {NOT_THERE}" if lacking else reason[:150]
     return lines[-1]

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from catkin_pkg.package import InvalidPackage, parse_package
 
+ROS_1 = {"ROS_VERSION": "1", "ROS_DISTRO": "noetic", "ROS_PYTHON_VERSION": "3"}
 OURS = ("cartpole", "bullet_gazebo_msgs")  # whose own files are what ws was called for
 STAND_IN = "gazebo_ros"
 GAZEBO = re.compile(r"gazebo|gazebo_dev|libgazebo.*")  # what a package for Gazebo itself depends on
@@ -19,6 +20,11 @@ MAKES = re.compile(
     r"|add_(executable|library|custom_command|custom_target)|catkin_add_env_hooks)\s*\(",
     re.IGNORECASE | re.MULTILINE,
 )
+MAKEFILES = ("CMakeLists.txt", "package.xml", "setup.py")
+SOURCES = {
+    *(".msg", ".srv", ".action", ".cfg", ".cmake", ".in", ".em"),
+    *(".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx"),
+}
 SETUP = re.compile(r"^\s*catkin_python_setup\s*\(", re.IGNORECASE | re.MULTILINE)
 PLAIN_SETUP = re.compile(r"package_dir\s*=\s*\{\s*(['\"])\1\s*:\s*(['\"])src/?\2")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
@@ -34,7 +40,9 @@ class Package:
     path: Path  # with all links followed
     depends: frozenset[str]
     has_cmake: bool
-    is_made: bool  # there is something that CMake has to make
+    has_sources: bool  # there is something that CMake can make something of
+    is_made: bool  # it does
+    is_ros2: bool
 
 
 @dataclass
@@ -116,6 +124,7 @@ def _take_package(path: Path, found: Found, root: Path) -> None:
         found.problems.append(f"left out: {where}{reason}")
         return
     other = found.packages.get(package.name)
+    is_companion = (root / "companions" / package.name).is_dir()
     if other is not None:
         if other.path != path:
             found.problems.append(
@@ -127,9 +136,11 @@ def _take_package(path: Path, found: Found, root: Path) -> None:
         )
     elif package.name == STAND_IN and any(GAZEBO.fullmatch(each) for each in package.depends):
         found.notes.append(f"left out: {path} is for Gazebo itself; its stand-in is used")
+    elif package.is_ros2 and is_companion:
+        found.notes.append(f"left out: {path} is for ROS 2; this checkout's is used")
     else:
         found.packages[package.name] = package
-        if (root / "companions" / package.name).is_dir():
+        if is_companion:
             found.notes.append(f"{package.name} is yours, {path}, and not this checkout's")
 
 
@@ -138,24 +149,37 @@ def _read(path: Path) -> Package:
 
     Raises:
         InvalidPackage: the first is no such file.
-        ValueError: nor is the second text, or the name can't be used.
+        ValueError: nor is the second text, a condition in the first is none, or the name can't be used.
         OSError: one of them can't be read.
     """
     xml = parse_package(str(path), warnings=[])
     if not NAME.fullmatch(xml.name):
         raise ValueError(f"the name {xml.name!r} can't be used")
-    if xml.get_build_type().startswith("ament"):
-        raise ValueError("it is for ROS 2")
-    depends = {each.name for each in xml.build_depends + xml.exec_depends + xml.buildtool_depends}
+    xml.evaluate_conditions(ROS_1)  # of a package for both
+    is_ros2 = xml.get_build_type().startswith("ament")
+    needed = xml.build_depends + xml.exec_depends + xml.buildtool_depends
+    depends = {each.name for each in needed if each.evaluated_condition}
     cmake = path / "CMakeLists.txt"
     setup = path / "setup.py"
-    is_made = False
-    if cmake.is_file():
+    has_sources = is_made = False
+    if cmake.is_file() and not is_ros2:
         text = re.sub("#.*", "", cmake.read_text(errors="replace"))
         # A setup.py with the usual folder needs nothing but that folder.
         usual = setup.is_file() and PLAIN_SETUP.search(setup.read_text(errors="replace"))
-        is_made = bool(MAKES.search(text) or (SETUP.search(text) and not usual))
-    return Package(xml.name, path, frozenset(depends), cmake.is_file(), is_made)
+        unusual = bool(SETUP.search(text) and not usual)
+        has_sources = unusual or any(each.suffix in SOURCES for each in source_files(path))
+        is_made = unusual or (has_sources and bool(MAKES.search(text)))
+    has_cmake = cmake.is_file() and not is_ros2
+    return Package(xml.name, path, frozenset(depends), has_cmake, has_sources, is_made, is_ros2)
+
+
+def source_files(folder: Path) -> Iterator[Path]:
+    """The files of a package that CMake makes something of, or reads, in alphabetical order."""
+    for name, below, files in os.walk(folder):
+        below[:] = sorted(each for each in below if each[0] != "." and each != "__pycache__")
+        for path in (Path(name, each) for each in sorted(files)):
+            if path.suffix in SOURCES or path.name in MAKEFILES:
+                yield path
 
 
 def _has_modules(folder: Path, is_package: bool) -> bool:

@@ -21,6 +21,8 @@ EFFORT = "EffortJointInterface"
 POSITION = "PositionJointInterface"
 VELOCITY = "VelocityJointInterface"
 STATE = "JointStateInterface"
+FULL = 0.999  # of an effort limit
+PUSHED, BACK = 1e-3, 1e-4  # [rad, m] off a motor's command: pushed away, and back at it
 GAINS = "gazebo_ros_control/pid_gains"  # where, in the robot's namespace, gains of drives stand
 
 
@@ -28,19 +30,31 @@ class Drive(ABC):
     """Moves one joint with a position or velocity interface (docs/contract/gazebo_ros_control.md 6.4).
 
     `pid` turns commands into efforts; without one, a motor drives the joint to the commanded state.
+    `strongest` [N m, N] is its effort limit, `pushed` whether something pushes it off its command.
     """
+
+    pushed = False
 
     def __init__(self, joint: JointHandle, pid: Pid | None) -> None:
         self.joint = joint
         self.pid = pid
         limit = joint.limits.effort
         self._most = UNLIMITED if limit is None else limit
+        self.strongest = self._most or UNLIMITED  # files say 0 where they know none
         speed = joint.limits.velocity
         self._fastest = UNLIMITED if speed is None else speed
+
+    @property
+    def at_its_limit(self) -> bool:
+        """Whether it gives all the effort it has."""
+        return self.pid is not None and abs(self.joint.effort) >= FULL * self._most
 
     @abstractmethod
     def relatch(self) -> None:
         """Makes the joint's present state the command, and forgets the past."""
+
+    def joints_moved(self) -> None:
+        """Called when something other than time has moved the joint."""
 
     def begin_hold(self) -> None:
         """Called when an emergency stop begins."""
@@ -81,8 +95,19 @@ class PositionDrive(Drive):
         self._limiter = PositionLimiter(joint.limits)
         self._held = joint.position
         self._good = joint.position
+        self.joints_moved()
+
+    @property
+    def at_its_limit(self) -> bool:
+        return self._missed > PUSHED if self.pid is None else super().at_its_limit
+
+    def joints_moved(self) -> None:
+        """Forgets where the joint was: something other than time has moved it."""
+        self._aim, self._way = self.joint.position, math.inf
+        self._missed, self.pushed = 0.0, False
 
     def relatch(self) -> None:
+        self.joints_moved()
         self._held = self._good = self.joint.command = self.joint.position
         self._limiter.forget()
         if self.pid is not None:
@@ -104,7 +129,14 @@ class PositionDrive(Drive):
         return self._clipped(self.joint.way_to(self.joint.command), dt)
 
     def motor(self, dt: float) -> tuple[float, float]:
-        return (self.joint.command - self.joint.position) / dt, UNLIMITED
+        position, command = self.joint.position, self.joint.command
+        self._missed = missed = abs(position - self._aim)
+        if missed > self._way + PUSHED:
+            self.pushed = True
+        elif missed < BACK:
+            self.pushed = False
+        self._aim, self._way = command, abs(command - position)
+        return (command - position) / dt, UNLIMITED
 
 
 class VelocityDrive(Drive):
@@ -179,17 +211,27 @@ class RobotHardware:
             if d.pid is not None
         ]
 
+    def at_their_limits(self) -> list[JointHandle]:
+        """Returns the joints whose motors give all the effort they have."""
+        efforts = [(joint, joint.limits.effort) for joint in self.effort_joints]
+        full = [joint for joint, most in efforts if most and abs(joint.effort) >= FULL * most]
+        return full + [drive.joint for drive in self.drives if drive.at_its_limit]
+
     def joint(self, interface: str, name: str) -> JointHandle:
         """Returns joint `name` of `interface`."""
-        joints = self.interfaces.get(interface)
-        if joints is None:
-            raise ControlError(f"the robot has no hardware_interface::{interface}")
-        if name not in joints:
-            known = ", ".join(sorted(joints)) or "none"
+        joints = self.interfaces.get(interface, {})
+        if name in joints:
+            return joints[name]
+        own = [each for each, others in self.interfaces.items() if name in others]
+        if own:
             raise ControlError(
-                f"joint '{name}' is not in hardware_interface::{interface} (it has: {known})"
+                f"joint '{name}' has hardware_interface::{own[0]}, and the controller needs "
+                f"hardware_interface::{interface}: its type and the joint's <transmission> must agree"
             )
-        return joints[name]
+        known = ", ".join(sorted(joints)) or "none"
+        raise ControlError(
+            f"joint '{name}' is not in hardware_interface::{interface} (it has: {known})"
+        )
 
     def relatch(self, names: Iterable[str] | None = None) -> None:
         """Forgets the commands of joints (default: all).

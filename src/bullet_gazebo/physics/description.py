@@ -3,6 +3,7 @@
 import os
 from collections import defaultdict
 from dataclasses import dataclass, field
+from itertools import combinations
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -53,12 +54,14 @@ class Mesh:
         hulls: points (k, 3) of the convex bodies that a moving mesh collides by: one for each object of the
             file.
         digest: of the arrays.
+        in_pieces: whether `hulls` are solid pieces of a concave mesh.
     """
 
     vertices: np.ndarray
     faces: np.ndarray
     hulls: tuple[np.ndarray, ...]
     digest: str
+    in_pieces: bool = False
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Mesh) and self.digest == other.digest
@@ -94,6 +97,11 @@ class Link:
     gravity: bool = True  # whether gravity acts on it
     self_collide: bool = False  # also with links of its own model that it isn't joined to
     part_of: str = ""  # of a helper link for the engine: the link that it was split from
+
+    @property
+    def owner(self) -> str:
+        """The name of the link in the file."""
+        return self.part_of or self.name
 
 
 @dataclass
@@ -167,6 +175,7 @@ class ModelDescription:
         root_pose: of the root link in the model.
         world_joints: joints that fix the root link to the world.
         left_out: sensors and the like, which nothing simulates.
+        stand_ins: models of Gazebo's database that aren't installed, in whose place simpler ones stand.
         islands: links of a static model that no joint connects with the root, and their poses seen from it.
         lumped: links that a fixed joint has made part of another one: that link, and their poses in it.
         initial_pose: where the file puts the model.
@@ -181,6 +190,7 @@ class ModelDescription:
     plugins: list[Plugin] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+    stand_ins: list[str] = field(default_factory=list)
     islands: dict[str, Pose] = field(default_factory=dict)
     lumped: dict[str, tuple[str, Pose]] = field(default_factory=dict)
     initial_pose: Pose = Pose()
@@ -193,6 +203,23 @@ class ModelDescription:
     @property
     def movable_joints(self) -> list[Joint]:
         return [joint for joint in self.joints.values() if joint.movable]
+
+    @property
+    def collides_with_itself(self) -> bool:
+        """Whether any link may collide with others of the model."""
+        return not self.static and any(link.self_collide for link in self.links.values())
+
+    def pairs_that_collide(self) -> list[tuple[Link, Link]]:
+        """Returns links that can meet (SDF's rule): either wants it and no joint connects them."""
+        joined = {frozenset((joint.parent, joint.child)) for joint in self.joints.values()}
+        solid = [link for link in self.links.values() if link.collisions]
+        return [
+            (a, b)
+            for a, b in combinations(solid, 2)
+            if (a.self_collide or b.self_collide)
+            and a.owner != b.owner
+            and frozenset((a.owner, b.owner)) not in joined
+        ]
 
     def joints_by_parent(self) -> defaultdict[str, list[Joint]]:
         """Returns the joints that each link carries, in document order."""

@@ -17,6 +17,8 @@ FURTHEST = math.pi
 a rotation has no direction, and explicit terms, such as centrifugal forces, add energy."""
 FASTEST = 1e9
 """The largest velocity [rad/s, m/s] of a body without joints, and of a motor."""
+OVERLAP = 0.0025
+"""The depth [m] from which two links overlap; PyBullet's margins around two meshes are 2 mm."""
 
 
 class Side(NamedTuple):
@@ -47,8 +49,12 @@ class Body(ABC):
 
     implicit_damping: ClassVar[bool]
     """Whether joint damping acts on the velocity after the step, instead of before it."""
+    bears_any_motor: ClassVar[bool]
+    """Whether joints stand still that motors of any force press against something."""
     joint_names: tuple[str, ...]
     link_names: tuple[str, ...]
+    overlapping: frozenset[frozenset[str]] = frozenset()
+    """Pairs of links that don't collide since they overlap where the model was loaded."""
     moved = True
     """Whether something other than time has moved it since this was set to False."""
 

@@ -89,6 +89,11 @@ class World:
         except Exception:
             self.engine.remove(body)
             raise
+        if body.overlapping:
+            pairs = sorted(" and ".join(sorted(pair)) for pair in body.overlapping)
+            description.warnings.append(
+                f"links that overlap in the initial pose don't collide with each other: {', '.join(pairs)}"
+            )
         self.models[name] = model
         self._index(model)
         model.number = self.version

@@ -8,8 +8,6 @@ import hashlib
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +18,7 @@ from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import IDENTITY, Pose, Vector, is_finite
 from bullet_gazebo.pictures.camera import Background, Camera, background
 from bullet_gazebo.pictures.visuals import Piece, Solid, box_around, moved, pieces_of
+from file_access.locks import scratch_folder
 
 MOST_CORNERS = 90_000  # of a body: PyBullet refuses more than 131072
 FARTHEST = 1e6  # [m]; beyond it nothing is drawn
@@ -131,8 +130,8 @@ class Renderer:
         """Returns PyBullet's number of an RGB image (h, w, 3) of uint8, which is loaded once."""
         digest = hashlib.sha256(repr(image.shape).encode() + image.tobytes()).digest()
         if digest not in self._textures:
-            with TemporaryDirectory() as folder:
-                path = str(Path(folder, "texture.png"))
+            with scratch_folder() as folder:
+                path = str(folder / "texture.png")
                 Image.fromarray(image).save(path, compress_level=1)
                 self._textures[digest] = pybullet.loadTexture(path, physicsClientId=self._client)
         return self._textures[digest]

@@ -58,8 +58,9 @@ class SceneOffer:
 class SceneServer:
     """Models and lights that a window doesn't know yet (~get_scene), ~scene_poses and ~scene_contacts.
 
-    While it has subscribers, the topics come thirty times a second of wall time: a thread of its own copies
-    the world between two ticks, and publishes the copies.
+    While it has subscribers, the topics come up to thirty times a second of wall time: a thread of its own
+    copies the world when the lock is free, in lock-step between two requests or slices of a long one, and
+    publishes the copies.
     """
 
     def __init__(self, sim: Simulator) -> None:

@@ -239,7 +239,7 @@ def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
         elif runner.is_connected():
             if seconds < 0:
                 raise ValueError("sleep length must be non-negative")
-            runner.wait(seconds)
+            runner.wait(seconds, skips_pauses=True)
         else:
             originals.sleep(seconds)
 

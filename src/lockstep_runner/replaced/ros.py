@@ -5,6 +5,7 @@ Messages to and from the simulator travel with its time; connections to services
 
 import io
 import math
+import re
 import select
 import threading
 from collections.abc import Callable
@@ -21,10 +22,14 @@ from rospy.impl.tcpros_service import ServiceProxy
 from rospy.topics import _PublisherImpl, _SubscriberImpl, _TopicImpl
 
 from lockstep_runner import originals
+from lockstep_runner.notices import tell_once
 from lockstep_runner.runner import ScriptRunner
 from lockstep_runner.world import NODE
 from lockstep_runner.world import SERVICE as ADVANCE
+from ros_calls import master
 from ros_calls.service import ServiceClient
+
+SILENCE = 10.0  # [s] of waiting for a topic before its silence is reported
 
 
 def replace_topics(runner: ScriptRunner) -> None:
@@ -100,11 +105,42 @@ class _Waiting:
             before = 0 if last.latched() else last.count
         seconds = timeout.to_sec() if isinstance(timeout, rospy.Duration) else timeout
         limit = math.inf if seconds is None else seconds
-        if not self._runner.wait(limit, lambda: last.count > before or rospy.is_shutdown(), [name]):
+
+        def wait(span: float) -> bool:
+            return self._runner.wait(
+                span, lambda: last.count > before or rospy.is_shutdown(), [name]
+            )
+
+        silence = max(0.0, min(limit, SILENCE - last.silence))
+        came = wait(silence)
+        last.silence = 0.0 if came else last.silence + silence
+        if not came and last.silence >= SILENCE:
+            tell_once(f"silence {name}", f"no message on {name} in {SILENCE:g} s: {_why(name)}")
+        if not came and not (limit > silence and wait(limit - silence)):
             raise rospy.ROSException(f"timeout exceeded while waiting for message on topic {topic}")
         if rospy.is_shutdown():
             raise rospy.exceptions.ROSInterruptException("rospy shutdown")
         return last.message
+
+
+def _why(topic: str) -> str:
+    """Returns why nothing comes on a topic."""
+    try:
+        published = dict(master.call("getSystemState")[0])
+        descriptions = [
+            str(master.call("getParam", name))
+            for name in master.call("getParamNames")
+            if name.endswith("robot_description")
+        ]
+    except (master.NoAnswer, master.Refused) as fault:
+        return f"the master at {master.uri()}: {fault}"
+    if topic in published:
+        return f"{', '.join(published[topic])} offers it, and sends nothing"
+    # <topicName>, <imageTopicName>, <topic>, ...: relative to the robot's namespace
+    named = rf"<\w*topic\w*>\s*/?{re.escape(topic.rpartition('/')[2])}\s*<"
+    if any(re.search(named, text, re.IGNORECASE) for text in descriptions):
+        return "it is named in the robot's description, by a sensor or plugin that isn't simulated"
+    return "it has no publisher"
 
 
 class _Last:
@@ -113,6 +149,7 @@ class _Last:
     def __init__(self, name: str, kind: type) -> None:
         self.message: Any = None
         self.count = 0
+        self.silence = 0.0  # [s] that was waited for a message in vain, until the next one
         self._subscriber = rospy.Subscriber(name, kind, self._keep)
 
     def _keep(self, message: Any) -> None:

@@ -54,6 +54,7 @@ class Episode:
     final_observation: np.ndarray | None = None  # after the last step
     terminated: bool = False  # by the task; False: it was cut off
     success: bool | None = None  # None if the environment doesn't say
+    curves: dict[str, float] = field(default_factory=dict)  # by tag: what the environment tells
 
     def add(self, observation: np.ndarray, action: Any, reward: float) -> None:
         self.observations.append(observation)

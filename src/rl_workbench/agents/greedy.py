@@ -96,3 +96,27 @@ class SingleChoice(Choice):
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         return self.scores(observations).argmax(dim=1)
+
+
+class SeveralChoices(Choice):
+    """Chooses the action with the highest score in each group of scores, (N, groups).
+
+    Args:
+        scores: maps observations to scores (N, A), on any scale.
+        sizes: of the groups; their sum is A.
+    """
+
+    def __init__(self, scores: nn.Module, sizes: list[int]) -> None:
+        super().__init__(scores)
+        self.sizes: list[int] = sizes
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        groups = self.scores(observations).split(self.sizes, dim=1)
+        return torch.stack([group.argmax(dim=1) for group in groups], dim=1)
+
+
+class Switches(Choice):
+    """Whether each score is positive: 0 or 1, (N, A)."""
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        return (self.scores(observations) > 0.0).long()

@@ -90,11 +90,6 @@ class PairActor:
         preference = float(self._weight @ observation) + self._bias
         return 1.0 / (1.0 + math.exp(min(preference, 700.0)))
 
-    def probabilities(self, observation: np.ndarray) -> np.ndarray:
-        """Of the actions: (A,), float64."""
-        first = self._first(observation)
-        return np.array([first, 1.0 - first])
-
     def draw(self, observation: np.ndarray, generator: np.random.Generator) -> int:
         return 0 if generator.random() < self._first(observation) else 1
 

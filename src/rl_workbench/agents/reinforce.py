@@ -108,11 +108,6 @@ class ReinforceAgent(TwoNetworks):
         scaled: np.ndarray = observations * self._factors
         return scaled if self._normaliser is None else self._normaliser(scaled)
 
-    def probabilities(self, observation: np.ndarray) -> np.ndarray:
-        """Returns the probabilities of discrete actions, (A,), for an observation (D,)."""
-        assert isinstance(self._actor, PairActor | SoftmaxActor)
-        return self._actor.probabilities(observation)
-
     def draw(self, observation: np.ndarray, generator: np.random.Generator) -> Any:
         """Draws an action to learn from; pass it through `limited` for the environment."""
         return self._actor.draw(observation, generator)

@@ -18,7 +18,7 @@ from rl_workbench.storage import as_json, as_text, write_file
 from rl_workbench.tools.flags import add_job_flags, number, write_figure
 from rl_workbench.tools.job import Job, last_words
 from rl_workbench.tools.jobs import claim, job_pool
-from rl_workbench.tools.runs import Run, open_run
+from rl_workbench.tools.runs import SUITE_RECORD, Run, open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm
 from rl_workbench.training.options import default_file, known_options, read_section
@@ -28,7 +28,6 @@ from rl_workbench.training.train import choose
 if TYPE_CHECKING:
     from rl_workbench.tools.results import RunResult
 
-RECORD = "suite.json"
 CONFIG = "benchmark.yaml"
 NAME = re.compile(r"\w[\w.+-]*")  # of a variant, and so of a folder
 MAX_SEEDS = 10_000
@@ -74,6 +73,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     add("--algo", choices=ALGORITHMS, help="default dqn")
     add("--env-id", metavar="ID", help="default CartPole-v1")
     add("--params", nargs="+", default=[], metavar="KEY=VALUE", help="options of the training")
+    add("--total-timesteps", type=number(1), metavar="N", help="length of each training [steps]")
     add("--seeds", type=number(1), metavar="N", help=f"how many (the suite's, or {SEEDS})")
     add("--first-seed", type=number(0), default=0, metavar="N", help="default 0")
     add_job_flags(parser)
@@ -97,10 +97,10 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     except OSError as error:
         raise WorkbenchError(f"can't make {folder}: {error.strerror}") from error
     with run_folder.held(folder, "another benchmark"):
-        if not (folder / RECORD).exists() and any(folder.iterdir()):
+        if not (folder / SUITE_RECORD).exists() and any(folder.iterdir()):
             raise WorkbenchError(f"{folder} holds something else; name another folder with --out")
         variants = [asdict(each) for each in suite.variants]
-        claim(folder, RECORD, variants, "runs with other options")
+        claim(folder, SUITE_RECORD, variants, "runs with other options")
         planned = [
             _Planned(variant.name, seed, _job(variant, seed, folder))
             for variant in suite.variants
@@ -123,16 +123,19 @@ def _job(variant: Variant, seed: int, folder: Path) -> Job:
 
 
 def _suite(arguments: argparse.Namespace) -> Suite:
+    steps = arguments.total_timesteps
     if arguments.suite:
-        if arguments.algo or arguments.env_id or arguments.params:
+        if arguments.algo or arguments.env_id or arguments.params or steps:
             raise WorkbenchError(
-                "a suite says what is trained: it takes no --algo, --env-id or --params"
+                "a suite says what is trained: it takes no --algo, --env-id, --total-timesteps or --params"
             )
         return read_suite(arguments.suite, arguments.suites)
     if arguments.suites:
         raise WorkbenchError(f"which suite of {arguments.suites}? Name one")
     kind, env_id = arguments.algo or "dqn", arguments.env_id or "CartPole-v1"
     given = {"env_id": env_id, **key_values(arguments.params, "--params")}
+    if steps:
+        given["total_timesteps"] = str(steps)
     name = f"{kind}__{as_file_name(given['env_id'])}"
     return Suite(name, "", SEEDS, (make_variant("--params", name, {"algo": kind, **given}),))
 
@@ -288,7 +291,9 @@ def _examine(planned: list[_Planned], episodes: int) -> "tuple[list[Run], list[R
     from rl_workbench.tools.results import RunResult, examine
 
     runs, results = [], []
-    for name, seed, job in planned:
+    for count, (name, seed, job) in enumerate(planned, 1):
+        each = f"{episodes} episodes each by the best and the last policy"
+        tell(f"evaluating {count} of {len(planned)}: {each} of {job.name}")
         try:
             runs.append(open_run(job.folder))
         except WorkbenchError as error:

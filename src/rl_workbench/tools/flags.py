@@ -21,10 +21,10 @@ def add_policy_flags(
     """Adds the flags that choose a run, one of its policies (or several), and the environment."""
     parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
     which = "best by evaluation, newest" + (", or random actions" if RANDOM in choices else "")
-    number: dict[str, Any] = {"default": "best"}
+    how_many: dict[str, Any] = {"default": "best"}
     if several:
-        number, which = {"default": ["best"], "nargs": "+"}, f"{which}; several side by side"
-    parser.add_argument("--checkpoint", choices=choices, help=f"{which} (default best)", **number)
+        how_many, which = {"default": ["best"], "nargs": "+"}, f"{which}; several side by side"
+    parser.add_argument("--checkpoint", choices=choices, help=f"{which} (default best)", **how_many)
     add_environment_flags(parser)
 
 

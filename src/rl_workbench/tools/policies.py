@@ -36,7 +36,7 @@ class LearnedPolicy(NamedTuple):
     """A learned policy and an environment of the kind it learned in, which the caller closes."""
 
     act: Act  # greedily, for one observation: (D,), or a dict as in the training
-    network: nn.Module  # observations (N, D) to actions; a choice among N actions has `scores`, too
+    network: nn.Module | None  # observations (N, D) to actions; a choice of N has `scores`, too
     env: gymnasium.Env[Any, Any]
     checkpoint: Path
     steps: int  # of the training up to this checkpoint
@@ -45,7 +45,8 @@ class LearnedPolicy(NamedTuple):
 def environment_of(run: Run, options: Mapping[str, Any]) -> gymnasium.Env[Any, Any]:
     """Makes an environment with the observations that a run's policies expect."""
     keeps_dict = algorithm(run.algorithm).keeps_dict
-    return make_environment(run.env_id, {**run.env_kwargs, **options}, keep_dict=keeps_dict)
+    given = {**run.env_kwargs, **options}
+    return make_environment(run.env_id, given, keep_dict=keeps_dict, wrapper=run.wrapper)
 
 
 def load_any(

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from file_access.locks import scratch_folder
 from rl_workbench.errors import WorkbenchError, need
 from rl_workbench.storage import as_text, write_file
 from rl_workbench.tools.job import (
@@ -34,7 +35,7 @@ TOKEN = ".seen_by_nodes"
 LOCAL = "local"
 CONNECT_TIMEOUT = 5.0  # [s]; Ray itself would try for more than a minute
 OBJECT_STORE = 128 * 2**20  # [bytes] of a local cluster; jobs hardly use it
-SOCKET_PATH = 40  # [bytes] of a temporary folder's path, so that Ray's sockets fit below
+SOCKET_PATH = 31  # [bytes] of a temporary folder's path, so that Ray's sockets fit below
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # Ray reads these as it is imported.
 QUIET = {
@@ -186,12 +187,11 @@ def _local_cluster(stack: contextlib.ExitStack) -> dict[str, Any]:
     if "ray" not in sys.modules:  # Ray reads these when it is imported
         os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN=secrets.token_hex(32))
     where = None if len(tempfile.gettempdir()) < SOCKET_PATH else "/tmp"
-    folder = tempfile.TemporaryDirectory(prefix="ray_", dir=where, ignore_cleanup_errors=True)
     return {
         "num_cpus": len(os.sched_getaffinity(0)),
         "object_store_memory": OBJECT_STORE,
         "include_dashboard": False,
-        "_temp_dir": stack.enter_context(folder),
+        "_temp_dir": str(stack.enter_context(scratch_folder(where))),
     }
 
 

@@ -4,13 +4,13 @@ import argparse
 import base64
 import contextlib
 import shutil
-import tempfile
 from collections.abc import Iterator, Sequence
 from io import BytesIO
 from itertools import accumulate, pairwise, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
+from file_access.locks import scratch_folder
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import POLICIES, add_policy_flags, env_options, key_values, number
@@ -275,8 +275,8 @@ def _write_mp4(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) ->
     """Writes an MP4 by way of a temporary file, since ffmpeg can't write this format to a stream."""
     from web_viewer.video import EncoderFailed, Mp4Writer
 
-    with tempfile.TemporaryDirectory(prefix="rl_workbench_") as folder:
-        path = Path(folder, "video.mp4")
+    with scratch_folder() as folder:
+        path = folder / "video.mp4"
         writer = Mp4Writer(path, rate)
         try:
             for frame in frames:

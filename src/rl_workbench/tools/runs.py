@@ -16,6 +16,7 @@ from rl_workbench.training.scalar_log import RETURN
 from web_viewer.table import NAME as SCALARS
 
 SUMMARY = "summary.json"
+SUITE_RECORD = "suite.json"  # in the folder of a benchmark
 RECORDED = {"env_id": str, "env_kwargs": dict, "exp_name": str, "seed": int}  # types in config.json
 
 
@@ -30,6 +31,11 @@ class Run:
     env_kwargs: dict[str, Any]  # of the evaluations
     seed: int
     config: dict[str, Any]  # the whole record
+
+    @property
+    def wrapper(self) -> str:
+        """What wraps its environments, as module:function; empty for nothing."""
+        return str(self.config.get("run", {}).get("wrapper", ""))
 
     @property
     def name(self) -> str:
@@ -120,9 +126,11 @@ def _matching(pattern: str, warn: Callable[[str], None]) -> list[Run]:
     path = Path(pattern)
     if is_run(path):
         return [open_run(path)]
-    inside = glob.glob(pattern) if not path.is_dir() else [str(each) for each in path.iterdir()]
+    inside = list(map(Path, glob.glob(pattern)))
+    if path.is_dir():  # a benchmark's has a folder for each variant
+        inside = list(path.glob("*/*" if (path / SUITE_RECORD).is_file() else "*"))
     found = []
-    for folder in map(Path, sorted(inside)):
+    for folder in sorted(inside):
         if is_run(folder):
             try:
                 found.append(open_run(folder))

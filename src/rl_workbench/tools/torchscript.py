@@ -20,7 +20,7 @@ from gymnasium import spaces
 from torch import nn
 
 from file_access.content import open_file
-from rl_workbench.agents.greedy import SingleChoice
+from rl_workbench.agents.greedy import Choice, SeveralChoices, Switches
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.policies import TEST_SEED, LearnedPolicy
 from rl_workbench.tools.runs import Run
@@ -178,6 +178,11 @@ def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement
         WorkbenchError: if the environment fails, its observations can't be exported, or the file
             would act differently.
     """
+    if policy.network is None:
+        raise WorkbenchError(
+            f"a policy of {run.folder} can't be exported: only Stable-Baselines3 computes it "
+            "(images, or a --policy of your own)"
+        )
     space, original = policy.env.observation_space, policy.env.unwrapped.observation_space
     module = _module(policy.network, space, run.env_id)
     # Read back, because the file's content is what must agree.
@@ -186,6 +191,7 @@ def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement
         "format": FORMAT,
         "env_id": run.env_id,
         "env_kwargs": run.env_kwargs,
+        "wrapper": run.wrapper,
         "algorithm": run.algorithm,
         "experiment": run.experiment,
         "seed": run.seed,
@@ -247,7 +253,9 @@ def _compare(
     equal = np.logical_and(*(same for same, _ in results))
     distances = np.maximum(*(distance for _, distance in results))
     is_continuous = isinstance(space, spaces.Box)
-    wrong = distances > ROUNDING if is_continuous else ~equal & ~_tied(policy, observations)
+    wrong = distances > ROUNDING if is_continuous else ~equal
+    if wrong.any() and not is_continuous:
+        wrong &= ~_tied(policy, observations)
     if wrong.any():
         raise WorkbenchError(
             f"not written: in {wrong.sum()} of {len(wanted)} observations the file acts otherwise than "
@@ -257,14 +265,23 @@ def _compare(
 
 
 def _tied(policy: LearnedPolicy, observations: list[Observation]) -> np.ndarray:
-    """Returns where the two best scores are equal but for rounding, which may pick either, (N,)."""
-    if not isinstance(policy.network, SingleChoice):
+    """Returns where scores choose so narrowly that rounding may choose otherwise, (N,)."""
+    network = policy.network
+    if not isinstance(network, Choice):
         return np.zeros(len(observations), bool)
-    module = _module(policy.network.scores, policy.env.observation_space, "")
+    module = _module(network.scores, policy.env.observation_space, "")
     with torch.no_grad():
         scores = module(batch(observations))
-    best = scores.topk(min(2, scores.shape[1])).values
-    return (best[:, 0] - best[:, -1] <= ROUNDING * scores.abs().amax(1).clamp_min(1.0)).numpy()
+    return (margins(network, scores) <= ROUNDING * scores.abs().amax(1).clamp_min(1.0)).numpy()
+
+
+def margins(network: Choice, scores: torch.Tensor) -> torch.Tensor:
+    """Returns how far scores (N, A) are from another choice, (N,)."""
+    if isinstance(network, Switches):
+        return scores.abs().amin(1)
+    sizes = network.sizes if isinstance(network, SeveralChoices) else [scores.shape[1]]
+    best = [each.topk(min(2, each.shape[1])).values for each in scores.split(sizes, dim=1)]
+    return torch.stack([each[:, 0] - each[:, -1] for each in best]).amin(0)
 
 
 def _differences(

@@ -107,7 +107,8 @@ class Policy(NamedTuple):
     """A learned policy."""
 
     act: Callable[[Any], Any]  # greedily, for one observation: (D,), or a dict as it learned from
-    network: nn.Module  # for TorchScript: of (N, D), float32, a Dict's parts side by side: (N, ...)
+    # For TorchScript: of (N, D), float32, a Dict's parts side by side: (N, ...); None if it can't be.
+    network: nn.Module | None
 
 
 def load_policy(

@@ -1,11 +1,11 @@
 """Callbacks for the events of a training, among them the scalar log and the learning curve's picture."""
 
 from collections.abc import Mapping, Sequence
-from importlib import import_module
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rl_workbench import errors
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
+from rl_workbench.option import imported
 from rl_workbench.storage import write_atomically
 from rl_workbench.training.scalar_log import CONFIRMED, EVAL_SUCCESS, EVALUATION, RETURN, SUCCESS
 
@@ -54,7 +54,8 @@ class Callback:
 
     Callbacks run in the order of the list, after our own. They must not touch the random generators of
     Python, NumPy or torch, or the training ends with other weights. A callback that raises ends the
-    training with one line; what was learned is saved.
+    training with one line, which names the step up to which what was learned is saved; the other callbacks
+    still hear of the event.
     """
 
     def on_training_start(self, training: Any) -> None:
@@ -103,7 +104,7 @@ class CurvesPicture(Callback):
 
     def on_training_end(self, training: Any) -> None:
         history, run = training.history, training.options.run
-        if not history.returns:
+        if not history.returns or not training.is_in_place:
             return
         # matplotlib is slow to import
         from rl_workbench.plotting import as_png, learning_curve
@@ -123,15 +124,9 @@ def load_callbacks(names: str) -> list[Callback]:
 
 
 def _load(name: str) -> Callback:
-    module, _, class_name = name.partition(":")
-    if not module or not class_name:
-        raise WorkbenchError(f"--callback must be module:Class, not {name!r}")
+    make = imported(name, "--callback")
     try:
-        made = getattr(import_module(module), class_name)()
-    except ModuleNotFoundError as error:
-        raise WorkbenchError(
-            f"--callback {name}: {error}; {errors.hints.finding_modules()}"
-        ) from error
+        made = make()
     except Exception as error:
         raise WorkbenchError(f"--callback {name}: {error_line(error)}") from error
     if not isinstance(made, Callback):
@@ -151,13 +146,16 @@ class CallbackList:
         self._own, self._users = own, users
 
     def call(self, event: str, training: Any, *arguments: Any) -> None:
-        """Calls the method of an event."""
-        for each in self._own:
-            getattr(each, event)(training, *arguments)
-        for each in self._users:
-            try:
-                getattr(each, event)(training, *arguments)
-            except Exception as error:
-                name = type(each).__name__
-                text = f"the callback {name} failed in {event}(): {error_line(error)}"
-                raise EnvironmentFailure(text) from error
+        """Calls the method of an event; all of the user's hear of it, whatever another one raises."""
+        with ExitStack() as users:
+            for each in reversed(self._users):
+                users.callback(self._call_user, each, event, training, *arguments)
+            for own in self._own:
+                getattr(own, event)(training, *arguments)
+
+    def _call_user(self, user: Callback, event: str, training: Any, *arguments: Any) -> None:
+        try:
+            getattr(user, event)(training, *arguments)
+        except Exception as error:
+            text = f"the callback {type(user).__name__} failed in {event}(): {error_line(error)}"
+            raise EnvironmentFailure(text) from error

@@ -1,7 +1,10 @@
 """Checks what an environment returns, before it spoils the weights."""
 
+import math
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from numbers import Real
 from typing import Any
 
 import gymnasium
@@ -15,11 +18,15 @@ COMPUTE_REWARD = "compute_reward"  # method of an environment with a goal
 BEGIN_STEP = "begin_step"  # method of an environment whose step takes time in another process
 
 
+CURVES = "episode_curves"  # in the last info of an episode: the means of its infos' numbers, by tag
+_UNFIT = re.compile(r"[^\w./-]+")  # for a tag
+
+
 class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Turns NaN, wrong shapes and exceptions of an environment into one-line errors.
 
     All methods raise WorkbenchError if the environment fails; `reset` and `step` also if an observation or
-    a reward isn't finite in float32.
+    a reward isn't finite in float32. The last info of an episode has the means of numbers, see `CURVES`.
 
     Args:
         env: Its observations are vectors, or a Dict of arrays.
@@ -30,6 +37,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     def __init__(self, env: gymnasium.Env[Any, Any], env_id: str, which: str = "") -> None:
         super().__init__(env)
         self._id, self._which, self._begin_step = env_id, which, _begin_method(env)
+        self._sums: dict[str, tuple[float, int]] = {}  # and counts, of an episode's info
 
     def begin_step(self, action: Any) -> None:
         """Begins a step, where the environment can. The next `step`, by the same action, waits for it."""
@@ -41,12 +49,15 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     ) -> tuple[Any, dict[str, Any]]:
         with self._running("reset"):
             observation, info = self.env.reset(seed=seed, options=options)
+        self._sums = {}
         self._check(observation)
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         with self._running("step"):
             observation, reward, terminated, truncated, info = self.env.step(action)
+            if info:
+                info = self._noted(info, terminated or truncated)
         self._check(observation)
         try:
             size = abs(float(reward))
@@ -55,6 +66,19 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         if not size <= LARGEST:  # true for NaN, too
             raise self._not_finite("reward", reward)
         return observation, reward, terminated, truncated, info
+
+    def _noted(self, info: dict[str, Any], is_last: bool) -> dict[str, Any]:
+        """Adds the numbers of an info to their sums; returns the info, at the end with the means."""
+        for name, value in info.items():
+            if type(value) is not bool and isinstance(value, Real):
+                total, count = self._sums.get(name, (0.0, 0))
+                self._sums[name] = total + float(value), count + 1
+        if not is_last:
+            return info
+        means = {
+            f"info/{_UNFIT.sub('_', name)}": total / n for name, (total, n) in self._sums.items()
+        }
+        return {**info, CURVES: {tag: mean for tag, mean in means.items() if math.isfinite(mean)}}
 
     @property
     def can_compute_reward(self) -> bool:

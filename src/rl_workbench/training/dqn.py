@@ -9,6 +9,7 @@ from rl_workbench.agents.dqn_agent import DQNAgent, Learned
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import mark_random_states, rewind_random_states
 from rl_workbench.training.algorithm import Algorithm, Policy, Say
+from rl_workbench.training.checked import CURVES
 from rl_workbench.training.checkpoints import fitting
 from rl_workbench.training.environments import as_vector, discrete_actions, succeeded
 from rl_workbench.training.options import TrainingOptions
@@ -68,10 +69,6 @@ class DQNTraining(Algorithm):
     def learn(self, frame: Training) -> None:
         while not frame.is_over():
             self._step(frame)
-            if self._last is not None and self.steps % self._log_frequency == 0:
-                td_loss, q_values = self._last
-                losses = {"losses/td_loss": td_loss, "losses/q_values": q_values}
-                frame.log.add(self.steps, losses)
             frame.step_done()
 
     def _step(self, frame: Training) -> None:
@@ -93,10 +90,15 @@ class DQNTraining(Algorithm):
             self._last = agent.learn()
             self._is_learning = False
         self._observation = following
+        if self._last is not None and self.steps % self._log_frequency == 0:
+            td_loss, q_values = self._last
+            losses = {"losses/td_loss": td_loss, "losses/q_values": q_values}
+            frame.log.add(self.steps, losses)
         if terminated or truncated:
             agent.episode_done()
             total, self._reward, self._observation = self._reward, 0.0, None
-            scalars, note = {"charts/epsilon": agent.epsilon}, f"ε: {agent.epsilon:.3f}"
+            scalars = {"charts/epsilon": agent.epsilon, **info.get(CURVES, {})}
+            note = f"ε: {agent.epsilon:.3f}"
             frame.episode_done(total, env.length, scalars, note, succeeded(info))
 
     def _set_mark(self) -> None:

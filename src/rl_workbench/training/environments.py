@@ -17,6 +17,7 @@ from gymnasium import spaces
 from rl_workbench import errors
 from rl_workbench.env_ids import FORM, import_module_of, module_of
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
+from rl_workbench.option import imported
 from rl_workbench.training.checked import CheckedEnvironment
 from rl_workbench.training.options import TrainingOptions
 
@@ -30,22 +31,28 @@ def make_environment(
     *,
     keep_dict: bool = False,
     which: str = "",
+    wrapper: str = "",
 ) -> CheckedEnvironment:
     """Makes an environment that refuses observations and rewards that aren't finite.
 
     Args:
         env_id: Gymnasium's, also as module:id.
         options: Of the environment.
-        keep_dict: Leave a Dict of arrays as it is. Other observations are flattened to a vector (D,).
+        keep_dict: Leave a Dict of arrays, and images, as they are. Other observations are flattened to a
+            vector (D,).
         which: Begins the errors while it runs, as "environment 2 of 3: ".
+        wrapper: A function that wraps it, as module:function.
 
     Raises:
-        WorkbenchError: If there is no such environment, something that it needs isn't installed, or its
-            options make no sense.
+        WorkbenchError: If there is no such environment, something that it needs isn't installed, its options
+            make no sense, or it observes images that can't be learned from.
     """
     import_module_of(env_id)
+    wrap = imported(wrapper, "--wrapper") if wrapper else lambda env: env
     try:
-        env: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **(options or {}))
+        env: gymnasium.Env[Any, Any] = wrap(gymnasium.make(env_id, **(options or {})))
+        if not isinstance(env, gymnasium.Env):
+            raise TypeError(f"--wrapper {wrapper} returns {env!r}, which is no gymnasium.Env")
     except gymnasium.error.DependencyNotInstalled as error:
         extras = errors.hints.extras  # else Gymnasium's own text names the command
         hint = f" ({extras} may install them)" if extras else ""
@@ -59,11 +66,11 @@ def make_environment(
     except (Exception, SystemExit) as error:
         raise EnvironmentFailure(f"can't make {env_id}: {error_line(error)}") from error
     space = env.observation_space
-    if (
-        keep_dict
-        and isinstance(space, spaces.Dict)
-        and all(isinstance(part, spaces.Box) for part in space.values())
-    ):
+    parts = list(space.values()) if isinstance(space, spaces.Dict) else [space]
+    keeps = keep_dict and all(isinstance(part, spaces.Box) for part in parts)
+    for part in filter(is_image, parts):
+        _check_image(env_id, part, keeps)
+    if keeps and (isinstance(space, spaces.Dict) or is_image(space)):
         return CheckedEnvironment(env, env_id, which)
     if not (isinstance(space, spaces.Box) and len(space.shape) == 1):
         if not space.is_np_flattenable:
@@ -80,8 +87,9 @@ def environment_for(
 ) -> CheckedEnvironment:
     """Makes an environment as a training's algorithm observes it."""
     return make_environment(
-        options.run.env_id, given, keep_dict=options.kind.keeps_dict, which=which
-    )
+        options.run.env_id, given, keep_dict=options.kind.keeps_dict, which=which,
+        wrapper=options.run.wrapper,
+    )  # fmt: skip
 
 
 def training_environments(options: TrainingOptions) -> list[CheckedEnvironment]:
@@ -158,6 +166,29 @@ def _attribute(env: gymnasium.Env[Any, Any], name: str) -> Any:
 
 
 # --- spaces -------------------------------------------------------------------------------------
+
+
+SMALLEST_IMAGE = 36  # [pixels], of each side, as Stable-Baselines3's CNN needs
+
+
+def is_image(space: gymnasium.Space[Any]) -> TypeGuard[spaces.Box]:
+    """Returns whether observations are images, or a stack of them; smaller arrays are numbers."""
+    if not isinstance(space, spaces.Box) or len(space.shape) < 2:
+        return False
+    is_large = sorted(space.shape)[-2] >= SMALLEST_IMAGE
+    return is_large and (len(space.shape) > 2 or space.dtype == np.uint8)
+
+
+def _check_image(env_id: str, image: spaces.Box, keeps: bool) -> None:
+    """Refuses images that would be learned as a vector, or that Stable-Baselines3's CNN doesn't take."""
+    is_full = bool(np.all(image.low == 0) and np.all(image.high == 255))
+    if keeps and image.dtype == np.uint8 and len(image.shape) == 3 and is_full:
+        return
+    hint = "a CNN takes uint8 from 0 to 255 of (height, width, channels); --wrapper may make them"
+    if not keeps:
+        hint = "this algorithm learns from vectors. Stable-Baselines3's have a CNN: --algo ppo, a2c or "
+        hint += "dqn-sb3, for continuous actions sac, td3 or ddpg"
+    raise WorkbenchError(f"{env_id} observes images, {image.dtype} of {image.shape}: {hint}")
 
 
 def has_goal(space: gymnasium.Space[Any]) -> bool:

@@ -15,7 +15,7 @@ from rl_workbench.states import (
     rewind_random_states,
     set_generator,
 )
-from rl_workbench.training.checked import BEGIN_STEP
+from rl_workbench.training.checked import BEGIN_STEP, CURVES
 from rl_workbench.training.environments import as_vector, succeeded
 
 Agent = PolicyGradientAgent | ReinforceAgent
@@ -51,7 +51,7 @@ def play(
         observation = as_vector(following)
         finished = terminated or truncated
     episode.final_observation, episode.terminated = observation, bool(terminated)
-    episode.success = succeeded(info)
+    episode.success, episode.curves = succeeded(info), info.get(CURVES, {})
     return episode
 
 

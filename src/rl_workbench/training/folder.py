@@ -117,7 +117,7 @@ def other_versions(before: Any) -> str:
     """
     if not isinstance(before, dict):
         return ""
-    now = library_versions()
+    now = versions()
     names = [name for name in LIBRARIES if name in before and before[name] != now.get(name)]
     return ", ".join(f"{name} {before[name]} is now {now.get(name)}" for name in names)
 

@@ -172,7 +172,7 @@ class Outcome(NamedTuple):
     def _how_to_resume(self) -> str:
         if not self.is_in_place or not candidates(self.folder):
             return ""
-        return f"; --resume {shlex.quote(str(self.folder))} goes on from the last checkpoint"
+        return f"; --resume {shlex.quote(str(self.folder))} continues from the last checkpoint"
 
 
 def _write_traceback(folder: Path, failure: WorkbenchError) -> str:

@@ -29,6 +29,9 @@ class RunOptions:
     env_kwargs: dict[str, Any] = option({}, "options of the environment, KEY=VALUE with commas")
     train_env_kwargs: dict[str, Any] = option({}, "further options, for training")
     eval_env_kwargs: dict[str, Any] = option({}, "further options, for evaluations")
+    wrapper: str = option(
+        "", "function that wraps each environment, as module:function", metavar="MODULE:FUNCTION"
+    )
     seed: int = option(0, "seed of weights, exploration, environment and evaluation", 0, 2**31 - 1)
     num_envs: int = option(1, "number of environments to learn in at the same time", 1, 1024)
     total_timesteps: int = option(0, "length of the training [steps]; 0: no limit", 0, LARGEST)

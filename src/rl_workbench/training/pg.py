@@ -107,10 +107,10 @@ class PolicyGradientTraining(Algorithm):
         self._steps += episode.length
         self._stride += episode.length
         by_episode = {"Reward": episode.total_reward}  # the tags of the existing script
-        by_step = {}
+        by_step = dict(episode.curves)
         if losses is not None:
             by_episode |= {"Value Loss": losses.value, "Policy Loss": losses.policy}
-            by_step = {"losses/value_loss": losses.value, "losses/policy_loss": losses.policy}
+            by_step |= {"losses/value_loss": losses.value, "losses/policy_loss": losses.policy}
         frame.log.add(self._episodes, by_episode)
         frame.episode_done(episode.total_reward, episode.length, by_step, success=episode.success)
         if self._save_every and self._episodes % self._save_every == 0:

@@ -44,7 +44,7 @@ An option that isn't given comes from the environment's section in config/{confi
 flag overrides all of them.
 Ctrl-C saves everything and exits with 130 (SIGTERM: 143, SIGHUP: 129, SIGXCPU: 152). --resume continues from
 there and ends bit-identical to a training that was never interrupted.
-Exit codes: 0 done, 1 failed (what was learned is saved), 2 wrong arguments."""
+Exit codes: 0 done, 1 failed (the error names the step up to which all is saved), 2 wrong arguments."""
 EPILOG = """\
 dqn, reinforce and reinforce-document are our own, the others are Stable-Baselines3's.
 Each has flags of its own: --algo NAME --help shows them."""
@@ -65,7 +65,8 @@ def train(algo: str, callbacks: Sequence[Callback] = (), **options: Any) -> Path
         The run folder.
 
     Raises:
-        WorkbenchError: If an option is wrong, or the training fails. What was learned is saved.
+        WorkbenchError: If an option is wrong, or the training fails. What was learned is saved, up to the
+            step that the text names.
     """
     return run_training(choose(algorithm(algo), [], options), Interrupt(), callbacks=callbacks)
 
@@ -88,7 +89,8 @@ def run_training(
         The folder.
 
     Raises:
-        WorkbenchError: If something fails that the user can mend. What was learned is saved.
+        WorkbenchError: If something fails that the user can mend. What was learned is saved, up to
+            the step that the text names.
     """
     with interrupt.reading():  # both are slow to import, and --help needs neither
         from rl_workbench.training import folder as run_folder
@@ -245,8 +247,8 @@ def choose(
     known = [*special, *options.names, *SESSION.names]
     from_flags = _parse(_parser(kind, options, prog, default, parents), flags, known)
     parameters = parameters or {}
-    for name in (each for each in parameters if each not in known):
-        raise WorkbenchError(f"parameters: {unknown('parameter', name, known)}")
+    if strange := [name for name in parameters if name not in known]:
+        raise WorkbenchError(f"parameters: {unknown('parameter', strange[0], known)}")
 
     # What isn't an option of the training: files, presets, and what holds for this session only.
     files = {name: str(parameters[name]) for name in special if parameters.get(name)}

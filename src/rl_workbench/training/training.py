@@ -2,7 +2,7 @@
 
 import contextlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -95,10 +95,15 @@ class Training:
         """Steps of the environment so far."""
         return self._algorithm.steps
 
+    @property
+    def is_in_place(self) -> bool:
+        """Whether the run folder is still where it was."""
+        return self._checkpoints.are_in_place()
+
     def _read_checkpoint(self) -> dict[str, Any] | None:
-        """Returns None if the training was killed before its first checkpoint: it begins anew."""
+        """Returns None if the training was killed before its first checkpoint: it starts from scratch."""
         if not candidates(self.folder):
-            tell(f"{self.folder} has no checkpoint yet; beginning anew")
+            tell(f"{self.folder} has no checkpoint yet; starting from scratch")
             return None
         content = read_newest(self.folder, tell)
         self.options.check_same(content.get("config"), str(self.folder))
@@ -121,7 +126,7 @@ class Training:
     # --- the course of a training ---------------------------------------------------------------
 
     def run(self) -> None:
-        """Trains and writes everything. What was learned is saved also when it fails."""
+        """Trains and writes everything. When it fails, what was learned until then is saved."""
         failure: WorkbenchError | None = None
         try:
             self._train()
@@ -175,7 +180,7 @@ class Training:
         total = f" after episode {len(self.history.returns)} of {run.episodes}"
         if run.total_timesteps:
             total = f" of {run.total_timesteps}"
-        tell(f"going on at step {algorithm.steps}{total}: {self.folder}")
+        tell(f"resuming at step {algorithm.steps}{total}: {self.folder}")
         self._resumed = None  # it holds a replay buffer's worth of memory
         self._callbacks.call("on_training_start", self)
         if algorithm.steps:
@@ -268,8 +273,8 @@ class Training:
     def _evaluate_at_the_end(self) -> None:
         """Evaluates the complete training, unless that was done at this step already.
 
-        The last checkpoint's history doesn't contain this evaluation. So a training that is prolonged goes on
-        as if it had been longer from the start, but keeps this `best.pt` until there is a better one.
+        The last checkpoint's history doesn't contain this evaluation. So a training that is prolonged
+        continues as if it had been longer from the start, but keeps this `best.pt` until one is better.
         """
         was_evaluated = self.history.was_evaluated(self._algorithm.steps)
         if not self._is_complete() or self._interrupt.requested() or was_evaluated:
@@ -326,25 +331,36 @@ class Training:
         """Writes and reports the outcome; then raises a failure, unless the user had stopped anyway."""
         outcome = Outcome(
             self.options, self.folder, self.history, self._algorithm.steps, self._is_complete(),
-            self._interrupt.requested(), self._evaluation, self._checkpoints.are_in_place(),
+            self._interrupt.requested(), self._evaluation, self.is_in_place,
         )  # fmt: skip
-        try:
-            self._checkpoints.check_place()
-            self._algorithm.export(self.folder)
-            self._callbacks.call("on_training_end", self)
-            outcome.write_summary(str(failure) if failure else None)
-        except (OSError, MemoryError) as error:
-            problem = self._not_written(error)
-            failure = problem if self._interrupt.requested() else failure or problem
-        except WorkbenchError as error:
-            failure = failure or error
-            outcome.write_summary(str(failure))
+        failure = self._tried(self._export, failure)
+        failure = self._tried(partial(self._callbacks.call, "on_training_end", self), failure)
+        if outcome.is_in_place:
+            summary = partial(outcome.write_summary, str(failure) if failure else None)
+            failure = self._tried(summary, failure)
         outcome.report()
         # After Ctrl-C the failure may be its effect, as it may have ended what the environment needs. A
         # failed write is reported all the same.
         if failure and not (self._interrupt.requested() and self._is_written):
             saved = self._saved_at if self._is_written else -1
             raise WorkbenchError(outcome.failure_text(failure, saved)) from failure
+
+    def _export(self) -> None:
+        self._checkpoints.check_place()
+        self._algorithm.export(self.folder)
+
+    def _tried(
+        self, action: Callable[[], object], failure: WorkbenchError | None
+    ) -> WorkbenchError | None:
+        """Returns the failure so far, or else that of an action of the end."""
+        try:
+            action()
+        except WorkbenchError as error:
+            return failure or error
+        except (OSError, MemoryError) as error:
+            problem = self._not_written(error)
+            return problem if self._interrupt.requested() else failure or problem
+        return failure
 
     def _not_written(self, error: OSError | MemoryError) -> WorkbenchError:
         self._is_written = False

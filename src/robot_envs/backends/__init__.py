@@ -58,9 +58,11 @@ def make_backend(
         raise ValueError(f"there is no backend {name!r}{near}")
     if deadline is not None and not (isinstance(deadline, (int, float)) and deadline > 0.0):
         raise ValueError(f"deadline is a time above 0 [s], not {deadline!r}")
-    plain = scene.robots[0].world in (None, EMPTY)  # other worlds may have another physics step
-    if plain and (control_period != 0.0 or name != REALTIME):
-        ticks_per_action(control_period, PHYSICS_STEP)  # an error before any simulator is started
+    step = scene.robots[0].physics_step
+    if step is None and scene.robots[0].world in (None, EMPTY):  # others may have another one
+        step = PHYSICS_STEP
+    if step and (control_period != 0.0 or name != REALTIME):
+        ticks_per_action(control_period, step)  # an error before any simulator is started
     if name in (IN_PROCESS, MUJOCO):
         from robot_envs.backends.in_process import InProcessWorld
 

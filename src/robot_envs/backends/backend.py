@@ -23,6 +23,7 @@ class RobotBackend(Protocol):
 
     scene: Scene
     deterministic: bool  # whether the same commands give the same states
+    complete: bool  # whether it can tell more than joints
     shared: bool  # whether all backends of its kind in a process move the same robots
 
     def look(self, query: StateQuery) -> None:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import starmap
 from operator import attrgetter
 from typing import Any
 
@@ -70,7 +71,7 @@ class InProcessWorld(RobotBackend):
         RobotEnvError: if a file isn't found, or something in it is wrong.
     """
 
-    deterministic, shared = True, False
+    deterministic, complete, shared = True, True, False
 
     def __init__(self, scene: Scene, control_period: float, engine: str = "bullet") -> None:
         self.scene = scene
@@ -79,6 +80,8 @@ class InProcessWorld(RobotBackend):
         self._closed = False
         try:
             fill(self._sim, scene.robots[0].world)
+            if step := scene.robots[0].physics_step:
+                self._sim.set_time_step(step)
             self._ticks = ticks_per_action(control_period, world.time_step)
             self._robots = {robot.model: self._add(robot) for robot in scene.robots}
             for each in scene.objects:
@@ -184,8 +187,8 @@ class InProcessWorld(RobotBackend):
             passed / NANOSECONDS,
             joints,
             self._held,
-            Links(zip(self._links, map(Motion._make, answer.links), strict=True)),
-            Models((name, Motion._make(state)) for name, state in answer.models.items()),
+            Links(zip(self._links, starmap(Motion.of, answer.links), strict=True)),
+            Models((name, Motion.of(*state)) for name, state in answer.models.items()),
             answer.contacts,
         )
 

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.pose import (
     Pose,
-    Vector,
     conjugate,
     multiply,
     scale,
@@ -15,7 +14,7 @@ from bullet_gazebo.state import SCOPE
 from file_access.text import did_you_mean
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
-from robot_envs.world_state import JointState, Motion, StateQuery, link_keys
+from robot_envs.world_state import ONLY_REWARDED, JointState, Motion, StateQuery, Twist, link_keys
 
 INSTANT = 1e-5  # [s] either way, over which poses are differentiated
 AT_REST = Motion(Pose())  # the world
@@ -71,12 +70,12 @@ class LinkView:
         return link_poses(self._links, self._root, positions)
 
 
-def _twist(before: Pose, after: Pose) -> tuple[Vector, Vector]:
+def _twist(before: Pose, after: Pose) -> Twist:
     """Returns the linear and angular velocity in the world, between two poses 2 * INSTANT apart."""
     rate = 0.5 / INSTANT
     linear = scale(subtract(after.position, before.position), rate)
     x, y, z, w = multiply(after.orientation, conjugate(before.orientation))
-    return linear, scale((x, y, z), 2.0 * rate if w >= 0.0 else -2.0 * rate)
+    return Twist(linear, scale((x, y, z), 2.0 * rate if w >= 0.0 else -2.0 * rate))
 
 
 def _check(robot: Robot, query: StateQuery) -> None:
@@ -88,11 +87,12 @@ def _check(robot: Robot, query: StateQuery) -> None:
         if asked:
             raise RobotEnvError(
                 f"the task asks for {what}, which aren't known of a robot that isn't simulated"
+                f"{ONLY_REWARDED}"
             )
     if query.links and not robot.links.fixed_base:
         raise RobotEnvError(
             f"the task asks for links, and '{robot.model}' isn't fixed to the world: its joints "
-            "don't determine where it is"
+            f"don't determine where it is{ONLY_REWARDED}"
         )
 
 

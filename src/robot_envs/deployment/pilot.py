@@ -13,8 +13,8 @@ from robot_envs.deployment.kinematics import LinkView
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.task import GoalTask, Task
-from robot_envs.world_state import Command, JointState, WorldState
+from robot_envs.task import GoalTask, Task, Unjudged
+from robot_envs.world_state import Command, JointState, StateQuery, WorldState
 
 
 class CommandLimits:
@@ -45,16 +45,12 @@ class CommandLimits:
 
     def __call__(self, command: Command, held: Command) -> tuple[Command, list[str]]:
         """Returns the nearest command that is allowed after the present one, and the joints out of bounds."""
-        exceeded, numbers = [], []
         wanted, before = self._numbers(command), self._numbers(held)
-        for joint, value, start, (lower, upper), way in zip(
-            self._port.joints, wanted, before, self._bounds, self._ways, strict=True
-        ):
-            if not lower <= value <= upper:
-                exceeded.append(joint)
-            near = min(max(value, start - way), start + way)
-            numbers.append(min(max(near, lower), upper))  # last, whatever it starts from
-        return numbers[0] if self._port.single else tuple(numbers), exceeded
+        named = zip(self._port.joints, wanted, self._bounds, strict=True)
+        exceeded = [joint for joint, value, (low, high) in named if not low <= value <= high]
+        moves = zip(wanted, before, self._ways, strict=True)
+        near = [min(max(value, start - way), start + way) for value, start, way in moves]
+        return self._bounded(near), exceeded  # last, whatever it starts from
 
     def _numbers(self, command: Command) -> list[float]:
         return [command] if self._port.single else list(command)  # type: ignore[list-item, arg-type]
@@ -65,9 +61,13 @@ class CommandLimits:
         A joint beyond a stop is commanded to the stop.
         """
         command = self._port.at_start({name: each.position for name, each in joints.items()})
-        bounds = zip(self._numbers(command), self._bounds, strict=True)
-        numbers = [min(max(value, lower), upper) for value, (lower, upper) in bounds]
-        return numbers[0] if self._port.single else tuple(numbers)
+        return self._bounded(self._numbers(command))
+
+    def _bounded(self, numbers: list[float]) -> Command:
+        """Returns the nearest command within the bounds."""
+        bounds = zip(numbers, self._bounds, strict=True)
+        found = tuple(min(max(value, lower), upper) for value, (lower, upper) in bounds)
+        return found[0] if self._port.single else found
 
 
 def _bounds(limits: JointLimits, quantity: str) -> tuple[float, float]:
@@ -108,7 +108,8 @@ class Pilot:
     """Runs a policy on a task, as in an environment, from the robot's joint states.
 
     Calls all methods of the task as an environment does, even its reward, so that the task stores the same
-    data as in training. Joints aren't moved to the task's initial state.
+    data as in training; of one with a `reward_query` it calls neither `reward` nor `is_terminal`. Joints
+    aren't moved to the task's initial state.
 
     Args:
         robot: the robot.
@@ -139,6 +140,7 @@ class Pilot:
         self._scene, self._task, self._act, self._say = Scene([robot]), task, act, say
         if not robot.ports:
             raise RobotEnvError(f"the robot '{robot.model}' has no controller that takes commands")
+        self._judge = task if task.reward_query == StateQuery() else Unjudged()
         self._links = LinkView(robot, task.query)
         self._limits = {port.name: CommandLimits(robot, port, way, period) for port in robot.ports}
         self._read_action = action_reader(task.action_space())
@@ -188,9 +190,9 @@ class Pilot:
             ValueError: if the policy or the task returns something impossible.
         """
         task, state = self._task, self._state(time, joints)
-        over = task.is_terminal(state)
+        over = self._judge.is_terminal(state)
         if self._action is not None:
-            task.reward(state, self._action)
+            self._judge.reward(state, self._action)
         if over:
             self._action = None
             return None

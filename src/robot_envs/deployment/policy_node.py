@@ -13,7 +13,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 
 from robot_envs.backends.ros import node
 from robot_envs.backends.ros.bringup import full_name
-from robot_envs.backends.ros.gazebo import lockstep_hint
+from robot_envs.backends.ros.running import lockstep_hint
 from robot_envs.deployment.pilot import Pilot
 from robot_envs.deployment.reports import ControllerWatch, JointListener
 from robot_envs.errors import RobotEnvError

@@ -131,7 +131,9 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         self._page: LivePage | None = None
 
     def _show(self) -> None:
-        """Shows the state on a page, as in the render mode "human"."""
+        """Shows the state on a page in the render mode "human"."""
+        if self.render_mode != "human":
+            return
         if self._page is None:
             from robot_envs.pictures.page import LivePage
 

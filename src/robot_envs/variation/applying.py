@@ -8,7 +8,7 @@ from bullet_gazebo.control.pid import Gains
 from bullet_gazebo.physics.description import Inertia
 from bullet_gazebo.physics.pose import Vector, scale
 from robot_envs.scene import Scene
-from robot_envs.variation.parts import Parts, RobotPart
+from robot_envs.variation.parts import Parts, RobotPart, varied
 from robot_envs.variation.variation import Variation, scaled
 
 
@@ -71,11 +71,9 @@ class Applier:
         if self._parts is None and variation.is_nominal:
             return
         parts = self._parts = self._parts or Parts(self._scene)
-        links = {name: parts.find("link", name) for name in (*variation.links, *variation.surfaces)}
-        joints = {
-            name: parts.find("joint", name) for name in (*variation.damping, *variation.friction)
-        }
-        controllers = {name: parts.find("controller", name) for name in variation.gains}
+        links = varied(parts.links, "link", (*variation.links, *variation.surfaces))
+        joints = varied(parts.joints, "joint", (*variation.damping, *variation.friction))
+        controllers = varied(parts.controllers, "controller", variation.gains)
         self._last = variation  # all names are known: from here on there is something to undo
         for name, difference in variation.links.items():
             if name not in self._links:

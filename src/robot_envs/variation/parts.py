@@ -3,7 +3,7 @@
 Joints are named as in a state, controllers as in commands, and links like joints.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from bullet_gazebo.control.errors import ControlError
@@ -15,13 +15,8 @@ from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.variation.variation import length_axis
 
-MOST_GAINS = {
-    "p": 1e5,
-    "i": 1e5,
-    "d": 1e3,
-    "i_max": 1e5,
-    "i_min": 1e5,
-}  # of control_toolbox's server
+# Of control_toolbox's server.
+MOST_GAINS = {"p": 1e5, "i": 1e5, "d": 1e3, "i_max": 1e5, "i_min": 1e5}
 
 
 class RobotPart(NamedTuple):
@@ -68,18 +63,21 @@ class Parts:
             for plain in robot.run:
                 self.controllers[scene.controller(robot, plain)] = RobotPart(robot, plain)
 
-    def find(self, kind: str, name: str) -> RobotPart:
-        """Returns a "link", "joint" or "controller" by name; raises SimulatorError if there is none."""
-        parts = {"link": self.links, "joint": self.joints, "controller": self.controllers}[kind]
-        if name not in parts:
-            hint = did_you_mean(name, parts) or f"; there are {', '.join(parts) or 'none'}"
-            raise SimulatorError(f"there is no {kind} '{name}' to vary{hint}")
-        return parts[name]
-
     def pids(self) -> dict[str, dict[str, Gains]]:
         """The gains of all PIDs, by controller and place below it; only controllers that have PIDs."""
         found = {name: gains_of(part) for name, part in self.controllers.items()}
         return {name: gains for name, gains in found.items() if gains}
+
+
+def varied(parts: Mapping[str, RobotPart], kind: str, names: Iterable[str]) -> dict[str, RobotPart]:
+    """Returns the parts with these names; raises SimulatorError, which tells their kind, if there is none."""
+    found = {}
+    for name in names:
+        if name not in parts:
+            hint = did_you_mean(name, parts) or f"; there are {', '.join(parts) or 'none'}"
+            raise SimulatorError(f"there is no {kind} '{name}' to vary{hint}")
+        found[name] = parts[name]
+    return found
 
 
 def gains_of(controller: RobotPart) -> dict[str, Gains]:

@@ -35,9 +35,8 @@ class Option(NamedTuple):
     most: float  # largest value that may be drawn
     nominal: float = 1.0  # of a robot that isn't varied
     numbers: int = 1  # how many are drawn for each
-    either_way: bool = (
-        True  # a single number is a half-width about the nominal value, or else the largest
-    )
+    # Whether a single number is a half-width about the nominal value, or else the largest.
+    either_way: bool = True
 
 
 OPTIONS = (  # in the order of drawing, which changes results: append new ones at the end

@@ -46,7 +46,16 @@ class Start:
     @property
     def is_orphan(self) -> bool:
         """Returns whether it still runs although its caller was killed."""
-        return bool(self.caller) and not _lives(self.caller) and bool(family(self.token))
+        members = family(self.token).values()
+        if not self.caller or not members:
+            return False
+        try:
+            caller = psutil.Process(self.caller)
+        except psutil.Error:
+            return True
+        # A younger process has the id only since the caller's end.
+        eldest = min(process.create_time() for process in members)
+        return caller.create_time() > eldest or not _lives(self.caller)
 
 
 def _starts(mark: str) -> list[Start]:
@@ -64,21 +73,29 @@ def _lives(pid: int) -> bool:
 
 
 def family(token: str) -> dict[int, psutil.Process]:
-    """Returns the living processes of a start, by id: those with its token, and their descendants.
+    """Returns the living processes of a start, by id. See `families`."""
+    return families([token])[0]
+
+
+def families(tokens: Sequence[str]) -> list[dict[int, psutil.Process]]:
+    """Returns the living processes of each start, by id: those with its token, and their descendants.
 
     The token finds children whose parent was killed; descent finds those with a cleaned environment.
     """
     everything: dict[int, psutil.Process] = {}
     parents: dict[int, int] = {}
-    found: set[int] = set()
+    marks: dict[int, str] = {}
     for process in psutil.process_iter():
         with contextlib.suppress(psutil.Error):
             everything[process.pid], parents[process.pid] = process, process.ppid()
-            if token in process.environ().get(MARK, ""):
-                found.add(process.pid)
-    while grown := {pid for pid, parent in parents.items() if parent in found} - found:
-        found |= grown
-    return {pid: everything[pid] for pid in found if _lives(pid)}
+            marks[process.pid] = process.environ().get(MARK, "")
+    result = []
+    for token in tokens:
+        found = {pid for pid, mark in marks.items() if token in mark}
+        while grown := {pid for pid, parent in parents.items() if parent in found} - found:
+            found |= grown
+        result.append({pid: everything[pid] for pid in found if _lives(pid)})
+    return result
 
 
 def started(own: Sequence[Start]) -> list[Start]:
@@ -113,7 +130,8 @@ def end(starts: Sequence[Start], reap: Callable[[set[str]], bool]) -> bool:
     """
     own_line = {process.pid for process in (psutil.Process(), *psutil.Process().parents())}
     gone = True
-    starts = [start for start in starts if own_line.isdisjoint(family(start.token))]
+    members = families([start.token for start in starts])
+    starts = [start for start, its in zip(starts, members, strict=True) if own_line.isdisjoint(its)]
     for kind in ("node", "launch", "master"):
         wave = [start for start in starts if start.kind == kind]
         if not wave:
@@ -152,9 +170,10 @@ def _end_wave(
             continue
         if not _end_with(number, grace, starts, reap):
             return set()
-    left = [start for start in starts if family(start.token)]
-    for start in left:
-        _log.warn(f"{start.label} can't be ended: processes {sorted(family(start.token))}")
+    members = families([start.token for start in starts])
+    left = {start: its for start, its in zip(starts, members, strict=True) if its}
+    for start, its in left.items():
+        _log.warn(f"{start.label} can't be ended: processes {sorted(its)}")
     return {start.token for start in left}
 
 
@@ -170,17 +189,17 @@ def _end_with(
     signalled: set[int] = set()
     while True:
         reap(set())
-        families = [family(start.token) for start in starts]
-        if not any(families):
+        running = families([start.token for start in starts])
+        if not any(running):
             return False
-        tops = {pid for members in families for pid in members.keys() - _children(members)}
+        tops = {pid for members in running for pid in members.keys() - _children(members)}
         programs = programs or tops
-        if programs.isdisjoint(set().union(*families)):
+        if programs.isdisjoint(set().union(*running)):
             programs = tops
             deadline = min(deadline, time.monotonic() + LEFTOVERS)
         if time.monotonic() > deadline or (hurry.is_set() and number is signal.SIGINT):
             return True
-        for members in families:
+        for members in running:
             for pid in members.keys() - signalled:
                 # As Ctrl-C in a terminal: to the program's process group, which ends its own children.
                 # roslaunch puts its nodes into groups of their own and ends them in order.

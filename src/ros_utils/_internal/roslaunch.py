@@ -60,10 +60,11 @@ def list_processes(handle: Handle) -> tuple[list[str], list[str]] | None:
     return None
 
 
-def has_started(handle: Handle) -> bool:
-    """Returns whether the launch has started its processes.
+def await_nodes(handle: Handle) -> bool:
+    """Waits until the processes of a launch have registered as nodes; briefly, as not every program is one.
 
-    If so, waits until they have registered as nodes; briefly, as not every program is one.
+    Returns:
+        False, at once, while the launch hasn't started its processes.
     """
     if list_processes(handle) is None:
         return False

@@ -5,7 +5,7 @@ import json
 import unittest
 
 import rostest
-from support.ros.pg_train_runs import Place
+from support.ros.programs import Place
 
 from cartpole import dqn_train
 

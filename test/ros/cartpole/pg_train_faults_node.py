@@ -7,7 +7,7 @@ import socket
 import unittest
 
 import rostest
-from support.ros.pg_train_runs import NETWORKS, Place, Process
+from support.ros.programs import NETWORKS, Place, Process
 
 ENDLESS = ("--episodes=100000", "--stop-at-length=0")
 

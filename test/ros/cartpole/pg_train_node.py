@@ -9,7 +9,7 @@ import unittest
 
 import rostest
 import torch
-from support.ros.pg_train_runs import NETWORKS, Place
+from support.ros.programs import NETWORKS, Place
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from cartpole import pg_train
@@ -88,7 +88,7 @@ class PgTrain(unittest.TestCase):
         training.end()
         resumed = killed.start("rosrun", "cartpole", "pg_train.py", f"--resume={killed.run}")
         self.assertEqual(resumed.end(), 0, resumed.output)
-        self.assertIn("going on at step", resumed.output)
+        self.assertIn("resuming at step", resumed.output)
         self.assert_same_weights(inside, killed)
         self.assertEqual(killed.left_after(), {})
 

@@ -12,7 +12,7 @@ import rostest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
-from support.ros.pg_train_runs import Place, Process
+from support.ros.programs import Place, Process
 from support.ros.subscribed import wait_until_heard
 from support.training import training_runs
 

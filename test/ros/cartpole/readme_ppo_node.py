@@ -6,7 +6,7 @@ import unittest
 from pathlib import Path
 
 import rostest
-from support.ros.pg_train_runs import Place
+from support.ros.programs import Place
 
 
 @unittest.skipUnless(importlib.util.find_spec("stable_baselines3"), "./ws extras isn't installed")

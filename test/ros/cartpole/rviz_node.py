@@ -7,7 +7,7 @@ import unittest
 
 import numpy as np
 import rostest
-from support.ros.pg_train_runs import Place
+from support.ros.programs import Place
 from support.ros.virtual_display import missing, virtual_display
 
 BOUND = 180.0  # [s] for anything

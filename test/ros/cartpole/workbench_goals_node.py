@@ -11,7 +11,7 @@ import unittest
 from pathlib import Path
 
 import rostest
-from support.ros.pg_train_runs import Place
+from support.ros.programs import Place
 
 from cartpole import workbench
 

@@ -12,13 +12,13 @@ from support.scenes.rover import ROVER, Push
 from support.scenes.two_arms import LEFT, RIGHT, Volley
 
 from robot_envs import InitialState, Pose, RobotEnv, RobotEnvError, SimulatorError
-from robot_envs.backends.ros import gazebo
+from robot_envs.backends.ros import running
 from robot_envs.testing import check_robot_env, differences, rollout
 
 
 def models():
     """What is in the simulator's world."""
-    return set(gazebo.models())
+    return set(running.models())
 
 
 class Scenes:

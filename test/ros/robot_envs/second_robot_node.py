@@ -38,7 +38,7 @@ class SecondRobot(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.said = []
-        raised = replace(PENDULUM, pose=Pose((0.0, 0.0, 0.3)))
+        raised = replace(PENDULUM, pose=Pose((0.0, 0.0, 0.3)), physics_step=0.002)
         cls.scene = Scene([raised])
         cls.session = RosSession(raised, "/learner", [], realtime=REALTIME, gui=False, seed=0)
         cls.addClassCleanup(cls.session.close)
@@ -52,6 +52,7 @@ class SecondRobot(unittest.TestCase):
         )
         pose = ros_gazebo.gazebo_get_model_state("pendulum")[1]
         self.assertAlmostEqual(pose.position.z, 0.3)
+        self.assertEqual(ros_gazebo.gazebo_get_time_step(), 0.002)
 
     def test_environments_made_afterwards_use_it_and_start_nothing(self):
         first, second = (make_pendulum(BACKEND, self.scene.robots[0]) for _ in range(2))

@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import data_equivalence as same
 from support.robots.rig import MASS, RIG, SLEDGE, make_both, make_rig
 
 from robot_envs import SimulatorError
-from robot_envs.backends.ros.gazebo import SimulatorService
+from robot_envs.backends.ros.running import SimulatorService
 from robot_envs.backends.ros.session import RosSession
 from robot_envs.variation import Variation
 

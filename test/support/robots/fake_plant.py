@@ -25,7 +25,7 @@ class FakePlant:
         fail_after: number of actions after which the simulator "dies"; None: never.
     """
 
-    scene, deterministic, shared = Scene([ROBOT]), True, False
+    scene, deterministic, complete, shared = Scene([ROBOT]), True, True, False
 
     def __init__(self, fail_after: int | None = None) -> None:
         self.closed = 0

@@ -50,6 +50,35 @@ CRATE = """<robot name="crate"><link name="crate">
   <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link></robot>"""
 
 
+class Roll(Task):
+    """Roll forward: the reward sees the hull, the policy the wheels alone."""
+
+    max_steps = 50
+    reward_query = StateQuery(models=("rover",), links=(LinkQuery("hull"),), all_contacts=True)
+
+    def action_space(self) -> Box:
+        return Box(-1.0, 1.0, (2,), np.float32)
+
+    def observation_space(self) -> Box:
+        return Box(-np.inf, np.inf, (2,), np.float64)
+
+    def apply(self, action: np.ndarray, state: WorldState) -> Commands:
+        right, left = (10.0 * action).tolist()
+        return {"wheels": (right, left)}
+
+    def observe(self, state: WorldState) -> np.ndarray:
+        return np.array([state.joints[name].velocity for name in ("right_axle", "left_axle")])
+
+    def reward(self, state: WorldState, action: np.ndarray) -> float:
+        return state.links["hull"].twist.linear[0]
+
+    def is_terminal(self, state: WorldState) -> bool:
+        return state.models["rover"].pose.position[2] < 0.05
+
+    def info(self, state: WorldState) -> dict[str, float]:
+        return {"contacts": float(len(state.contacts))}
+
+
 class Push(Task):
     """The rover, put somewhere else in each episode, pushes a crate forward; none of its joints is named."""
 

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from support.ros.pg_train_runs import Place, Process
+from support.ros.programs import Place, Process
 
 BOUND = 120.0  # [s] for anything to come up, or to end
 OURS = re.compile(r'File "[^"]*/(?:src|scripts|companions)/(?!\.)[^"]*"')  # of a traceback

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from gazebo_msgs.srv import DeleteModel, GetModelState, GetWorldProperties, SpawnModel
 from geometry_msgs.msg import Pose
-from support.ros.pg_train_runs import Place, Process
+from support.ros.programs import Place, Process
 from support.stress.places import BOUND, OURS, launch, leftovers, pid_of, place, waits
 
 from ros_calls import master

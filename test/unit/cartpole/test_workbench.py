@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from support.training import workbench_runs
 
+from cartpole import workbench
 from cartpole.workbench import PROGRAM, WorkspaceHints, main
 from rl_workbench.starting import JOB
 
@@ -34,6 +35,13 @@ def test_errors_begin_with_the_name_it_was_called_by(
         main(["train", f"--resume={tmp_path}"])
     assert ended.value.code == 2
     assert capsys.readouterr().err.splitlines()[-1].startswith("workbench.py train: error: ")
+
+
+def test_no_free_port_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(JOB, "1")
+    monkeypatch.setattr(workbench, "MASTER_PORTS", range(0))
+    with pytest.raises(SystemExit, match="^workbench.py: no port is free"):
+        main(["--help"])
 
 
 @pytest.mark.slow

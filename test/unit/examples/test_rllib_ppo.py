@@ -1,6 +1,6 @@
 """examples/rllib_ppo.py configures RLlib for the cart-pole; RLlib is a stand-in."""
 
-import importlib
+import importlib.util
 import sys
 from pathlib import Path
 from unittest.mock import MagicMock
@@ -15,9 +15,10 @@ RLLIB = ("ray", "ray.rllib", "ray.rllib.algorithms", "ray.rllib.algorithms.ppo",
 def test_workers_make_the_cart_pole(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in RLLIB:
         monkeypatch.setitem(sys.modules, name, MagicMock())
-    monkeypatch.syspath_prepend(EXAMPLES)
     monkeypatch.setattr(sys, "argv", ["rllib_ppo.py", "--iterations", "0"])
-    example = importlib.import_module("rllib_ppo")
+    spec = importlib.util.spec_from_file_location("rllib_ppo", EXAMPLES / "rllib_ppo.py")
+    example = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(example)
     example.main()
     name, make_env = example.register_env.call_args.args
     (chosen,), options = example.PPOConfig().environment.call_args

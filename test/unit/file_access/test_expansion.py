@@ -74,6 +74,13 @@ def test_a_file_that_is_missing_is_told_once(bad, tmp_path):
 
 
 @pytest.mark.slow
+def test_a_missing_package_is_told_once(bad):
+    path = bad('<xacro:include filename="$(find no_such_package)/a.xacro"/>')
+    with pytest.raises(CannotExpand) as caught:
+        expand(path)
+    assert str(caught.value) == f"{path}: package 'no_such_package' not found on ROS_PACKAGE_PATH"
+
+
 def test_a_bomb_of_macros(bad):
     """Each macro calls the one before ten times."""
     macros = '<xacro:macro name="m0"><link/></xacro:macro>' + "".join(

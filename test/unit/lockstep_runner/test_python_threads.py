@@ -3,6 +3,7 @@
 import concurrent.futures
 import queue
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures import _base as futures
 from concurrent.futures import thread as pools
@@ -134,6 +135,22 @@ def test_tasks_of_an_executor_take_the_time_that_they_sleep(replaced, workers):
     assert passed(replaced) == {1: 110, 3: 80}[workers]  # none for the end of its threads
     ends = {1: [10, 30, 60], 3: [10, 20, 30]}[workers]
     assert results == list(zip(range(3), ends, strict=True))
+
+
+@pytest.mark.parametrize("polls", [False, True])
+def test_a_paused_world_ends_a_task_s_sleep_at_once(replaced, monkeypatch, polls):
+    monkeypatch.setattr(time, "sleep", time.sleep)
+    python_threads.replace_time(replaced, virtual_wall_clock=False)
+    replaced.world.paused = True
+    begin = originals.monotonic()
+    with ThreadPoolExecutor(1) as executor:
+        task = executor.submit(lambda: [time.sleep(1000.0) for _ in range(3)])
+        while polls and not task.done() and originals.monotonic() < begin + BOUND:
+            time.sleep(0.001)
+            assert not threading.Event().wait(0.01)
+        replaced.wait(BOUND, task.done)
+        replaced.clock.release_all()
+    assert passed(replaced) == 0 and originals.monotonic() < begin + BOUND
 
 
 def test_no_time_passes_while_a_task_computes(replaced):

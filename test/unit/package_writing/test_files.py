@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -81,21 +82,55 @@ def test_meshes_of_a_package_that_was_downloaded_without_its_package_xml_come_al
     assert made.links.links["rod"].collisions[0].mesh == str(copy)
 
 
-@pytest.mark.slow
-def test_a_package_that_it_needs_is_depended_on(new, tmp_path, monkeypatch):
+@pytest.fixture
+def described(tmp_path, monkeypatch):
+    """A xacro file of a package for ROS 2 that draws on itself, and another package in a false condition."""
     other = tmp_path / "ws/their_description"
     (other / "urdf").mkdir(parents=True)
-    (other / "package.xml").write_text("<package><name>their_description</name></package>")
-    (other / "urdf/links.xacro").write_text(robot(LINK.format("base", "") + LINK.format("rod", "")))
+    (other / "package.xml").write_text(
+        "<package><name>their_description</name><export><build_type>ament_cmake</build_type></export></package>"
+    )
+    shapes = ""
+    for kind in ("visual", "collision"):  # of one name
+        (other / "meshes" / kind).mkdir(parents=True)
+        (other / "meshes" / kind / "rod.stl").write_bytes(binary_stl(len(kind)))
+        place = f"$(arg from)their_description/meshes/{kind}/rod.stl"
+        shapes += f'<{kind}><geometry><mesh filename="{place}"/></geometry></{kind}>'
+    links = LINK.format("base", "") + LINK.format("rod", shapes)
+    (other / "urdf/links.xacro").write_text(robot(links))
     urdf = other / "urdf/arm.urdf.xacro"
     urdf.write_text(
         robot(
-            '<xacro:include filename="$(find their_description)/urdf/links.xacro"/>', SWING, FIXED
+            '<xacro:arg name="from" default="package://"/>',
+            '<xacro:include filename="$(find their_description)/urdf/links.xacro"/>', SWING, FIXED,
+            '<xacro:if value="false"><xacro:include filename="$(find nobodys)/hand.xacro"/></xacro:if>',
         )
-    )
+    )  # fmt: skip
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}/ws:{os.environ['ROS_PACKAGE_PATH']}")
     monkeypatch.setenv("CARTPOLE_WITH", str(tmp_path / "ws"))
-    folder, made, _, told = new("my_described", urdf)
+    return urdf
+
+
+@pytest.mark.slow
+def test_a_package_that_it_needs_is_depended_on(new, tmp_path, described):
+    folder, made, _, told = new("my_described", described)
     made.check()
-    assert "<exec_depend>their_description</exec_depend>" in (folder / "package.xml").read_text()
+    depends = re.findall("<exec_depend>(.*)</exec_depend>", (folder / "package.xml").read_text())
+    assert "their_description" in depends and "nobodys" not in depends
+    assert "takes files from other packages (--standalone copies them): their_description" in told
     assert f"./ws --with {tmp_path}/ws --with " in told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", ["package://", "file://{}/ws/"])
+def test_a_standalone_package_needs_no_other(new, tmp_path, described, start):
+    argument = f"from:={start.format(tmp_path)}"
+    folder, made, _, told = new("my_own", described, "--standalone", argument)
+    (tmp_path / "ws").rename(tmp_path / "gone")
+    made.check()
+    for kind, shapes in (("visual", "visuals"), ("collision", "collisions")):
+        (copy,) = folder.glob(f"meshes/**/{kind}/rod.stl")
+        assert copy.read_bytes() == binary_stl(len(kind))
+        assert getattr(made.links.links["rod"], shapes)[0].mesh == str(copy)
+    assert "their_description" not in (folder / "package.xml").read_text()
+    assert f"./ws --with {folder} test" in told and argument not in told

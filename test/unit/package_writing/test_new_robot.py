@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,7 @@ from support.robots.new_robots import (
     LINK,
     MOTOR,
     PLUGIN,
+    SWING,
     reaches,
     robot,
 )
@@ -159,7 +161,7 @@ def test_it_is_written_beside_the_checkout(root, tmp_path, monkeypatch, capsys):
     told = capsys.readouterr().out
     page = (root / "docs/tutorial_robot.md").read_text()
     commands = re.findall(r"^  (\./ws .*?)(?:    #.*)?$", told, re.MULTILINE)
-    assert len(commands) == 7
+    assert len(commands) == 8
     assert [each for each in commands if each not in page] == [], "those of the tutorial"
 
 
@@ -175,24 +177,54 @@ def test_its_options_are_those_of_trainings(new, algo, tmp_path):
 
 
 @pytest.mark.slow
-def test_its_test_holds_for_a_task_that_takes_the_place_of_reach(new):
-    """Who follows the README's list of what goes together has a package that works."""
-    folder, *_ = new("my_other")
+def test_its_test_holds_for_a_task_that_takes_the_place_of_reach_in_a_clone(new, tmp_path):
+    """Who follows the README's list of what goes together has a package that works, for others, too."""
+    (tmp_path / "parts").mkdir()
+    seen = '<visual><geometry><box size="0.1 0.1 0.4"/></geometry></visual>'
+    (tmp_path / "parts/rod.xacro").write_text(robot(LINK.format("rod", seen)))
+    parts = robot(BARE[0], FIXED, SWING, '<xacro:include filename="parts/../parts/rod.xacro"/>')
+    folder, *_ = new("my_other", parts)
     (folder / "src/my_other/tasks.py").write_text(
         (folder / "src/my_other/tasks.py")
         .read_text()
         .replace("RANGES", "SPANS")
         .replace("Reach", "Hold")
     )
-    named = ("src/my_other/environment.py", "test/test_environment.py", "launch/train.launch")
+    named = (
+        *("src/my_other/environment.py", "launch/train.launch"),
+        *("test/test_environment.py", "test/simulation_node.py"),
+    )
     for place in named:
         text = (folder / place).read_text()
         assert "Reach" in text
         (folder / place).write_text(text.replace("Reach", "Hold"))
         assert place.rpartition("/")[2] in (folder / "README.md").read_text()
+    clone = tmp_path / "clone"
+    for command in (
+        ["init", "-q"], ["add", "."], ["-c", "user.name=a", "-c", "user.email=a@b.c", "commit", "-qm", "all"],
+        ["clone", "-q", folder, clone],
+    ):  # fmt: skip
+        subprocess.run(["git", *command], cwd=folder, check=True)
+    folder.rename(tmp_path / "gone")
+    assert os.access(clone / "test/simulation_node.py", os.X_OK)
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", folder / "test"],
-        cwd=folder, capture_output=True, text=True, check=False,
-        env={**os.environ, "PYTHONPATH": f"{folder}/src:{os.environ.get('PYTHONPATH', '')}"},
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", clone / "test"],
+        cwd=clone, capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": f"{clone}/src:{os.environ.get('PYTHONPATH', '')}",
+             "ROS_PACKAGE_PATH": f"{clone}:{os.environ['ROS_PACKAGE_PATH']}"},
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_reader_that_goes_is_no_fault(root, tmp_path):
+    """As in `new_robot.py my_arm | head -n 0`."""
+    command = [sys.executable, root / "scripts/new_robot.py", "my_arm", "--to", tmp_path]
+    read, write = os.pipe()
+    os.close(read)
+    for environment in ({}, {"PYTHONUNBUFFERED": "1"}):
+        done = subprocess.run(
+            command, stdout=write, stderr=subprocess.PIPE, check=False, env=os.environ | environment
+        )
+        assert done.stderr == b"" and (tmp_path / "my_arm/package.xml").is_file()
+        shutil.rmtree(tmp_path / "my_arm")
+    os.close(write)

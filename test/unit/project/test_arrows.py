@@ -39,7 +39,7 @@ ALLOWED = {
     "file_access": set(),
     "ros_utils": {"ros_calls", "file_access"},
     "robot_envs": {"bullet_gazebo", "file_access", "ros_calls", "ros_utils", "web_viewer"},
-    "lockstep_runner": {"ros_calls"},
+    "lockstep_runner": {"file_access", "ros_calls"},
     "package_writing": {"bullet_gazebo", "file_access", "robot_envs", "ros_calls"},
     "rl_workbench": {"file_access", "web_viewer"},
     "web_viewer": {"file_access"},

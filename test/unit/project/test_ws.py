@@ -97,6 +97,7 @@ def test_interpreter_is_the_workspaces(ws, root, name):
         ("rossrv", "show", "bullet_gazebo_msgs/StepWorld"),
         ("catkin_find", "cartpole", "--share"),
         ("rosrun", "xacro", "xacro", str(URDF)),
+        ("rosrun", "xacro", "xacro.py", str(URDF)),  # as $(find xacro)/xacro.py
     ],
     ids=" ".join,
 )

@@ -176,3 +176,23 @@ def test_all_works_below_a_strange_path(ws, root, tmp_path, tmp_path_factory):
     finally:
         there("clean")
     assert not list(home.rglob("*venv*"))
+
+
+@pytest.mark.slow
+def test_a_checkout_that_was_moved_is_made_ready_again(ws, root, tmp_path):
+    """Virtual environment and CMake's cache hold the old path."""
+    few = [each.name for each in (root / "companions").iterdir() if each.name != "gazebo_ros"]
+    ignored = shutil.ignore_patterns(".*", "__pycache__", "runs", "docs", *few[1:])
+    shutil.copytree(root, tmp_path / "here", ignore=ignored)
+    (tmp_path / "here/docs").mkdir()
+    (tmp_path / "here/requirements/base.txt").write_text("")
+    for place in ("here", "dort drüben"):
+        copy = (tmp_path / "here").rename(tmp_path / place)
+        code = "import ros_utils, sys; print(sys.prefix, ros_utils.__file__, sep='\\n')"
+        built = ws(
+            "bash", "-c", f'rospack find gazebo_ros && python3 -c "{code}"', script=copy / "ws"
+        )
+        assert built.returncode == 0, built.stderr
+        found = [Path(each).resolve() for each in built.stdout.splitlines()]
+        assert len(found) == 3 and all(each.is_relative_to(copy) for each in found)
+    ws("clean", script=copy / "ws")

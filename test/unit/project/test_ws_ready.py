@@ -158,3 +158,43 @@ def test_a_step_that_takes_long_says_how_far_it_is(root, tmp_path):
     assert re.fullmatch(r"ws: \[1/1\] the step: done in \d+ s\n", told[-2])
     assert re.fullmatch(r"ws: ready after \d+ s, go on\n", told[-1])
     assert (tmp_path / ".ws/log/one.log").read_text() == "half way\nthrough\n"
+
+
+def test_what_a_killed_ws_leaves_running_keeps_the_lock(root, tmp_path):
+    """Or pip and catkin_make would work in one folder twice."""
+    os.mkfifo(tmp_path / "go")
+    command = ["bash", "-c", STEPS.format(tools=root / "tools")]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as first:
+        assert any("half way" in line for line in first.stderr)
+        first.kill()
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as second:
+        line = second.stderr.readline()
+        if "waiting for another ws" not in line:
+            second.kill()  # it would wait for the test
+        assert "waiting" in line
+        (tmp_path / "go").write_text("the first one's step\n")
+        assert any(line.startswith("ws: [1/1] the step ...") for line in second.stderr)
+        (tmp_path / "go").write_text("through\n")
+        told = second.stderr.read()
+    assert second.returncode == 0 and "ready after" in told
+
+
+def test_progress_leaves_out_that_pip_cannot_uninstall_what_is_debians(root, tmp_path):
+    os.mkfifo(tmp_path / "go")
+    steps = STEPS.replace("half way", "Collecting\\nCan't uninstall 'numpy'").replace(
+        'echo "Coll', 'echo -e "Coll'
+    )
+    command = ["bash", "-c", steps.format(tools=root / "tools")]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        assert any(line.endswith(" s: Collecting\n") for line in process.stderr)
+        (tmp_path / "go").write_text("through\n")
+        process.stderr.read()
+
+
+@pytest.mark.slow
+def test_what_others_build_against_comes_with_its_size(ws, checkout, debian):
+    (checkout / "requirements/debian.txt").write_text("")
+    (checkout / "requirements/foreign.txt").write_text("one\ntwo\n")
+    told = ws("foreign", "true", script=checkout / "ws", **debian).stderr
+    assert "Debian packages that others build against: 12 packages, 34.5 MB to fetch" in told
+    assert "Debian packages that others build against: done in" in told

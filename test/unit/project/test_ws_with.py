@@ -9,6 +9,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+import psutil
 import pytest
 
 pytestmark = pytest.mark.slow  # what one test has built is there for the next
@@ -27,15 +28,17 @@ DRIVE = """#!/usr/bin/env python3
 from my_messages import msg, tasks
 print(tasks.X, msg.Tip(x=2))
 """
+NEEDY = "needy (it needs nowhere, which isn't installed)"
 FIND = "for p in {}; do rospack find $p; done"
 
 
-def package(folder: Path, name: str, cmake: str = "", *depends: str) -> Path:
+def package(folder: Path, name: str, cmake: str = "", *depends: str, more: str = "") -> Path:
     made = folder / name
     made.mkdir(parents=True)
     lines = [f"<depend>{each}</depend>" for each in depends]
-    (made / "package.xml").write_text(XML.format(name=name, depends="".join(lines)))
+    (made / "package.xml").write_text(XML.format(name=name, depends="".join(lines) + more))
     if cmake:
+        (made / "code.cpp").touch()
         needs = f" COMPONENTS {' '.join(depends)}" if depends else ""
         (made / "CMakeLists.txt").write_text(CMAKE.format(name=name, needs=needs) + cmake)
     return made
@@ -187,28 +190,64 @@ def test_what_cannot_be_used_is_said_and_the_rest_works(ws, tmp_path):
         "broken/package.xml",
         f"two packages are named twice: {tmp_path}/one/twice is used, {tmp_path}/two/twice isn't",
         "the name cartpole is this checkout's",
-        "your package needy isn't built: CMake Error at CMakeLists.txt:4",
-        "your package needier isn't built: it needs needy",
         f"{tmp_path}/robot_envs.py can't be imported",
         f"{tmp_path}/random.py hides Python's own module",
     ):
         (line,) = [each for each in again.stderr.splitlines() if words in each]
         assert line.startswith("ws: ") and line in first.stderr
-    assert "gazebo_ros is for Gazebo itself" in first.stderr
-    assert "Gazebo itself" not in again.stderr
-    assert re.findall("building your package ([a-z]+)", again.stderr) == ["needy"], "once more"
+    for words in (
+        "gazebo_ros is for Gazebo itself",
+        f"not built: {NEEDY}, needier (it needs needy)",
+    ):
+        assert first.stderr.count(words) == 1
+        assert words not in again.stderr
+    assert "building your package" not in again.stderr
 
 
-def test_what_failed_is_built_once_it_can_be(ws, tmp_path):
-    """As after an `apt-get install` of a library that it needs: its own files are as before."""
-    missing = tmp_path / "library"
-    package(tmp_path, "waiting", f"file(READ {missing} text)\ncatkin_package()\n")
+def test_what_failed_is_built_once_it_has_changed(ws, tmp_path):
+    waiting = package(tmp_path, "waiting", "file(READ missing text)\ncatkin_package()\n")
     package(tmp_path, "after", "add_custom_target(y)\n", "waiting")
-    assert "your package waiting isn't built" in ws("--with", str(tmp_path), "true").stderr
-    missing.write_text("here")
+    told = ws("--with", str(tmp_path), "true").stderr.splitlines()
+    assert "building your package waiting" in told[0]
+    assert "not built: waiting (CMake Error" in told[1] and "docs/controllers.md" in told[1]
+    assert len(told) == 2
+    assert ws("--with", str(tmp_path), "true").stderr == "", "told once, and not tried again"
+    (waiting / "missing").touch()
+    (waiting / "code.cpp").write_text("// mended")
     mended = ws("--with", str(tmp_path), "true").stderr
-    assert "waiting: done" in mended and "after: done" in mended and "isn't built" not in mended
+    assert "waiting: done" in mended and "after: done" in mended and "not built" not in mended
     assert ws("--with", str(tmp_path), "true").stderr == ""
+
+
+def test_packages_of_descriptions_are_found_by_cmake_and_not_built(ws, tmp_path):
+    """Their CMakeLists.txt may ask for what isn't installed, such as what their launch files start."""
+    described = package(tmp_path, "some_description", "add_custom_target(x)\n", "no_such_gui")
+    (described / "code.cpp").unlink()
+    uses = "catkin_package(CATKIN_DEPENDS some_description)\nadd_custom_target(x)\n"
+    package(tmp_path, "some_driver", uses, "some_description")
+    told = ws("--with", str(tmp_path), "true").stderr.splitlines()
+    assert len(told) == 2 and "some_driver: done" in told[1]
+    found = ws("--with", str(tmp_path), "rospack", "find", "some_description").stdout
+    assert found == f"{described}\n"
+
+
+def test_packages_for_ros_2_are_used_for_their_files(ws, tmp_path):
+    ament = "<export><build_type{}>ament_cmake</build_type></export>"
+    package(
+        tmp_path, "other_description", "find_package(ament_cmake REQUIRED)\n", more=ament.format("")
+    )
+    package(tmp_path, "gazebo_msgs", more=ament.format(""))
+    both = package(tmp_path, "for_both", "add_custom_target(x)\n")
+    text = XML.format(name="for_both", depends=ament.format(' condition="$ROS_VERSION == 2"'))
+    (both / "package.xml").write_text(text.replace('"2"', '"3"'))
+    find = FIND.format("other_description gazebo_msgs for_both")
+    done = ws("--with", str(tmp_path), "bash", "-c", find)
+    description, msgs, of_both = done.stdout.splitlines()
+    assert description == str(tmp_path / "other_description") and of_both == str(both)
+    assert not msgs.startswith(str(tmp_path))
+    assert "for ROS 2, used for their files (URDF, meshes): other_description\n" in done.stderr
+    assert "gazebo_msgs is for ROS 2; this checkout's is used" in done.stderr
+    assert "for_both: done" in done.stderr
 
 
 def test_what_changes_is_built_anew_and_what_goes_is_gone(ws, tmp_path):
@@ -257,3 +296,42 @@ def test_a_folder_and_a_workspace_that_cannot_be_written(root, workspace):
             pytest.skip("this checkout is closed to others")
         assert (done.returncode, done.stdout) == (0, "1 x: 2\n"), done.stderr
         assert f"{home}/own/.cache/cartpole" in done.stderr
+
+
+def test_what_failed_is_tried_again_with_other_debian_packages(root, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(root)
+    monkeypatch.syspath_prepend("/usr/lib/python3/dist-packages")
+    from tools.user_packages import build, find
+
+    installed, tried = tmp_path / "status", []
+    installed.touch()
+    package(tmp_path / "theirs", "waiting", "add_custom_target(y)\n")
+    found = find.look_through([tmp_path / "theirs"], [], root)
+    monkeypatch.setattr(build, "DEBIAN", installed)
+    monkeypatch.setattr(build.Overlay, "_build", lambda *_: tried.append(1) or "no library")
+    for time in (1, 1, 2):
+        os.utime(installed, (time, time))
+        overlay = build.Overlay(tmp_path / "made", found.folders, build.Tools("", "", ""))
+        assert overlay.make(found) == {"waiting": "no library"}
+    assert len(tried) == 2
+
+
+def test_what_a_killed_ws_builds_on_keeps_the_next_one_waiting(root, tmp_path):
+    os.mkfifo(tmp_path / "go")
+    package(tmp_path, "slow", f"execute_process(COMMAND cat {tmp_path}/go)\nadd_custom_target(x)\n")
+    command = [root / "ws", "--with", tmp_path, "true"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as first:
+        assert "building your package slow" in first.stderr.readline()
+        below = psutil.Process(first.pid).children(recursive=True)
+        for each in below:
+            if "user_packages" in " ".join(each.cmdline()):
+                each.kill()
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as second:
+        line = second.stderr.readline()
+        if "waiting for another ws that builds your packages" not in line:
+            second.kill()  # it would wait for the test
+        assert "waiting" in line
+        (tmp_path / "go").write_text("the first one's cmake\n")
+        assert "building your package slow" in second.stderr.readline()
+        (tmp_path / "go").write_text("its own\n")
+        assert "slow: done" in second.stderr.read()

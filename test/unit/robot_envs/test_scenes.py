@@ -6,9 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gymnasium.spaces import Box
-from support.scenes.rover import ROVER, Push
+from support.robots.fake_plant import FakePlant
+from support.scenes.rover import ROVER, Push, Roll
 from support.scenes.two_arms import LEFT, RIGHT, SKIN, Volley
 
+from cartpole.robot import ROBOT
+from cartpole.tasks import BalanceTask
 from robot_envs import (
     InitialState,
     LinkQuery,
@@ -20,6 +23,59 @@ from robot_envs import (
     StateQuery,
 )
 from robot_envs.testing import differences, rollout
+
+
+class Peeking(Roll):
+    """What it observes isn't there where it is deployed."""
+
+    def observe(self, state):
+        return super().observe(state) * state.links["hull"].pose.position[2]
+
+
+def test_a_coarser_physics_step(make) -> None:
+    rover = replace(ROVER, physics_step=0.004)
+    env, fine = RobotEnv(rover, Roll()), make("rover", Roll())
+    counts = []
+    for each in (env, fine):
+        advance = each.backend._sim.advance
+        each.backend._sim.advance = lambda ticks, advance=advance: (
+            counts.append(ticks),
+            advance(ticks),
+        )
+        each.reset(seed=0)
+        for _ in range(20):
+            each.step(np.ones(2, np.float32))
+    assert counts[-1] == 20 == 4 * counts[0]
+    assert env.state.time == fine.state.time == pytest.approx(0.4)
+    places = [each.state.models["rover"].pose.position for each in (env, fine)]
+    assert places[0] == pytest.approx(places[1], abs=0.02) and places[0] != places[1]
+    env.close()
+    with pytest.raises(ValueError, match="0.02 s is not a multiple of the physics step 0.003 s"):
+        RobotEnv(replace(ROVER, physics_step=0.003), Roll(), "ros-own")
+    with pytest.raises(RobotEnvError, match="physics_step must be a time between 1e-06 and 1"):
+        RobotEnv(replace(ROVER, physics_step=0.0), Roll())
+
+
+def test_what_a_reward_sees_the_policy_does_not(make) -> None:
+    env = make("rover", Roll())
+    env.reset(seed=0)
+    for _ in range(20):
+        _, reward, terminated, _, info = env.step(np.ones(2, np.float32))
+    assert reward > 0.3 and not terminated and info["contacts"] >= 1
+    with pytest.raises(KeyError, match="no link 'hull'; there are: none; the task's query names"):
+        make("rover", Peeking()).reset(seed=0)
+
+
+def test_a_world_of_joints_alone_rewards_nothing_and_says_so() -> None:
+    plant = FakePlant()
+    plant.complete = False
+    task = BalanceTask()
+    task.reward_query = StateQuery(links=(LinkQuery("pole"),))
+    with pytest.warns(UserWarning, match="rewards of BalanceTask are 0, and nothing terminates"):
+        env = RobotEnv(ROBOT, task, plant)
+    env.reset(seed=0)
+    assert env.step(1)[1:3] == (0.0, False)
+
 
 BOX3 = Box(-np.inf, np.inf, (3,), np.float64)
 HIT = np.array(

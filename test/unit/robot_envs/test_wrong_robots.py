@@ -69,7 +69,8 @@ ROBOTS = {
     ),
     "another interface": (
         {"controllers": with_pair(type="effort_controllers/JointGroupEffortController")},
-        "the robot has no hardware_interface::EffortJointInterface",
+        "has hardware_interface::PositionJointInterface, and the controller needs "
+        "hardware_interface::EffortJointInterface: its type and the joint's <transmission> must agree",
     ),
     "a type that doesn't exist": (
         {"controllers": with_pair(type="position_controllers/JointGroupPositionControler")},

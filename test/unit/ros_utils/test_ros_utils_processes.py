@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import psutil
@@ -192,6 +193,9 @@ def test_a_launch_whose_caller_was_killed_is_waited_for(place, monkeypatch, stub
     assert _programs.end_orphans() and _processes.family(entry.token), "its caller lives"
     starter.kill()
     starter.wait(BOUND)
+    younger = python("import signal; signal.pause()")
+    assert replace(entry, caller=younger.pid).is_orphan, "the id went to a younger process"
+    younger.kill()
     assert _programs.end_orphans() and not _processes.family(entry.token)
     assert _programs.started() == []
 

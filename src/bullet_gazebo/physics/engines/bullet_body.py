@@ -5,8 +5,8 @@ from functools import partial
 from itertools import combinations
 from typing import Any
 
-from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription
-from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Body, Contact, Side, Twist
+from bullet_gazebo.physics.description import DescriptionError, Inertia, Link, ModelDescription
+from bullet_gazebo.physics.engine import FASTEST, FURTHEST, OVERLAP, Body, Contact, Side, Twist
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, scale, subtract
 
@@ -14,11 +14,6 @@ BASE = -1
 # PyBullet's defaults for which links collide: bits of a link's group, and of the groups that it meets.
 DYNAMIC, STATIC, EVERYTHING = 1, 2, -1
 NO_STOP = 1e16  # [rad, m]
-
-
-def collides_with_itself(description: ModelDescription) -> bool:
-    """Returns whether any two links of the model could meet."""
-    return any(link.self_collide for link in description.links.values())
 
 
 def contacts(client: int, sides: Mapping[tuple[int, int], Side]) -> list[Contact]:
@@ -42,6 +37,7 @@ class BulletBody(Body):
     """A multi-body of PyBullet, without PyBullet's default motors and damping."""
 
     implicit_damping = False
+    bears_any_motor = False
 
     def __init__(
         self,
@@ -160,26 +156,31 @@ class BulletBody(Body):
                 )
 
     def _choose_self_collisions(self) -> None:
-        """Lets two links of the model meet if either wants it and no joint connects them (SDF's rule).
+        """Lets only those links meet that can and don't overlap now.
 
         With self-collision, PyBullet lets all of them meet but parent and child.
         """
-        description = self._description
-        if not collides_with_itself(description):
+        if not self._description.collides_with_itself:
             return
-        joined = {frozenset((joint.parent, joint.child)) for joint in description.joints.values()}
-        solid = [
-            link
-            for name, link in description.links.items()
-            if name in self._links and link.collisions
-        ]
-        for a, b in combinations(solid, 2):
-            owners = frozenset(link.part_of or link.name for link in (a, b))
-            meet = (a.self_collide or b.self_collide) and len(owners) == 2 and owners not in joined
+        meet = self._description.pairs_that_collide()
+        solid = [link for link in self._description.links.values() if link.collisions]
+        self.overlapping = frozenset(
+            frozenset((a.owner, b.owner)) for a, b in meet if self._overlap(a, b)
+        )
+        names = {(a.name, b.name) for a, b in meet if {a.owner, b.owner} not in self.overlapping}
+        for a, b in combinations((link.name for link in solid if link.name in self._links), 2):
             pybullet.setCollisionFilterPair(
-                self.id, self.id, self._links[a.name], self._links[b.name], int(meet),
+                self.id, self.id, self._links[a], self._links[b], int((a, b) in names),
                 physicsClientId=self._client,
             )  # fmt: skip
+
+    def _overlap(self, a: Link, b: Link) -> bool:
+        """Returns whether two links overlap in the present pose."""
+        found = pybullet.getClosestPoints(
+            self.id, self.id, 0.0, self._links[a.name], self._links[b.name],
+            physicsClientId=self._client,
+        )  # fmt: skip
+        return any(point[8] < -OVERLAP for point in found)
 
     def _keep_moments(self, index: int, inertia: Inertia) -> None:
         """Sets moments that no real body has (a > b + c): PyBullet drops them, ODE doesn't.

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from bullet_gazebo.heap import give_back
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
@@ -15,17 +14,16 @@ from bullet_gazebo.physics.engine_form import at_joints, parents_first
 from bullet_gazebo.physics.engines.bullet_body import (
     BASE,
     BulletBody,
-    collides_with_itself,
     contacts,
     is_plane,
 )
 from bullet_gazebo.physics.engines.bullet_files import write_urdf
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, scale
+from file_access.locks import scratch_folder
 
 MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
 PLANE = 1200  # [bytes] of a file, if it had been loaded from one
-SCRATCH = "bullet_gazebo_"  # begins the names of temporary folders
 MOST_WASTE = 1_000_000  # [bytes] of files that removed bodies were loaded from: 5 MB of memory
 
 
@@ -83,7 +81,7 @@ class BulletClient:
             return self._load_plane(description, pose)
         engine_form, offsets = at_joints(description)
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_MAINTAIN_LINK_ORDER
-        if collides_with_itself(description):
+        if description.collides_with_itself:
             flags |= (
                 pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
             )
@@ -98,8 +96,7 @@ class BulletClient:
     def _load_files(self, model: ModelDescription, pose: Pose, flags: int) -> int:
         """Loads a model in the engine's form by way of files; returns PyBullet's number of the body."""
         try:
-            with TemporaryDirectory(prefix=SCRATCH) as name:
-                folder = Path(name)
+            with scratch_folder() as folder:
                 path = folder / "model.urdf"
                 path.write_text(write_urdf(parents_first(model), folder), encoding="utf-8")
                 size = _size(folder)

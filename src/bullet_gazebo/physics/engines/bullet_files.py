@@ -26,7 +26,7 @@ def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
 
     Args:
         concave: whether to write its triangles instead of its hulls.
-        objects: whether it came from an OBJ file.
+        objects: whether it came from an OBJ file, or is in pieces.
     """
     path = folder / f"{mesh.digest}.{'stl' if concave or not objects else 'obj'}"
     if path.exists():
@@ -97,7 +97,7 @@ def _write_link(robot: Element, link: Link, static: bool, folder: Path) -> None:
         if static and shape.kind == "mesh":
             written.set("concave", "yes")  # moving bodies collide by their convex hulls
         if shape.solid is not None:
-            objects = Path(shape.mesh).suffix.lower() == ".obj"
+            objects = shape.solid.in_pieces or Path(shape.mesh).suffix.lower() == ".obj"
             written_mesh = write_mesh(shape.solid, folder, concave=static, objects=objects)
             shape = replace(shape, mesh=written_mesh)
         _write_shape(written, shape)

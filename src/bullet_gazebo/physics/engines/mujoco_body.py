@@ -8,9 +8,9 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription
-from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Body, Contact, Side, Twist
-from bullet_gazebo.physics.engines.mujoco_model import Elements, priority, wxyz, xyzw
+from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription, Shape
+from bullet_gazebo.physics.engine import FASTEST, FURTHEST, OVERLAP, Body, Contact, Side, Twist
+from bullet_gazebo.physics.engines.mujoco_model import Elements, geoms_of, priority, wxyz, xyzw
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, conjugate, rotate, scale
 
 FREE = 6  # degrees of freedom of a body without joints
@@ -116,6 +116,19 @@ class MujocoState:
         ax, ay, az, vx, vy, vz = speed.tolist()
         return Pose((x, y, z), xyzw(data.xquat[index])), ((vx, vy, vz), (ax, ay, az))
 
+    def overlapping(
+        self, touching: Mapping[int, tuple[str, tuple[str, ...]]]
+    ) -> frozenset[frozenset[str]]:
+        """Returns pairs of links that overlap with all joints at zero, of a model with these geoms."""
+        data = mujoco.MjData(self.model)
+        mujoco.mj_fwdPosition(self.model, data)
+        pairs = [contact.geom.tolist() for contact in data.contact if contact.dist < -OVERLAP]
+        return frozenset(
+            frozenset((touching[a][0], touching[b][0]))
+            for a, b in pairs
+            if a in touching and b in touching
+        )
+
     def contacts(self, sides: Mapping[int, Side]) -> list[Contact]:
         """Returns where bodies touched in the last step, without those that were only near."""
         found, wrench = [], np.empty(6)
@@ -157,6 +170,7 @@ class MujocoBody(Body):
     """The bodies and joints of one model. `bind` finds them again after the world was recompiled."""
 
     implicit_damping = True
+    bears_any_motor = True
 
     def __init__(
         self,
@@ -188,7 +202,7 @@ class MujocoBody(Body):
         self.touching = {}  # links and collisions by MuJoCo's shape: a link's follow one another in order
         for link, index in self._ids.items():
             first = int(model.body_geomadr[index])
-            for place, shape in enumerate(self.description.links[link].collisions):
+            for place, shape in enumerate(self._geoms(link)):
                 self.touching[first + place] = (link, (shape.name,))
         self._indices = [elements.joints[name].id for name in self.joint_names]
         self._q = model.jnt_qposadr[self._indices].tolist()
@@ -262,9 +276,14 @@ class MujocoBody(Body):
     def set_friction(self, link: str, factor: float) -> None:
         self._frictions[link] = factor
         model, first = self._state.model, int(self._state.model.body_geomadr[self._ids[link]])
-        for place, shape in enumerate(self.description.links[link].collisions):
+        for place, shape in enumerate(self._geoms(link)):
             model.geom_friction[first + place, 0] = factor * shape.mu
             model.geom_priority[first + place] = priority(factor * shape.mu)
+
+    def _geoms(self, link: str) -> list[Shape]:
+        """Returns the shape that each geom of a link stands for."""
+        shapes = self.description.links[link].collisions
+        return [shape for shape in shapes for _ in range(geoms_of(shape))]
 
     def set_limits(self, index: int, lower: float, upper: float) -> None:
         joint, model = self._joints[index], self._state.model

@@ -47,6 +47,10 @@ class MujocoEngine(Engine):
         check_bounds(description)
         body = MujocoBody(self._state, description, pose, self._compile)
         self._compile({f"{next(self._keys)}": body})
+        if description.collides_with_itself:
+            body.overlapping = self._state.overlapping(body.touching)
+            if body.overlapping:
+                self._compile()
         return body
 
     def remove(self, body: Body) -> None:
@@ -81,10 +85,11 @@ class MujocoEngine(Engine):
         spec = mujoco.MjSpec()
         spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
         spec.compiler.degree = False
-        written = {
-            key: ModelWriter(spec, key, body.description, body.inertias).write(body.pose)
+        writers = {
+            key: ModelWriter(spec, key, body.description, body.inertias, body.overlapping)
             for key, body in bodies.items()
         }
+        written = {key: writer.write(bodies[key].pose) for key, writer in writers.items()}
         model = compile_spec(spec)
         motions = {key: body.motion() for key, body in self._bodies.items()}
         self._state.replace(model)

@@ -46,6 +46,7 @@ class ModelWriter:
     key: str  # begins names, which are unique in the world
     model: ModelDescription
     inertias: Mapping[str, Inertia | None]  # of links, which replace those of the description
+    overlapping: frozenset[frozenset[str]]  # pairs of links that never meet
     _elements: Elements = field(default_factory=Elements)
 
     def write(self, pose: Pose) -> Elements:
@@ -101,29 +102,32 @@ class ModelWriter:
         )
 
     def _add_shape(self, body: mujoco.MjsBody, shape: Shape) -> None:
-        geom = body.add_geom(
-            type=GEOMS[shape.kind], pos=shape.pose.position, quat=wxyz(shape.pose.orientation),
-            condim=3,
-        )  # fmt: skip
-        geom.friction[0] = shape.mu
-        geom.priority = priority(shape.mu)
-        if shape.kind == "mesh":
-            geom.meshname = self._add_mesh(shape)
-        elif shape.kind == "box":
-            geom.size = [length / 2.0 for length in shape.size]
-        elif shape.kind == "cylinder":
-            geom.size = [shape.size[0], shape.size[1] / 2.0, 0.0]
-        elif shape.kind == "sphere":
-            geom.size = [shape.size[0], 0.0, 0.0]
-        else:
-            geom.size = [0.0, 0.0, 1.0]  # infinite
+        for number in range(geoms_of(shape)):
+            geom = body.add_geom(
+                type=GEOMS[shape.kind], pos=shape.pose.position, quat=wxyz(shape.pose.orientation),
+                condim=3,
+            )  # fmt: skip
+            geom.friction[0] = shape.mu
+            geom.priority = priority(shape.mu)
+            if shape.kind == "mesh":
+                geom.meshname = self._add_mesh(shape, number)
+            elif shape.kind == "box":
+                geom.size = [length / 2.0 for length in shape.size]
+            elif shape.kind == "cylinder":
+                geom.size = [shape.size[0], shape.size[1] / 2.0, 0.0]
+            elif shape.kind == "sphere":
+                geom.size = [shape.size[0], 0.0, 0.0]
+            else:
+                geom.size = [0.0, 0.0, 1.0]  # infinite
 
-    def _add_mesh(self, shape: Shape) -> str:
-        """Adds the points of a mesh, once for each scale; returns their name."""
-        assert shape.solid is not None  # collisions are read
-        name = f"{shape.mesh}:{shape.solid.digest}:{shape.size}"  # MuJoCo's errors show it
+    def _add_mesh(self, shape: Shape, piece: int) -> str:
+        """Adds the points of a mesh or of a piece of it, once for each scale; returns their name."""
+        mesh = shape.solid
+        assert mesh is not None  # collisions are read
+        name = f"{shape.mesh}:{mesh.digest}:{shape.size}:{piece}"  # MuJoCo's errors show it
         if self.spec.mesh(name) is None:
-            points = np.unique(np.concatenate(shape.solid.hulls), axis=0) * np.array(shape.size)
+            hull = mesh.hulls[piece] if mesh.in_pieces else np.concatenate(mesh.hulls)
+            points = np.unique(hull, axis=0) * np.array(shape.size)
             self.spec.add_mesh(
                 name=name, uservert=points.ravel().tolist(),
                 inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
@@ -131,16 +135,17 @@ class ModelWriter:
         return name
 
     def _keep_apart(self) -> None:
-        """Excludes contacts of links unless one wants self-collision and no joint connects them (SDF)."""
-        model = self.model
-        joined = {frozenset((joint.parent, joint.child)) for joint in model.joints.values()}
-        solid = [link for link in model.links.values() if link.collisions]
+        """Excludes contacts of links but those that can meet and didn't overlap at first."""
+        meet = {frozenset((a.name, b.name)) for a, b in self.model.pairs_that_collide()}
+        solid = [name for name, link in self.model.links.items() if link.collisions]
         for a, b in combinations(solid, 2):
-            meet = (a.self_collide or b.self_collide) and frozenset((a.name, b.name)) not in joined
-            if not meet:
-                self.spec.add_exclude(
-                    bodyname1=f"{self.key}:{a.name}", bodyname2=f"{self.key}:{b.name}"
-                )
+            if frozenset((a, b)) not in meet - self.overlapping:
+                self.spec.add_exclude(bodyname1=f"{self.key}:{a}", bodyname2=f"{self.key}:{b}")
+
+
+def geoms_of(shape: Shape) -> int:
+    """Returns how many geoms stand for a shape: one, or one for each of its pieces."""
+    return len(shape.solid.hulls) if shape.solid is not None and shape.solid.in_pieces else 1
 
 
 def principal(inertia: Inertia) -> tuple[Quaternion, Vector]:

@@ -18,9 +18,9 @@ import numpy as np
 
 from bullet_gazebo.physics.description import DescriptionError, Mesh
 from bullet_gazebo.physics.files.elements import numbers, place, shown
-from bullet_gazebo.physics.files.hull import hull_points
+from bullet_gazebo.physics.files.hull import convex_pieces, hull_points
 from bullet_gazebo.physics.files.mesh_looks import axes_of, read_glb, read_parts
-from bullet_gazebo.physics.files.meshes import Submesh
+from bullet_gazebo.physics.files.meshes import Submesh, read_arrays, written
 from file_access.content import FileError, read_file
 from file_access.xml_text import parse
 
@@ -53,20 +53,22 @@ Part = tuple[np.ndarray, np.ndarray]
 
 
 def answer(request: bytes) -> bytes:
-    """Answers a request of `meshes`: the digest, vertices, faces and hulls of a file, or its looks."""
-    what, name, submesh = json.loads(request)
+    """Answers a request of `meshes`: digest, vertices, faces and hulls of a file, its looks, or pieces."""
+    head, _, data = request.partition(b"\n")
+    what, name, submesh = json.loads(head)
     path, stream = Path(name), BytesIO()
     if what == "glb":
         return read_glb(path)
+    arrays: Iterable[np.ndarray]
     if what == "parts":
         arrays = read_parts(path)
+    elif what == "pieces":
+        arrays = convex_pieces(*read_arrays(data))
     else:
         mesh = load(path, Submesh(*submesh) if submesh else None)
         stream.write(mesh.digest.encode())
-        arrays = iter((mesh.vertices, mesh.faces, *mesh.hulls))
-    for array in arrays:
-        np.save(stream, array, allow_pickle=False)
-    return stream.getvalue()
+        arrays = (mesh.vertices, mesh.faces, *mesh.hulls)
+    return stream.getvalue() + written(arrays)
 
 
 def load(path: Path, submesh: Submesh | None = None) -> Mesh:

@@ -1,19 +1,24 @@
-"""Mesh files as checked triangles, and with their colours and textures.
+"""Mesh files as checked triangles, with their colours and textures, and in convex pieces.
 
-A limited child process reads them (`mesh_program`, `mesh_looks`).
+A limited child process reads them (`mesh_program`, `mesh_looks`) and takes them apart (`hull`).
 """
 
 import json
-from dataclasses import dataclass
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from io import BytesIO
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import NamedTuple
 
 import numpy as np
 
 from bullet_gazebo.physics.description import Color, DescriptionError, Mesh
 from bullet_gazebo.physics.files.elements import place
+from bullet_gazebo.physics.files.hull import is_solid
 from file_access.limited import LimitedProcess, Limits, RequestRefused
 
 SUFFIXES = (".stl", ".dae", ".obj")
@@ -21,6 +26,7 @@ PLAIN = (".stl",)  # of files that have no materials
 LIMITS = Limits(processor_time=60, wall_time=120.0, memory=4 << 30, output=1 << 30)
 DIGEST = 32  # characters
 MOST_KEPT = 32  # files with their looks
+PIECES = "v-hacd-1"  # begins the names of kept pieces; another one when others would come out
 
 # It stays for further meshes: starting Python and importing trimesh takes longer than most files.
 _process = LimitedProcess("bullet_gazebo.physics.files.mesh_program:answer", LIMITS)
@@ -64,7 +70,7 @@ class MeshLook:
     @cached_property
     def parts(self) -> list[MeshPart]:
         """The parts for a renderer of triangles; none without materials."""
-        fields = iter(_arrays(BytesIO(self._ask("parts"))))
+        fields = iter(read_arrays(self._ask("parts")))
         return [
             MeshPart(
                 triangles,
@@ -98,8 +104,47 @@ def read_mesh(path: Path, submesh: Submesh | None = None) -> Mesh:
             raise DescriptionError(str(error)) from error
     stream = BytesIO(data)
     digest = stream.read(DIGEST).decode()
-    vertices, faces, *hulls = _arrays(stream)
+    vertices, faces, *hulls = read_arrays(stream.read())
     return Mesh(vertices, faces, tuple(hulls), digest)
+
+
+def in_pieces(mesh: Mesh) -> Mesh:
+    """Returns a mesh with convex pieces as its hulls; unchanged if it is convex.
+
+    Pieces take seconds to compute, so they are kept in a folder, by the mesh's content. A mesh that comes in
+    several objects has its pieces already.
+
+    Raises:
+        DescriptionError: if they can't be computed; one line.
+    """
+    if len(mesh.hulls) > 1:
+        return _of_pieces(mesh, mesh.hulls) if all(map(is_solid, mesh.hulls)) else mesh
+    cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    kept = Path(cache, "bullet_gazebo", "meshes", f"{PIECES}-{mesh.digest}")
+    try:
+        pieces = read_arrays(kept.read_bytes())
+    except (OSError, ValueError, EOFError):
+        data = json.dumps(["pieces", "", None]).encode() + b"\n"
+        try:
+            answer = _process.ask(data + written((mesh.vertices, mesh.faces)))
+        except RequestRefused as error:
+            raise DescriptionError(str(error)) from error
+        _keep(kept, answer)
+        pieces = read_arrays(answer)
+    return _of_pieces(mesh, pieces) if pieces else mesh
+
+
+def _of_pieces(mesh: Mesh, pieces: Iterable[np.ndarray]) -> Mesh:
+    return replace(mesh, hulls=tuple(pieces), digest=f"{mesh.digest}-pieces", in_pieces=True)
+
+
+def _keep(path: Path, data: bytes) -> None:
+    """Writes a file all at once; where that is not possible, none."""
+    with suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with NamedTemporaryFile(dir=path.parent, delete=False) as file:
+            file.write(data)
+        os.replace(file.name, path)
 
 
 def read_look(path: str) -> MeshLook:
@@ -118,10 +163,18 @@ def _look(path: Path, _changed: int, _size: int) -> MeshLook:
     return MeshLook(path, read_mesh(path))
 
 
-def _arrays(stream: BytesIO) -> list[np.ndarray]:
-    """Returns the arrays that the child process has written from here on."""
-    arrays = []
-    while stream.tell() < len(stream.getbuffer()):
+def written(arrays: Iterable[np.ndarray]) -> bytes:
+    """Returns arrays as bytes, one after the other."""
+    stream = BytesIO()
+    for array in arrays:
+        np.save(stream, array, allow_pickle=False)
+    return stream.getvalue()
+
+
+def read_arrays(data: bytes) -> list[np.ndarray]:
+    """Returns the arrays that `written` has written."""
+    stream, arrays = BytesIO(data), []
+    while stream.tell() < len(data):
         arrays.append(np.load(stream, allow_pickle=False))
         arrays[-1].setflags(write=False)
     return arrays

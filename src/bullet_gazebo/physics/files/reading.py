@@ -3,14 +3,19 @@
 import os
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
-from bullet_gazebo.physics.description import DescriptionError, LimitExceeded, Mesh
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    LimitExceeded,
+    Mesh,
+    ModelDescription,
+)
 from bullet_gazebo.physics.files.elements import files_named_by_a_model, place, shown
-from bullet_gazebo.physics.files.meshes import Submesh, check_mesh, read_mesh
+from bullet_gazebo.physics.files.meshes import Submesh, check_mesh, in_pieces, read_mesh
 from file_access.content import MAX_BYTES, FileError, TooLarge, read_file
 from file_access.xml_text import MAX_ELEMENTS, parse
 
@@ -21,6 +26,7 @@ MeshFile = tuple[str, Mesh | None]
 MAX_FILES = 1000  # different ones
 MAX_MESH_BYTES = 400_000_000  # of different mesh files, which take about twice that of memory
 MAX_MODELS = 5000  # in a world, or nested in a model
+MAX_CONCAVE = 100  # different meshes of a model in convex pieces; each takes seconds
 MAX_SECONDS = 60.0  # [s] of computing, however busy the machine is otherwise
 
 
@@ -50,6 +56,9 @@ class Resources:
                     return path
             except (OSError, ValueError) as error:  # a name that is too long, or no permission
                 reason = f"; {getattr(error, 'strerror', None) or error}"
+        scheme, _, rest = uri.strip().partition("://")
+        if scheme in ("model", "package") and not self._in_package(rest):
+            reason += f"; there is no package '{shown(rest.partition('/')[0])}'"
         where = ", ".join(str(path) for path in tried[:5]) or "no folder to look in"
         raise DescriptionError(f"'{uri[:200]}' is not found (looked for: {where[:1000]}{reason})")
 
@@ -137,6 +146,31 @@ class Reading:
                 )
             self._meshes[path, submesh] = read_mesh(path, submesh)
         return self._meshes[path, submesh]
+
+    def split_meshes(self, model: ModelDescription) -> None:
+        """Gives concave meshes convex pieces if any link collides with its own model.
+
+        By their hulls alone, links would meet that don't. What can't be split keeps its hull, with a warning.
+        """
+        if not model.collides_with_itself:
+            return
+        found: dict[Mesh, Mesh] = {}
+        for link in model.links.values():
+            for number, shape in enumerate(link.collisions):
+                if shape.solid is None:
+                    continue
+                self.check()
+                if shape.solid not in found:
+                    found[shape.solid] = shape.solid
+                    try:
+                        if len(found) > MAX_CONCAVE:
+                            raise DescriptionError(f"{MAX_CONCAVE} meshes were split before it")
+                        found[shape.solid] = in_pieces(shape.solid)
+                    except DescriptionError as error:
+                        model.warnings.append(
+                            f"mesh '{shape.mesh}' collides by its convex hull: {error}"
+                        )
+                link.collisions[number] = replace(shape, solid=found[shape.solid])
 
     def model(self) -> None:
         """Counts one more model."""

@@ -46,6 +46,7 @@ from bullet_gazebo.physics.lumping import (
 )
 from bullet_gazebo.physics.pose import Pose
 
+OWN_MODELS = Path(__file__).with_name("models.sdf")
 OVERRIDES = ("pose", "static")
 MODEL_URI = "model://"
 MAX_NESTING = 10
@@ -73,15 +74,16 @@ def open_include(include: Element, context: FileContext) -> tuple[Element, FileC
         return _overridden(entity, include), inner
 
 
-def included_name(include: Element) -> str:
-    """Returns the plain name behind the URI: `sun` of `model://sun`."""
-    uri = (include.findtext("uri") or "").strip()
-    return uri.removeprefix(MODEL_URI).strip("/") if uri.startswith(MODEL_URI) else ""
-
-
 def _open(uri: str, context: FileContext) -> tuple[Element, FileContext]:
     with files_named_by_a_model(f"'{shown(uri)}'"):
-        found = context.resources.find(uri, context.folder)
+        try:
+            found = context.resources.find(uri, context.folder)
+        except DescriptionError:
+            name = uri.removeprefix(MODEL_URI).strip("/") if uri.startswith(MODEL_URI) else ""
+            for element in context.reading.open(OWN_MODELS):
+                if element.get("folder") == name:
+                    return element, replace(context, version=(1, 6), folder=None)
+            raise
         path = _model_file(found, context.reading) if found.is_dir() else found
     root = context.reading.open(path)
     with place(str(path)):
@@ -147,6 +149,7 @@ class _Parts:
     plugins: list[Plugin] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+    stand_ins: list[str] = field(default_factory=list)
 
 
 def parse_sdf(
@@ -200,6 +203,7 @@ def read_model(element: Element, context: FileContext) -> ModelDescription:
             parts.warnings.append("written for a newer SDF than 1.7: what is new in it is ignored")
         model = _assemble(name, parts, static)
         model.initial_pose = read_pose(element, "model")[0]
+        context.reading.split_meshes(model)
         return model
 
 
@@ -219,7 +223,7 @@ def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
     model = ModelDescription(name, links, joints, roots[0], poses[roots[0]])
     model.islands = {root: poses[root].relative_to(poses[roots[0]]) for root in roots[1:]}
     model.plugins, model.warnings, model.left_out = parts.plugins, parts.warnings, parts.left_out
-    model.static = static
+    model.static, model.stand_ins = static, parts.stand_ins
     detach_from_world(model)
     mend_moments(model)
     return model
@@ -231,6 +235,8 @@ def _read_parts(model: Element, context: FileContext, static: bool, depth: int) 
         raise LimitExceeded(f"models are nested more than {MAX_NESTING} deep (MAX_NESTING)")
     context.reading.model()
     parts, frames = _Parts(), Frames()
+    if model.get("folder") and not truth(model.get("exact")):
+        parts.stand_ins.append(model.get("folder", ""))
     nested = list(_nested(model, context, static, depth))
     _name_frames(model, frames)
     for name, element, inner in nested:
@@ -261,6 +267,8 @@ def _nested(
         inner, inner_context, origin = element, context, ""
         if element.tag == "include":
             inner, inner_context = open_include(element, context)
+            if inner.tag == "light":  # no part of a body
+                continue
             origin = f" (<include> of '{shown((element.findtext('uri') or '').strip())}')"
         name = named(inner, "model")
         with elements.place(f"model '{shown(name)}'{origin}"):
@@ -283,6 +291,7 @@ def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
     parts.plugins += inner.plugins
     parts.warnings += inner.warnings
     parts.left_out += inner.left_out
+    parts.stand_ins += inner.stand_ins
 
 
 def _name_frames(model: Element, frames: Frames) -> None:

@@ -374,9 +374,11 @@ def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDe
     apply_extensions(model, robot)
     reading.check()
     try:
-        return lump_fixed_joints(model)
+        lumped = lump_fixed_joints(model)
     except DescriptionError as error:
         if not warnings:
             raise
         # A root without mass is the consequence of an inertial that was left out.
         raise DescriptionError(f"{error}. Before that: {warnings[0]}") from error
+    reading.split_meshes(lumped)
+    return lumped

@@ -17,7 +17,6 @@ from bullet_gazebo.physics.files.reading import Reading, Resources
 from bullet_gazebo.physics.files.sdf import (
     FileContext,
     first_entity,
-    included_name,
     open_include,
     read_model,
     renamed,
@@ -131,11 +130,7 @@ def _add(world: WorldDescription, element: Element, context: FileContext) -> Non
     """Adds one model or light. If it is broken, it alone is left out."""
     try:
         if element.tag == "include":
-            found = included(element, context)
-            if isinstance(found, (Light, ModelDescription)):
-                _keep(world, found)
-                return
-            element, context = found
+            element, context = open_include(element, context)
         _keep(
             world, read_light(element) if element.tag == "light" else read_model(element, context)
         )
@@ -143,29 +138,6 @@ def _add(world: WorldDescription, element: Element, context: FileContext) -> Non
         raise
     except DescriptionError as error:
         world.warnings.append(f"{error}; it is left out")
-
-
-def included(
-    include: Element, context: FileContext
-) -> Light | ModelDescription | tuple[Element, FileContext]:
-    """Returns the model or light of an `<include>`. ground_plane and sun need no file."""
-    try:
-        return open_include(include, context)
-    except LimitExceeded:
-        raise
-    except DescriptionError:
-        name = included_name(include)
-        if name not in ("ground_plane", "sun"):
-            raise
-    entity = ground_plane() if name == "ground_plane" else sun()
-    entity.name = (include.findtext("name") or "").strip() or entity.name
-    if include.find("pose") is not None:
-        pose, _ = read_pose(include, f"<include> of '{entity.name}'")
-        if isinstance(entity, Light):
-            entity.pose = pose
-        else:
-            entity.initial_pose = pose
-    return entity
 
 
 def _keep(world: WorldDescription, entity: Light | ModelDescription) -> None:
@@ -228,10 +200,6 @@ def read_entity(
 def _read_sdf(root: Element, name: str, context: FileContext) -> ModelDescription | Light:
     element = first_entity(root)
     if element.tag == "include":
-        found = included(element, context)
-        if isinstance(found, (Light, ModelDescription)):
-            found.name = name
-            return found
-        element, context = found
+        element, context = open_include(element, context)
     element = renamed(element, name)
     return read_light(element) if element.tag == "light" else read_model(element, context)

@@ -129,6 +129,7 @@ def _run(options: argparse.Namespace, piped: bytes) -> int:
         names, positions = zip(*options.joints, strict=True)
         placed = bool(set_model_configuration_client(options.model, "", names, positions, gazebo))
     if options.unpause:
+        wait_for_service(f"{gazebo}/unpause_physics")
         _call(f"{gazebo}/unpause_physics", Empty)
     if options.bond:
         rospy.loginfo("spawn_model: '%s' stays until this node is shut down", options.model)

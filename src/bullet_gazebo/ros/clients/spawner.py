@@ -23,7 +23,7 @@ from std_msgs.msg import Bool
 from bullet_gazebo.ros.common.node_process import SignalHandler, init_node
 from file_access.content import FileError, read_file
 from file_access.yaml_text import load_parameters
-from ros_calls.service import ServiceClient, ServiceFailed
+from ros_calls.service import ServiceClient, ServiceFailed, ServiceGone
 from ros_calls.waiting import service_comes_up, wait_until
 
 BEST_EFFORT = srv.SwitchControllerRequest.BEST_EFFORT
@@ -242,6 +242,8 @@ class _Spawner:
             rospy.loginfo("Unloading all loaded controllers...")
             for name in reversed(self._loaded):
                 self._unload(name)
+        except ServiceGone:  # roslaunch ends the simulator at the same time
+            rospy.loginfo("The controller manager has ended, and its controllers with it")
         except ServiceFailed as fault:
             rospy.logwarn("Controller Spawner error while taking down controllers: %s", fault)
 

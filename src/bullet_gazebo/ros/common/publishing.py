@@ -27,7 +27,7 @@ QUEUE = 10  # messages of /clock and the states
 
 
 class SubscriberCount(rospy.SubscribeListener):
-    """Counts a topic's subscribers, so that none is made in vain."""
+    """Counts a topic's subscribers, so that no message is built that no one receives."""
 
     def __init__(self, changed: Callable[[], None] = lambda: None) -> None:
         """Calls `changed` after each change, from a thread of rospy's."""

@@ -123,7 +123,7 @@ class TrajectoryAction:
     def note(self, handle: ServerGoalHandle, news: TrajectorySample | GoalOutcome) -> None:
         """Keeps a goal's feedback or result, to be published soon; new feedback replaces older one."""
         with self._news:
-            # A result is a goal's last news. Without this, feedback that nobody delivers would pile up.
+            # A result is a goal's last news. Without this, undelivered feedback would pile up.
             if self._kept and self._kept[-1][0] is handle and isinstance(news, TrajectorySample):
                 self._kept.pop()
             self._kept.append((handle, news))

@@ -18,6 +18,7 @@ from bullet_gazebo.physics.engine import Engine
 from bullet_gazebo.physics.engines import BULLET, ENGINES, EngineError, make_engine
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.pictures.recording import RecordingError, RecordingOptions, SimulationRecorder
+from bullet_gazebo.ros.clients.gz import METHOD
 from bullet_gazebo.ros.common.node_process import (
     SignalHandler,
     end_within,
@@ -34,7 +35,7 @@ from bullet_gazebo.ros.common.rospy_connections import (
     bound_messages,
     hang_up_on_nonsense,
 )
-from bullet_gazebo.ros.common.rospy_internals import free_polls_at_once
+from bullet_gazebo.ros.common.rospy_internals import answer_xmlrpc, free_polls_at_once
 from bullet_gazebo.ros.node.master_watch import MasterWatch, NameLoss, NodeNameTaken, refuse_twin
 from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
@@ -136,7 +137,8 @@ class GazeboNode:
 
     def _advertise(self, network: bool) -> None:
         scene = SceneOffer(self.sim)
-        WorldControl(self.sim, self._watchdog, scene.show if network else None)
+        control = WorldControl(self.sim, self._watchdog, scene.show if network else None)
+        answer_xmlrpc(METHOD, control.answer)
         free_polls_at_once()
         bound_messages()
         bound_calls()
@@ -156,11 +158,13 @@ class GazeboNode:
                 StepService(self.sim, self._watchdog, one_at_a_time),
                 AdvanceService(self.sim, self._watchdog, thinner, one_at_a_time),
             ]
-        self._services = [
-            *stepping,
-            SpawnServices(self.sim, plugins),
-            *advertise_world_services(self.sim),
-        ]
+        spawning = threading.Lock()
+        with spawning:  # once a model is there, clients use all other services without a wait
+            self._services = [
+                *stepping,
+                SpawnServices(self.sim, plugins, spawning),
+                *advertise_world_services(self.sim),
+            ]
 
     def run(self, signals: SignalHandler) -> int:
         """Simulates until the node is shut down; returns the exit code."""

@@ -130,7 +130,7 @@ class MasterWatch:
             return
         self._taken = known
         rospy.logwarn(
-            "The master at %s was restarted, and another node (at %s) has the name %s there: nobody finds "
-            "this simulator (at %s). End one of the two",
+            "The master at %s was restarted, and another node (at %s) has the name %s there: clients don't "
+            "find this simulator (at %s). End one of the two",
             master.uri(), known, rospy.get_name(), self._address,
         )  # fmt: skip

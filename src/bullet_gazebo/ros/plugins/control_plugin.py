@@ -21,6 +21,7 @@ from bullet_gazebo.ros.control.controller_topics import PidTopics
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 
 POLL = 0.1  # [s]
+SIM_TYPE = "gazebo_ros_control/DefaultRobotHWSim"
 REMIND = 10.0  # [s]
 
 
@@ -72,7 +73,7 @@ class ControlPlugin:
                     self._started.close()
                     known = isinstance(error, ControlError)
                     rospy.logfatal(
-                        "gazebo_ros_control of model '%s' can't start: %s",
+                        "gazebo_ros_control of model '%s' can't start, so this robot has no control here: %s",
                         self._context.model.name,
                         error if known else "".join(traceback.format_exception(error)),
                     )
@@ -82,6 +83,12 @@ class ControlPlugin:
         if not rosgraph.names.is_legal_name(self._namespace):
             raise ControlError(f"'{self._namespace}' is not a legal namespace")
         limits = rospy.get_param(rospy.names.ns_join(self._namespace, "joint_limits"), {})
+        kind = self._context.text("robotSimType", SIM_TYPE)
+        if kind != SIM_TYPE:
+            rospy.logwarn(
+                "Model '%s': the <robotSimType> %s is not simulated: its joints are moved by %s",
+                self._context.model.name, kind, SIM_TYPE,
+            )  # fmt: skip
         description = read_description(text).limited_by(limits)
         for warning in description.warnings:
             rospy.logwarn("gazebo_ros_control: %s", warning)

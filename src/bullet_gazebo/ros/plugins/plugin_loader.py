@@ -7,6 +7,7 @@ called, SystemExit and KeyboardInterrupt included: a Ctrl-C raises nothing in th
 
 import importlib
 import os
+import re
 import traceback
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -27,6 +28,7 @@ BUILT_IN = {
     CONTROL_PLUGIN: "bullet_gazebo.ros.plugins.control_plugin:ControlPlugin",
     "libgazebo_ros_joint_state_publisher.so": "bullet_gazebo.ros.plugins.joint_state_plugin:JointStatePlugin",
 }  # fmt: skip
+CONTROL = re.compile("control|drive|steer|planar_move|hw_sim", re.IGNORECASE)  # foreign libraries
 PARAMETER = "~plugins"  # the same table for users' plugins
 PATIENCE = 10.0  # [s of wall time]
 Update = Callable[[int], None]
@@ -106,7 +108,7 @@ class PluginRegistry:
         """Holds time while a model comes and its plugins start: as in Gazebo, it has its drives before its
         first step.
 
-        If a plugin waits for time to pass, time goes on after PATIENCE.
+        If a plugin waits for time to pass, the hold ends after PATIENCE.
         """
         return self._sim.holds.hold(PATIENCE, partial(_warn_late, models))
 
@@ -145,9 +147,7 @@ class PluginRegistry:
             return self._built_in[library]
         place = places.get(library)
         if place is None:
-            # The spawn services log it together with the sensors.
-            unknown = f"plugin {plugin.filename or 'without a filename'}"
-            model.description.left_out.append(unknown)
+            _leave_out(plugin.filename or "without a filename", model)
             return None
         try:
             return _import(place)
@@ -159,14 +159,27 @@ class PluginRegistry:
             return None
 
 
+def _leave_out(name: str, model: Model) -> None:
+    libraries = {os.path.basename(each.filename) for each in model.description.plugins}
+    if CONTROL.search(name) and CONTROL_PLUGIN not in libraries:
+        rospy.logwarn(
+            "Model '%s': the plugin %s is not simulated: this robot has no control here (docs/plugins.md)",
+            model.name, name,
+        )  # fmt: skip
+    else:  # the spawn services log it together with the sensors
+        model.description.left_out.append(f"plugin {name}")
+
+
 def _warn_late(models: str) -> None:
     rospy.logwarn(
-        "The plugins of %s have been loading for %g s; time goes on without them", models, PATIENCE
+        "The plugins of %s have been loading for %g s; time passes without them from now on",
+        models,
+        PATIENCE,
     )
 
 
 def _registered() -> dict[str, object]:
-    """Reads users' plugins, for each model anew, so that one can be added while the simulator runs."""
+    """Reads users' plugins, again for each model, so that one can be added while the simulator runs."""
     try:
         places = rospy.get_param(PARAMETER, {})
     except OSError as error:  # the master; the model is in the world already

@@ -13,7 +13,7 @@ class ServiceRefused(Exception):
     """A request can't be carried out, and nothing has changed; the text says why."""
 
 
-def offer(name: str, kind: type, act: Callable[[Any], str | genpy.Message]) -> rospy.Service:
+def offer(name: str, kind: Any, act: Callable[[Any], str | genpy.Message]) -> rospy.Service:
     """Offers a service whose answer has `success` and `status_message`.
 
     Args:
@@ -22,16 +22,15 @@ def offer(name: str, kind: type, act: Callable[[Any], str | genpy.Message]) -> r
         act: carries out a request and returns the answer, or the text of one that has only that; or raises
             ServiceRefused.
     """
-    answer: Any = kind
 
     def handle(request: genpy.Message) -> genpy.Message:
         try:
             done = act(request)
         except ServiceRefused as refusal:
             text = f"{kind.__name__}: {refusal}"
-            return answer._response_class(success=False, status_message=text)
+            return kind._response_class(success=False, status_message=text)
         if isinstance(done, str):
-            return answer._response_class(success=True, status_message=done)
+            return kind._response_class(success=True, status_message=done)
         return done
 
     return rospy.Service(name, kind, handle)

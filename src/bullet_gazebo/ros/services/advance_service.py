@@ -21,10 +21,9 @@ from bullet_gazebo.ros.common.rospy_internals import (
     on_topics_changed,
     publish_without_yielding,
 )
-from bullet_gazebo.ros.services.step_requests import MAX_TICKS
+from bullet_gazebo.ros.services.step_requests import MAX_TICKS, SLICE
 from bullet_gazebo.simulator import Simulator
 
-SLICE = 500  # ticks between which other services get their turn
 CONNECTING = 2.0  # [s of wall time] for a node to connect to its topics
 LOOK = 0.002  # [s]
 MOST_BYTES = 256 * 2**20  # [bytes] for one node; beyond it the node listens and never asks

@@ -8,6 +8,7 @@ import functools
 import os
 import re
 import threading
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -53,21 +54,27 @@ HOME_MODELS = "~/.gazebo/models"
 class SpawnServices:
     """Services that bring models and lights into the world, and take models out."""
 
-    def __init__(self, sim: Simulator, plugins: PluginRegistry) -> None:
+    def __init__(
+        self, sim: Simulator, plugins: PluginRegistry, one_at_a_time: threading.Lock
+    ) -> None:
+        """While someone else holds `one_at_a_time`, requests wait."""
         self._sim = sim
         self._plugins = plugins
         # Spawning and deleting take several steps, with plugins between them: one at a time, as Gazebo
         # serialises all its services (docs/contract/gazebo.md 1.1).
-        self._one_at_a_time = threading.Lock()
+        self._one_at_a_time = one_at_a_time
         self._services = [
             rospy.Service("~spawn_urdf_model", srv.SpawnModel, self._spawn_urdf),
-            rospy.Service("~spawn_sdf_model", srv.SpawnModel, self._spawn),
+            rospy.Service("~spawn_sdf_model", srv.SpawnModel, self._spawn_sdf),
             offer("~delete_model", srv.DeleteModel, self._delete),
         ]
 
+    def _spawn_sdf(self, request: srv.SpawnModelRequest) -> srv.SpawnModelResponse:
+        return self._spawn(request, request.model_xml)
+
     def _spawn_urdf(self, request: srv.SpawnModelRequest) -> srv.SpawnModelResponse:
         if len(request.model_xml) > MAX_BYTES:
-            return self._spawn(request)  # refuses it before anything parses it
+            return self._spawn_sdf(request)  # refuses it before anything parses it
         text = without_comments(request.model_xml)
         root = ROOT_TAG.search(text)
         if root is None or root.group(1) != "robot":
@@ -75,14 +82,12 @@ class SpawnServices:
             raise _refused(f"entity format is invalid: {found} instead of a URDF's <robot>.")
         return self._spawn(request, _with_package_paths(text))
 
-    def _spawn(self, request: srv.SpawnModelRequest, text: str = "") -> srv.SpawnModelResponse:
+    def _spawn(self, request: srv.SpawnModelRequest, text: str) -> srv.SpawnModelResponse:
         try:
             self._checked_pose(request)  # before anything takes time
             # Reading may take long; others spawn meanwhile.
             reading = Reading(cancelled=rospy.is_shutdown)
-            entity = read_entity(
-                text or request.model_xml, request.model_name, resources(), reading
-            )
+            entity = read_entity(text, request.model_name, resources(), reading)
             own = entity.pose if isinstance(entity, Light) else entity.initial_pose
             with self._one_at_a_time:
                 self._add(request, entity, self._checked_pose(request).compose(own))
@@ -196,16 +201,28 @@ def load_plugins(sim: Simulator, plugins: PluginRegistry) -> None:
 
 def _log(what: str, found: WorldDescription | ModelDescription) -> None:
     """Logs a file's warnings, and what was left out of the world."""
-    for warning in _at_most(found.warnings):
+    for warning in _listed(found.warnings):
         rospy.logwarn("%s: %s", what, warning)
+    for name in found.stand_ins if isinstance(found, ModelDescription) else ():
+        _tell_stand_in(name)
     if found.left_out:
-        text = ", ".join(_at_most(found.left_out))
+        text = ", ".join(_listed(found.left_out))
         rospy.logwarn("%s: not simulated here, so left out: %s", what, text)
 
 
-def _at_most(texts: list[str]) -> list[str]:
-    rest = len(texts) - MOST_WARNINGS
-    return texts if rest <= 0 else [*texts[:MOST_WARNINGS], f"and {rest} more of the kind"]
+@functools.cache
+def _tell_stand_in(name: str) -> None:
+    rospy.logwarn(
+        "model://%s is not installed: a simple shape of its size and mass stands in for it", name
+    )
+
+
+def _listed(texts: list[str]) -> list[str]:
+    """Returns each text once, with how often it is there, and at most MOST_WARNINGS of them."""
+    counts = Counter(texts)
+    once = [text if count == 1 else f"{text} ({count} times)" for text, count in counts.items()]
+    rest = len(once) - MOST_WARNINGS
+    return once if rest <= 0 else [*once[:MOST_WARNINGS], f"and {rest} more of the kind"]
 
 
 def without_comments(text: str) -> str:

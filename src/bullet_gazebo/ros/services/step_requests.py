@@ -29,6 +29,7 @@ from bullet_gazebo.state import NOTHING, LinkQuery, StateQuery, find_model
 from file_access.text import did_you_mean
 
 MAX_TICKS = 1_000_000  # more than this is a mistake and would take minutes
+SLICE = 500  # ticks between which other services get their turn
 Placing = tuple[dict[str, float], dict[str, float]]
 """Positions [rad, m] and velocities [rad/s, m/s] of joints by plain name."""
 Actuated = tuple[ControlledRobot, JointHandle]
@@ -74,11 +75,16 @@ class Addresses:
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self.version = sim.version
-        each = [(robot, joint) for robot in sim.robots for joint in robot.hardware.joints.values()]
+        self._pairs: list[Actuated] = [
+            (robot, joint) for robot in sim.robots for joint in robot.hardware.joints.values()
+        ]
         scoped = len(sim.robots) > 1
-        self.joints = [joint for _, joint in each]
+        self.joints = [joint for _, joint in self._pairs]
         """All joints with a transmission, in the order of answers."""
-        self.joint_names = [f"{r.model.name}::{j.name}" if scoped else j.name for r, j in each]
+        self.joint_names = [
+            f"{robot.model.name}::{joint.name}" if scoped else joint.name
+            for robot, joint in self._pairs
+        ]
 
     def commanded(self, controllers: Sequence[str], joints: Sequence[str]) -> Commanded:
         """Finds the running controllers and the free joints of these names.
@@ -129,8 +135,7 @@ class Addresses:
     def _actuated(self) -> dict[str, list[Actuated]]:
         return _by_name(
             (joint.name, f"{robot.model.name}::{joint.name}", (robot, joint))
-            for robot in self._sim.robots
-            for joint in robot.hardware.joints.values()
+            for robot, joint in self._pairs
         )
 
     @cached_property

@@ -8,7 +8,7 @@
 
 import secrets
 import threading
-from collections.abc import Callable
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 
 import rospy
@@ -39,11 +39,17 @@ from bullet_gazebo.ros.common.messages import (
 )
 from bullet_gazebo.ros.common.node_process import seed_random_numbers
 from bullet_gazebo.ros.services import ServiceRefused, offer
-from bullet_gazebo.ros.services.step_requests import MAX_TICKS, Addresses, StepPlan, query_of
+from bullet_gazebo.ros.services.step_requests import (
+    MAX_TICKS,
+    SLICE,
+    Addresses,
+    Commanded,
+    StepPlan,
+    query_of,
+)
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import NOTHING, StateReader, UnknownName
 
-SLICE = 500  # ticks between which other services get their turn
 MOST_HANDLES = 256  # a client whose handle was dropped prepares its step again
 
 
@@ -142,13 +148,12 @@ class StepService:
             if prepared is None or not prepared.commanded.is_ready:
                 return PreparedStepResponse(False, True, sim.now, "PreparedStep: stale", [], [])
             commanded = prepared.commanded
-            of_joints = request.commands[commanded.size :]
             try:
                 prepared.check(request)
                 commanded.send(list(request.commands[: commanded.size]))
             except ControlError as error:
                 return self._refused(str(error))
-            self._advance(request.ticks, (lambda: commanded.hold(of_joints)) if of_joints else None)
+            self._advance(request.ticks, commanded, request.commands[commanded.size :])
             try:
                 if request.ticks > SLICE:
                     self._check_layout(prepared)
@@ -180,10 +185,7 @@ class StepService:
                 self._begin(request, plan)  # from here on only a user's controller can fail
             except (ControlError, UnknownName) as error:
                 return self._answer(status_message=f"StepWorld: {error}")
-            hold = None
-            if request.commanded_joints:
-                hold = lambda: plan.commanded.hold(request.joint_commands)  # noqa: E731
-            self._advance(request.ticks, hold)
+            self._advance(request.ticks, plan.commanded, request.joint_commands)
             try:
                 state = self._reader.read(self._knows_contacts)
             except UnknownName as error:
@@ -221,21 +223,21 @@ class StepService:
         plan.commanded.send(list(request.commands))
         plan.commanded.hold(request.joint_commands)
 
-    def _advance(self, ticks: int, hold: Callable[[], None] | None) -> None:
-        """Lets time pass; `hold` commands joints, before each tick."""
+    def _advance(self, ticks: int, commanded: Commanded, of_joints: Sequence[float]) -> None:
+        """Lets time pass; the joints are commanded before each tick."""
         if not ticks:
             return
         with self._watchdog:
             while ticks > SLICE:
-                self._pass(SLICE, hold)
+                self._pass(SLICE, commanded, of_joints)
                 ticks -= SLICE
                 self._sim.lock.yield_turn()
                 self._sim.await_holds()
-            self._pass(ticks, hold)
+            self._pass(ticks, commanded, of_joints)
         self._knows_contacts = True
 
-    def _pass(self, ticks: int, hold: Callable[[], None] | None) -> None:
-        if hold is None:
+    def _pass(self, ticks: int, commanded: Commanded, of_joints: Sequence[float]) -> None:
+        if not of_joints:
             self._sim.advance(ticks)
             return
         left = ticks
@@ -244,10 +246,10 @@ class StepService:
             nonlocal left
             left -= 1
             if left:  # not after the last tick: what limits have left of a command stays
-                hold()
+                commanded.hold(of_joints)
             return False
 
-        hold()
+        commanded.hold(of_joints)
         self._sim.advance(ticks, hold_on)
 
     def _answer(self, **fields: object) -> StepWorldResponse:

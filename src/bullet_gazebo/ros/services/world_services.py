@@ -16,10 +16,9 @@ from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from bullet_gazebo.physics.world import SolverSettings
-from bullet_gazebo.ros.clients.gz import CHUNK, METHOD
+from bullet_gazebo.ros.clients.gz import CHUNK
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import bad_number, from_pose_msg, to_vector
-from bullet_gazebo.ros.common.rospy_internals import answer_xmlrpc
 from bullet_gazebo.ros.services import ServiceRefused, check_message, offer
 from bullet_gazebo.ros.services.joint_services import ForceServices, JointServices
 from bullet_gazebo.ros.services.model_services import LinkServices, ModelServices
@@ -267,7 +266,6 @@ class WorldControl:
         }
         if show is not None:
             self._commands["show"] = show
-        answer_xmlrpc(METHOD, self.answer)
 
     def answer(self, *arguments: object) -> Answer:
         """Runs a command; returns code (1 is success), text, ticks done.

@@ -7,8 +7,15 @@ import torch
 from gymnasium import spaces
 from torch import nn
 
-from rl_workbench.agents.greedy import Choice, ClippedAction, Continuous, SingleChoice
+from rl_workbench.agents.greedy import (
+    ClippedAction,
+    Continuous,
+    SeveralChoices,
+    SingleChoice,
+    Switches,
+)
 from rl_workbench.training.algorithm import Policy
+from rl_workbench.training.environments import is_image
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.sb3.hyperparameters import ON_POLICY
 from rl_workbench.training.sb3.models import make_acting_model
@@ -28,6 +35,11 @@ def load_policy(
     def act(observation: Any) -> Any:
         return model.policy.predict(observation, deterministic=True)[0]
 
+    own, space = options.hyperparameters, env.observation_space
+    parts = space.values() if isinstance(space, spaces.Dict) else [space]
+    others = ":" in own.policy or any("extractor" in name for name in own.policy_kwargs)
+    if others or any(map(is_image, parts)):
+        return Policy(act, None)
     return Policy(act, greedy_network(model, options.kind.name))
 
 
@@ -46,7 +58,7 @@ def greedy_network(model: Any, algorithm: str) -> nn.Module:
         if isinstance(actions, spaces.Box):
             return ClippedAction(outputs, actions.low, actions.high)
         if isinstance(actions, spaces.MultiDiscrete):
-            return SeveralChoices(outputs, actions)
+            return SeveralChoices(outputs, actions.nvec.tolist())
         is_binary = isinstance(actions, spaces.MultiBinary)
         return Switches(outputs) if is_binary else SingleChoice(outputs)
     if algorithm == "sac":  # its actor gives the mean before it is squashed
@@ -54,25 +66,6 @@ def greedy_network(model: Any, algorithm: str) -> nn.Module:
     else:
         actor = policy.actor.mu
     return ScaledAction(actor, actions.low, actions.high)
-
-
-class SeveralChoices(Choice):
-    """One action of each group of scores, (N, groups)."""
-
-    def __init__(self, scores: nn.Module, actions: spaces.MultiDiscrete) -> None:
-        super().__init__(scores)
-        self.sizes: list[int] = actions.nvec.tolist()
-
-    def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        groups = self.scores(observations).split(self.sizes, dim=1)
-        return torch.stack([group.argmax(dim=1) for group in groups], dim=1)
-
-
-class Switches(Choice):
-    """Whether each score is positive: 0 or 1, (N, A)."""
-
-    def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        return (self.scores(observations) > 0.0).long()
 
 
 class ScaledAction(Continuous):

@@ -17,6 +17,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import check_optimizer
 from rl_workbench.storage import write_atomically
 from rl_workbench.training.algorithm import Algorithm, Say
+from rl_workbench.training.checked import CURVES
 from rl_workbench.training.checkpoints import fitting
 from rl_workbench.training.environments import succeeded
 from rl_workbench.training.options import TrainingOptions
@@ -250,7 +251,8 @@ class FrameCallback(BaseCallback):
             total_reward, length = float(info["episode"]["r"]), int(info["episode"]["l"])
             _check_finite(f"the return of episode {self._episodes}", total_reward)
             success = succeeded(info)
-            self._frame.episode_done(total_reward, length, {}, success=success, step=step)
+            curves = info.get(CURVES, {})
+            self._frame.episode_done(total_reward, length, curves, success=success, step=step)
         self._ended = []
 
     def _on_training_end(self) -> None:

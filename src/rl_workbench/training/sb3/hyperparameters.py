@@ -25,6 +25,13 @@ class SB3Options:
         "constant", "linear: falls to 0 over total_timesteps", choices=("constant", "linear")
     )
     gamma: float = option(0.99, "discount factor", 0, 1)
+    policy: str = option(
+        "", "MlpPolicy, CnnPolicy or MultiInputPolicy, or one of your own as module:Class; by default what "
+        "the observations need",
+    )  # fmt: skip
+    policy_kwargs: dict[str, Any] = option(
+        {}, "arguments of the policy, KEY=VALUE with commas; classes as module:Class"
+    )
     net_arch: Any = option(None, "units of the hidden layers, as in 64,64")
     log_std_init: float | None = option(None, "initial log of the policy's standard deviation")
 
@@ -37,7 +44,8 @@ class SB3Options:
     @property
     def own(self) -> dict[str, Any]:
         """The arguments of the algorithm's class and of its network."""
-        ours = {"lr_schedule", "her", "n_sampled_goal", "goal_selection_strategy"}
+        ours = {"policy", "policy_kwargs", "lr_schedule", "her", "n_sampled_goal",
+                "goal_selection_strategy"}  # fmt: skip
         return {
             each.name: getattr(self, each.name) for each in fields(self) if each.name not in ours
         }

@@ -19,8 +19,9 @@ from stable_baselines3.common.type_aliases import RolloutReturn
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.option import imported
 from rl_workbench.training.checked import BEGIN_STEP, COMPUTE_REWARD, CheckedEnvironment
-from rl_workbench.training.environments import has_goal
+from rl_workbench.training.environments import has_goal, is_image
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.repeatable import RepeatableEnvironment
 from rl_workbench.training.sb3.hyperparameters import ON_POLICY
@@ -129,6 +130,10 @@ def _model_in(
     network = {name: value for name, value in network.items() if value is not None}
     if "net_arch" in network:
         network["net_arch"] = _layers(network["net_arch"])
+    network |= {
+        name: _named(value, f"--policy-kwargs {name}=")
+        for name, value in options.hyperparameters.policy_kwargs.items()
+    }
     if options.hyperparameters.lr_schedule == "linear":
         arguments["learning_rate"] = linear(arguments["learning_rate"])
     if arguments.get("action_noise") is not None:
@@ -137,11 +142,11 @@ def _model_in(
         arguments["action_noise"] = NormalActionNoise(np.zeros(shape), deviation)
     if isinstance(arguments.get("train_freq"), list):  # a number and a unit
         arguments["train_freq"] = tuple(arguments["train_freq"])
-    sees_dict = isinstance(vector.observation_space, spaces.Dict)
+    policy = options.hyperparameters.policy or _policy_for(vector.observation_space)
     try:
         torch.empty(0, device=run.device)  # where there is none, the model would take the CPU
         model = made_class(
-            "MultiInputPolicy" if sees_dict else "MlpPolicy", vector, seed=run.seed,
+            _named(policy, "--policy"), vector, seed=run.seed,
             device=run.device, policy_kwargs=network or None, **arguments,
         )  # fmt: skip
     except WorkbenchError:
@@ -151,6 +156,22 @@ def _model_in(
         raise WorkbenchError(f"{options.kind.name} can't be made: {text}") from error
     model.set_logger(Logger(None, []))  # it keeps what the model records
     return model
+
+
+def _named(value: Any, flag: str) -> Any:
+    """Returns the class that a text names as module:Class; other values as they are."""
+    if not isinstance(value, str) or ":" not in value:
+        return value
+    found = imported(value, flag)  # a foreign record mustn't have anything else called
+    if not (isinstance(found, type) and issubclass(found, torch.nn.Module | torch.optim.Optimizer)):
+        raise WorkbenchError(f"{flag} {value}: it is neither a torch Module nor an Optimizer")
+    return found
+
+
+def _policy_for(space: gymnasium.Space[Any]) -> str:
+    if isinstance(space, spaces.Dict):
+        return "MultiInputPolicy"
+    return "CnnPolicy" if is_image(space) else "MlpPolicy"
 
 
 def _hindsight(options: TrainingOptions, env: CheckedEnvironment) -> dict[str, Any]:

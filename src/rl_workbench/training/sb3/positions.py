@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+from stable_baselines3.common.preprocessing import maybe_transpose
 
 from rl_workbench.states import (
     generator_state,
@@ -120,9 +121,9 @@ class Positions:
         model._last_obs = _apply(np.copy, model._last_obs)
         if isinstance(begun, dict):
             for name, part in model._last_obs.items():
-                part[index] = begun[name]
+                part[index] = maybe_transpose(begun[name], model.observation_space[name])
         else:
-            model._last_obs[index] = begun
+            model._last_obs[index] = maybe_transpose(begun, model.observation_space)
         model._last_episode_starts = model._last_episode_starts.copy()
         model._last_episode_starts[index] = True
         _cut_off(getattr(model, "replay_buffer", None), index)

@@ -9,8 +9,8 @@ from typing import Any
 import rospy
 from controller_manager_msgs.srv import ListControllers
 
-from robot_envs.backends.ros import gazebo, node
-from robot_envs.backends.ros.gazebo import WORLD_SERVICE, SimulatorService, Undo
+from robot_envs.backends.ros import node, running
+from robot_envs.backends.ros.running import WORLD_SERVICE, SimulatorService, Undo
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
@@ -65,7 +65,7 @@ def ready(scene: Scene) -> Ready:
 
 
 def _bring_model(robot: Robot, say: Say) -> list[Undo]:
-    if robot.model in gazebo.models():
+    if robot.model in running.models():
         return []
     say(f"spawning the robot '{robot.model}'")
     # Set before the robot is spawned, whose drives read them; as text, since a package of the user's may have
@@ -73,7 +73,7 @@ def _bring_model(robot: Robot, say: Say) -> list[Undo]:
     for name, value in robot.parameters.items():
         _set_parameter(full_name(robot, name), value)
     _set_parameter(full_name(robot, robot.description), robot.xml)
-    return [gazebo.spawn(robot.model, robot.xml, robot.pose, f"/{robot.namespace.strip('/')}")]
+    return [running.spawn(robot.model, robot.xml, robot.pose, f"/{robot.namespace.strip('/')}")]
 
 
 def _bring_controllers(robot: Robot, say: Say) -> list[Undo]:
@@ -136,7 +136,7 @@ def spawn_command(robot: Robot, argv: list[str]) -> int:
     try:
         name = node.full_name(argv, "spawn_robot")
         rospy.init_node(os.path.basename(name), argv=["", *argv], disable_signals=True)
-        if not wait_until(gazebo.simulator_answers, SIMULATOR_TIMEOUT, "a simulator"):
+        if not wait_until(running.simulator_answers, SIMULATOR_TIMEOUT, "a simulator"):
             raise RobotEnvError(
                 f"no simulator offered {WORLD_SERVICE} within {SIMULATOR_TIMEOUT:g} s; "
                 "start one with roslaunch gazebo_ros empty_world.launch"

@@ -6,20 +6,21 @@ from typing import Any
 
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from gazebo_msgs.msg import ContactState
-from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
+from geometry_msgs.msg import Point, Quaternion, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
+from geometry_msgs.msg import Twist as TwistMsg
 
 from bullet_gazebo.physics.pose import Pose, Vector
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.ros.bringup import full_name, ready
-from robot_envs.backends.ros.gazebo import (
+from robot_envs.backends.ros.properties import RosVariation
+from robot_envs.backends.ros.running import (
     STEP_SERVICE,
     JointStateReader,
     RunningSimulator,
     SharedWorld,
     SimulatorService,
 )
-from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
@@ -32,6 +33,7 @@ from robot_envs.world_state import (
     Models,
     Motion,
     StateQuery,
+    Twist,
     WorldState,
     link_keys,
 )
@@ -51,7 +53,7 @@ class LockstepWorld(RobotBackend):
         timeout: wall time [s] that an answer may take, on top of 10 ms for each tick.
     """
 
-    deterministic = shared = True
+    deterministic = complete = shared = True
 
     def __init__(
         self, scene: Scene, ticks: int, world: SharedWorld, timeout: float = TIMEOUT
@@ -97,7 +99,7 @@ class LockstepWorld(RobotBackend):
         request.models = list(placed)
         for (place, turn), (line, spin) in placed.values():
             request.poses.append(PoseMsg(Point(*place), Quaternion(*turn)))
-            request.twists.append(Twist(Vector3(*line), Vector3(*spin)))
+            request.twists.append(TwistMsg(Vector3(*line), Vector3(*spin)))
         with self._simulator:
             self._world.claim(self)
         answer = self._call(self._reset, request)
@@ -239,7 +241,7 @@ def _motions_of(numbers: Sequence[float]) -> Iterator[Motion]:
     """Reads links and models from the numbers of a prepared step."""
     for i in range(0, len(numbers), MOTION):
         x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz = numbers[i : i + MOTION]
-        yield Motion(Pose((x, y, z), (qx, qy, qz, qw)), ((vx, vy, vz), (wx, wy, wz)))
+        yield Motion(Pose((x, y, z), (qx, qy, qz, qw)), Twist((vx, vy, vz), (wx, wy, wz)))
 
 
 def _contact_of(state: ContactState) -> ContactPair:

@@ -17,7 +17,7 @@ import rospkg
 
 import bullet_gazebo
 from robot_envs.backends.backend import Slot
-from robot_envs.backends.ros.gazebo import world_path
+from robot_envs.backends.ros.running import world_path
 from robot_envs.errors import RobotEnvError, SimulatorFault, SimulatorHangs
 from robot_envs.files import Source
 from ros_calls import master

@@ -2,7 +2,7 @@
 
 import contextlib
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -13,9 +13,9 @@ from bullet_gazebo.simulator import NANOSECONDS
 from robot_envs.backends import backend
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.ros.bringup import bring_up
-from robot_envs.backends.ros.gazebo import SharedWorld, physics_step
 from robot_envs.backends.ros.lockstep import LockstepWorld
 from robot_envs.backends.ros.own_simulator import OwnSimulator, check_memory
+from robot_envs.backends.ros.running import SharedWorld, physics_step, set_physics_step
 from robot_envs.backends.world_files import world_models
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, SimulatorHangs
 from robot_envs.scene import Scene
@@ -67,8 +67,19 @@ class Journal:
             return
         raise SimulatorFault(
             f"the same reset and {len(self.commands)} steps lead to another state, as where a plugin draws "
-            f"random numbers: {state}, not {self.last}"
+            f"random numbers: {_difference(state, self.last)}"
         )
+
+
+def _difference(state: WorldState, last: WorldState | None) -> str:
+    """Returns the first entry of a state that differs from the last one."""
+    now, then = state._asdict(), last._asdict() if last else {}
+    part = next(name for name in now if repr(now[name]) != repr(then.get(name)))
+    one, other = now[part], then.get(part)
+    if isinstance(one, Mapping) and isinstance(other, Mapping) and one.keys() == other.keys():
+        name = next(name for name in one if repr(one[name]) != repr(other[name]))
+        return f"{part} '{name}': {one[name]}, not {other[name]}"
+    return f"{part}: {one}, not {other}"
 
 
 def checked(state: WorldState, expected: int) -> WorldState:
@@ -111,7 +122,7 @@ class OwnWorld(RobotBackend):
             brought up.
     """
 
-    deterministic, shared = True, False
+    deterministic, complete, shared = True, True, False
 
     def __init__(self, scene: Scene, control_period: float, deadline: float | None = None) -> None:
         self.scene = scene
@@ -228,6 +239,8 @@ class OwnWorld(RobotBackend):
         try:
             self.simulator.wait()
             with master.using(self.simulator.uri):
+                if wanted := self.scene.robots[0].physics_step:
+                    set_physics_step(wanted)
                 step = physics_step()
                 ticks = ticks_per_action(self._period, step)
                 self._step = ticks * round(step * NANOSECONDS)  # [ns] of one action

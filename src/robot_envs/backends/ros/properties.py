@@ -26,7 +26,7 @@ from bullet_gazebo.physics.description import Inertia
 from bullet_gazebo.physics.pose import IDENTITY, Vector
 from bullet_gazebo.physics.pose import Pose as Frame
 from robot_envs.backends.ros.bringup import full_name
-from robot_envs.backends.ros.gazebo import SimulatorService, check_success
+from robot_envs.backends.ros.running import SimulatorService, check_success
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation

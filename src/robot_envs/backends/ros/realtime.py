@@ -18,18 +18,19 @@ from std_srvs.srv import Empty
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.ros.bringup import full_name, ready
-from robot_envs.backends.ros.gazebo import (
+from robot_envs.backends.ros.properties import RosVariation
+from robot_envs.backends.ros.running import (
     JointStateReader,
     RunningSimulator,
     SharedWorld,
     SimulatorService,
     check_success,
 )
-from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.world_state import (
+    ONLY_REWARDED,
     Commands,
     InitialState,
     JointState,
@@ -180,7 +181,7 @@ class RealtimeWorld(RobotBackend):
         RobotEnvError: for several robots.
     """
 
-    deterministic, shared = False, True
+    deterministic, complete, shared = False, False, True
 
     def __init__(self, scene: Scene, control_period: float, world: SharedWorld) -> None:
         if scene.several:
@@ -260,7 +261,9 @@ class RealtimeWorld(RobotBackend):
 
     def look(self, query: StateQuery) -> None:
         if query != StateQuery():
-            raise RobotEnvError(f"{_ONLY_JOINTS}: it has no links, models and contacts")
+            raise RobotEnvError(
+                f"{_ONLY_JOINTS}: it has no links, models and contacts{ONLY_REWARDED}"
+            )
 
     def vary(self, variation: Variation) -> None:
         with self._simulator:

@@ -5,15 +5,16 @@ import contextlib
 import os
 import re
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import rospy
 
+from file_access.locks import scratch_folder
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
-from robot_envs.backends.ros import gazebo, node, windows
+from robot_envs.backends.ros import node, running, windows
 from robot_envs.backends.ros.bringup import Say, bring_up
-from robot_envs.backends.ros.gazebo import STEP_SERVICE, RunningSimulator, SharedWorld, Undo
+from robot_envs.backends.ros.running import STEP_SERVICE, RunningSimulator, SharedWorld, Undo
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
@@ -99,14 +100,18 @@ class RosSession:
             self._start_simulator()
         self._become_node()
         self._check_mode()
-        gazebo.check_world(robot)
+        running.check_world(robot)
+        if robot.physics_step:
+            before, step = RunningSimulator(), running.physics_step()
+            running.set_physics_step(robot.physics_step)
+            self._undo.callback(_undo_if_running, before, partial(running.set_physics_step, step))
         if self._curves is not None:
             self._undo.callback(windows.show_curves(self._curves))
         changes = bring_up(self._scene, say)
         if not self._started_simulator:  # otherwise it ends with all that is in it
-            running = RunningSimulator()
+            before = RunningSimulator()
             for undo in (*changes, lambda: self._world.place_objects(())):
-                self._undo.callback(_undo_if_running, running, undo)
+                self._undo.callback(_undo_if_running, before, undo)
         if self._gui:
             self._show_window(say)
         if self._rviz:
@@ -117,18 +122,18 @@ class RosSession:
 
     def _start_simulator(self) -> None:
         """Starts the simulator, and the master if there is none."""
-        folder = self._undo.enter_context(TemporaryDirectory())
+        folder = self._undo.enter_context(scratch_folder())
         started = ros_gazebo.launch_Gazebo(
             paused=True, gui=self._gui, output="log", launch_new_term=False,
-            custom_world_path=gazebo.world_path(self._scene.robots[0].world, Path(folder)),
+            custom_world_path=running.world_path(self._scene.robots[0].world, folder),
             lockstep=not self._realtime, seed=self._seed, timeout=START_TIMEOUT,
         )  # fmt: skip
         if isinstance(started, bool):
             raise RobotEnvError("the simulator didn't start; see the messages above")
-        running = RunningSimulator()
+        before = RunningSimulator()
 
         def end() -> None:
-            if started.pid is not None and running.is_registered():
+            if started.pid is not None and before.is_registered():
                 ros_gazebo.close_Gazebo()
             else:  # another simulator has taken its name, and isn't ours to end
                 started.close()
@@ -181,7 +186,7 @@ class RosSession:
             ValueError: if the period isn't a whole number of physics steps.
             RobotEnvError: if the simulator doesn't answer, or an object can't be spawned.
         """
-        ticks = ticks_per_action(control_period, gazebo.physics_step()) if control_period else 0
+        ticks = ticks_per_action(control_period, running.physics_step()) if control_period else 0
         if self._realtime:
             from robot_envs.backends.ros.realtime import RealtimeWorld
 
@@ -218,7 +223,7 @@ def running_session(scene: Scene, realtime: bool) -> RosSession:
             is open.
     """
     for session in reversed(_sessions[:]):
-        answers, has_them = gazebo.simulator_answers(), session._scene.robots == scene.robots
+        answers, has_them = running.simulator_answers(), session._scene.robots == scene.robots
         if has_them and session._realtime == realtime:
             if answers:
                 return session
@@ -238,11 +243,11 @@ def running_session(scene: Scene, realtime: bool) -> RosSession:
 
 
 def _simulator_runs() -> bool:
-    return node.master_is_up() and gazebo.simulator_answers()
+    return node.master_is_up() and running.simulator_answers()
 
 
-def _undo_if_running(running: RunningSimulator, undo: Undo) -> None:
+def _undo_if_running(before: RunningSimulator, undo: Undo) -> None:
     """Undoes a change, unless the simulator has died meanwhile or was replaced."""
     with contextlib.suppress(RobotEnvError, rospy.ServiceException, rospy.ROSException, OSError):
-        if running.is_registered() and gazebo.simulator_answers():
+        if before.is_registered() and running.simulator_answers():
             undo()

@@ -133,7 +133,7 @@ def launch_Gazebo(
 
 
 def _start(
-    switches: dict[str, object],
+    switches: Mapping[str, object],
     world: tuple[str | None, str | None, str | None],
     window: bool,
     log_file: str | None,
@@ -142,10 +142,9 @@ def _start(
     """Starts roslaunch; returns None, with an error in the log, if it can't be started."""
     try:
         path = _world(*world)
-        if path is not None:
-            switches["world_name"] = path
+        world_name = {} if path is None else {"world_name": path}
         _packages.file("gazebo_ros", "launch", "empty_world.launch")
-        arguments = [f"{name}:={value}" for name, value in switches.items()]
+        arguments = [f"{name}:={value}" for name, value in {**switches, **world_name}.items()]
         command = ["gazebo_ros", "empty_world.launch", *arguments]
         screen = switches["output"] == "screen" and not window
         return _roslaunch.start(command, LABEL, window, screen, log_file, env)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import rosgraph
 from gazebo_msgs import srv
@@ -72,7 +71,17 @@ def spawn(
     return SpawnResult(True, str(answer.status_message))
 
 
-def spawn_param(kind: str, param_name: str, name: str, namespace: str, *more: Any) -> SpawnResult:
+def spawn_param(
+    kind: str,
+    param_name: str,
+    name: str,
+    namespace: str,
+    frame: str,
+    pose: Pose,
+    timeout: float,
+    gazebo_ns: str,
+    verify: bool,
+) -> SpawnResult:
     """Spawns a model from the text in parameter ``<namespace>/<param_name>``. See `spawn`."""
     full = rosgraph.names.ns_join(namespace or "/", param_name)
     try:
@@ -81,7 +90,7 @@ def spawn_param(kind: str, param_name: str, name: str, namespace: str, *more: An
         return _failed(f"parameter {full}: {fault}")
     except KeyError:
         return _failed(f"parameter {full} is not set: load the robot's description first")
-    return spawn(kind, xml, name, namespace, *more)
+    return spawn(kind, xml, name, namespace, frame, pose, timeout, gazebo_ns, verify)
 
 
 def gazebo_delete_model(

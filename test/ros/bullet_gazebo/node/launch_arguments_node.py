@@ -9,7 +9,7 @@ import xmlrpc.client
 import rosgraph
 import rostest
 from support.ros.calls import wait_until
-from support.ros.pg_train_runs import BOUND, Place
+from support.ros.programs import BOUND, Place
 
 SERVER = ("rosrun", "gazebo_ros", "gzserver")
 SPAWN = ("rosrun", "gazebo_ros", "spawn_model", "-urdf", "-param", "/box", "-model", "box")

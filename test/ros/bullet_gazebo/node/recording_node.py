@@ -7,7 +7,7 @@ import unittest
 
 import imageio_ffmpeg
 import rostest
-from support.ros.pg_train_runs import BOUND, Place
+from support.ros.programs import BOUND, Place
 
 WORLD = ("gazebo_ros", "empty_world.launch", "gui:=false", "server_required:=true")
 

@@ -67,7 +67,7 @@ def test_bad_parameters_are_refused(params, text):
 
 
 def test_a_robot_without_the_interface_is_refused():
-    with pytest.raises(ControlError, match="no hardware_interface::VelocityJointInterface"):
+    with pytest.raises(ControlError, match="has hardware_interface::EffortJointInterface"):
         BUILT_IN["velocity_controllers/JointTrajectoryController"].create(
             "arm", {"joints": ["shoulder"], "gains": GAINS}, Rig("Effort").hardware
         )

@@ -7,6 +7,8 @@ import pytest
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.world_file import empty_world, load_world, parse_world
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.ros.services.spawn_services import fill_world, find_world, read_world
 
 EMPTY = Path(__file__).resolve().parents[4] / "companions/gazebo_ros/worlds/empty.world"
@@ -45,6 +47,52 @@ def test_models_includes_and_their_poses():
     assert found.models["a"].initial_pose.position == (1.0, 2.0, 3.0)
     assert (found.models["a"].static, found.models["b"].static) == (False, True)
     assert found.models["floor"].initial_pose.position == (0.0, 0.0, -1.0)
+
+
+INCLUDE = "<include><uri>model://{}</uri></include>"
+DATABASE = {  # of Gazebo: mass [kg] if it moves, height [m]
+    "table": (None, 1.015), "cafe_table": (None, 0.775), "bookshelf": (None, 1.2),
+    "fire_hydrant": (None, 0.7685), "jersey_barrier": (4000.0, 1.143), "construction_cone": (1.0, 1.089),
+    "cardboard_box": (20.0, 0.3), "cube_20k": (1.0, 1.0), "unit_box": (1.0, 0.5),
+    "unit_sphere": (1.0, 0.5), "unit_cylinder": (1.0, 0.5),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("folder", DATABASE)
+def test_a_model_of_gazebos_database_has_its_size_and_mass(new_engine, folder):
+    ((name, model),) = world(INCLUDE.format(folder)).models.items()
+    mass, height = DATABASE[folder]
+    assert model.stand_ins == ([] if folder.startswith("unit_") else [folder])
+    tops = [each.pose.position[2] + max(each.size[2:] or each.size) / 2 for each in
+            model.links["link"].collisions]  # fmt: skip
+    tops = [0.5 if folder.startswith("unit_") else top for top in tops]
+    assert max(tops) == pytest.approx(height, abs=1e-3)
+    assert (None if model.static else model.links["link"].inertia.mass) == mass
+    made = World(new_engine())
+    made.spawn("ground_plane", ground_plane(), Pose())
+    stands = made.spawn(name, model, Pose((0.0, 0.0, 0.5 if "unit" in folder else 0.0)))
+    before = stands.state()[0]
+    for _ in range(200):
+        made.step()
+    assert stands.state()[0].position == pytest.approx(before.position, abs=2e-3)
+
+
+def test_ground_plane_and_sun_are_found_inside_of_a_model_too(new_engine):
+    found = world(
+        f'<model name="place"><static>1</static>{INCLUDE.format("sun")}{INCLUDE.format("ground_plane")}'
+        f"<include><uri>model://cube_20k</uri><pose>1 0 0 0 0 0</pose></include></model>"
+    )
+    assert found.warnings == []
+    assert set(found.models["place"].links) == {"ground_plane::link", "cube_20k::link"}
+    assert found.models["place"].stand_ins == ["cube_20k"]
+    made = World(new_engine())
+    made.spawn("place", found.models["place"], Pose())
+    ball = made.spawn(
+        "ball", world(INCLUDE.format("unit_sphere")).models["unit_sphere"], Pose((-3.0, 0.0, 0.5))
+    )
+    for _ in range(200):
+        made.step()
+    assert ball.state()[0].position[2] == pytest.approx(0.5, abs=2e-3)
 
 
 def test_an_include_overrides_name_pose_and_static(tmp_path):

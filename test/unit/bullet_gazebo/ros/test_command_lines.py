@@ -5,11 +5,12 @@ import random
 import numpy as np
 import pytest
 
-from bullet_gazebo.ros.clients import gz, gzclient
+from bullet_gazebo.ros.clients import gz, gzclient, spawn_model, spawner
 from bullet_gazebo.ros.clients.spawn_model import parse
 from bullet_gazebo.ros.common.node_process import seed_random_numbers
 from bullet_gazebo.ros.node.gzserver import parse_args
 from bullet_gazebo.ros.services.spawn_services import model_paths
+from ros_calls.service import ServiceFailed, ServiceGone
 
 
 def test_options_stand_in_any_order():
@@ -43,6 +44,18 @@ def test_negative_numbers_of_spawn_model():
     line = "-urdf -param p -model m -x -1e-05 -R -1.5 -J hinge -2e-1"
     options = parse(line.split())
     assert (options.x, options.R, options.joints) == (-1e-05, -1.5, [("hinge", -0.2)])
+
+
+def test_spawn_model_waits_for_the_service_that_unpauses(monkeypatch):
+    done = []
+    monkeypatch.setattr(spawn_model, "wait_for_service", lambda name: done.append(f"wait {name}"))
+    monkeypatch.setattr(spawn_model, "_call", lambda name, kind: done.append(name))
+    monkeypatch.setattr(spawn_model, "_read", lambda *_: "<robot/>")
+    monkeypatch.setattr(spawn_model, "_spawn", lambda *_: done.append("spawn"))
+    options = spawn_model.parse(["-urdf", "-param", "r", "-model", "m", "-unpause"])
+    assert spawn_model._run(options, b"") == 0
+    unpause = "/gazebo/unpause_physics"
+    assert done == ["wait /gazebo/spawn_urdf_model", "spawn", f"wait {unpause}", unpause]
 
 
 @pytest.mark.parametrize(
@@ -101,3 +114,25 @@ def test_another_window_keeps_its_name(line, dead, living, anonymous, master, mo
     monkeypatch.setattr(gzclient, "init_node", lambda name, _, anonymous: taken.append(anonymous))
     gzclient.become_node(["gzclient", *line.split()])
     assert taken == [anonymous]
+
+
+@pytest.mark.parametrize(("fault", "warns"), [(ServiceGone, False), (ServiceFailed, True)])
+def test_a_spawner_that_ends_with_the_simulator_has_nothing_to_complain_of(
+    monkeypatch, fault, warns
+):
+    """roslaunch and rostest end both at the same time."""
+
+    class Manager:
+        def load(self, name):
+            return True
+
+        def running(self, timeout):
+            raise fault("gone")
+
+    told, leave = [], []
+    monkeypatch.setattr(spawner.rospy, "logwarn", lambda *text: told.append(text))
+    monkeypatch.setattr(spawner.rospy, "on_shutdown", leave.append)
+    monkeypatch.setattr(spawner.rospy, "spin", lambda: None)
+    spawner._Spawner(Manager()).run(["arm_controller"], stopped=True)
+    leave[0]()
+    assert bool(told) == warns

@@ -3,6 +3,7 @@
 import argparse
 import socket
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 import rospy
@@ -21,6 +22,28 @@ def failing(monkeypatch):
     signals = SimpleNamespace(noted=lambda: False)
     monkeypatch.setattr(gzserver, "GazeboNode", made)
     return lambda: gzserver.simulate(argparse.Namespace(), object(), signals)
+
+
+PARTS = ("SceneOffer", "WorldControl", "answer_xmlrpc", "free_polls_at_once", "bound_messages",
+         "bound_calls", "Reception", "hang_up_on_nonsense", "Thinner", "advertise_states",
+         "PluginRegistry", "load_plugins", "_clock_frequency")  # fmt: skip
+
+
+def test_no_model_is_spawned_before_all_services_are_there(monkeypatch):
+    for name in PARTS:
+        monkeypatch.setattr(gzserver, name, Mock())
+    gates = []
+
+    def others(_):
+        assert gates[0].locked()
+        return ["all others"]
+
+    monkeypatch.setattr(gzserver, "SpawnServices", lambda sim, plugins, gate: gates.append(gate))
+    monkeypatch.setattr(gzserver, "advertise_world_services", others)
+    node = gzserver.GazeboNode.__new__(gzserver.GazeboNode)
+    node.sim, node._watchdog = SimpleNamespace(lockstep=False), None
+    node._advertise(True)
+    assert node._services[-1] == "all others" and not gates[0].locked()
 
 
 def test_a_master_that_goes_meanwhile_is_told_in_one_line(failing, capsys):

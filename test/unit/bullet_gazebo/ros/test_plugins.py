@@ -127,6 +127,14 @@ def test_a_parameter_that_is_no_table_is_a_warning(setting, places) -> None:
     assert any("no table" in each for each in setting.errors)
 
 
+@pytest.mark.parametrize("plugin", ["gazebo_ros_diff_drive", "my_robot_control"])
+def test_a_foreign_control_plugin_is_told_in_a_line_of_its_own(setting, plugin) -> None:
+    model = setting.spawn(plugin, "bumper")
+    (told,) = setting.errors
+    assert f"the plugin lib{plugin}.so is not simulated: this robot has no control here" in told
+    assert model.description.left_out == ["plugin libbumper.so"]
+
+
 def test_a_master_that_is_away_leaves_no_model_half_there(setting, monkeypatch) -> None:
     def away(name: str, default: object) -> object:
         raise ConnectionRefusedError("no master")

@@ -107,7 +107,7 @@ def test_numbers_that_do_not_fit_are_refused_and_nothing_done(world, ticks, comm
 
 def test_a_prepared_step_says_what_has_gone_during_a_long_request(objects, monkeypatch):
     sim = objects.sim
-    linked, every = objects.prepare(link_states_of=["crate"]), objects.prepare(model_states=True)
+    every = objects.prepare(model_states=True)
     monkeypatch.setattr(
         sim.lock, "yield_turn", lambda: sim.world.spawn("new", ground_plane(), Pose())
     )

@@ -1,7 +1,10 @@
-"""The text of a model, before it is parsed."""
+"""The text of a model, before it is parsed; what the log says about it."""
 
 import pytest
+import rospy
 
+from bullet_gazebo.physics.files.sdf import parse_sdf
+from bullet_gazebo.ros.services import spawn_services
 from bullet_gazebo.ros.services.spawn_services import without_comments
 
 
@@ -17,3 +20,21 @@ from bullet_gazebo.ros.services.spawn_services import without_comments
 )
 def test_the_declaration_and_whole_comments_go(text: str, left: str) -> None:
     assert without_comments(text) == left
+
+
+def test_the_log_names_each_thing_once(monkeypatch) -> None:
+    logged: list[str] = []
+    monkeypatch.setattr(rospy, "logwarn", lambda text, *args: logged.append(text % args))
+    table = '<sdf version="1.6"><model name="t">{}<include><uri>model://table</uri></include></model></sdf>'
+    model = parse_sdf(table.format("<static>1</static>"))
+    model.left_out += ["plugin a.so", "plugin b.so", "plugin a.so", "plugin a.so"]
+    model.warnings += ["a hole", "a hole"]
+    spawn_services._tell_stand_in.cache_clear()
+    for _ in range(2):
+        spawn_services._log("Model 't'", model)
+    assert logged[:3] == [
+        "Model 't': a hole (2 times)",
+        "model://table is not installed: a simple shape of its size and mass stands in for it",
+        "Model 't': not simulated here, so left out: plugin a.so (3 times), plugin b.so",
+    ]
+    assert logged[3:] == [logged[0], logged[2]]

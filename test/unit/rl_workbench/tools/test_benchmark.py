@@ -20,6 +20,7 @@ from rl_workbench.tools import job as job_module
 from rl_workbench.tools import results
 from rl_workbench.tools.benchmark import (
     CONFIG,
+    _suite,
     check_package,
     default_file,
     make_variant,
@@ -87,8 +88,19 @@ def test_a_suite_gives_tables_with_every_seed_and_every_failure(
     assert rows["broken"]["best"] is None and "can't make NoSuch-v0" in rows["broken"]["fault"]
     text = (out / "results.md").read_text()
     assert "| plain | 0 of 1 |" in text and "| broken | 0 of 1, 1 failed |" in text
+    assert "evaluating 1 of 2: 2 episodes each by the best and the last policy of plain" in said
+    assert cli.main(["compare", str(out), "--episodes=0"]) == 0, "it takes the folder as it is"
+    assert "plain in CartPole-v1" in capsys.readouterr().out
     for name in ("curves.png", "evaluations.png"):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_its_length_is_a_flag_as_of_train(suites: Path, capsys) -> None:
+    words = ["benchmark", "--total-timesteps=5000", "--params", "total_timesteps=1"]
+    suite = _suite(cli.parse(words))
+    assert suite.variants[0].options["total_timesteps"] == "5000"
+    assert cli.main(["benchmark", "two", f"--suites={suites}", "--total-timesteps=1"]) == 1
+    assert "a suite says what is trained: it takes no --algo" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import gymnasium
@@ -11,8 +12,10 @@ import pytest
 import torch
 from gymnasium import spaces
 from support.training import workbench_runs
+from torch import nn
 
 from rl_workbench import cli
+from rl_workbench.agents.greedy import SeveralChoices, SingleChoice, Switches
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools import torchscript
 from rl_workbench.tools.policies import LearnedPolicy, load_learned
@@ -132,6 +135,20 @@ def test_the_file_acts_as_the_policy(tmp_path: Path, name: str, capsys) -> None:
     assert agreement["observations"] == 1000 and agreement["largest_difference"] < 1e-5
     assert file.metadata["algorithm"] == (KINDS | SB3)[name][0]
     policy.env.close()
+
+
+@pytest.mark.parametrize(
+    ("kind", "scores", "margins"),
+    [
+        (SingleChoice, [[1.0, 3.0, 2.5], [2.0, 2.0, 1.0]], [0.5, 0.0]),
+        (SingleChoice, [[4.0]], [0.0]),
+        (partial(SeveralChoices, sizes=[2, 3]), [[1.0, 3.0, 5.0, 4.0, 4.5]], [0.5]),
+        (Switches, [[2.0, -0.25, 1.0]], [0.25]),
+    ],
+)
+def test_how_far_scores_are_from_another_choice(kind, scores: list, margins: list) -> None:
+    found = torchscript.margins(kind(nn.Identity()), torch.tensor(scores))
+    assert found.tolist() == margins
 
 
 @pytest.mark.slow

@@ -56,7 +56,7 @@ def test_another_process_goes_on(trained: Path) -> None:
     command = [*PROGRAM, "train", "--resume", str(trained), "--total-timesteps", "340"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert "going on at step 300 of 340" in done.stdout
+    assert "resuming at step 300 of 340" in done.stdout
 
 
 def test_eval_knows_the_line_and_the_successes(trained: Path, capsys) -> None:

@@ -1,14 +1,16 @@
 """Callbacks of the user's own: what they see, what they may break, and how they are named."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from support.training.training_runs import small, summary
+from support.training.training_runs import rows, small, summary
 
 import rl_workbench
 from rl_workbench import Callback, WorkbenchError, cli
 from rl_workbench.starting import Interrupt
+from rl_workbench.training.pg import PolicyGradientTraining
 from rl_workbench.training.training import Training
 
 MODULE = """
@@ -97,10 +99,44 @@ def test_one_that_fails_ends_the_training_with_a_line(tmp_path: Path, module: st
     assert summary(folder)["complete"]
 
 
+class Stopping(Callback):
+    """Raises at one event."""
+
+    def __init__(self, event: str) -> None:
+        setattr(self, event, self._raise)
+
+    def _raise(self, *_: object) -> None:
+        raise ZeroDivisionError("no such luck")
+
+
+@pytest.mark.slow
+def test_all_hear_of_the_end_whatever_fails_there(tmp_path: Path, monkeypatch) -> None:
+    seen, folder = Recorder(), tmp_path / "run"
+    monkeypatch.setattr(PolicyGradientTraining, "export", lambda *_: (folder / "no/file").touch())
+    with pytest.raises(WorkbenchError, match="can't write .*no/file"):
+        run("reinforce", folder, Stopping("on_training_end"), seen)
+    assert seen.of("end") == [summary(folder)["steps"]]
+    assert "no/file" in summary(folder)["failure"]
+
+
+@pytest.mark.slow
+def test_a_loss_is_logged_at_the_step_at_which_one_fails(tmp_path: Path) -> None:
+    class Late(Callback):
+        def on_episode(self, training, episode) -> None:
+            assert episode.step < 60, "by then it learns"
+
+    options = small("dqn")
+    options = options._replace(run=replace(options.run, log_frequency=1))
+    with pytest.raises(WorkbenchError, match="Late failed"):
+        Training(options, tmp_path, Interrupt(), [Late()]).run()
+    end = str(summary(tmp_path)["steps"])
+    assert (end, "losses/td_loss") in [row[:2] for row in rows(tmp_path)]
+
+
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("my_callbacks", "must be module:Class"),
+        ("my_callbacks", "must be module:name"),
         ("my_callback:Failing", "No module named 'my_callback'"),
         ("my_callbacks:Missing", "has no attribute 'Missing'"),
         ("my_callbacks:NoCallback", "must be a subclass of rl_workbench.Callback"),

@@ -73,7 +73,7 @@ def test_a_disk_that_fills_up_keeps_the_checkpoint_before(
         fill_disk(disk, is_full)
         line = failure(lambda: train(run, name, keep_checkpoints=0))
     assert "No space left on device" in line and "is saved" not in line
-    assert f"--resume {run} goes on from the last checkpoint" in line
+    assert f"--resume {run} continues from the last checkpoint" in line
     assert 0 < checkpoint(run)["steps"] < summary(whole(name))["steps"]
     resume(run)
     assert summary(run)["complete"] and summary(run)["failure"] is None
@@ -144,7 +144,7 @@ def test_memory_that_ends_in_the_training(whole, tmp_path: Path, monkeypatch, na
         patched.setattr(History, "state_dict", learn)
         line = failure(lambda: train(run, name, keep_checkpoints=0))
     assert "there is no memory left; stopped after" in line and "is saved" not in line
-    assert f"--resume {run} goes on from the last checkpoint" in line
+    assert f"--resume {run} continues from the last checkpoint" in line
     resume(run)
     assert summary(run)["complete"]
     assert summary(run)["returns"] == summary(whole(name))["returns"]

@@ -100,7 +100,9 @@ def test_a_signal_saves_and_tells_how_to_go_on(
     newer_checkpoint(run, process)
     process.send_signal(number)
     told = ended(process, 128 + number)
-    found = re.search(r"^interrupted; --resume (.*) goes on from the last checkpoint$", told, re.M)
+    found = re.search(
+        r"^interrupted; --resume (.*) continues from the last checkpoint$", told, re.M
+    )
     assert found and shlex.split(found[1]) == [str(run)]
     assert summary(run)["interrupted"]
     ended(start("--resume", str(run)))

@@ -165,7 +165,7 @@ def test_killed_before_its_first_checkpoint_it_begins_anew(
     for path in (run / "checkpoints").iterdir():
         path.rename(path.with_name(f".{path.name}.a1b2c3"))  # half written
     resume(run)
-    assert "has no checkpoint yet; beginning anew" in capsys.readouterr().out
+    assert "has no checkpoint yet; starting from scratch" in capsys.readouterr().out
     assert_same_run(whole(name), run)
     assert_no_doubles(run)
     assert not list((run / "checkpoints").glob(".*"))

@@ -81,9 +81,9 @@ def test_resumed_by_its_folder_alone(tmp_path: Path, capsys) -> None:
     steps = summary(tmp_path / "run")["steps"]
     assert main(["--resume=run", "--episodes=3"]) == 0
     told = capsys.readouterr().out
-    assert f"going on at step {steps} after episode 2 of 3: {tmp_path / 'run'}" in told
+    assert f"resuming at step {steps} after episode 2 of 3: {tmp_path / 'run'}" in told
     assert main([*DQN, "--run-dir=other"]) == main(["--resume=other"]) == 0
-    assert "going on at step 60 of 60" in capsys.readouterr().out
+    assert "resuming at step 60 of 60" in capsys.readouterr().out
 
 
 def test_parameters_of_a_node(tmp_path: Path) -> None:

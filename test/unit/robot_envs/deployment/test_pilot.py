@@ -6,6 +6,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
+from support.scenes.rover import ROVER, Roll
 
 import cartpole  # noqa: F401 - registers the environments
 from bullet_gazebo.control.joint import JointLimits
@@ -64,6 +65,19 @@ def test_it_stops_where_an_episode_would_be_over_and_goes_on_from_there() -> Non
     assert pilot.step(3 * PERIOD, fallen) is None
     assert pilot.step(4 * PERIOD, upright) == {CONTROLLER: pytest.approx(0.12)}
     env.close()
+
+
+def test_what_only_the_reward_sees_need_not_be_known() -> None:
+    pilot = Pilot(ROVER, Roll(), lambda seen: np.full(2, 0.5, np.float32), ROVER.control_period)
+    still = {name: JointState(0.0, 0.0, 0.0) for name in ("left_axle", "right_axle")}
+    pilot.begin(still)
+    assert [pilot.step(n * 0.02, still) for n in range(2)] == [{"wheels": (5.0, 5.0)}] * 2
+    asking = Roll()
+    asking.query, asking.reward_query = asking.reward_query, asking.query
+    with pytest.raises(
+        RobotEnvError, match="what only the reward needs belongs into the task's rew"
+    ):
+        Pilot(ROVER, asking, lambda seen: seen, ROVER.control_period)
 
 
 def test_commands_are_kept_within_the_stops_and_that_is_told_once() -> None:

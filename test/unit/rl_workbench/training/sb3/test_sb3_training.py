@@ -151,7 +151,7 @@ def test_a_rate_that_blows_up(tmp_path: Path) -> None:
         train(tmp_path, "ppo", learning_rate=1e30, total_timesteps=640, eval_frequency=64)
     line = str(raised.value)
     assert "the weights are NaN or infinite: a smaller learning_rate may help" in line
-    assert "goes on from the last checkpoint" in line and "\n" not in line
+    assert "continues from the last checkpoint" in line and "\n" not in line
     assert summary(tmp_path)["failure"] and not summary(tmp_path)["complete"]
     assert all(torch.isfinite(each).all() for each in weights(tmp_path / "last.pt").values())
 

@@ -9,12 +9,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import gymnasium
 import pytest
 import rospy
+from support.scenes.rover import ROVER, Roll
 from support.scenes.two_arms import LEFT, RIGHT, Volley
 from support.training.environment_conformance import RICH, EnvironmentConformance
 
@@ -88,6 +90,12 @@ def env() -> Iterator[RobotEnv]:
     made = own(deadline=HANG, **RICH)
     yield made
     made.close()
+
+
+def test_a_coarser_physics_step_gives_the_same_bits_as_in_process() -> None:
+    rover = replace(ROVER, physics_step=0.004)
+    with RobotEnv(rover, Roll()) as wanted, RobotEnv(rover, Roll(), "ros-own") as found:
+        assert differences(rollout(found, 40, seed=8), rollout(wanted, 40, seed=8)) == ""
 
 
 def test_side_by_side_each_has_the_bits_that_it_has_alone(truth, monkeypatch) -> None:

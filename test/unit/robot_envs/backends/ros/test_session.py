@@ -5,9 +5,11 @@ from types import SimpleNamespace
 import pytest
 import rospy
 
-from robot_envs.backends.ros import gazebo, node, session
+from robot_envs.backends.ros import node, session
 from robot_envs.backends.ros.session import RosSession
 from robot_envs.errors import SimulatorFault
+
+RUNNING = "robot_envs.backends.ros.running"
 
 
 @pytest.mark.parametrize(
@@ -32,11 +34,18 @@ def test_one_that_it_started_is_replaced_once(monkeypatch, deaths, running, star
 
     monkeypatch.setattr(rospy.core, "is_initialized", lambda: False)
     monkeypatch.setattr(node, "master_is_up", lambda: its.is_there)
-    monkeypatch.setattr(gazebo, "simulator_answers", lambda: its.is_there)
-    monkeypatch.setattr(gazebo, "check_world", lambda robot: None)
+    monkeypatch.setattr(f"{RUNNING}.simulator_answers", lambda: its.is_there)
+    monkeypatch.setattr(f"{RUNNING}.check_world", lambda robot: None)
     monkeypatch.setattr(session, "bring_up", bring_up)
     monkeypatch.setattr(session, "Scene", lambda robots: SimpleNamespace(robots=robots))
-    made = RosSession([SimpleNamespace(world=None)], "/a", [], realtime=False, gui=False, seed=0)
+    made = RosSession(
+        [SimpleNamespace(world=None, physics_step=None)],
+        "/a",
+        [],
+        realtime=False,
+        gui=False,
+        seed=0,
+    )
     for name, does in (
         ("_start_simulator", start),
         ("_become_node", lambda: None),

@@ -5,7 +5,7 @@ import socket
 import pytest
 import rospy
 
-from robot_envs.backends.ros.gazebo import RunningSimulator
+from robot_envs.backends.ros.running import RunningSimulator
 from robot_envs.errors import SimulatorError, SimulatorHangs
 
 

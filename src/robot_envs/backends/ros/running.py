@@ -152,6 +152,12 @@ def physics_step() -> float:
     return step
 
 
+def set_physics_step(step: float) -> None:
+    """Sets the simulator's physics step [s]; raises RobotEnvError if it refuses."""
+    if not ros_gazebo.gazebo_set_time_step(step):
+        raise RobotEnvError(f"the physics step can't be set to {step:g} s; see the messages above")
+
+
 def check_world(robot: Robot) -> None:
     """Raises RobotEnvError if the running simulator lacks a model of the robot's world file."""
     present = models()

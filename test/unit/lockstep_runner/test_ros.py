@@ -1,0 +1,42 @@
+"""Waits for messages that don't come."""
+
+import pytest
+import rospy
+from sensor_msgs.msg import LaserScan
+from support.ros.lockstep_world import MS
+
+from lockstep_runner.replaced import ros
+from ros_calls import master
+
+PLUGIN = "<plugin filename='a.so'><topicName> scan </topicName></plugin>"
+
+
+@pytest.mark.parametrize(
+    ("publishers", "description", "reason"),
+    [
+        ([], "", "it has no publisher"),
+        ([], PLUGIN, "by a sensor or plugin that isn't simulated"),
+        ([["/turtle/scan", ["/driver"]]], PLUGIN, "/driver offers it, and sends nothing"),
+    ],
+)
+@pytest.mark.parametrize("timeout", [4.0, 25.0])
+def test_silence_is_explained_once(
+    runner, monkeypatch, capsys, publishers, description, reason, timeout
+):
+    answers = {
+        "getSystemState": [publishers, [], []],
+        "getParamNames": ["/turtle/robot_description", "/rate"],
+        "getParam": description,
+    }
+    monkeypatch.setattr(master, "call", lambda method, *_: answers[method])
+    monkeypatch.setattr(rospy, "Subscriber", lambda *_: None)
+    monkeypatch.setattr(ros._Last, "latched", lambda self: False)
+    runner.topics.changed = lambda: None
+    wait = ros._Waiting(runner, rospy.wait_for_message)
+    for count in range(1, 6):
+        with pytest.raises(rospy.ROSException, match="timeout exceeded"):
+            wait("/turtle/scan", LaserScan, timeout)
+        assert runner.clock.passed == count * timeout * 1000 * MS
+        told = capsys.readouterr().err
+        assert (reason in told) is (count == (3 if timeout < 10 else 1)), told
+        assert told.count("\n") <= 1
