@@ -62,7 +62,7 @@ class Camera:
                 raise ValueError(
                     f"a camera's {name} is like {like}, in [{low:g}, {high:g}]: {value!r}"
                 )
-        given = {name: tuple(v) if name == "target" else v for name, v in fields.items()}
+        given: Any = {name: tuple(v) if name == "target" else v for name, v in fields.items()}
         return replace(self, **given)
 
     @property

@@ -194,7 +194,7 @@ class SideBySide(Sequence["np.ndarray"]):
         pictures = []
         for film in self._films:
             frame = film.frames[min(index, len(film.frames) - 1)]
-            picture = Image.open(BytesIO(frame.seen))
+            picture: Image.Image = Image.open(BytesIO(frame.seen))
             if frame.ended:
                 picture = Image.blend(picture, Image.new("RGB", picture.size, PAPER), FADED)
             pictures.append(
