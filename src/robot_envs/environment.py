@@ -160,10 +160,8 @@ class RobotEnv(DrawnEnv):
             backend.look(both(task.query, task.reward_query))
             return task
         backend.look(task.query)
-        name = type(task).__name__
-        gymnasium.logger.warn(
-            f"rewards of {name} are 0, and nothing terminates: this world can't tell its reward_query"
-        )
+        text = "are 0, and nothing terminates: this world can't tell its reward_query"
+        gymnasium.logger.warn(f"rewards of {type(task).__name__} {text}")
         return Unjudged()
 
     def _adopt(self, task: Task) -> None:
@@ -251,9 +249,8 @@ class RobotEnv(DrawnEnv):
         if self._actuator is not None:
             self._actuator.begin(state.commands)
         if self._goal_task is not None:
-            checks.set_goal(
-                self._goal_task, self._shown(state), self.np_random, options.get("goal")
-            )
+            shown, goal = self._shown(state), options.get("goal")
+            checks.set_goal(self._goal_task, shown, self.np_random, goal)
         measured = state if self._sensor is None else self._sensor.begin(state, self.np_random)
         observation = self._observe(measured)
         self._steps = 0
