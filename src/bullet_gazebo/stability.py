@@ -2,7 +2,8 @@
 
 The engines step semi-implicitly, v' = v - dt/M (p x + d v), x' = x + dt v', with the effort of the state
 before the step. Such a loop diverges, alternating from step to step, if an eigenvalue of
-M^-1 (p dt² + 2 d dt) exceeds 4; a loop on velocity diverges if one of M^-1 (2 p dt + 4 d) does.
+M^-1 (p dt² + 2 d dt) exceeds 4; a loop on velocity diverges if one of M^-1 (2 p dt + 4 d) does. The effort of
+a loop that does is divided by 1 + (p dt² + d dt) / M or 1 + (p dt + 2 d) / M, as an implicit step would do.
 """
 
 import logging
@@ -49,7 +50,7 @@ class StabilityWatch:
         Raises:
             ControlError: if the model's `<pOnlyDamping>` isn't a number from 0 to 1.
         """
-        self.shaking: set[str] = set()  # joints that gains drive which are too high
+        self.shares: dict[str, float] = {}  # of efforts, for joints whose gains are too high
         self._model = model
         self._hardware = hardware
         self._manager = manager
@@ -66,11 +67,11 @@ class StabilityWatch:
         dt = max(period, self._model.time_step)
         acting = self._acting()
         found = too_high(self._model, acting, dt)
-        self.shaking = {each.loop.joint for each, _ in found}
+        self.shares = {each.loop.joint: share for each, _, share in found}
         for controller in self._manager.loaded:
             if controller.state != RUNNING:
                 found += too_high(self._model, _owned([controller]), dt)
-        for each, excess in found:
+        for each, excess, _ in found:
             self._warn_of(each, excess, dt)
         self._damp(acting)
 
@@ -144,7 +145,7 @@ class StabilityWatch:
             logging.WARNING,
             f"{owner} drives joint '{loop.joint}' of model '{self._model.name}' with {gain} = {value:g}, "
             f"{excess:.3g} times what a step of {dt:g} s can follow (about {value / excess:.3g}): "
-            "it will shake. Lower the gain, or take a shorter step.",
+            "it would shake, so its effort is softened. Lower the gain, or take a shorter step.",
         )
 
     def _damp(self, acting: list[OwnedLoop]) -> None:
@@ -166,10 +167,13 @@ class StabilityWatch:
         self._model.add_damping(added)
 
 
-def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[tuple[OwnedLoop, float]]:
+def too_high(
+    model: Model, loops: list[OwnedLoop], dt: float
+) -> list[tuple[OwnedLoop, float, float]]:
     """Returns the loops whose gains are too high for steps of `dt` [s], the worst first.
 
-    Each comes with the factor by which it is too high. Inertias are those with all joints at zero.
+    Each comes with the factor by which it is too high, and the share of its effort to take. Inertias are
+    those with all joints at zero.
     """
     left = {each.loop.joint: each for each in loops if sum(_stiffness(each.loop, dt)) > 0.0}
     order = [joint.name for joint in model.description.movable_joints]
@@ -193,7 +197,12 @@ def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[tuple[Owne
         if not values[-1] >= MOST:
             break
         worst = list(left)[int(np.argmax(np.abs(vectors[:, -1])))]
-        found.append((left.pop(worst), float(values[-1]) / MOST))
+        each = left.pop(worst)
+        p, d = _stiffness(each.loop, dt)
+        own_part = (p + d) / 2.0 if each.loop.of_velocity else p + d / 2.0
+        place = order.index(worst)
+        share = 1.0 / (1.0 + own_part * float(matrix[place, place]))
+        found.append((each, float(values[-1]) / MOST, share))
     return found
 
 

@@ -8,7 +8,7 @@ import gymnasium
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import data_equivalence
 
-from bullet_gazebo.pictures.camera import Camera
+from bullet_gazebo.pictures.camera import CameraLike
 from file_access.text import did_you_mean
 from robot_envs import checks
 from robot_envs.backends import LOCKSTEP, OWN, REALTIME, make_backend
@@ -86,7 +86,8 @@ class RobotEnv(DrawnEnv):
         actuator_lag: time constant with which commands are followed [s]; see `Actuator`.
         randomisation: what differs from episode to episode: options of `UniformRandomisation` by name, or a
             `Randomisation`. The reset's `info["variation"]` reports what was drawn.
-        camera: of pictures; None: one that sees the robots.
+        camera: of pictures, or only some fields of a `Camera`, as in {"yaw": 90.0}; None: one that sees the
+            robots.
         width: of pictures [pixels].
         height: of pictures [pixels].
         render_mode: "rgb_array": pictures; "human": a page in the browser, whose address is printed once, at
@@ -116,7 +117,7 @@ class RobotEnv(DrawnEnv):
         actuator_limit: float | Mapping[str, float] | None = None,
         actuator_lag: float | Mapping[str, float] = 0.0,
         randomisation: Mapping[str, Any] | Randomisation | None = None,
-        camera: Camera | None = None,
+        camera: CameraLike = None,
         width: int = WIDTH,
         height: int = HEIGHT,
         render_mode: str | None = None,
@@ -159,10 +160,8 @@ class RobotEnv(DrawnEnv):
             backend.look(both(task.query, task.reward_query))
             return task
         backend.look(task.query)
-        name = type(task).__name__
-        gymnasium.logger.warn(
-            f"rewards of {name} are 0, and nothing terminates: this world can't tell its reward_query"
-        )
+        text = "are 0, and nothing terminates: this world can't tell its reward_query"
+        gymnasium.logger.warn(f"rewards of {type(task).__name__} {text}")
         return Unjudged()
 
     def _adopt(self, task: Task) -> None:
@@ -250,9 +249,8 @@ class RobotEnv(DrawnEnv):
         if self._actuator is not None:
             self._actuator.begin(state.commands)
         if self._goal_task is not None:
-            checks.set_goal(
-                self._goal_task, self._shown(state), self.np_random, options.get("goal")
-            )
+            shown, goal = self._shown(state), options.get("goal")
+            checks.set_goal(self._goal_task, shown, self.np_random, goal)
         measured = state if self._sensor is None else self._sensor.begin(state, self.np_random)
         observation = self._observe(measured)
         self._steps = 0

@@ -1,7 +1,7 @@
 """What a task sees: joints, links, models and contacts by name; and how an episode begins."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector
@@ -147,25 +147,21 @@ ONLY_REWARDED = "; what only the reward needs belongs into the task's reward_que
 
 def both(first: StateQuery, second: StateQuery) -> StateQuery:
     """Returns a query for what either of two asks for."""
-    return StateQuery(
-        models=tuple(dict.fromkeys([*first.models, *second.models])),
-        all_models=first.all_models or second.all_models,
-        links=tuple(dict.fromkeys([*first.links, *second.links])),
-        contacts_of=tuple(dict.fromkeys([*first.contacts_of, *second.contacts_of])),
-        all_contacts=first.all_contacts or second.all_contacts,
-    )
+
+    def merged(name: str) -> Any:
+        one, other = getattr(first, name), getattr(second, name)
+        return one or other if isinstance(one, bool) else tuple(dict.fromkeys([*one, *other]))
+
+    return StateQuery(**{each.name: merged(each.name) for each in fields(StateQuery)})
 
 
 def part_of(state: WorldState, query: StateQuery) -> WorldState:
     """Returns a state without the links and models that a query doesn't name; contacts stay all, or none."""
     links = Links((name, state.links[name]) for name in link_keys(query))
-    models = Models((name, state.models[name]) for name in query.models)
-    touches = query.all_contacts or query.contacts_of
-    return state._replace(
-        links=links,
-        models=state.models if query.all_models else models,
-        contacts=state.contacts if touches else (),
-    )
+    named = Models((name, state.models[name]) for name in query.models)
+    contacts = state.contacts if query.all_contacts or query.contacts_of else ()
+    models = state.models if query.all_models else named
+    return state._replace(links=links, models=models, contacts=contacts)
 
 
 def link_keys(query: StateQuery) -> list[str]:

@@ -65,21 +65,26 @@ def make_environment(
         raise WorkbenchError(f"can't make {env_id}: {reason}") from error
     except (Exception, SystemExit) as error:
         raise EnvironmentFailure(f"can't make {env_id}: {error_line(error)}") from error
+    return CheckedEnvironment(_suited(env, env_id, keep_dict), env_id, which)
+
+
+def _suited(env: gymnasium.Env[Any, Any], env_id: str, keep_dict: bool) -> gymnasium.Env[Any, Any]:
+    """Returns an environment whose observations are vectors, or in a form that is to be kept."""
     space = env.observation_space
     parts = list(space.values()) if isinstance(space, spaces.Dict) else [space]
     keeps = keep_dict and all(isinstance(part, spaces.Box) for part in parts)
     for part in filter(is_image, parts):
         _check_image(env_id, part, keeps)
+    if isinstance(space, spaces.Box) and len(space.shape) == 1:
+        return env
     if keeps and (isinstance(space, spaces.Dict) or is_image(space)):
-        return CheckedEnvironment(env, env_id, which)
-    if not (isinstance(space, spaces.Box) and len(space.shape) == 1):
-        if not space.is_np_flattenable:
-            env.close()
-            raise WorkbenchError(
-                f"{env_id} observes {space}; agents learn only from vectors of numbers"
-            )
-        env = gymnasium.wrappers.FlattenObservation(env)
-    return CheckedEnvironment(env, env_id, which)
+        return env
+    if not space.is_np_flattenable:
+        env.close()
+        raise WorkbenchError(
+            f"{env_id} observes {space}; agents learn only from vectors of numbers"
+        )
+    return gymnasium.wrappers.FlattenObservation(env)
 
 
 def environment_for(

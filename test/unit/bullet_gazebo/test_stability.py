@@ -81,16 +81,19 @@ def bound(kind, share_of_d, step, damping=0.0, implicit=False):
     ("kind", "share_of_d"), [(POSITION, 0.0), (POSITION, 0.5), (POSITION, 0.99), (VELOCITY, 0.0),
                              (VELOCITY, 0.3)]
 )  # fmt: skip
-def test_a_loop_beyond_the_bound_grows_and_is_told_and_one_below_does_neither(
+def test_a_loop_beyond_the_bound_is_softened_and_told_and_one_below_is_neither(
     rig, kind, share_of_d, step
 ):
     p, d = bound(kind, share_of_d, step)
     first, most, last, told = swing(rig, {"p": 0.97 * p, "d": 0.97 * d}, step, EXACT, kind)
     assert last <= most < 10.0 * first
     assert told == []
-    first, most, _, told = swing(rig, {"p": 1.03 * p, "d": 1.03 * d}, step, EXACT, kind)
-    assert most > 100.0 * first
-    assert [text for text in told if "will shake" in text and "'axle'" in text]
+    for beyond in (1.03, 100.0):
+        gains = {"p": beyond * p, "d": beyond * d}
+        first, most, last, told = swing(rig, gains, step, EXACT, kind)
+        assert last <= most < 2.0 * first
+        assert share_of_d == 0.0 or last < 1e-3 * first
+    assert [text for text in told if "would shake" in text and "'axle'" in text]
 
 
 @pytest.mark.parametrize("step", [0.001, 0.005])
@@ -161,50 +164,57 @@ def test_sane_robots_are_told_nothing_of(rig, name):
 
 
 @pytest.mark.parametrize("step", [0.001, 0.002, 0.005, 0.01])
-def test_a_light_hand_that_fell_before_its_controllers_came_stays_within_a_turn_of_its_stops(
-    rig, step
-):
+def test_a_light_hand_that_fell_before_its_controllers_came_goes_where_they_say(rig, step):
     robot = rig(urdf_of("light_hand"), step)
     names = robot.model.joint_names
     assert beyond_stops(robot.model, robot.run(1.0)) < 2.0
     for name in names:
         robot.load(POSITION, name, HAND)
         robot.controller(name).command(0.0 if "spread" in name else 0.8)
-    states = robot.run(1.0)
+    states = robot.run(2.0)
     assert beyond_stops(robot.model, states) < 2.0 * math.pi
     assert max(abs(speed) for state in states for _, speed in state) <= math.pi / step
-    assert "blew up" in " ".join(robot.warnings())
+    if step == 0.001:
+        goals = [0.0 if "spread" in name else 0.8 for name in names]
+        assert [position for position, _ in states[-1]] == pytest.approx(goals, abs=0.02)
+        assert max(abs(speed) for _, speed in states[-1]) < 1e-6
     for name in names:  # once the cause is gone, it comes back
         robot.controller(name).pids["pid"].gains = Gains(0.002, d=1e-6)
+    robot.manager.loops_changed()
     states = robot.run(2.0)
     assert beyond_stops(robot.model, states[-10:]) < 0.05
     assert max(abs(speed) for _, speed in states[-1]) < 20.0
 
 
 @pytest.mark.parametrize("step", [0.001, 0.002, 0.005, 0.01])
-def test_an_arm_with_shipped_gains_shakes_and_comes_back(rig, step):
+def test_an_arm_with_shipped_gains_does_not_shake(rig, step):
     robot = rig(urdf_of("arm"), step)
     goal = dict(zip(ARM, (0.3, 0.5, 0.9, 0.3, 0.3, 0.3), strict=True))
     for name, (p, d) in ARM.items():
         robot.load(POSITION, name, {"p": p, "d": d})
         robot.controller(name).command(goal[name])
-    states = robot.run(1.0)
-    assert beyond_stops(robot.model, states) < 2.0 * math.pi
-    if step < 0.005:  # what is well within the step's reach goes on
-        assert abs(states[-1][0][0] - goal["pan"]) < 0.1
+    states = robot.run(3.0)  # it shook by 200 rad/s
+    for (position, speed), wanted in zip(states[-1], goal.values(), strict=True):
+        assert abs(speed) < 0.01
+        assert abs(position - wanted) < 30.0 * step
     assert any("'wrist_3'" in text and "d = 20" in text for text in robot.warnings())
-    for name, (p, d) in ARM.items():
-        robot.controller(name).pids["pid"].gains = Gains(p / 400.0, d=d / 2000.0)
-    states = robot.run(4.0)
-    assert beyond_stops(robot.model, states[-10:]) < 0.05
-    assert max(abs(speed) for _, speed in states[-1]) < 10.0
+
+
+def test_a_light_wheel_with_a_high_gain_keeps_its_speed(rig):
+    """A racecar's, p = 1 on 2.6e-4 kg m²: its speed alternated from step to step, and grew."""
+    robot = rig(EXACT.replace(str(INERTIA), "0.00026"))
+    robot.load(VELOCITY, "axle", {"p": 1.0, "i": 0.01})
+    robot.controller("axle").command(20.0)
+    speeds = [state[0][1] for state in robot.run(1.0)[-100:]]
+    assert speeds == pytest.approx([20.0] * 100, abs=0.1)
 
 
 def test_a_blow_up_names_the_joint_and_who_drives_it_once(rig):
-    robot = rig(urdf_of("arm"), 0.01)
+    robot = rig(urdf_of("arm"))
     robot.load(POSITION, "wrist_3", {"p": 1000.0, "d": 20.0})
-    robot.controller("wrist_3").command(0.5)
-    robot.run(1.0)
+    for _ in range(2):
+        robot.model.body.reset_joint(5, 0.0, 1e5)
+        robot.run(0.1)
     told = [text for text in robot.warnings() if "blew up" in text]
     [wrist] = [text for text in told if "joint 'wrist_3'" in text]
     assert "The controller 'wrist_3_controller' drives it with p = 1000, i = 0, d = 20" in wrist
@@ -235,7 +245,7 @@ def test_in_a_process_it_is_told_by_pythons_logging(rig, caplog):
     robot.use_default_log()
     with caplog.at_level(logging.WARNING):
         robot.load(POSITION, "axle", {"p": 10.0, "d": 600.0})
-    assert "will shake" in caplog.text
+    assert "would shake" in caplog.text
 
 
 # what a P gain alone drives

@@ -9,6 +9,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+import psutil
 import pytest
 
 pytestmark = pytest.mark.slow  # what one test has built is there for the next
@@ -295,3 +296,42 @@ def test_a_folder_and_a_workspace_that_cannot_be_written(root, workspace):
             pytest.skip("this checkout is closed to others")
         assert (done.returncode, done.stdout) == (0, "1 x: 2\n"), done.stderr
         assert f"{home}/own/.cache/cartpole" in done.stderr
+
+
+def test_what_failed_is_tried_again_with_other_debian_packages(root, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(root)
+    monkeypatch.syspath_prepend("/usr/lib/python3/dist-packages")
+    from tools.user_packages import build, find
+
+    installed, tried = tmp_path / "status", []
+    installed.touch()
+    package(tmp_path / "theirs", "waiting", "add_custom_target(y)\n")
+    found = find.look_through([tmp_path / "theirs"], [], root)
+    monkeypatch.setattr(build, "DEBIAN", installed)
+    monkeypatch.setattr(build.Overlay, "_build", lambda *_: tried.append(1) or "no library")
+    for time in (1, 1, 2):
+        os.utime(installed, (time, time))
+        overlay = build.Overlay(tmp_path / "made", found.folders, build.Tools("", "", ""))
+        assert overlay.make(found) == {"waiting": "no library"}
+    assert len(tried) == 2
+
+
+def test_what_a_killed_ws_builds_on_keeps_the_next_one_waiting(root, tmp_path):
+    os.mkfifo(tmp_path / "go")
+    package(tmp_path, "slow", f"execute_process(COMMAND cat {tmp_path}/go)\nadd_custom_target(x)\n")
+    command = [root / "ws", "--with", tmp_path, "true"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as first:
+        assert "building your package slow" in first.stderr.readline()
+        below = psutil.Process(first.pid).children(recursive=True)
+        for each in below:
+            if "user_packages" in " ".join(each.cmdline()):
+                each.kill()
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as second:
+        line = second.stderr.readline()
+        if "waiting for another ws that builds your packages" not in line:
+            second.kill()  # it would wait for the test
+        assert "waiting" in line
+        (tmp_path / "go").write_text("the first one's cmake\n")
+        assert "building your package slow" in second.stderr.readline()
+        (tmp_path / "go").write_text("its own\n")
+        assert "slow: done" in second.stderr.read()

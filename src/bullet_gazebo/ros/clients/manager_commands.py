@@ -84,13 +84,13 @@ def group_main(argv: Sequence[str] | None = None) -> int:
     command = commands.add_parser("list", help="the groups and their controllers")
     command.set_defaults(act=lambda _: _list_groups(_read_groups()))
     command = commands.add_parser("spawn", help="load and start the controllers of a group")
-    command.set_defaults(act=lambda options: _spawn(_group(options.group)))
+    command.set_defaults(act=lambda options: _spawn(_read_groups(), options.group))
     command.add_argument("group", metavar="GROUP")
     text = (
         "stop the other groups' running controllers, and start those of a group, loaded if need be"
     )
     command = commands.add_parser("switch", help=text)
-    command.set_defaults(act=lambda options: _switch_to(_group(options.group)))
+    command.set_defaults(act=lambda options: _switch_to(_read_groups(), options.group))
     command.add_argument("group", metavar="GROUP")
     options = parser.parse_args(rospy.myargv(list(sys.argv if argv is None else argv))[1:])
     return _run("controller_group", lambda: options.act(options))
@@ -144,8 +144,7 @@ def _read_groups() -> Groups:
     return {str(group): names for group, names in found.items()}
 
 
-def _group(name: str) -> list[str]:
-    groups = _read_groups()
+def _group(groups: Groups, name: str) -> list[str]:
     if name not in groups:
         raise CommandFailed(
             f"no group '{name}' in {rospy.resolve_name(PARAMETER)}: {sorted(groups)}"
@@ -161,19 +160,21 @@ def _list_groups(groups: Groups) -> None:
             print(f"      {name}")
 
 
-def _spawn(names: Sequence[str]) -> None:
+def _spawn(groups: Groups, group: str) -> None:
+    names = _group(groups, group)
     _require_manager()
     _on_controllers(SPAWN, names)
 
 
-def _switch_to(wanted: Sequence[str]) -> None:
+def _switch_to(groups: Groups, group: str) -> None:
+    wanted = _group(groups, group)
     _require_manager()
     states = {each.name: each.state for each in loaded_controllers()}
     for name in wanted:
         if name not in states:
             load_controller(name)
     start = [name for name in wanted if states.get(name) != "running"]
-    grouped = {name for names in _read_groups().values() for name in names}
+    grouped = {name for names in groups.values() for name in names}
     stop = [
         name
         for name, state in states.items()

@@ -32,7 +32,7 @@ from bullet_gazebo.sensors.schedule import SensorClock
 from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.simulator import Simulator
 
-CONTROL = re.compile("control|drive|steer|planar_move|hw_sim", re.IGNORECASE)  # foreign libraries
+CONTROL = re.compile("plugin .*(control|drive|steer|planar_move|hw_sim)", re.IGNORECASE)
 PARAMETER = "~plugins"  # users' plugins: library: "module:Factory"
 PATIENCE = 10.0  # [s of wall time]
 Update = Callable[[int], None]
@@ -185,6 +185,7 @@ class PluginRegistry:
             except BaseException:  # noqa: BLE001 - a user's code must not leave the model half loaded
                 context.report("is left out, because it raised")
                 context.release()
+        _tell_missing_control(model)
 
     def unload(self, model: Model) -> None:
         """Ends the plugins of `model`."""
@@ -205,8 +206,10 @@ class PluginRegistry:
             return self._built_in[library]
         place = places.get(library, places.get(plugin.filename))
         if place is None:
-            name = plugin.filename or "without a filename"
-            _leave_out(f"{name} of sensor '{sensor.name}'" if sensor else name, model)
+            # The spawn services log all that is left out together.
+            unknown = f"plugin {plugin.filename or 'without a filename'}"
+            unknown += f" of sensor '{sensor.name}'" if sensor else ""
+            model.description.left_out.append(unknown)
             return None
         try:
             return _import(place)
@@ -231,15 +234,15 @@ def _built_in() -> dict[str, Factory]:
     }
 
 
-def _leave_out(name: str, model: Model) -> None:
-    libraries = {library_of(each.filename) for each in model.description.plugins}
-    if CONTROL.search(name) and CONTROL_PLUGIN not in libraries:
+def _tell_missing_control(model: Model) -> None:
+    """Says in a line of its own if a plugin that is left out was to control the robot."""
+    foreign = next(filter(CONTROL.match, model.description.left_out), None)
+    libraries = {library_of(plugin.filename) for plugin in model.description.plugins}
+    if foreign is not None and CONTROL_PLUGIN not in libraries:
         rospy.logwarn(
-            "Model '%s': the plugin %s is not simulated: this robot has no control here (docs/plugins.md)",
-            model.name, name,
+            "Model '%s': %s is not simulated: this robot has no control here (docs/plugins.md)",
+            model.name, foreign,
         )  # fmt: skip
-    else:  # the spawn services log all that is left out together
-        model.description.left_out.append(f"plugin {name}")
 
 
 def _warn_late(models: str) -> None:

@@ -130,10 +130,8 @@ def _model_in(
     network = {name: value for name, value in network.items() if value is not None}
     if "net_arch" in network:
         network["net_arch"] = _layers(network["net_arch"])
-    network |= {
-        name: _named(value, f"--policy-kwargs {name}=")
-        for name, value in options.hyperparameters.policy_kwargs.items()
-    }
+    for name, value in options.hyperparameters.policy_kwargs.items():
+        network[name] = _named(value, f"--policy-kwargs {name}=")
     if options.hyperparameters.lr_schedule == "linear":
         arguments["learning_rate"] = linear(arguments["learning_rate"])
     if arguments.get("action_noise") is not None:
@@ -142,12 +140,11 @@ def _model_in(
         arguments["action_noise"] = NormalActionNoise(np.zeros(shape), deviation)
     if isinstance(arguments.get("train_freq"), list):  # a number and a unit
         arguments["train_freq"] = tuple(arguments["train_freq"])
-    policy = options.hyperparameters.policy or _policy_for(vector.observation_space)
     try:
         torch.empty(0, device=run.device)  # where there is none, the model would take the CPU
         model = made_class(
-            _named(policy, "--policy"), vector, seed=run.seed,
-            device=run.device, policy_kwargs=network or None, **arguments,
+            _policy(options, vector.observation_space), vector, seed=run.seed, device=run.device,
+            policy_kwargs=network or None, **arguments,
         )  # fmt: skip
     except WorkbenchError:
         raise
@@ -158,6 +155,13 @@ def _model_in(
     return model
 
 
+def _policy(options: TrainingOptions, space: gymnasium.Space[Any]) -> Any:
+    """Returns the policy's name or class: the one asked for, or what suits the observations."""
+    suits = "CnnPolicy" if is_image(space) else "MlpPolicy"
+    suits = "MultiInputPolicy" if isinstance(space, spaces.Dict) else suits
+    return _named(options.hyperparameters.policy or suits, "--policy")
+
+
 def _named(value: Any, flag: str) -> Any:
     """Returns the class that a text names as module:Class; other values as they are."""
     if not isinstance(value, str) or ":" not in value:
@@ -166,12 +170,6 @@ def _named(value: Any, flag: str) -> Any:
     if not (isinstance(found, type) and issubclass(found, torch.nn.Module | torch.optim.Optimizer)):
         raise WorkbenchError(f"{flag} {value}: it is neither a torch Module nor an Optimizer")
     return found
-
-
-def _policy_for(space: gymnasium.Space[Any]) -> str:
-    if isinstance(space, spaces.Dict):
-        return "MultiInputPolicy"
-    return "CnnPolicy" if is_image(space) else "MlpPolicy"
 
 
 def _hindsight(options: TrainingOptions, env: CheckedEnvironment) -> dict[str, Any]:

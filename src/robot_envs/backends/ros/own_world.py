@@ -15,7 +15,7 @@ from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.ros.bringup import bring_up
 from robot_envs.backends.ros.lockstep import LockstepWorld
 from robot_envs.backends.ros.own_simulator import OwnSimulator, check_memory
-from robot_envs.backends.ros.running import SharedWorld, physics_step, set_physics_step
+from robot_envs.backends.ros.running import SharedWorld, physics_step
 from robot_envs.backends.world_files import world_models
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, SimulatorHangs
 from robot_envs.scene import Scene
@@ -239,9 +239,7 @@ class OwnWorld(RobotBackend):
         try:
             self.simulator.wait()
             with master.using(self.simulator.uri):
-                if wanted := self.scene.robots[0].physics_step:
-                    set_physics_step(wanted)
-                step = physics_step()
+                step = physics_step(self.scene.robots[0].physics_step)
                 ticks = ticks_per_action(self._period, step)
                 self._step = ticks * round(step * NANOSECONDS)  # [ns] of one action
                 bring_up(self.scene, logger.debug)

@@ -144,18 +144,18 @@ def world_path(source: Source | None, folder: Path) -> str | None:
     return str(path)
 
 
-def physics_step() -> float:
-    """Returns the simulator's physics step [s]; raises RobotEnvError if it doesn't answer."""
+def physics_step(wanted: float | None = None) -> float:
+    """Returns the simulator's physics step [s], once the one that is wanted is set.
+
+    Raises:
+        RobotEnvError: if the simulator refuses, or doesn't answer.
+    """
+    if wanted and not ros_gazebo.gazebo_set_time_step(wanted):
+        raise RobotEnvError(f"the physics step can't be {wanted:g} s; see the messages above")
     step = ros_gazebo.gazebo_get_time_step()
     if not step > 0.0:
         raise RobotEnvError("the simulator doesn't report its time step; see the messages above")
     return step
-
-
-def set_physics_step(step: float) -> None:
-    """Sets the simulator's physics step [s]; raises RobotEnvError if it refuses."""
-    if not ros_gazebo.gazebo_set_time_step(step):
-        raise RobotEnvError(f"the physics step can't be set to {step:g} s; see the messages above")
 
 
 def check_world(robot: Robot) -> None:

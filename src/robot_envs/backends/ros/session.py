@@ -101,10 +101,7 @@ class RosSession:
         self._become_node()
         self._check_mode()
         running.check_world(robot)
-        if robot.physics_step:
-            before, step = RunningSimulator(), running.physics_step()
-            running.set_physics_step(robot.physics_step)
-            self._undo.callback(_undo_if_running, before, partial(running.set_physics_step, step))
+        self._set_physics_step(robot.physics_step)
         if self._curves is not None:
             self._undo.callback(windows.show_curves(self._curves))
         changes = bring_up(self._scene, say)
@@ -119,6 +116,12 @@ class RosSession:
             self._undo.callback(windows.open_rviz(robot))
         _sessions.append(self)
         self._undo.callback(_sessions.remove, self)
+
+    def _set_physics_step(self, step: float | None) -> None:
+        if step:
+            restore = partial(running.physics_step, running.physics_step())
+            self._undo.callback(_undo_if_running, RunningSimulator(), restore)
+            running.physics_step(step)
 
     def _start_simulator(self) -> None:
         """Starts the simulator, and the master if there is none."""

@@ -35,13 +35,12 @@ def test_what_is_read_is_whole(tmp_path_factory, file):
 
 @pytest.mark.slow
 @settings(QUICK, max_examples=60)
-@given(mesh_files())
-def test_no_mesh_ends_an_engine(make_world, tmp_path_factory, file):
+@given(file=mesh_files())
+def test_no_mesh_ends_an_engine(world, tmp_path_factory, file):
     """One that moves and one that stands; an engine that crashes ends this process."""
     path = tmp_path_factory.getbasetemp() / f"mesh{file[0]}"
     path.write_bytes(file[1])
     for static in (0, 1):
-        world = make_world(ground=True)
         try:
             world.spawn("m", parse_sdf(SDF.format(static=static, path=path)), Pose())
         except DescriptionError as error:
