@@ -104,6 +104,7 @@ run_tests() {  # [--fast] [ARG...]
         arguments=(--numprocesses 3 --dist loadfile --no-loadscope-reorder)
     [[ -z $fast ]] || arguments=(-m "not ($NOT_FAST)" "${arguments[@]}")
     cd -- "$ROOT"
+    unset PYTHONDONTWRITEBYTECODE  # hundreds of processes import the same modules
     exec "$VENV/bin/python3" -m pytest --override-ini "cache_dir=$STATE/pytest" "${arguments[@]}"
 }
 

@@ -1,14 +1,14 @@
 """A controlled robot: the seam between a model of the physics world and its ros_control hardware."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import ceil, isfinite
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.physics.description import Plugin
-from bullet_gazebo.physics.engine import FURTHEST, Contact
+from bullet_gazebo.physics.engine import FURTHEST
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.stability import Log, StabilityWatch
 
@@ -81,9 +81,9 @@ class ControlledRobot:
         self._efforts = [0.0] * len(indices)
         moved = {drive.joint.name for drive, _ in self._drives if drive.pid is None}
         # What a motor drives is as fast as its command.
-        self._watched = [index for name, index in indices.items() if name not in moved]
+        self.watched = [index for name, index in indices.items() if name not in moved]
         self._others = [index for name, index in indices.items() if name not in hardware.joints]
-        self._watch = StabilityWatch(model, hardware, manager, log)
+        self.watch = StabilityWatch(model, hardware, manager, log)
         self._read_ahead = (
             False  # whether the handles hold the state that the next tick begins with
         )
@@ -97,8 +97,8 @@ class ControlledRobot:
         self._fast = FAST / self.model.time_step
         self._slow = -self._fast
         self._read_ahead = False
-        self._watch.review(self._control_period / NANOSECONDS)
-        shares = self._watch.shares
+        self.watch.review(self._control_period / NANOSECONDS)
+        shares = self.watch.shares
         self._softened = [
             (joint, shares[joint.name])
             for joint in self.hardware.effort_joints
@@ -149,18 +149,14 @@ class ControlledRobot:
         for joint, share in self._softened:
             joint.command *= share
 
-    def report_stalls(self, now: int, contacts: Callable[[], list[Contact]]) -> None:
-        """Logs, once for each joint, that a contact has stalled its motor for a second; `now` [ns]."""
-        self._watch.report_stalls(now, contacts)
-
     def _contain(self, states: JointStates) -> None:
         """Removes energy that came from nowhere, as ODE's solver loses it, and reads the new state."""
         names = self.model.joint_names
-        blown = [names[index] for index in self._watched if not abs(states[index][1]) < self._fast]
-        self._watch.blown_up(blown, self._fast)
+        blown = [names[index] for index in self.watched if not abs(states[index][1]) < self._fast]
+        self.watch.blown_up(blown, self._fast)
         # A shaking joint keeps half of its speed, which its gains brake in the next step. At rest it would
         # be pushed the same way forever.
-        self.model.calm({name: 0.5 if name in self._watch.shares else 0.0 for name in blown})
+        self.model.calm({name: 0.5 if name in self.watch.shares else 0.0 for name in blown})
         states = self.model.body.joint_states()
         for joint, index in self._joints:
             joint.position, joint.velocity = states[index][:2]

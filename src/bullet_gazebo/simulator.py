@@ -295,7 +295,7 @@ class Simulator:
         for robot in self.robots:
             robot.update(now, dt)
             if now % STALL_CHECK < self._period:
-                robot.report_stalls(now, self.world.engine.contacts)
+                robot.watch.report_stalls(now, self.world.engine.contacts)
         for listener in self.listeners:
             listener(now)
         for robot in self.robots:

@@ -40,14 +40,6 @@ class OwnedLoop(NamedTuple):
     loop: Loop
 
 
-class TooHigh(NamedTuple):
-    """A loop with the factor by which its gains are too high, and the share of its effort that is taken."""
-
-    each: OwnedLoop
-    excess: float
-    share: float
-
-
 class StabilityWatch:
     """Checks a robot's gains whenever they or its controllers change, and logs each fault once."""
 
@@ -175,10 +167,13 @@ class StabilityWatch:
         self._model.add_damping(added)
 
 
-def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[TooHigh]:
+def too_high(
+    model: Model, loops: list[OwnedLoop], dt: float
+) -> list[tuple[OwnedLoop, float, float]]:
     """Returns the loops whose gains are too high for steps of `dt` [s], the worst first.
 
-    Inertias are those with all joints at zero.
+    Each comes with the factor by which it is too high, and the share of its effort to take. Inertias are
+    those with all joints at zero.
     """
     left = {each.loop.joint: each for each in loops if sum(_stiffness(each.loop, dt)) > 0.0}
     order = [joint.name for joint in model.description.movable_joints]
@@ -207,7 +202,7 @@ def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[TooHigh]:
         own_part = (p + d) / 2.0 if each.loop.of_velocity else p + d / 2.0
         place = order.index(worst)
         share = 1.0 / (1.0 + own_part * float(matrix[place, place]))
-        found.append(TooHigh(each, float(values[-1]) / MOST, share))
+        found.append((each, float(values[-1]) / MOST, share))
     return found
 
 

@@ -11,7 +11,7 @@ from cartpole.tasks import TASKS, CartPoleTask
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.environment import RobotEnv
 from robot_envs.making import check_options
-from robot_envs.pictures.drawn import Camera
+from robot_envs.pictures.drawn import Camera, CameraLike
 from robot_envs.variation import LinkScale, Variation
 from robot_envs.vector import RobotVectorEnv
 
@@ -90,6 +90,7 @@ class CartPoleEnv(RobotEnv):
         task: what is to be learned.
         backend: see above, or a backend, which the environment closes.
         sensor_noise: see above.
+        camera: of pictures, or some of its fields.
         options: the others of the table, as `RobotEnv` has them.
 
     Raises:
@@ -103,10 +104,13 @@ class CartPoleEnv(RobotEnv):
         backend: str | RobotBackend | None = None,
         *,
         sensor_noise: float | Sequence[float] | np.ndarray | Mapping[str, Any] = 0.0,
+        camera: CameraLike = None,
         **options: Any,
     ) -> None:
         noise = _by_joint(sensor_noise)
-        super().__init__(ROBOT, task, backend, sensor_noise=noise, camera=CAMERA, **options)
+        if not isinstance(camera, Camera):
+            camera = CAMERA.changed(camera or {})
+        super().__init__(ROBOT, task, backend, sensor_noise=noise, camera=camera, **options)
 
 
 def _by_joint(noise: float | Sequence[float] | np.ndarray | Mapping[str, Any]) -> Any:

@@ -64,14 +64,9 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
 
 
 def _stances(model: ModelDescription, below: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Returns what the joints of legs carry if half the feet are on the ground.
+    """Returns load [N m, N] and inertia [kg m², kg] of legs' joints, with half the feet on the ground.
 
-    Args:
-        model: the robot.
-        below: the mass that each joint carries with its foot in the air [kg].
-
-    Returns:
-        Upper bounds of load [N m, N] and inertia [kg m², kg], by joint.
+    `below` is the mass that each joint carries with its foot in the air [kg].
     """
     poses, on = poses_at_zero(model), feet(model)
     total = sum(each.inertia.mass for each in model.links.values() if each.inertia is not None)
@@ -84,14 +79,10 @@ def _stances(model: ModelDescription, below: Mapping[str, float]) -> dict[str, t
             if joint.kind == "prismatic":
                 found[joint.name] = (GRAVITY * mass * abs(z), mass)
             else:
-                arm = math.dist(frame.position, poses[foot].position) + _reach(model, foot)
+                soles = [poses[foot].compose(each.pose) for each in model.links[foot].collisions]
+                arm = max(math.dist(frame.position, each.position) for each in soles)
                 found[joint.name] = (GRAVITY * mass * arm * math.hypot(x, y), mass * arm**2)
     return found
-
-
-def _reach(model: ModelDescription, link: str) -> float:
-    """Returns how far a link's collisions lie from its frame [m]."""
-    return max(math.hypot(*shape.pose.position) for shape in model.links[link].collisions)
 
 
 def wheel_gains(model: ModelDescription) -> dict[str, Gains]:

@@ -18,7 +18,7 @@ import yaml
 from bullet_gazebo.physics.files.reading import Resources
 from package_writing import CannotWrite, contents
 from package_writing.survey import Survey, feet, height_note, look_at, root_link, standing_height
-from package_writing.urdf_files import Copied, copy_urdf, expanded, write_expanded
+from package_writing.urdf_files import Copied, copy_urdf, expanded
 from robot_envs import Robot, RobotEnvError, controllers, files
 
 TREE = Path(__file__).resolve().parents[2]  # the source tree
@@ -89,8 +89,9 @@ def write(request: PackageRequest, made: Path) -> list[str]:
     """
     if request.height is not None and not math.isfinite(request.height):
         raise CannotWrite(f"--height is a number of metres, not {request.height}")
-    taken = write_expanded if request.standalone else copy_urdf
-    copied = taken(request.urdf or ARM, request.arguments, request.name, made)
+    copied = copy_urdf(
+        request.urdf or ARM, request.arguments, request.name, made, request.standalone
+    )
     if request.standalone:
         request = replace(request, arguments={})
     if not re.fullmatch(r"[\w .+@,=/-]+", copied.place):  # it stands in launch files and in Python

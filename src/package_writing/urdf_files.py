@@ -35,27 +35,9 @@ class Copied:
     outside: tuple[Path, ...]
 
 
-def write_expanded(path: Path, arguments: Mapping[str, str], package: str, folder: Path) -> Copied:
-    """Writes a file's URDF, expanded, with all its meshes, so that it needs no other package.
-
-    Args and errors are those of `copy_urdf`.
-    """
-    path = Path(os.path.abspath(path.expanduser()))
-    xml = expanded(path, arguments)
-    copy = folder / "urdf" / f"{path.name.partition('.')[0]}.urdf"
-    try:
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        text = _with_meshes(xml, path, package, folder, every=True)
-        text = text.replace("${", "$${").replace("$(", "$$(")  # xacro will read it
-        copy.write_text(text, encoding="utf-8", errors="surrogateescape")
-    except OSError as error:
-        raise CannotWrite(f"can't copy {error.filename}: {error.strerror}") from error
-    xml = expanded(copy, {})
-    needed = sorted(set(NAMED.findall(xml)) - {package})
-    return Copied(copy.name, xml, tuple(needed), ())
-
-
-def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Path) -> Copied:
+def copy_urdf(
+    path: Path, arguments: Mapping[str, str], package: str, folder: Path, standalone: bool = False
+) -> Copied:
     """Copies a file and those that it includes by relative paths; the paths stay the same.
 
     Args:
@@ -63,19 +45,22 @@ def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Pa
         arguments: xacro's arguments.
         package: the package's name.
         folder: the package's folder.
+        standalone: whether to write the file expanded, and to copy all meshes; it takes no arguments then.
 
     Raises:
         CannotWrite: if one of them can't be read or copied.
     """
     path = Path(os.path.abspath(path.expanduser()))  # without .., which git can't keep empty
     try:
-        expand(path, arguments)
-        files = [path, *map(Path, included_files(path, arguments))]
-        texts = [each.read_text(encoding="utf-8", errors="surrogateescape") for each in files]
-        own = _own(files, texts)
+        texts = _texts(path, arguments, standalone)
+        arguments = {} if standalone else arguments
+        own = _own(texts)
         top = Path(os.path.commonpath([each.parent for each in own]))
         for each in own:
-            _copy(each, folder / "urdf" / each.relative_to(top), package, folder)
+            target = folder / "urdf" / each.relative_to(top)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            text = _with_meshes(texts[each], each, package, folder, standalone)
+            target.write_text(text, encoding="utf-8", errors="surrogateescape")
         copy = folder / "urdf" / path.relative_to(top)
         xml = expand(copy, arguments)
         others = [Path(each).resolve() for each in included_files(copy, arguments)]
@@ -83,7 +68,7 @@ def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Pa
         raise CannotWrite(f"can't read {error}") from error
     except OSError as error:
         raise CannotWrite(f"can't copy {error.filename}: {error.strerror}") from error
-    text = "".join(texts)
+    text = "".join(texts.values())
     # What only a false <xacro:if> asks for need not be there.
     there = {
         found[1] for found in FOUND.finditer(text) if _is_found(f"{PACKAGE}{found[1]}/package.xml")
@@ -103,6 +88,16 @@ def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Pa
     )
 
 
+def _texts(path: Path, arguments: Mapping[str, str], standalone: bool) -> dict[Path, str]:
+    """Returns the text of a file and, unless it is expanded, of those that it includes."""
+    xml = expand(path, arguments)
+    if standalone:  # xacro will read it again
+        return {path: xml.replace("${", "$${").replace("$(", "$$(")}
+    included = (Path(os.path.normpath(each)) for each in included_files(path, arguments))
+    files = [path, *included]
+    return {each: each.read_text(encoding="utf-8", errors="surrogateescape") for each in files}
+
+
 def expanded(path: Path, arguments: Mapping[str, str]) -> str:
     """Returns a file's URDF, expanded if it is xacro; raises CannotWrite if it can't be read."""
     try:
@@ -111,30 +106,18 @@ def expanded(path: Path, arguments: Mapping[str, str]) -> str:
         raise CannotWrite(f"can't read {error}") from error
 
 
-def _own(files: list[Path], texts: list[str]) -> list[Path]:
+def _own(texts: Mapping[Path, str]) -> list[Path]:
     """Returns the files to copy: those included by relative paths. Others are found where they are."""
-    found = {Path(each[2]).name for text in texts for each in FOUND.finditer(text)}
+    files = list(texts)
+    found = {Path(each[2]).name for text in texts.values() for each in FOUND.finditer(text)}
     near = files[0].resolve().parent.parent  # the package's folder, if the file lies in its `urdf`
-    own = {
-        Path(os.path.normpath(each)): None
-        for each in files[1:]
-        if each.name not in found and each.resolve().is_relative_to(near)
-    }
+    own = [
+        each for each in files[1:] if each.name not in found and each.resolve().is_relative_to(near)
+    ]
     return [files[0], *own]
 
 
-def _copy(source: Path, target: Path, package: str, folder: Path) -> None:
-    target.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(source, target)
-    text = target.read_text(encoding="utf-8", errors="surrogateescape")
-    changed = _with_meshes(text, source, package, folder)
-    if changed != text:
-        target.write_text(changed, encoding="utf-8", errors="surrogateescape")
-
-
-def _with_meshes(
-    text: str, source: Path, package: str, folder: Path, *, every: bool = False
-) -> str:
+def _with_meshes(text: str, source: Path, package: str, folder: Path, every: bool) -> str:
     """Copies a text's meshes, also those of other packages if `every`; returns it with their new places."""
 
     def moved(match: re.Match[str]) -> str:

@@ -18,6 +18,7 @@ from matplotlib.patches import Patch
 from rl_workbench.statistics import bands
 
 DPI = 110
+WIDTH = 10.0  # [inches]; on a page that is narrower, 10-point letters can still be read
 WINDOW = 20  # [episodes] of the moving average
 POINTS = 200  # of a mean over seeds
 MAX_PALE = 8  # runs whose single episodes are drawn; those of more would hide each other
@@ -203,10 +204,10 @@ def evaluation_curves(panels: Sequence[Panel]) -> Figure:
 def _environments(panels: Sequence[Panel]) -> tuple[Figure, list[Axes]]:
     """Large axes, one pair for each environment, since their returns don't compare."""
     if len(panels) == 1:
-        figure = new_figure(10, 5)
+        figure = new_figure(WIDTH, 5)
         return figure, [figure.subplots()]
     rows = math.ceil(len(panels) / 2)
-    figure = new_figure(13, 4.2 * rows + 0.4)
+    figure = new_figure(WIDTH, 3.6 * rows + 0.4)
     grid = list(figure.subplots(rows, 2, squeeze=False).flat)
     for axes in grid[len(panels) :]:
         figure.delaxes(axes)
@@ -243,15 +244,15 @@ def _draw_seeds(
                       zorder=3, clip_on=False)  # fmt: skip
 
 
-def _draw_threshold(axes: Axes, threshold: float | None) -> None:
+def _draw_threshold(axes: Axes, threshold: float | None, more: str = "") -> None:
     if threshold is not None:
-        label = f"solved ({threshold:g})"
+        label = f"solved ({threshold:g}){more}"
         axes.axhline(threshold, gid="threshold", color="tab:red", ls="--", lw=1, label=label)
 
 
 def _finish(axes: Axes, panel: Panel, across: str, up: str) -> None:
-    _draw_threshold(axes, panel.threshold)
-    axes.set_title(panel.environment)
+    _draw_threshold(axes, panel.threshold, ", without exploration")  # which these returns have
+    axes.set_title(panel.environment.rpartition(":")[2])
     axes.set_xlabel(across)
     axes.set_ylabel(SUCCESS if panel.shows_success else up)
     if panel.shows_success:

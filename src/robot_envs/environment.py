@@ -8,7 +8,7 @@ import gymnasium
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import data_equivalence
 
-from bullet_gazebo.pictures.camera import Camera
+from bullet_gazebo.pictures.camera import CameraLike
 from file_access.text import did_you_mean
 from robot_envs import checks
 from robot_envs.backends import LOCKSTEP, OWN, REALTIME, make_backend
@@ -86,7 +86,8 @@ class RobotEnv(DrawnEnv):
         actuator_lag: time constant with which commands are followed [s]; see `Actuator`.
         randomisation: what differs from episode to episode: options of `UniformRandomisation` by name, or a
             `Randomisation`. The reset's `info["variation"]` reports what was drawn.
-        camera: of pictures; None: one that sees the robots.
+        camera: of pictures, or only some fields of a `Camera`, as in {"yaw": 90.0}; None: one that sees the
+            robots.
         width: of pictures [pixels].
         height: of pictures [pixels].
         render_mode: "rgb_array": pictures; "human": a page in the browser, whose address is printed once, at
@@ -116,7 +117,7 @@ class RobotEnv(DrawnEnv):
         actuator_limit: float | Mapping[str, float] | None = None,
         actuator_lag: float | Mapping[str, float] = 0.0,
         randomisation: Mapping[str, Any] | Randomisation | None = None,
-        camera: Camera | None = None,
+        camera: CameraLike = None,
         width: int = WIDTH,
         height: int = HEIGHT,
         render_mode: str | None = None,

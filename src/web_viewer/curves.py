@@ -30,7 +30,11 @@ HEIGHT = 150  # [pixels]
 # Mantissas of the axes' ends. We set the range of steps ourselves, and seldom: when viser fits it to the
 # data, a chart that is drawn while it is hidden loses its range.
 ENDS = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0, 6.4, 8.0, 10.0)
-AXES = (uplot.Axis(space=85), uplot.Axis(size=55))  # [pixels] for 100,000,000 and for 100,000
+AXES = (uplot.Axis(space=85), uplot.Axis(size=55))  # [pixels] for 100,000,000 and for -9,999.9
+PADDING = (8, 36, 0, 0)  # [pixels] above, and to the right for half of the last step
+SMALLEST, LARGEST = 0.01, 10_000.0  # values that are written out
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+MOST_LETTERS = 40  # of a title
 PALE, STRONG, SINGLE = "rgba(76, 114, 176, 0.45)", "#c0392b", "#2a6f97"
 WINDOW = 20  # values of the moving average, as in the pictures that `plot` draws
 MAX_BUCKETS = 300  # a chart is about as many pixels wide
@@ -98,18 +102,22 @@ class Curves:
     def _draw(self) -> None:
         for tag in sorted(self._changed):
             x, values, averages = self._series[tag].arrays()
+            title, unit = _title(tag, values)
+            values, averages = values / unit, averages / unit
             smooth = tag in SMOOTHED or tag.startswith(EXTRA)
             data = (x, values, averages) if smooth else (x, values)
             if tag in self._charts:
-                self._charts[tag].data = data
+                self._charts[tag].data, self._charts[tag].title = data, title
                 if self._ends[tag] < x[-1]:
                     self._charts[tag].scales = self._scales(tag, x[-1])
             else:
                 with self._container:
-                    self._charts[tag] = self._add_chart(tag, data)
+                    self._charts[tag] = self._add_chart(tag, title, data)
         self._changed.clear()
 
-    def _add_chart(self, tag: str, data: tuple[np.ndarray, ...]) -> viser.GuiUplotHandle:
+    def _add_chart(
+        self, tag: str, title: str, data: tuple[np.ndarray, ...]
+    ) -> viser.GuiUplotHandle:
         lines = [uplot.Series(label="step")]
         if len(data) == 3:
             lines.append(uplot.Series(label="each", stroke=PALE, width=1))
@@ -119,7 +127,7 @@ class Curves:
         names = list(TITLES)
         index = names.index(tag) if tag in names else len(names)
         return self._gui.add_uplot(
-            data, tuple(lines), title=TITLES.get(tag, tag), height=HEIGHT,
+            data, tuple(lines), title=title, height=HEIGHT, padding=PADDING,
             order=float(self._summary.order) + 0.001 * (1 + index),
             legend=uplot.Legend(show=False), axes=AXES, scales=self._scales(tag, data[0][-1]),
         )  # fmt: skip
@@ -144,6 +152,18 @@ class Curves:
         content = f'<div style="padding: 0.4em 0.8em">{text}</div>'
         if content != self._summary.content:
             self._summary.content = content
+
+
+def _title(tag: str, values: np.ndarray) -> tuple[str, float]:
+    """Returns a chart's title, and the unit in which its axis has few digits."""
+    size = float(np.abs(values).max())
+    title = TITLES.get(tag, tag)
+    power = 0
+    if size and not SMALLEST <= size < LARGEST:
+        power = max(3 * math.floor(math.log10(size) / 3.0), -300)
+        title = f"{title}, in 10{str(power).translate(RAISED)}"
+    half = MOST_LETTERS // 2
+    return title if len(title) <= MOST_LETTERS else f"{title[:half]}…{title[-half:]}", 10.0**power
 
 
 class _Bucket(NamedTuple):

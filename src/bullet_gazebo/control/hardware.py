@@ -30,11 +30,11 @@ class Drive(ABC):
     """Moves one joint with a position or velocity interface (docs/contract/gazebo_ros_control.md 6.4).
 
     `pid` turns commands into efforts; without one, a motor drives the joint to the commanded state.
-    `strongest` [N m, N] is its effort limit, `pushed` whether something pushes it off its command, `share`
-    what is taken of the PID's effort.
+    `strongest` [N m, N] is its effort limit, `blocked` whether it didn't get to its command in the last step,
+    `pushed` whether something pushes it away from there, `share` what is taken of the PID's effort.
     """
 
-    pushed = False
+    blocked = pushed = False
     share = 1.0
 
     def __init__(self, joint: JointHandle, pid: Pid | None) -> None:
@@ -45,11 +45,6 @@ class Drive(ABC):
         self.strongest = self._most or UNLIMITED  # files say 0 where they know none
         speed = joint.limits.velocity
         self._fastest = UNLIMITED if speed is None else speed
-
-    @property
-    def at_its_limit(self) -> bool:
-        """Whether it gives all the effort it has."""
-        return self.pid is not None and abs(self.joint.effort) >= FULL * self._most
 
     @abstractmethod
     def relatch(self) -> None:
@@ -99,14 +94,10 @@ class PositionDrive(Drive):
         self._good = joint.position
         self.joints_moved()
 
-    @property
-    def at_its_limit(self) -> bool:
-        return self._missed > PUSHED if self.pid is None else super().at_its_limit
-
     def joints_moved(self) -> None:
         """Forgets where the joint was: something other than time has moved it."""
         self._aim, self._way = self.joint.position, math.inf
-        self._missed, self.pushed = 0.0, False
+        self.blocked = self.pushed = False
 
     def relatch(self) -> None:
         self.joints_moved()
@@ -132,7 +123,8 @@ class PositionDrive(Drive):
 
     def motor(self, dt: float) -> tuple[float, float]:
         position, command = self.joint.position, self.joint.command
-        self._missed = missed = abs(position - self._aim)
+        missed = abs(position - self._aim)
+        self.blocked = missed > PUSHED
         if missed > self._way + PUSHED:
             self.pushed = True
         elif missed < BACK:
@@ -215,9 +207,9 @@ class RobotHardware:
 
     def at_their_limits(self) -> list[JointHandle]:
         """Returns the joints whose motors give all the effort they have."""
-        efforts = [(joint, joint.limits.effort) for joint in self.effort_joints]
+        efforts = [(joint, joint.limits.effort) for joint in self.joints.values()]
         full = [joint for joint, most in efforts if most and abs(joint.effort) >= FULL * most]
-        return full + [drive.joint for drive in self.drives if drive.at_its_limit]
+        return full + [drive.joint for drive in self.drives if drive.blocked]
 
     def joint(self, interface: str, name: str) -> JointHandle:
         """Returns joint `name` of `interface`."""

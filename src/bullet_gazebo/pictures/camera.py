@@ -1,8 +1,9 @@
 """The camera of a picture, and its background: a sky, and tiles that fade towards the horizon."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,8 +11,14 @@ from bullet_gazebo.physics.pose import Vector
 
 NEAR, FAR = 0.02, 100.0  # clipping planes, as multiples of the camera's distance
 MARGIN = 1.1  # factor on the width and height that an overview must show
-SKY = (238, 242, 247)
-TILES = ((222, 225, 230), (203, 207, 213))
+THIRD = 2.8  # the same, for a robot that fills a third of the picture
+RANGES = {  # of each number of a field that a user names
+    "target": (-1e6, 1e6), "distance": (1e-3, 1e6), "yaw": (-360.0, 360.0), "pitch": (-90.0, 90.0),
+    "view": (1.0, 170.0), "follows": (0, 1),
+}  # fmt: skip
+# Neither white, grey nor black, so that robots stand out.
+SKY = (228, 235, 243)
+TILES = ((134, 153, 174), (117, 137, 159))
 TILES_IN_SIGHT = 8.0  # within the camera's distance
 FADING = 3.0  # of the camera's distance, until a third of the colour is left
 
@@ -39,6 +46,24 @@ class Camera:
     def at(self, target: Vector) -> "Camera":
         """Returns a copy that looks at another point [m]."""
         return replace(self, target=target)
+
+    def changed(self, fields: Mapping[str, Any]) -> "Camera":
+        """Returns a copy with other values of some fields.
+
+        Raises:
+            ValueError: for an unknown field, or a value that it can't have.
+        """
+        for name, value in fields.items():
+            if name not in RANGES:
+                raise ValueError(f"a camera has no {name!r}; it has {', '.join(RANGES)}")
+            (low, high), like, found = RANGES[name], getattr(self, name), np.array(value)
+            fits = found.shape == np.shape(like) and found.dtype.kind in "bif"
+            if not fits or (np.clip(found, low, high) != found).any():
+                raise ValueError(
+                    f"a camera's {name} is like {like}, in [{low:g}, {high:g}]: {value!r}"
+                )
+        given: Any = {name: tuple(v) if name == "target" else v for name, v in fields.items()}
+        return replace(self, **given)
 
     @property
     def axes(self) -> np.ndarray:
@@ -70,7 +95,13 @@ class Camera:
         return math.tan(math.radians(self.view) / 2.0)
 
 
-def overview(points: np.ndarray, aspect: float, looking: Camera | None = None) -> Camera:
+CameraLike = Camera | Mapping[str, Any] | None
+"""A camera, some fields that differ from those of the one that is used by default, or that one."""
+
+
+def overview(
+    points: np.ndarray, aspect: float, looking: Camera | None = None, margin: float = MARGIN
+) -> Camera:
     """Returns a camera that sees all of `points` [m] (n, 3), in the direction of `looking`."""
     looking = looking or Camera()
     if not len(points):
@@ -81,7 +112,7 @@ def overview(points: np.ndarray, aspect: float, looking: Camera | None = None) -
     seen = points - (x, y, z)
     # How far away the camera has to be to see each point.
     sideways, upright = abs(seen @ right) / aspect, abs(seen @ up)
-    needed = np.maximum(sideways, upright) * MARGIN / looking.slope - seen @ forward
+    needed = np.maximum(sideways, upright) * margin / looking.slope - seen @ forward
     return replace(looking, target=(x, y, z), distance=max(float(needed.max()), 1e-3))
 
 

@@ -13,6 +13,7 @@ from bullet_gazebo.physics.description import Color, DescriptionError, Joint, Sh
 from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.physics.files.meshes import read_look
 from bullet_gazebo.physics.pose import Pose, Vector, rotate
+from bullet_gazebo.pictures.camera import TILES
 from bullet_gazebo.pictures.page_batches import (
     Appearance,
     Batches,
@@ -33,6 +34,7 @@ AXIS_COLOR = (250, 200, 0)
 OWN_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 AXES_COLORS = ((225, 0, 0), (0, 190, 0), (0, 0, 225))
 MOST_FILES = 32
+LINES, SHADOW = ((117, 135, 155), (102, 119, 138)), 0.4  # on the ground; how dark its shadows are
 
 
 class ShapeMaker:
@@ -109,8 +111,8 @@ class ShapeMaker:
     def _add_plane(self, where: Where, pose: Pose) -> None:
         plane = self._scene.add_grid(
             self._singles.name(), infinite_grid=True, cell_size=1.0, section_size=10.0, fade_distance=60.0,
-            cell_color=(205, 205, 205), section_color=(170, 170, 170), plane_color=(235, 235, 235),
-            plane_opacity=1.0,
+            cell_color=LINES[0], section_color=LINES[1], plane_color=TILES[0], plane_opacity=1.0,
+            shadow_opacity=SHADOW,
         )  # fmt: skip
         self._singles.add(where, _numbers(pose), plane)
 

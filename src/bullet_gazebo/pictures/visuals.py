@@ -1,13 +1,20 @@
 """The visible parts of models: their shapes as records for a page, and as triangles for a renderer."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from bullet_gazebo.physics.description import Color, Joint, Link, ModelDescription, Shape
+from bullet_gazebo.physics.description import (
+    Color,
+    DescriptionError,
+    Joint,
+    Link,
+    ModelDescription,
+    Shape,
+)
 from bullet_gazebo.physics.files.meshes import read_look
 from bullet_gazebo.physics.pose import Pose, rotate
 
@@ -22,7 +29,7 @@ class VisibleModel:
     """A model's links with their shapes, and its movable joints.
 
     `number` is unique: another model with its name has another number. `root` is the index of its root link,
-    `frame` the model's frame as seen from that link.
+    `frame` the model's frame as seen from that link. A `static` one never moves.
     """
 
     number: int
@@ -31,6 +38,17 @@ class VisibleModel:
     joints: Sequence[Joint] = ()
     root: int = 0
     frame: Pose = Pose()
+    static: bool = False
+
+    def corners(self, links: np.ndarray) -> np.ndarray:
+        """Returns box corners around its visuals (n, 3) [m], from the poses (m, 7) of its links."""
+        poses = {}
+        for link, (x, y, z, *turn) in zip(self.links, links.tolist(), strict=True):
+            poses[link.name] = Pose((x, y, z), (turn[0], turn[1], turn[2], turn[3]))
+        shapes = [(each.name, shape) for each in self.links for shape in each.visuals]
+        bounded = boxes_of((link, shape) for link, shape in shapes if shape.kind != "plane")
+        found = [moved(box, poses[link].compose(pose)) for link, pose, box in bounded]
+        return np.concatenate([np.zeros((0, 3)), *found])
 
     def pose(self, links: np.ndarray) -> Pose:
         """Returns where the model's frame is, from the poses (n, 7) of its links."""
@@ -70,6 +88,7 @@ def visible_model(
         [description.joints[each] for each in joints],
         links.index(description.root) if description.root in links else 0,
         description.root_pose.inverse(),
+        description.static,
     )
 
 
@@ -145,6 +164,15 @@ def box_around(solid: Solid) -> np.ndarray:
     """Returns the corners of the box around a solid, in its frame [m]: (8, 3)."""
     low, high = solid.corners.min(axis=0), solid.corners.max(axis=0)
     return np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
+
+
+def boxes_of(shapes: Iterable[tuple[str, Shape]]) -> Iterator[tuple[str, Pose, np.ndarray]]:
+    """Yields link, pose in it, and box corners (8, 3) around each shape that can be drawn."""
+    for link, shape in shapes:
+        try:
+            yield link, shape.pose, box_around(solid_of(shape))
+        except DescriptionError:
+            continue  # drawing it reports that
 
 
 def moved(points: np.ndarray, pose: Pose) -> np.ndarray:

@@ -177,7 +177,7 @@ def to_model(model: Model, number: int, collisions: bool) -> SceneModel:
     return SceneModel(
         number=number,
         name=model.name,
-        is_static=description.static,
+        is_static=seen.static,
         links=[
             SceneLink(link.name, _to_shapes(link.visuals), _to_shapes(link.collisions))
             for link in seen.links
@@ -203,6 +203,7 @@ def from_model(message: SceneModel) -> VisibleModel:
         [_from_joint(joint) for joint in message.joints],
         message.root,
         from_pose_msg(message.frame),
+        message.is_static,
     )
 
 

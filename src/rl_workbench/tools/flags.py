@@ -1,6 +1,7 @@
 """Flags that several commands share, and the writing of pictures."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,13 +48,16 @@ def add_job_flags(parser: argparse.ArgumentParser) -> None:
 
 def env_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """Returns the options of the environment, with values as `train` reads them."""
+    return key_values(arguments.env_kwargs, "--env-kwargs")
+
+
+def key_values(words: Sequence[str], flag: str) -> dict[str, Any]:
+    """Returns the values of a flag's words KEY=VALUE."""
     from rl_workbench.option import Options
     from rl_workbench.training.options import RunOptions
 
-    text = ",".join(arguments.env_kwargs)
-    return dict(
-        Options(RunOptions).read({"env_kwargs": text}, "--env-kwargs").get("env_kwargs", {})
-    )
+    read = Options(RunOptions).read({"env_kwargs": ",".join(words)}, flag)
+    return dict(read.get("env_kwargs", {}))
 
 
 def number(lowest: int) -> Any:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 from file_access.locks import scratch_folder
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
-from rl_workbench.tools.flags import POLICIES, add_policy_flags, env_options, number
+from rl_workbench.tools.flags import POLICIES, add_policy_flags, env_options, key_values, number
 from rl_workbench.training.progress import tell
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ GIF_TICK = 10  # [ms], the format's own
 COLOURS = 96  # of a GIF; drawings have few
 PAGE = Path(__file__).with_name("page.html")
 TEXT, PAPER = (40, 44, 52), (255, 255, 255)
+FADED = 0.4  # share of white in the picture of an episode that has ended
 LINES = 14.0  # lines of text that fit into a picture's height
 END = 1.0  # [s] for which a 3-D recording shows its last frame before it restarts
 
@@ -51,6 +52,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
         help="cut the episode off after N steps; 0: never (default)")  # fmt: skip
     add("--size", type=_size, metavar="WIDTHxHEIGHT",
         help="size of the pictures [pixels] (default: the environment's)")  # fmt: skip
+    add("--camera", nargs="+", default=[], metavar="KEY=VALUE",
+        help="fields of the environment's camera, e.g. distance=2.5 yaw=90 target=[0,0,0.3]")  # fmt: skip
     add("--fps", type=_rate, metavar="HZ",
         help="frames per second of simulated time (default 25; 50 for an MP4)")  # fmt: skip
     add("--no-captions", action="store_true", help="no line with step, return and action")
@@ -109,10 +112,15 @@ def _policy(
     from rl_workbench.tools.policies import load_any
 
     options = {**env_options(arguments), "render_mode": "rgb_array"}
+    if arguments.camera:
+        options["camera"] = key_values(arguments.camera, "--camera")
     if arguments.size:
         sized = dict(zip(("width", "height"), arguments.size, strict=True))
-        with contextlib.suppress(WorkbenchError):  # without such options pictures are scaled later
+        try:
             return load_any(run, which, {**options, **sized}, arguments.seed)
+        except WorkbenchError as error:
+            if not isinstance(error.__cause__, TypeError):  # no such options: pictures are scaled
+                raise
     return load_any(run, which, options, arguments.seed)
 
 
@@ -186,7 +194,9 @@ class SideBySide(Sequence["np.ndarray"]):
         pictures = []
         for film in self._films:
             frame = film.frames[min(index, len(film.frames) - 1)]
-            picture = Image.open(BytesIO(frame.seen))
+            picture: Image.Image = Image.open(BytesIO(frame.seen))
+            if frame.ended:
+                picture = Image.blend(picture, Image.new("RGB", picture.size, PAPER), FADED)
             pictures.append(
                 _captioned(picture, frame.caption(film.title)) if self._captions else picture
             )

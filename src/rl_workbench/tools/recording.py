@@ -57,12 +57,14 @@ class EpisodeFrame(NamedTuple):
     total_reward: float
     action: str  # empty at the reset
     success: bool | None = None  # at the end, if the environment says
+    ended: bool = False  # the episode, which wasn't cut off
 
     def caption(self, title: str = "") -> str:
         """Returns a line of text for below the picture."""
         action = [f"action {self.action}"] if self.action else []
         parts = [title] if title else []
-        return "   ".join([*parts, f"step {self.step}", f"return {self.total_reward:.1f}", *action])
+        parts += [f"step {self.step}", f"return {self.total_reward:.1f}", *action]
+        return "   ".join([*parts, "ended"] if self.ended else parts)
 
 
 class PictureView:
@@ -174,7 +176,8 @@ def record_episode(
         if length < due and not step.finished:
             continue
         action = "" if step.action is None else _action_text(step.action)
-        yield EpisodeFrame(length, view.take(), total, action, step.success)
+        ended = step.finished and length != max_steps
+        yield EpisodeFrame(length, view.take(), total, action, step.success, ended)
         while due <= length:
             due += stride
 

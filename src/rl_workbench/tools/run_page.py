@@ -244,7 +244,8 @@ class Playback:
             index = min(int(self._position), episode.length)
             frame = episode.frames[index]
             total = f"of {episode.length}" if episode.is_over else f"of {episode.length}+"
-            lines.append(f"step {index} {total}, return {frame.total_reward:.1f}")
+            end = ", ended" if frame.ended else ""
+            lines.append(f"step {index} {total}, return {frame.total_reward:.1f}{end}")
             lines.append(f"action {frame.action or '-'}")
         if episode.note:
             lines.append(episode.note)

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import subprocess
+import threading
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +11,6 @@ from rl_workbench.starting import search_path
 from rl_workbench.training.callbacks import Callback
 from rl_workbench.training.progress import tell
 
-END = 15.0  # [s] for the page's process to end
 POLICIES = ("last", "best", "random")
 
 
@@ -39,8 +39,4 @@ class Page(Callback):
         assert self._process.stdin is not None
         with contextlib.suppress(OSError):
             self._process.stdin.close()
-        try:
-            self._process.wait(END)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        threading.Thread(target=self._process.wait, daemon=True).start()  # reaps it

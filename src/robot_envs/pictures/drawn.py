@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 
 from bullet_gazebo.physics.pose import Pose, add
-from bullet_gazebo.pictures.camera import Camera
+from bullet_gazebo.pictures.camera import Camera, CameraLike
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.pictures.placement import Placement, Surroundings
 from robot_envs.robot import Robot
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bullet_gazebo.pictures.renderer import Renderer
     from robot_envs.pictures.page import LivePage, RobotOnPage
 
-__all__ = ["HEIGHT", "WIDTH", "Camera", "DrawnEnv", "RobotPicture"]
+__all__ = ["HEIGHT", "WIDTH", "Camera", "CameraLike", "DrawnEnv", "RobotPicture"]
 
 WIDTH, HEIGHT = 640, 320  # [pixels], by default
 LARGEST = 4096  # [pixels]
@@ -34,12 +34,12 @@ class RobotPicture:
         robot: the robot.
         width: of the pictures [pixels].
         height: of the pictures [pixels].
-        camera: for the robot as it is spawned; None: one that sees all that the joints can reach.
+        camera: for the robot as it is spawned; see `Placement.camera`.
         base: returns the pose of its root link, which the camera follows; None: where it is spawned.
         beside: what else is in its world; None: nothing.
 
     Raises:
-        ValueError: for an impossible size.
+        ValueError: for an impossible size or camera.
         RobotEnvError: later, if the robot's file can't be read.
     """
 
@@ -49,7 +49,7 @@ class RobotPicture:
         width: int = WIDTH,
         height: int = HEIGHT,
         *,
-        camera: Camera | None = None,
+        camera: CameraLike = None,
         base: Callable[[], Pose] | None = None,
         beside: Surroundings | None = None,
     ) -> None:
@@ -57,9 +57,12 @@ class RobotPicture:
             if not 1 <= side <= LARGEST or side != int(side):
                 raise ValueError(f"a picture's width and height lie in [1, {LARGEST}], not {side}")
         self._size = (int(width), int(height))
+        if isinstance(camera, Mapping):
+            Camera().changed(camera)
         self._camera = camera
         self._place = lambda: Placement(robot, base, beside)
         self._loaded: tuple[Placement, Camera, Renderer] | None = None
+        self._on_page: list[RobotOnPage] = []
 
     def __call__(self, positions: Mapping[str, float]) -> np.ndarray:
         """Draws the robot with its joints at positions [rad, m], by name: (height, width, 3) of uint8."""
@@ -85,10 +88,14 @@ class RobotPicture:
         """Draws the robot on a viser page, where `positions` puts it; see `RobotEnv.draw_on`."""
         from robot_envs.pictures.page import RobotOnPage
 
-        return RobotOnPage(server, self._place(), positions, self._camera, self._size, beside)
+        made = RobotOnPage(server, self._place(), positions, self._camera, self._size, beside)
+        self._on_page.append(made)
+        return made
 
     def close(self) -> None:
-        """Frees what it has loaded; may be called twice."""
+        """Frees what it has loaded, and takes its switches off pages; may be called twice."""
+        while self._on_page:
+            self._on_page.pop().close()
         if self._loaded is not None:
             self._loaded[2].close()
             self._loaded = None
@@ -103,7 +110,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
     _state: WorldState | None
 
     def _prepare_drawing(
-        self, period: float, camera: Camera | None, size: tuple[int, int], render_mode: str | None
+        self, period: float, camera: CameraLike, size: tuple[int, int], render_mode: str | None
     ) -> None:
         """Checks the options; see `RobotEnv`. The period is that of control [s]."""
         if render_mode not in (None, *RENDER_MODES):

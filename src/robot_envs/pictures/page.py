@@ -12,7 +12,7 @@ import viser
 from bullet_gazebo.physics.description import Link, Shape
 from bullet_gazebo.physics.files.world_file import empty_world
 from bullet_gazebo.physics.pose import IDENTITY, ZERO
-from bullet_gazebo.pictures.camera import Camera, overview
+from bullet_gazebo.pictures.camera import CameraLike, overview
 from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.visuals import VisibleModel, visible_model
 from robot_envs.pictures.placement import Placement
@@ -20,6 +20,7 @@ from web_viewer.address import LOOPBACK, find_address
 from web_viewer.server import serve, stop
 
 WORLD = "/world"  # node
+ASPECT = 4.0 / 3.0  # of what a browser's window shows beside the panel
 GAP = 0.15  # between robots, as a share of what one of them can reach
 LOW = 0.9  # of a caption, from the middle of what the camera sees to its lower edge
 
@@ -34,9 +35,9 @@ class Placed(NamedTuple):
 
 
 class RobotOnPage:
-    """A robot on a page; the first one brings a ground, lights and the initial camera.
+    """A robot on a page; the first one brings ground, lights, initial camera and a switch to follow it.
 
-    The first robot stays in place on the page, and the world moves instead. So all cameras follow it, however
+    A followed robot stays in place on the page, and the world moves instead. So all cameras follow, however
     a viewer has turned them, and so does a recording's.
 
     Args:
@@ -56,7 +57,7 @@ class RobotOnPage:
         server: viser.ViserServer,
         placement: Placement,
         positions: Callable[[], Mapping[str, float]],
-        camera: Camera | None,
+        camera: CameraLike,
         size: tuple[int, int],
         beside: int,
     ) -> None:
@@ -64,7 +65,7 @@ class RobotOnPage:
         self._is_first, self._node = not beside, f"{WORLD}/{beside}"
         self._caption_node = f"/caption{beside}"
         self._caption: viser.LabelHandle | None = None
-        reach, aspect = placement.reach(), size[0] / size[1]
+        reach, aspect = placement.reach(), min(size[0] / size[1], ASPECT)
         looking = placement.camera(camera, aspect)
         right, up, _ = looking.axes
         low = looking.target - LOW * looking.slope * looking.distance * up
@@ -78,9 +79,12 @@ class RobotOnPage:
         server.initial_camera.fov = float(np.radians(looking.view))
         self._foot = low + beside * aside
         scene = server.scene
+        self._travelled = np.zeros(3)
         if self._is_first:
             self._world = scene.add_frame(WORLD, show_axes=False)
             _draw_ground(server)
+            self._follow = server.gui.add_checkbox("Follow", looking.follows, order=-1.0)
+            self._follow.on_update(lambda _: self._move_world())
         scene.add_frame(self._node, show_axes=False, position=beside * aside)
         self._seen = _seen(placement)
         self._picture = Picture(server, logger.warning, below=self._node)
@@ -107,10 +111,19 @@ class RobotOnPage:
         """Moves it to where it was at another moment."""
         with self._server.atomic():
             self._picture.move(placed.links)
-            if self._is_first:
-                self._world.position = -placed.travelled
+            self._travelled = placed.travelled
+            self._move_world()
             if caption:
                 self._write(caption)
+
+    def _move_world(self) -> None:
+        if self._is_first:
+            self._world.position = -self._travelled * self._follow.value
+
+    def close(self) -> None:
+        """Takes the switch off the page."""
+        if self._is_first:
+            self._follow.remove()
 
     def _write(self, caption: str) -> None:
         if self._caption is None:

@@ -1,17 +1,16 @@
 """Where a robot's links are in a state, what surrounds it, and a camera that sees all of it."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 from math import pi
 
 import numpy as np
 
-from bullet_gazebo.physics.description import DescriptionError, Joint, ModelDescription, Shape
+from bullet_gazebo.physics.description import Joint, ModelDescription, Shape
 from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.pose import Pose, Vector, subtract
-from bullet_gazebo.pictures.camera import Camera, overview
-from bullet_gazebo.pictures.visuals import box_around, moved, solid_of, visible_shapes
+from bullet_gazebo.pictures.camera import THIRD, Camera, CameraLike, overview
+from bullet_gazebo.pictures.visuals import boxes_of, moved, visible_shapes
 from robot_envs.backends.world_files import object_model, world_models
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
@@ -69,8 +68,6 @@ class Surroundings:
         return links
 
 
-# of the camera's distance, to see the way of a robot without a fixed base
-ROOM = 2.5
 QUARTERS = (0.0, pi / 2.0, pi, -pi / 2.0)  # [rad] of a joint without stops
 
 
@@ -117,31 +114,35 @@ class Placement:
     def reach(self) -> np.ndarray:
         """Returns box corners around all that the robots' joints can reach from the start, (n, 3) [m]."""
         others = [Placement(each).reach() for each in self._beside.robots] if self._beside else []
-        return np.concatenate([self._own_reach(), *others])
-
-    def _own_reach(self) -> np.ndarray:
         reached = [{}, *({joint.name: place} for joint, place in self._places())]
+        return np.concatenate([self._corners(reached), *others])
+
+    def _corners(self, reached: Sequence[Mapping[str, float]]) -> np.ndarray:
+        """Returns box corners around the robot at its start with joints at these positions, (n, 3) [m]."""
         poses = [link_poses(self.description, self._start, each) for each in reached]
         corners = [
             moved(box, each[link].compose(pose))
-            for link, pose, box in self._boxes()
+            for link, pose, box in boxes_of(self.shapes)
             for each in poses
         ]
         return np.concatenate([np.zeros((0, 3)), *corners])
 
-    def camera(self, camera: Camera | None, aspect: float) -> Camera:
-        """`camera`, or one that sees all that joints can reach, and more ground around a robot that drives.
+    def camera(self, camera: CameraLike, aspect: float) -> Camera:
+        """`camera`, or one that sees all that joints can reach, or in which a robot that drives is a third.
 
         Args:
-            camera: for the robot as it is spawned.
+            camera: for the robot as it is spawned, or some of its fields.
             aspect: of the pictures, width to height.
         """
-        if camera is not None:
+        if isinstance(camera, Camera):
             return camera
-        seen = overview(self.reach(), aspect)
+        fields = camera or {}
+        looking = Camera().changed(fields)
         if self.description.fixed_base:
-            return seen
-        return replace(seen, distance=ROOM * seen.distance)
+            seen = overview(self.reach(), aspect, looking)
+        else:
+            seen = overview(self._corners([{}]), aspect, looking, THIRD)
+        return seen.changed(fields)
 
     def travelled(self, positions: Mapping[str, float], base: Pose) -> Vector:
         """Returns how far it is from its start [m]: its root link, and along slides without near stops."""
@@ -152,14 +153,6 @@ class Placement:
             for pose, each in ((self._start, {**positions, **self._slides}), (base, positions))
         )
         return subtract(there, here)
-
-    def _boxes(self) -> Iterator[tuple[str, Pose, np.ndarray]]:
-        """Link, pose in it, and box around each shape that can be drawn."""
-        for link, shape in self.shapes:
-            try:
-                yield link, shape.pose, box_around(solid_of(shape))
-            except DescriptionError:
-                continue  # drawing it reports that
 
     def _places(self) -> Iterator[tuple[Joint, float]]:
         """Yields sample positions of the joints [rad, m]: at their stops, or all the way round."""

@@ -1,36 +1,12 @@
 #!/usr/bin/env python3
-"""The bundled robots over ROS in lock-step: the bits of the in-process world, and the conformance suite."""
+"""Bundled robots, a robot that falls, and scenes, one after the other."""
 
-import unittest
-
-import gymnasium
 import rostest
+from free_robot_cases import FreeRobot
+from robots_cases import Robots
+from scenes_cases import Arms, Rover
 
-import robot_envs.robots  # noqa: F401 - registers the environments
-from robot_envs.testing import check_robot_env, differences, rollout
-
-# One of each robot; the others differ in what is made of the same numbers.
-IDS = tuple(
-    f"robot_envs/{name}-v0"
-    for name in ("TwoLinkReachGoal", "SixJointReach", "Furuta", "DoublePendulum", "Hopper")
-)
-
-
-class Robots(unittest.TestCase):
-    def test_the_bits_are_those_of_the_robot_in_process(self):
-        for identifier in IDS:
-            with self.subTest(identifier):
-                over_ros, here = (
-                    gymnasium.make(identifier, backend="ros"),
-                    gymnasium.make(identifier),
-                )
-                for seed in (1, 2):  # the second time after other episodes
-                    given = rollout(over_ros, 30, seed)
-                    self.assertEqual(differences(given, rollout(here, 30, seed)), "")
-                over_ros.close()
-                here.close()
-                check_robot_env(identifier, ("ros",), steps=30)
-
+__all__ = ["Arms", "FreeRobot", "Robots", "Rover"]
 
 if __name__ == "__main__":
-    rostest.rosrun("cartpole", "robots", Robots)
+    rostest.rosrun("cartpole", "robots", "__main__")

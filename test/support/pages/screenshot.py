@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Takes a picture of a web page with headless Chromium (apt-get install chromium).
 
-./ws python3 test/support/pages/screenshot.py http://127.0.0.1:8080/ page.png --click World --size 1200x700
+./ws env PYTHONPATH=test python3 test/support/pages/screenshot.py http://127.0.0.1:8080/ out.png --click World
 """
 
 import argparse

@@ -103,15 +103,17 @@ def test_where_seeds_ended_is_marked_and_whether_they_were_complete() -> None:
 def test_each_environment_has_axes_and_a_line_of_its_own() -> None:
     cart, car = seed([1, 2], [10, 400]), seed([1, 2], [-200, -110])
     panels = [
-        panel({"dqn": [cart]}, "CartPole-v1", 475.0),
+        panel({"dqn": [cart]}, "my_module:CartPole-v1", 475.0),
         panel({"dqn": [car], "ppo": [car]}, "MountainCar-v0", -110.0),
     ]
     for figure in (seed_curves(panels), training_curves(panels, "episode")):
+        assert figure.get_figwidth() <= 10.0, "it is read on a page of half its pixels"
         first, second = figure.axes
         assert [axes.get_title() for axes in figure.axes] == ["CartPole-v1", "MountainCar-v0"]
         for axes, line in ((first, 475.0), (second, -110.0)):
             (drawn,) = lines(axes, "threshold")
             assert set(drawn.get_ydata()) == {line}
+            assert drawn.get_label() == f"solved ({line:g}), without exploration"
         assert first.get_ylim()[0] > -100.0
         names = {line.get_label(): line.get_color() for line in second.lines}
         same = {line.get_label(): line.get_color() for line in first.lines}

@@ -70,6 +70,30 @@ def test_the_world_goes_by_a_robot_that_drives_away(server):
     assert found.at()["/world"]["position"] == pytest.approx([-7.0, 2.0, -0.1])
 
 
+def test_a_switch_lets_the_robot_drive_out_of_sight_and_goes_with_its_environment(server):
+    place = [Pose((0.0, 0.0, 0.1))]
+    picture = RobotPicture(ROVER_ROBOT, base=lambda: place[0])
+    robot = picture.draw_on(server, lambda: {"neck": 0.0})
+    place[0] = Pose((7.0, -2.0, 0.1))
+    robot()
+    (switch,) = switches(server)
+    for follows, where in ((False, [0.0, 0.0, 0.0]), (True, [-7.0, 2.0, -0.1])):
+        switch.value = follows
+        nodes = Recording(server.get_scene_serializer().serialize()).at()
+        assert nodes["/world"]["position"] == pytest.approx(where)
+    picture.close()
+    assert not switches(server)
+    picture.draw_on(server, lambda: {"neck": 0.0})
+    still = RobotPicture(ROVER_ROBOT, camera=Camera(follows=False))
+    still.draw_on(server, lambda: {"neck": 0.0})
+    assert [each.value for each in switches(server)] == [True, False]
+
+
+def switches(server):
+    found = server.gui._gui_input_handle_from_uuid.values()
+    return [each for each in list(found) if each.label == "Follow"]
+
+
 def test_several_stand_beside_each_other_with_captions_and_are_all_seen(server):
     picture = RobotPicture(ROVER_ROBOT, camera=Camera(distance=1.0, yaw=0.0))
     robots = [

@@ -1,12 +1,15 @@
 """Pictures of robots by their state."""
 
 import dataclasses
+import re
 
+import gymnasium
 import numpy as np
 import pytest
-from support.robots.bodies import ROVER_ROBOT
+from support.robots.bodies import ROVER, ROVER_ROBOT
 from support.robots.pendulum import PENDULUM
 
+import cartpole  # noqa: F401 - registers its environments
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
 from robot_envs.errors import RobotEnvError
@@ -32,7 +35,7 @@ def test_a_robot_is_drawn_as_its_state_says():
     assert not np.array_equal(left, right) and not np.array_equal(up, down)
     for each in drawn:
         border = np.concatenate([each[0], each[:, 0], each[:, -1]])
-        assert (border.min(axis=-1) > 180).all()  # sky and ground: nothing is cut off
+        assert (border[:, 2] - border[:, 0] > 10).all()  # bluish sky and ground: nothing is cut off
 
 
 def test_the_camera_follows_what_drives_away():
@@ -82,6 +85,52 @@ def test_a_camera_that_stays_sees_the_robot_drive():
     right = where(picture({"neck": 0.0}), 0)
     picture.close()
     assert right[0] > left[0] + 20
+
+
+@pytest.mark.parametrize(
+    "colour", ["1 1 1 1", "0.6 0.6 0.6 1", "0.05 0.05 0.05 1", "0.9 0.92 0.95 1"]
+)
+def test_a_robot_stands_out_from_the_ground(colour):
+    """Seen from above, where all around it is ground."""
+    robot = dataclasses.replace(
+        ROVER_ROBOT, urdf=re.sub("rgba='.*?'|rgba=\".*?\"", f'rgba="{colour}"', ROVER)
+    )
+    camera = Camera(pitch=-60.0, follows=False)
+    drawn, empty = (
+        RobotPicture(robot, 160, 120, camera=camera, base=base)({"neck": 0.0}).astype(int)
+        for base in (None, lambda: Pose((0.0, 0.0, -9.0)))
+    )
+    apart = np.abs(drawn - empty).max(axis=-1)
+    assert (apart > 0).sum() > 500
+    assert np.median(apart[apart > 0]) > 35
+
+
+@pytest.mark.parametrize("size", [(320, 160), (160, 160), (100, 200)])
+def test_a_robot_that_drives_is_a_third_of_the_picture(size):
+    picture = RobotPicture(ROVER_ROBOT, *size)
+    drawn = picture({"neck": 0.0}).astype(int)
+    picture.close()
+    rows, columns = np.nonzero(np.ptp(drawn, axis=-1) > 70)  # more colour than ground and sky
+    share = max(np.ptp(columns) / size[0], np.ptp(rows) / size[1])
+    assert share == pytest.approx(1.0 / 3.0, abs=0.05)
+
+
+def test_a_camera_is_changed_by_its_fields():
+    env = gymnasium.make("cartpole/Balance-v0", render_mode="rgb_array", camera={"yaw": 104.0})
+    env.reset(seed=0)
+    (turned,) = [env.render()]
+    env.close()
+    assert np.ptp(np.nonzero(np.ptp(turned.astype(int), axis=-1) > 70)[1]) < 0.2 * turned.shape[1]
+    whole, far = (
+        RobotPicture(ROVER_ROBOT, 160, 120, camera=camera)
+        for camera in ({"pitch": -90.0}, {"pitch": -90.0, "distance": 9.0})
+    )
+    areas = [(np.ptp(each({"neck": 0.0}).astype(int), axis=-1) > 70).sum() for each in (whole, far)]
+    assert areas[0] > 4 * areas[1] > 0
+    for each in (whole, far):
+        each.close()
+    with pytest.raises(ValueError, match="a camera has no 'jaw'"):
+        gymnasium.make("cartpole/Balance-v0", camera={"jaw": 3})
 
 
 @pytest.mark.parametrize("size", [(0, 10), (10, 5000), (10.5, 10), (-1, 10)])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rl_workbench.plotting import moving_average
-from web_viewer.curves import MAX_BUCKETS, Series
+from web_viewer.curves import MAX_BUCKETS, Series, _title
 
 
 def filled(values):
@@ -50,3 +50,20 @@ def test_the_extremes_come_in_their_order():
     assert (np.diff(each) > 0).all()
     _, each, _ = filled([float(-index) for index in range(count)]).arrays()
     assert (np.diff(each) < 0).all()
+
+
+@pytest.mark.parametrize(
+    ("tag", "values", "title", "unit"),
+    [
+        ("charts/episodic_return", [-9999.0, 20.0], "return", 1.0),
+        ("charts/episodic_return", [0.0], "return", 1.0),
+        ("charts/episodic_return", [-1234567.0, 3.0], "return, in 10⁶", 1e6),
+        ("losses/value", [2e-5, 0.0], "losses/value, in 10⁻⁶", 1e-6),
+        ("losses/value", [5e-324], "losses/value, in 10⁻³⁰⁰", 1e-300),
+        ("losses/value", [1.7e308], "losses/value, in 10³⁰⁶", 1e306),
+        ("losses/" + 90 * "x" + "_end", [1.0], "losses/xxxxxxxxxxxxx…xxxxxxxxxxxxxxxx_end", 1.0),
+    ],
+)
+def test_what_would_be_cut_off_beside_a_chart_is_shortened(tag, values, title, unit):
+    found, divisor = _title(tag, np.array(values))
+    assert found == title and divisor == pytest.approx(unit)

@@ -28,7 +28,7 @@ BUILT_IN = {
     CONTROL_PLUGIN: "bullet_gazebo.ros.plugins.control_plugin:ControlPlugin",
     "libgazebo_ros_joint_state_publisher.so": "bullet_gazebo.ros.plugins.joint_state_plugin:JointStatePlugin",
 }  # fmt: skip
-CONTROL = re.compile("control|drive|steer|planar_move|hw_sim", re.IGNORECASE)  # foreign libraries
+CONTROL = re.compile("plugin .*(control|drive|steer|planar_move|hw_sim)", re.IGNORECASE)
 PARAMETER = "~plugins"  # the same table for users' plugins
 PATIENCE = 10.0  # [s of wall time]
 Update = Callable[[int], None]
@@ -129,6 +129,7 @@ class PluginRegistry:
             except BaseException:  # noqa: BLE001 - a user's code must not leave the model half loaded
                 context.report("is left out, because it raised")
                 context.release()
+        _tell_missing_control(model)
 
     def unload(self, model: Model) -> None:
         """Ends the plugins of `model`."""
@@ -147,7 +148,9 @@ class PluginRegistry:
             return self._built_in[library]
         place = places.get(library)
         if place is None:
-            _leave_out(plugin.filename or "without a filename", model)
+            # The spawn services log it together with the sensors.
+            unknown = f"plugin {plugin.filename or 'without a filename'}"
+            model.description.left_out.append(unknown)
             return None
         try:
             return _import(place)
@@ -159,15 +162,15 @@ class PluginRegistry:
             return None
 
 
-def _leave_out(name: str, model: Model) -> None:
-    libraries = {os.path.basename(each.filename) for each in model.description.plugins}
-    if CONTROL.search(name) and CONTROL_PLUGIN not in libraries:
+def _tell_missing_control(model: Model) -> None:
+    """Says in a line of its own if a plugin that is left out was to control the robot."""
+    foreign = next(filter(CONTROL.match, model.description.left_out), None)
+    libraries = {os.path.basename(plugin.filename) for plugin in model.description.plugins}
+    if foreign is not None and CONTROL_PLUGIN not in libraries:
         rospy.logwarn(
-            "Model '%s': the plugin %s is not simulated: this robot has no control here (docs/plugins.md)",
-            model.name, name,
+            "Model '%s': %s is not simulated: this robot has no control here (docs/plugins.md)",
+            model.name, foreign,
         )  # fmt: skip
-    else:  # the spawn services log it together with the sensors
-        model.description.left_out.append(f"plugin {name}")
 
 
 def _warn_late(models: str) -> None:

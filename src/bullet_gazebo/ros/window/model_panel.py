@@ -1,4 +1,4 @@
-"""The page's list of models; the chosen one can be followed, and its joints moved."""
+"""The page's list of models; the chosen one is followed, and its joints can be moved."""
 
 import html
 import math
@@ -27,7 +27,7 @@ UNMOVED = "These sliders work only while time stands still:"
 
 
 class ModelPanel:
-    """Lists models, follows the chosen one, and has a slider for each of its joints.
+    """Lists models, follows the chosen one, or the only one that moves; has a slider for each of its joints.
 
     `world` is the scene node above all models. For one thread, which alone makes and removes sliders; clicks
     come in viser's threads.
@@ -59,7 +59,7 @@ class ModelPanel:
         self._touched: dict[str, float] = {}  # [s] when someone moved a joint's slider
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._choice = server.gui.add_dropdown("Model", [NONE], initial_value=NONE)
-        self._follow = server.gui.add_checkbox("Follow it", False)
+        self._follow = server.gui.add_checkbox("Follow", True)
         self._joints = server.gui.add_folder("Joints", visible=False)
         self._unmoved = server.gui.add_html("", visible=False)  # joints whose sliders move nothing
         self._list = server.gui.add_html("")
@@ -180,11 +180,12 @@ class ModelPanel:
             self._unmoved.visible = bool(text)
 
     def follow(self, links: dict[str, np.ndarray]) -> None:
-        """Keeps the chosen model where it is on the page, if it is to be followed, and moves the world.
+        """Keeps the followed model where it is on the page, and moves the world.
 
         Moving all cameras instead would fight with browsers that meanwhile report where theirs were.
         """
-        model = self._models.get(self._chosen)
+        moving = [each for each in self._models.values() if not each.static]
+        model = self._models.get(self._chosen, moving[0] if len(moving) == 1 else None)
         if not self._follow.value or model is None or model.name not in links:
             self._let_go()
             return
@@ -197,12 +198,12 @@ class ModelPanel:
             self._world.position = self._start - place
 
     def _let_go(self) -> None:
-        """Moves the world back, and all cameras with it, so that they see the same."""
-        way = -np.array(self._world.position)
+        """Moves the world back, and all cameras with it, so that they see the same, if it is still there."""
+        way, is_there = -np.array(self._world.position), self._followed in self._models
         self._start, self._followed = None, ""
         if np.abs(way).max() > 0.0:
             self._world.position = (0.0, 0.0, 0.0)
-            for client in self._server.get_clients().values():
+            for client in self._server.get_clients().values() if is_there else ():
                 # This moves the point that it looks at, too.
                 client.camera.position = client.camera.position + way
 

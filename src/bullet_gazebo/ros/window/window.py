@@ -15,6 +15,7 @@ import viser
 from bullet_gazebo_msgs.msg import SceneContacts, ScenePoses
 from PIL import Image
 
+from bullet_gazebo.pictures.camera import THIRD, Camera, overview
 from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.page_batches import NUMBERS
 from bullet_gazebo.ros.clients.gz import ControlFailed
@@ -28,7 +29,9 @@ from web_viewer.curves import Curves
 from web_viewer.server import open_browser, serve, stop
 
 TITLE = "gzclient"
-CAMERA, LOOK_AT = (1.4, -1.9, 1.1), (0.0, 0.0, 0.35)  # [m]
+CAMERA = Camera((0.0, 0.0, 0.35), 2.5, yaw=36.0, pitch=-18.0, view=75.0)  # while nothing moves
+ASPECT = 4.0 / 3.0  # of a browser's window, beside the panel
+UNTOUCHED, UNKNOWN = 1e-3, (3.0, 3.0, 3.0)  # [m]; viser's, before a browser has told its camera
 ADVICE = "~window"  # parameter: the lines that say where the page is
 CURVES = "~curves"  # parameter: a run folder, or the table of one
 TRAINED = "/gazebo_gui/curves"  # the same; a training sets it, for windows of any name
@@ -55,6 +58,7 @@ class Window:
         self._version: int | None = None  # of the scene on the page
         self._redraw = threading.Event()  # everything, with other options
         self._newest: ScenePoses | None = None
+        self._aimed: set[int] = set()  # numbers of models
         commands = Commands(self._scene.node)
         self._controllers = Controllers()
         gui = server.gui
@@ -124,6 +128,26 @@ class Window:
             with self._server.atomic():
                 self._picture.move(np.array(poses.poses, dtype=float).reshape(-1, NUMBERS))
                 self._models.follow(self._picture.links)
+                self._aim()
+
+    def _aim(self) -> None:
+        """Has new models that move fill a third of the page, where nobody has moved the camera."""
+        links, models = self._picture.links, self._picture.models.values()
+        moving = [each for each in models if not each.static]
+        numbers = {each.number for each in moving}
+        if not moving or self._aimed & numbers or not all(each.name in links for each in moving):
+            return
+        self._aimed = numbers
+        points = np.concatenate([each.corners(links[each.name]) for each in moving])
+        points = points[np.isfinite(points).all(axis=1)]
+        camera = overview(points, ASPECT, CAMERA, THIRD)
+        start = self._server.initial_camera
+        before = np.array(start.position)
+        start.position, start.look_at = camera.eye, camera.target
+        for client in self._server.get_clients().values():
+            ways = np.abs(client.camera.position - np.array([before, UNKNOWN])).max(axis=1)
+            if ways.min() < UNTOUCHED:
+                client.camera.position, client.camera.look_at = camera.eye, camera.target
 
     def _touch(self, message: SceneContacts | None) -> None:
         """Shows contact points; None leaves the old ones."""
@@ -210,7 +234,7 @@ def show(address: Address, browser: bool) -> None:
     Raises:
         PortInUse: another process was quicker.
     """
-    server = serve(address, TITLE, CAMERA, LOOK_AT)
+    server = serve(address, TITLE, tuple(CAMERA.eye.tolist()), CAMERA.target)
     try:
         window = Window(server)
         advice = address.advice("the window", "moves the simulation")

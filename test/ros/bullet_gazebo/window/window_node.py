@@ -15,11 +15,11 @@ from support.pages.browser import wait_for
 from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count, proxy
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.pictures.camera import Camera
+from bullet_gazebo.pictures.camera import THIRD, overview
 from bullet_gazebo.pictures.renderer import Renderer
 from bullet_gazebo.pictures.visuals import visible_shapes
 from bullet_gazebo.ros.common.messages import from_pose_msg
-from bullet_gazebo.ros.window.window import CAMERA, LOOK_AT
+from bullet_gazebo.ros.window.window import ASPECT, CAMERA
 
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>
@@ -42,7 +42,6 @@ ODD = "<b>ö\t\"&'/x"
 # The lengths of all charts' data, as viser's page offers them to tests.
 CHARTS = """Object.values((window.__viserTestpoints || {}).uplots || {})
   .map(each => each.chart.data[0].length)"""
-VIEW = 75.0  # [degrees]; what the page's camera sees from top to bottom
 FEW = 3  # [pixels]
 AWAY = (3.0, -4.0, 0.6)  # [m]; behind the camera
 
@@ -136,16 +135,14 @@ class WindowTest(WindowCase):
         self.addCleanup(self.page.wait_for_text, "One step")
         self.addCleanup(self.page.reload)
         self.spawn("ball", BALL, z=0.6)
-        self.page.choose("(none)", "ball")
-        self.addCleanup(self.page.choose, "ball", "(none)")
         self.wait_until_seen(RED, 1000)
-        self.page.click("Follow it")
-        self.page.wait_for_text("ball (followed)")
+        self.page.wait_for_text("ball (followed)")  # the only one that moves
         for x, y, z in (AWAY, (-20.0, 30.0, 0.6)):
             self.place("ball", (x, y, z))
             self.page.wait_for_text(f"ball (followed)\t{x:.3f}\t{y:.3f}\t{z:.3f}")
             self.wait_until_seen(RED, 1000)
-        self.page.click("Follow it")
+        self.page.click("Follow")
+        self.addCleanup(self.page.click, "Follow")
         wait_for(lambda: "(followed)" not in self.page.text, "end of following")
         self.wait_until_seen(RED, 1000)  # the camera stays with it
         self.place("ball", (0.0, 0.0, 0.6))
@@ -172,6 +169,8 @@ class WindowTest(WindowCase):
         self.assertEqual(picture[0, 0].tolist(), [255, 255, 255])  # the sky
         red = count(picture.reshape(-1, 3).T, RED)
         self.assertAlmostEqual(red / count(self.view(), RED), 1.0, delta=0.1)
+        rows = [each for each in range(height) if count(picture[each].T, RED)]
+        self.assertAlmostEqual(len(rows) / height, 0.25, delta=0.08)  # its box is about a third
 
     def test_the_curves_of_a_training_beside_the_robot(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -195,33 +194,31 @@ class WindowTest(WindowCase):
         xml = rospy.get_param("/robot_description")
         self.spawn("cartpole", xml)
         place = proxy("/gazebo/set_model_configuration", SetModelConfiguration)
-        self.assertTrue(place("cartpole", "", ["stand_cart", "cart_pole"], [0.2, 0.4]).success)
-        link = proxy("/gazebo/get_link_state", GetLinkState)
-        model = parse_urdf(xml)
-        poses = {
-            name: from_pose_msg(link(f"cartpole::{name}", "world").link_state.pose)
-            for name in ("stand", "cart", "pole")
-        }
         scene = Renderer()
         self.addCleanup(scene.close)
-        scene.add("cartpole", visible_shapes(model))
-        scene.place("cartpole", poses)
+        scene.add("cartpole", visible_shapes(parse_urdf(xml)))
+        self.place_links(scene)
+        camera = overview(scene.corners("cartpole"), ASPECT, CAMERA, THIRD)  # of the first moment
+        self.assertTrue(place("cartpole", "", ["stand_cart", "cart_pole"], [0.2, 0.4]).success)
+        self.place_links(scene)
         width, height = self.page.run(CANVAS)
-        wanted = boxes(scene.picture(page_camera(), width, height))
+        wanted = boxes(scene.picture(camera, width, height))
         self.assertGreater(wanted[3] - wanted[1], 60)  # the pole's height
         # As soon as the page has heard of the joints' positions
         wait_for(
             lambda: np.abs(boxes(self.screenshot()) - wanted).max() <= FEW, f"picture with {wanted}"
         )
 
-
-def page_camera():
-    """The page's camera as one that takes pictures."""
-    way = np.subtract(LOOK_AT, CAMERA)
-    distance = float(np.linalg.norm(way))
-    x, y, z = way / distance
-    yaw, pitch = np.degrees([np.arctan2(-x, y), np.arcsin(z)]).tolist()
-    return Camera(LOOK_AT, distance, yaw, pitch, VIEW)
+    def place_links(self, scene):
+        """Places the robot in a renderer as the simulator has it."""
+        link = proxy("/gazebo/get_link_state", GetLinkState)
+        scene.place(
+            "cartpole",
+            {
+                name: from_pose_msg(link(f"cartpole::{name}", "world").link_state.pose)
+                for name in ("stand", "cart", "pole")
+            },
+        )
 
 
 def boxes(picture):
@@ -230,7 +227,7 @@ def boxes(picture):
     edges = []
     for part in (
         (red > green + 20) & (green > blue + 20),
-        (blue > green + 20) & (green > red + 20),
+        (blue > green + 20) & (blue > 2 * red),  # the ground is a pale blue
     ):
         rows, columns = np.nonzero(part)
         edges += [columns.min(), rows.min(), columns.max(), rows.max()] if len(rows) else [0] * 4

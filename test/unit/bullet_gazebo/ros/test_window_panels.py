@@ -6,8 +6,10 @@ import threading
 import numpy as np
 import pytest
 import viser
+from support.pages.browser import Browser, find_browser, wait_for
 
 from bullet_gazebo.physics.description import Joint, Link
+from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.visuals import VisibleModel
 from bullet_gazebo.ros.window.model_panel import NONE, ModelPanel
@@ -81,6 +83,86 @@ def test_models_are_chosen_while_another_thread_shows_them(server, interleaved):
         choice.value = name
         panel.show(picture.links, {})
         assert sorted(handles(server, viser.GuiSliderHandle)) == sorted(names.get(name, []))
+
+
+def test_the_only_one_that_moves_is_followed_unless_another_is_chosen(server):
+    world = server.scene.add_frame("/world")
+    panel = ModelPanel(server, world, None, NoControllers(), None, lambda: True)
+    fixed = VisibleModel(1, "ground", [Link("base")], static=True)
+    models = [fixed, VisibleModel(2, "walker", [Link("base")])]
+    switch = handles(server, viser.GuiCheckboxHandle)["Follow"]
+
+    def seen(place):
+        panel.set_models(models)
+        places = {"ground": 0.0, "walker": place, "other": 0.0}
+        panel.follow(
+            {
+                each.name: np.array([[places[each.name], 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
+                for each in models
+            }
+        )
+        return float(world.position[0])
+
+    assert [seen(1.0), seen(3.0), seen(-4.0)] == [0.0, -2.0, 5.0]
+    switch.value = False
+    assert seen(3.0) == 0.0
+    switch.value = True
+    models.append(VisibleModel(3, "other", [Link("base")]))
+    assert [seen(1.0), seen(3.0)] == [0.0, 0.0]  # which of them?
+    handles(server, viser.GuiDropdownHandle)["Model"].value = "walker"
+    assert [seen(1.0), seen(3.0)] == [0.0, -2.0]
+    del models[1:]
+    assert seen(1.0) == 0.0
+
+
+HURT = "window.hurt = 1"
+NAMES = (
+    f"<img src=x onerror='{HURT}'>",
+    f'"><script>{HURT}</script>',
+    f"[a link](javascript:{HURT})",
+    "99999999999999999999",
+    "né 机器人 🤖 \u202e right",
+    "a\nb\tc",
+)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not find_browser(), reason="no Chromium: apt-get install chromium")
+def test_foreign_names_and_numbers_are_only_text_to_a_browser(server):
+    """As names of models, joints and curves, as options, labels, captions and faults; as stops of joints."""
+    limits = (1.0, 1e14, 99999999999999999999.0, 1e-300, 1e308, -1.0)
+    joints = [
+        Joint(f"{name} joint", "revolute", "", "base", lower=-limit, upper=limit)
+        for name, limit in zip(NAMES, limits, strict=True)
+    ]
+    models = [
+        VisibleModel(number, name, [Link("base")], joints) for number, name in enumerate(NAMES)
+    ]
+    panel = ModelPanel(
+        server, server.scene.add_frame("/world"), None, NoControllers(), None, lambda: False
+    )
+    picture = Picture(server, lambda line: None)
+    picture.draw(models, [], joint_frames=True)
+    picture.move(np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]] * len(models)))
+    panel.set_models(models)
+    handles(server, viser.GuiDropdownHandle)["Model"].value = NAMES[0]
+    positions = {name: [1e300, 0.0, -1e20, float("nan"), 1e308, 0.0] for name in NAMES}
+    panel.show(picture.links, positions)
+    with Browser(f"http://127.0.0.1:{server.get_port()}") as page:
+        for name in NAMES:
+            page.wait_for_text(" ".join(shown(name).split()))
+        (client,) = server.get_clients().values()
+        for name in NAMES:
+            client.add_notification("It wasn't done", name, auto_close_seconds=None)
+        page.choose(shown(NAMES[0]), shown(NAMES[4]))
+        wait_for(lambda: handles(server, viser.GuiDropdownHandle)["Model"].value == NAMES[4], "it")
+        panel.show(picture.links, positions)
+        page.push_slider(shown(f"{NAMES[1]} joint"), "ArrowRight", 1)
+        assert page.run("window.hurt") is None
+        own = "e.src.startsWith('data:image/svg+xml')"  # viser's
+        assert page.run(f"[...document.images].filter(e => !{own}).map(e => e.src)") == []
+        links = page.run("[...document.links].map(e => e.href)")
+        assert not [each for each in links if each.startswith("javascript:")]
 
 
 def test_a_slider_that_is_dragged_leaves_its_joint_where_it_was_left(server):

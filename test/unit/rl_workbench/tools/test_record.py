@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from support.pages import viser_recording
+from support.training.workbench_runs import record as bare_run
 
 import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli
@@ -61,7 +62,8 @@ def film(length: int, title: str = "", stride: float = 1.0, max_steps: int = 0) 
 def test_frames_come_at_the_stride_that_was_asked_for(stride, steps):
     made = film(8, stride=stride)
     assert [frame.step for frame in made.frames] == steps
-    assert [int(frame[0, 0, 0]) // 10 for frame in SideBySide([made], captions=False)] == steps
+    sheets = SideBySide([made], captions=False)
+    assert [int(frame[0, 0, 0]) // 10 for frame in sheets][:-1] == steps[:-1]
     assert made.frames[-1].total_reward == 4.0
 
 
@@ -70,10 +72,19 @@ def test_an_episode_is_cut_off_where_one_wants():
 
 
 def test_episodes_side_by_side_wait_for_the_longest():
-    sheets = SideBySide([film(2), film(5)], captions=False)
+    sheets = SideBySide([film(9, max_steps=2), film(9, max_steps=5)], captions=False)
     assert len(sheets) == 6
     assert [frame[0, 0, 0] for frame in sheets] == [0, 10, 20, 20, 20, 20]
     assert [frame[0, 400, 0] for frame in sheets] == [0, 10, 20, 30, 40, 50]
+
+
+def test_an_episode_that_has_ended_is_marked_and_one_that_is_cut_off_is_not():
+    whole, cut = film(3), film(8, max_steps=3)
+    assert [each.frames[-1].ended for each in (whole, cut)] == [True, False]
+    assert not any(each.ended for each in whole.frames[:-1])
+    paled, plain = (SideBySide([each], captions=False)[3] for each in (whole, cut))
+    assert plain.max() == 30 < paled.min()
+    assert cut.frames[-1].caption() == "step 3   return 1.5   action +0.00 +0.00 +0.00 ..."
 
 
 def test_captions_stand_below_the_picture_and_change_with_it():
@@ -96,7 +107,7 @@ def test_actions_of_any_kind_are_told(action, text):
 
     env = Constant(2)
     *_, last = record_episode(env, lambda _: action, PictureView(env), 0)
-    assert last.caption("best") == f"best   step 2   return 1.0   action {text}"
+    assert last.caption("best") == f"best   step 2   return 1.0   action {text}   ended"
     assert EpisodeFrame(0, b"", 0.0, "").caption() == "step 0   return 0.0"
 
 
@@ -126,6 +137,18 @@ def test_best_last_and_random_side_by_side(robot_run: Path, tmp_path: Path, caps
         assert video.info["duration"] == 100
     told = capsys.readouterr().out.splitlines()
     assert [line.split(":")[0] for line in told] == ["best", "last", "random", str(out)]
+
+
+def test_the_camera_is_placed_by_its_fields(robot_run: Path, tmp_path: Path, capsys):
+    words = ("--max-steps", "1", "--size", "64x48", "--camera")
+    seen = []
+    for name, fields in (("a.gif", ("distance=2",)), ("b.gif", ("yaw=104", "target=[0,0,0.3]"))):
+        assert record(robot_run, tmp_path / name, *words, *fields) == 0
+        with Image.open(tmp_path / name) as video:
+            seen.append(np.asarray(video.convert("RGB"))[:48])
+    assert (seen[0] != seen[1]).any()
+    assert record(robot_run, tmp_path / "a.gif", *words, "jaw=104") == 1
+    assert "a camera has no 'jaw'; it has target, distance, yaw" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -158,6 +181,31 @@ def test_a_page_holds_all_that_it_shows(tmp_path: Path):
     assert levels == pytest.approx([0, 40, 80, 120, 160], abs=3)
     assert "const rate = 12.5;" in text and 'width="30" height="20"' in text
     assert "@" not in re.sub(r'"[A-Za-z0-9+/=]+"', "", text) and "http" not in text
+
+
+class Narrow(Counter):
+    """One with a size of its own choice."""
+
+    def __init__(self, width: int = 400, height: int = 60, render_mode: str = "rgb_array") -> None:
+        if width > 500:
+            raise ValueError(f"{width} pixels are too wide for this one")
+        super().__init__(3, render_mode)
+
+
+def test_a_size_that_an_environment_refuses_is_said(tmp_path: Path, capsys):
+    gymnasium.register("Narrow-v0", Narrow)
+    run = bare_run(tmp_path / "run", [1.0], env_id="Narrow-v0")
+    words = ("--checkpoint", "random", "--size", "600x60")
+    assert record(run, tmp_path / "a.gif", *words) == 1
+    assert "600 pixels are too wide for this one" in capsys.readouterr().err
+
+
+def test_an_environment_without_a_size_has_its_pictures_scaled(tmp_path: Path):
+    gymnasium.register("Counter-v0", Counter)
+    run = bare_run(tmp_path / "run", [1.0], env_id="Counter-v0")
+    assert record(run, tmp_path / "a.gif", "--checkpoint", "random", "--size", "100x30") == 0
+    with Image.open(tmp_path / "a.gif") as video:
+        assert video.size == (100, 30 + 8)
 
 
 # In 3-D. That a browser plays the file: test_record_played.py.

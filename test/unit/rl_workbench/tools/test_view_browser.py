@@ -17,6 +17,8 @@ from PIL import Image
 from support.pages.browser import BOUND, Browser, find_browser, wait_for
 from support.training.workbench_runs import policy_gradient
 
+import cartpole  # noqa: F401 - registers its environments
+
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not find_browser(), reason="no Chromium: apt-get install chromium"),
@@ -29,6 +31,7 @@ DATA = """Object.values((window.__viserTestpoints || {}).uplots || {})
 SIZE = (900, 650)  # [pixels]: it is drawn without a graphics card
 BLUE, ORANGE = (20, 90, 190), (230, 140, 40)  # cart and pole of our robot
 BLACK, BROWN = (0, 0, 0), (202, 152, 101)  # and of the pictures of CartPole-v1
+HOSTILE = "<img src=x onerror='hurt=1'>né🤖"
 CANVASES = "document.querySelectorAll('.uplot canvas').length"
 
 
@@ -112,13 +115,17 @@ def is_served(url: str) -> bool:
 
 
 def test_a_run_is_seen_and_played(start, tmp_path) -> None:
-    run = policy_gradient(tmp_path / "run", env_id="cartpole/Balance-v0", episodes=30, seed=1)
+    run = policy_gradient(tmp_path / HOSTILE, env_id="cartpole/Balance-v0", episodes=30, seed=1)
+    with (run / "scalars.csv").open("a") as table:
+        table.write(f"100000,losses/{HOSTILE},1,0\n100000,losses/value,{20 * '9'},0\n")
     viewing = start("view", str(run), "--port", "0", "--checkpoint", "best", "random")
     with Browser(viewing.url(), size=SIZE) as page:
         page.wait_for_text("30 episodes")
         wait_for(lambda: page.run(CANVASES) >= 3, "charts")
         assert 30 in page.run(DATA)
         page.wait_for_text("best, of step")
+        page.wait_for_text(f"losses/{HOSTILE}")
+        page.wait_for_text("losses/value, in 10¹⁸")
         pause(page)
         wait_for(lambda: is_seen(page, BLUE, ORANGE), "robot in 3-D")
         page.press_keys("[role=slider]", "Home", 1)
@@ -131,6 +138,11 @@ def test_a_run_is_seen_and_played(start, tmp_path) -> None:
         wait_for(lambda: step_of(page) > 3, "step")
         page.choose("best", "random")
         page.wait_for_text("random, seed 0")
+        page.type("input.mantine-NumberInput-input", 20 * "9")
+        page.reload()
+        page.wait_for_text("random, seed ")
+        assert page.text.count(HOSTILE) == 2, "the run's name, and a curve's"
+        assert page.run("window.hurt") is None
     assert viewing.interrupt() == 130
     assert len(viewing.lines) == 2
 

@@ -10,12 +10,12 @@ from types import SimpleNamespace
 import pytest
 from support.training.training_runs import assert_same_run
 
-from rl_workbench.training import page
 from rl_workbench.training import train as cli
 from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.page import Page
 from rl_workbench.training.train import choose
 
+BOUND = 60.0  # [s]
 SHORT = ["--algo=dqn", "--total-timesteps=300", "--learning-starts=50", "--eval-episodes=1"]
 # Writes the arguments once it is up, and a file once its input has ended.
 PAGE = """import sys
@@ -43,6 +43,7 @@ def test_it_runs_beside_the_training_and_ends_with_it(tmp_path) -> None:
     shown = begun(tmp_path, PAGE)
     assert not (tmp_path / "ended").exists()
     shown.on_training_end(None)
+    shown._process.wait(BOUND)
     assert (tmp_path / "ended").exists()
 
 
@@ -54,18 +55,16 @@ def test_without_a_page_the_training_goes_on(tmp_path, capsys) -> None:
     assert capsys.readouterr().out == words
 
 
-def test_one_that_is_killed_or_hangs_isnt_waited_for(tmp_path, monkeypatch) -> None:
+def test_one_that_is_killed_or_hangs_isnt_waited_for(tmp_path) -> None:
     shown = begun(tmp_path, PAGE)
-    process = shown._process
-    process.kill()
+    shown._process.kill()
     shown.on_training_end(None)
-    assert process.returncode == -signal.SIGKILL and not (tmp_path / "ended").exists()
-    monkeypatch.setattr(page, "END", 0.1)
     (tmp_path / "up").unlink()
     shown = begun(tmp_path, PAGE.replace("sys.stdin.read()", "import signal; signal.pause()"))
-    process = shown._process
     shown.on_training_end(None)
-    assert process.returncode == -signal.SIGKILL
+    assert shown._process.poll() is None, "it still hangs, and the training is over"
+    shown._process.kill()
+    assert shown._process.wait(BOUND) == -signal.SIGKILL
 
 
 @pytest.mark.parametrize("name", ["dqn", "reinforce", "reinforce-document"])

@@ -1,10 +1,8 @@
-#!/usr/bin/env python3
 """Services that report, change and place joints; resets."""
 
 import threading
 
 import rospy
-import rostest
 from gazebo_msgs.msg import LinkState, LinkStates, ModelState, ODEJointProperties
 from gazebo_world import BOX, INF, NAN, GazeboTest, call, now, run
 from geometry_msgs.msg import Point, Pose, Twist, Vector3
@@ -123,8 +121,3 @@ class JointsTest(GazeboTest):
         self.assertEqual(len(states.name), len(states.pose))
         box = states.name.index("box::body")
         self.assertEqual((states.pose[box].position.z, states.twist[box].linear.z), (20.0, 0.0))
-
-
-if __name__ == "__main__":
-    rospy.init_node("gazebo_joints_test")
-    rostest.rosrun("cartpole", "gazebo_joints", JointsTest)

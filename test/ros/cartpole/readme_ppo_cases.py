@@ -1,11 +1,9 @@
-#!/usr/bin/env python3
 """examples/ppo_over_ros.py runs unchanged, but for fewer steps."""
 
 import importlib.util
 import unittest
 from pathlib import Path
 
-import rostest
 from support.ros.programs import Place
 
 
@@ -29,7 +27,3 @@ class ReadmePpo(unittest.TestCase):
         self.assertRegex(training.output, r"steps of 500: \d+\.\d+\s*\Z")
         self.assertGreater((place.folder / "ppo_cartpole.zip").stat().st_size, 10_000)
         self.assertEqual(place.left_after(), {})
-
-
-if __name__ == "__main__":
-    rostest.rosrun("cartpole", "readme_ppo", ReadmePpo)

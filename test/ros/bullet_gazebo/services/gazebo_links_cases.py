@@ -1,10 +1,8 @@
-#!/usr/bin/env python3
 """Services that report, change and place links: each text, failure and effect."""
 
 import math
 
 import rospy
-import rostest
 from gazebo_msgs.msg import LinkState
 from gazebo_msgs.srv import GetLinkPropertiesResponse, SetLinkPropertiesRequest
 from gazebo_world import INF, NAN, SCOPE, GazeboTest, call, run
@@ -106,8 +104,3 @@ class LinksTest(GazeboTest):
         call("set_link_state", LinkState("body", Pose(Point(3, 0, 20), quarter), twist, ""))
         found = call("get_link_state", "cart", "body").link_state.twist
         self.close([(found.linear.y, 1.0), (found.angular.z, -2.0), (found.linear.x, 0.0)])
-
-
-if __name__ == "__main__":
-    rospy.init_node("gazebo_links_test")
-    rostest.rosrun("cartpole", "gazebo_links", LinksTest)

@@ -1,10 +1,8 @@
-#!/usr/bin/env python3
 """dqn_train.py as a ROS node, and without ROS."""
 
 import json
 import unittest
 
-import rostest
 from support.ros.programs import Place
 
 from cartpole import dqn_train
@@ -66,15 +64,3 @@ class DqnTrain(unittest.TestCase):
         self.assertEqual(training.end(), 0, training.output)
         self.assertEqual(place.processes(), {})
         self.assertIn("last.pt", place.files())
-
-    def test_an_unknown_parameter_is_one_line(self):
-        place = self.place()
-        output = self.launched(place, f"run_dir:={place.run}", "params:=gama=0.9")
-        self.assertIn(
-            "dqn_train.py: error: --params: unknown option 'gama'; did you mean gamma?", output
-        )
-        self.assertFalse(place.run.exists())
-
-
-if __name__ == "__main__":
-    rostest.rosrun("cartpole", "dqn_train", DqnTrain)

@@ -1,10 +1,8 @@
-#!/usr/bin/env python3
 """Physics properties, dynamic_reconfigure, lights and loggers."""
 
 import time
 
 import rospy
-import rostest
 from dynamic_reconfigure.client import Client
 from dynamic_reconfigure.msg import BoolParameter, Config, DoubleParameter, IntParameter
 from dynamic_reconfigure.srv import Reconfigure
@@ -148,8 +146,3 @@ class PhysicsTest(GazeboTest):
             loggers = call("get_loggers", kind=GetLoggers).loggers
             levels = {each.name: each.level for each in loggers}
             self.assertEqual(levels["rosout"].lower()[:4], level[:4])
-
-
-if __name__ == "__main__":
-    rospy.init_node("gazebo_physics_test")
-    rostest.rosrun("cartpole", "gazebo_physics", PhysicsTest)

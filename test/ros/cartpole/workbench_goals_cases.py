@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """workbench.py with an arm that reaches for goals: the same figures over ROS as in-process.
 
 Evaluations come in the midst of episodes, and move the robot that is learned with. Halfway, in the midst of
@@ -10,7 +9,6 @@ import json
 import unittest
 from pathlib import Path
 
-import rostest
 from support.ros.programs import Place
 
 from cartpole import workbench
@@ -63,7 +61,3 @@ class WorkbenchGoals(unittest.TestCase):
             returns.append(json.loads(figures_file.read_text())["returns"])
         self.assertEqual(*returns)
         self.assertEqual(self.place.left_after(), {})
-
-
-if __name__ == "__main__":
-    rostest.rosrun("cartpole", "workbench_goals", WorkbenchGoals)

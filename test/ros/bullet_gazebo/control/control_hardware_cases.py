@@ -1,11 +1,9 @@
-#!/usr/bin/env python3
 """Limits, control periods and faulty controllers of users (docs/contract/ros_control.md 5)."""
 
 import math
 
 import rosgraph
 import rospy
-import rostest
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from control_msgs.msg import JointControllerState, PidState
 from sensor_msgs.msg import JointState
@@ -178,8 +176,3 @@ class HardwareTest(SlidesTest):
         self.assertIn("the reader of 'command' raised SystemExit", answer.status_message)
         self.publish_until(command, 2.0, lambda joints: joints["effort_b"][2] == 2.0)
         self.assertEqual(self.state("rude"), "running")
-
-
-if __name__ == "__main__":
-    rospy.init_node("control_hardware_test")
-    rostest.rosrun("cartpole", "control_hardware", HardwareTest)

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """The programs controller_manager and controller_group: printed lines and exit codes.
 
 The world is paused throughout. Lines are those that ros_control's own tests expect of its scripts. Most
@@ -13,7 +12,6 @@ import subprocess
 import unittest
 
 import rospy
-import rostest
 from controller_client import CONTROLLERS, spawn
 from controller_manager import controller_manager_interface as interface
 from support.ros.calls import BOUND, delete_model, executable
@@ -240,8 +238,3 @@ class ScriptsTest(unittest.TestCase):
         self.assertTrue(printed.getvalue().startswith(expected), printed.getvalue())
         self.assertTrue(printed.getvalue().endswith(f"{self.manager.types().types[-1]}\n"))
         self.assertTrue(self.manager.switch(["pole"], [], STRICT))
-
-
-if __name__ == "__main__":
-    rospy.init_node("controller_manager_scripts_test")
-    rostest.rosrun("cartpole", "controller_manager_scripts", ScriptsTest)

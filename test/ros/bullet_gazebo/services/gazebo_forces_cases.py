@@ -1,8 +1,6 @@
-#!/usr/bin/env python3
 """Services that apply and clear efforts and wrenches."""
 
 import rospy
-import rostest
 from gazebo_world import BOX, INF, NAN, GazeboTest, call, now, physics, run, spawn
 from geometry_msgs.msg import Point, Vector3, Wrench
 
@@ -122,8 +120,3 @@ class ForcesTest(GazeboTest):
         run(0.02)
         self.assertEqual(self.joint("cartpole::cart_pole")[1], 0.0)
         self.assertEqual(self.box().twist.linear.x, 0.0)
-
-
-if __name__ == "__main__":
-    rospy.init_node("gazebo_forces_test")
-    rostest.rosrun("cartpole", "gazebo_forces", ForcesTest)

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Scenes over ROS in lock-step, one after the other: two arms with a ball, a rover with a crate."""
 
 import tempfile
@@ -7,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import rostest
 from support.scenes.rover import ROVER, Push
 from support.scenes.two_arms import LEFT, RIGHT, Volley
 
@@ -119,7 +117,3 @@ class Rover(Scenes, unittest.TestCase):
         with self.assertRaisesRegex(RobotEnvError, r"of 'rover' is open; close\(\) it first"):
             RobotEnv(other, Push(), "ros")
         first.step(first.action_space.sample())
-
-
-if __name__ == "__main__":
-    rostest.rosrun("cartpole", "scenes", "__main__")

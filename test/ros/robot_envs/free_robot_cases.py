@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """A robot that isn't fixed to the world: pictures over ROS equal those in-process."""
 
 import tempfile
@@ -7,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import rostest
 from support.robots.pendulum import FILES, PENDULUM, Upright
 
 from robot_envs.backends.ros.session import RosSession
@@ -55,7 +53,3 @@ class FreeRobot(unittest.TestCase):
         self.assertEqual(places["ros"], places["bullet"])
         self.assertLess(places["ros"].position[2], -0.05)  # it falls
         self.assertGreater(abs(places["ros"].orientation[1]), 0.01)  # and turns
-
-
-if __name__ == "__main__":
-    rostest.rosrun("cartpole", "free_robot", FreeRobot)

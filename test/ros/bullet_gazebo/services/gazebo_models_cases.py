@@ -1,10 +1,8 @@
-#!/usr/bin/env python3
 """Services that report and place models: each text, failure and effect."""
 
 import math
 
 import rospy
-import rostest
 from gazebo_msgs.msg import LinkState, ModelState
 from gazebo_world import BOX, INF, NAN, GazeboTest, call, now, run
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
@@ -129,8 +127,3 @@ class ModelsTest(GazeboTest):
         self.assertEqual((gone.header.seq, gone.header.frame_id), (0, ""))
         call("reset_simulation")
         self.assertEqual(self.box().header.seq, first.header.seq + 2)
-
-
-if __name__ == "__main__":
-    rospy.init_node("gazebo_models_test")
-    rostest.rosrun("cartpole", "gazebo_models", ModelsTest)

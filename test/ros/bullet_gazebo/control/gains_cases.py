@@ -1,11 +1,9 @@
-#!/usr/bin/env python3
 """Gains at run time: dynamic_reconfigure, write-back, PID state (docs/contract/ros_control.md 4)."""
 
 import math
 import subprocess
 
 import rospy
-import rostest
 from control_msgs.msg import JointControllerState, PidState
 from dynamic_reconfigure.msg import Config, ConfigDescription, DoubleParameter
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
@@ -129,8 +127,3 @@ class GainsTest(SlidesTest):
             kept.close()
             with self.assertRaises(rospy.ROSException):
                 rospy.wait_for_service(service, 0.3)
-
-
-if __name__ == "__main__":
-    rospy.init_node("gains_test")
-    rostest.rosrun("cartpole", "gains", GainsTest)

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """spawner and unspawner: in launch files, on the command line, and every line they print."""
 
 import re
@@ -10,7 +9,6 @@ import unittest
 from pathlib import Path
 
 import rospy
-import rostest
 from controller_client import spawn
 from std_msgs.msg import Bool
 from std_srvs.srv import Empty
@@ -39,6 +37,9 @@ COLOUR, STAMP = re.compile(r"\x1b\[[0-9;]*m"), re.compile(r"^\[(\w+)\] \[[\d., ]
 
 class SpawnerTest(unittest.TestCase):
     def setUp(self):
+        for name in ("states", "cart", "pole"):
+            if rospy.has_param(f"/{name}"):
+                rospy.delete_param(f"/{name}")
         self.assertTrue(spawn().success)
         self.manager = Manager()
         self.programs = []
@@ -50,9 +51,6 @@ class SpawnerTest(unittest.TestCase):
         for program in list(self.programs):
             self.end(program, signal.SIGINT)
         delete_model()
-        for name in ("states", "cart", "pole"):
-            if rospy.has_param(f"/{name}"):
-                rospy.delete_param(f"/{name}")
 
     def file(self, name):
         return str(self.folder / f"{name}.yaml")
@@ -289,9 +287,3 @@ class SpawnerTest(unittest.TestCase):
 
 def is_retry(line):
     return "still waiting" in line
-
-
-if __name__ == "__main__":
-    rospy.init_node("spawner_test")
-    rospy.wait_for_service("/gazebo/get_world_properties", BOUND)
-    rostest.rosrun("cartpole", "spawner", SpawnerTest)

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """JointTrajectoryController through ROS (docs/contract/ros_control.md 3.5)."""
 
 import math
@@ -7,13 +6,12 @@ import unittest
 import rosgraph
 import rosnode
 import rospy
-import rostest
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 from control_msgs.msg import JointTolerance
 from control_msgs.srv import QueryTrajectoryState
 from gazebo_msgs.srv import GetJointProperties
 from std_srvs.srv import Empty
-from support.ros.calls import BOUND, call, delete_model, spawn_model, wait_until
+from support.ros.calls import call, delete_model, spawn_model, wait_until
 from support.ros.manager import STRICT, Manager
 from trajectory_client import Arm, trajectory
 
@@ -35,7 +33,7 @@ def unpause():
 
 
 def topics_below(namespace):
-    state = rosgraph.Master("/trajectory_test").getSystemState()
+    state = rosgraph.Master(rospy.get_name()).getSystemState()
     own = rospy.get_name()
     return {
         topic
@@ -267,9 +265,3 @@ class TrajectoryTest(unittest.TestCase):
         self.assertTrue(pursuit.wait_active())
         delete_model("slides")
         self.check(pursuit, "PREEMPTED", "SUCCEEDED", "stopped")
-
-
-if __name__ == "__main__":
-    rospy.init_node("trajectory_test")
-    rospy.wait_for_service("/gazebo/spawn_urdf_model", BOUND)
-    rostest.rosrun("cartpole", "trajectory", TrajectoryTest)

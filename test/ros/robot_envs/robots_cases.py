@@ -1,0 +1,30 @@
+"""The bundled robots over ROS in lock-step: the bits of the in-process world, and the conformance suite."""
+
+import unittest
+
+import gymnasium
+
+import robot_envs.robots  # noqa: F401 - registers the environments
+from robot_envs.testing import check_robot_env, differences, rollout
+
+# One of each robot; the others differ in what is made of the same numbers.
+IDS = tuple(
+    f"robot_envs/{name}-v0"
+    for name in ("TwoLinkReachGoal", "SixJointReach", "Furuta", "DoublePendulum", "Hopper")
+)
+
+
+class Robots(unittest.TestCase):
+    def test_the_bits_are_those_of_the_robot_in_process(self):
+        for identifier in IDS:
+            with self.subTest(identifier):
+                over_ros, here = (
+                    gymnasium.make(identifier, backend="ros"),
+                    gymnasium.make(identifier),
+                )
+                for seed in (1, 2):  # the second time after other episodes
+                    given = rollout(over_ros, 30, seed)
+                    self.assertEqual(differences(given, rollout(here, 30, seed)), "")
+                over_ros.close()
+                here.close()
+                check_robot_env(identifier, ("ros",), steps=30)
