@@ -6,6 +6,7 @@ parent was killed, and there is no list that could be out of date.
 
 import contextlib
 import json
+import math
 import os
 import signal
 import threading
@@ -47,15 +48,9 @@ class Start:
     def is_orphan(self) -> bool:
         """Returns whether it still runs although its caller was killed."""
         members = family(self.token).values()
-        if not self.caller or not members:
-            return False
-        try:
-            caller = psutil.Process(self.caller)
-        except psutil.Error:
-            return True
-        # A younger process has the id only since the caller's end.
-        eldest = min(process.create_time() for process in members)
-        return caller.create_time() > eldest or not _lives(self.caller)
+        # A process that is younger than they are has the id only since the caller's end.
+        eldest = min(map(_began, members), default=math.inf)
+        return bool(self.caller and members) and not _lives(self.caller, eldest)
 
 
 def _starts(mark: str) -> list[Start]:
@@ -65,11 +60,20 @@ def _starts(mark: str) -> list[Start]:
         return []  # not ours: nothing can be ended safely
 
 
-def _lives(pid: int) -> bool:
+def _lives(pid: int, until: float = math.inf) -> bool:
+    """Returns whether a process of that id runs that began until a time."""
     try:
-        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+        process = psutil.Process(pid)
+        return process.status() != psutil.STATUS_ZOMBIE and process.create_time() <= until
     except psutil.Error:
         return False
+
+
+def _began(process: psutil.Process) -> float:
+    try:
+        return process.create_time()
+    except psutil.Error:  # it has just ended
+        return math.inf
 
 
 def family(token: str) -> dict[int, psutil.Process]:

@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = ROOT / "examples"
 FILES = ["dqn_single_file.py", "reinforce_single_file.py"]
 LONGEST = 250  # [lines]
-LEAST = 2000  # [steps] that a comparison needs
+LEAST = 1000  # [steps] that a comparison needs
 LIMIT = 300.0  # [s] for a process
 
 
@@ -76,13 +76,13 @@ def assert_same_weights(network: torch.nn.Module, state: dict[str, torch.Tensor]
 
 
 DQN = {
-    "as it comes": ["--total-timesteps", "3000", "--seed", "3"],
-    "plain": ["--total-timesteps", "2000", "--n-step", "1", "--no-double", "--no-dueling",
+    "as it comes": ["--total-timesteps", "1500", "--seed", "3"],
+    "plain": ["--total-timesteps", "1000", "--n-step", "1", "--no-double", "--no-dueling",
               "--loss", "mse", "--reward-scale", "1", "--no-normalize-observations",
               "--learning-starts", "0", "--target-network-frequency", "10",
               "--exploration-fraction", "0"],
     "truncated, clipped, a buffer that overflows": [
-        "--env-id", "Acrobot-v1", "--total-timesteps", "2100", "--buffer-size", "600",
+        "--env-id", "Acrobot-v1", "--total-timesteps", "1100", "--buffer-size", "600",
         "--max-grad-norm", "0.05", "--n-step", "5", "--batch-size", "16", "--hidden-sizes", "24",
         "--gamma", "0.9", "--end-e", "0.3", "--seed", "1"],
 }  # fmt: skip
@@ -107,8 +107,8 @@ def test_dqn_comes_to_the_weights_of_the_library(
 
 ROBOT = ["--env-id", "cartpole/Balance-v0"]
 REINFORCE = {
-    "as it comes": ["--episodes", "45", "--seed", "1"],
-    "the robot, normalised": ["--episodes", "60", "--normalize-observations"],
+    "as it comes": ["--episodes", "30", "--seed", "1"],
+    "the robot, normalised": ["--episodes", "40", "--normalize-observations"],
     "batches, entropy, a hidden layer": [
         "--env-id", "CartPole-v1", "--episodes", "61", "--batch-episodes", "3",
         "--policy-hidden", "8", "--value-hidden", "16", "--entropy-coefficient", "0.02",

@@ -131,7 +131,7 @@ def test_without_room_for_its_files_a_model_keeps_the_old_world(often, sim, monk
     assert not stays_among_others(sim.world, tmp_path, lambda: monkeypatch.setattr(writer, full))
 
 
-@pytest.mark.parametrize("function", ["write_urdf", "_size", "TemporaryDirectory"])
+@pytest.mark.parametrize("function", ["write_urdf", "_size", "scratch_folder"])
 def test_a_full_disk_is_a_reason_and_leaves_the_world_as_it_was(sim, monkeypatch, function):
     world, model = sim.world, parse_urdf(chain(2))
     with monkeypatch.context() as disk:

@@ -1,11 +1,9 @@
-#!/usr/bin/env python3
 """A node that roslaunch starts finds ROS, PyPI's packages and ours."""
 
 import importlib
 import unittest
 
 import rospy
-import rostest
 from nodelet.srv import NodeletList
 from std_msgs.msg import String
 
@@ -39,8 +37,3 @@ class Workspace(unittest.TestCase):
     def test_nodelet(self):
         rospy.wait_for_service("manager/list", timeout=60)
         self.assertEqual(rospy.ServiceProxy("manager/list", NodeletList)().nodelets, [])
-
-
-if __name__ == "__main__":
-    rospy.init_node("workspace")
-    rostest.rosrun("cartpole", "workspace", Workspace)
