@@ -27,6 +27,7 @@ Answer = Callable[[Any, Request], Response | None]
 LONGEST_PATH = 1000  # of a request [characters]
 LONGEST_TEXT = 1000  # of a field [characters]
 LARGEST = 2.0**53  # integers that JavaScript has exactly
+LARGEST_SIDE = 2**14  # of a page [pixels]
 Point = tuple[float, float, float]  # [m]
 
 
@@ -131,6 +132,30 @@ def _check_fields(server: viser.ViserServer) -> None:
     pages.register_handler(messages.GuiUpdateMessage, checked)
 
 
+def _is_camera(message: messages.ViewerCameraMessage) -> bool:
+    """Returns whether a page's camera is made of numbers that can be calculated with."""
+    vectors = (message.wxyz, message.position, message.look_at, message.up_direction)
+    if not all(isinstance(each, (list, tuple)) for each in vectors):
+        return False
+    sides = message.image_height, message.image_width
+    numbers = [*(n for each in vectors for n in each), message.fov, message.near, message.far]
+    return [len(each) for each in vectors] == [4, 3, 3, 3] and (
+        all(type(n) in (int, float) and abs(n) <= LARGEST for n in numbers)
+        and all(type(side) is int and 0 <= side <= LARGEST_SIDE for side in sides)
+    )
+
+
+async def _check_camera(page: Any) -> None:
+    """Passes on only cameras: viser takes anything, and whoever reads it later would fail."""
+    (take,) = page._incoming_handlers.pop(messages.ViewerCameraMessage)
+
+    async def checked(client: Any, message: messages.ViewerCameraMessage) -> None:
+        if _is_camera(message):
+            await take(client, message)
+
+    page.register_handler(messages.ViewerCameraMessage, checked)
+
+
 def _start(address: Address, title: str = "") -> viser.ViserServer:
     """Starts viser with a gate in front; viser has no public hook for one."""
     module = websockets.asyncio.server
@@ -166,6 +191,7 @@ def serve(address: Address, title: str, camera: Point, look_at: Point) -> viser.
     for message in (messages.ShareUrlRequest, messages.ShareUrlDisconnect):
         server._websock_server.unregister_handler(message)
     _check_fields(server)
+    server._websock_server.on_client_connect(_check_camera)
     server.gui.main_panel.dock_right()
     server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
     server.initial_camera.position = camera

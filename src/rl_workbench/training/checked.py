@@ -76,7 +76,8 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         if not is_last:
             return info
         means = {
-            f"info/{_UNFIT.sub('_', name)}": total / n for name, (total, n) in self._sums.items()
+            f"info/{_UNFIT.sub('_', str(name))}": total / n
+            for name, (total, n) in self._sums.items()
         }
         return {**info, CURVES: {tag: mean for tag, mean in means.items() if math.isfinite(mean)}}
 

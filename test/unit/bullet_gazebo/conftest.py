@@ -8,6 +8,14 @@ from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.simulator import Simulator
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _own_cache(tmp_path_factory):
+    """Keep pieces of meshes out of the user's folder."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
+        yield
+
+
 @pytest.fixture
 def make_world(new_engine):
     """Make a world, with or without ground; other options are World's."""

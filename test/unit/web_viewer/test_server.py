@@ -2,14 +2,18 @@
 
 import asyncio
 import socket
+import time
+from importlib.metadata import version
 
+import msgspec
 import pytest
-from viser._messages import GuiUpdateMessage
+from viser._messages import GuiUpdateMessage, ViewerCameraMessage
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
+from websockets.sync.client import connect
 
 from web_viewer.address import Address, PortInUse, find_address
-from web_viewer.server import Gate, serve, stop
+from web_viewer.server import Gate, _is_camera, serve, stop
 
 TOKEN = "a-token"
 WINDOW = ("the window", "moves the simulation")
@@ -166,3 +170,35 @@ def test_a_field_takes_only_what_it_can(page, field, good, bad):
     assert handle.value == before and handle.visible
     send({"value": good})
     assert handle.value == good
+
+
+CAMERA = {
+    "type": "ViewerCameraMessage", "wxyz": [1, 0, 0, 0], "position": [3.0, 0, 1], "fov": 1.0, "near": 0.01,
+    "far": 1000.0, "image_height": 600, "image_width": 800, "look_at": [0, 0, 0], "up_direction": [0, 0, 1],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"position": "far"}, {"position": [1, 2]}, {"position": [1, 2, "3"]}, {"look_at": None},
+        {"position": [1e300, 0, 0]}, {"wxyz": [float("nan"), 0, 0, 1]}, {"fov": "1"}, {"far": []},
+        {"up_direction": [[1], [2], [3]]}, {"image_height": 10**9}, {"image_width": -1}, {"fov": True},
+    ],
+)  # fmt: skip
+def test_a_camera_that_cant_be_calculated_with_isnt_taken(bad):
+    plain = {name: value for name, value in CAMERA.items() if name != "type"}
+    assert _is_camera(ViewerCameraMessage(**plain))
+    assert not _is_camera(ViewerCameraMessage(**{**plain, **bad}))
+
+
+def test_a_page_with_such_a_camera_is_none(page):
+    address = f"ws://127.0.0.1:{page.get_port()}"
+    with connect(address, subprotocols=[f"viser-v{version('viser')}"], max_size=None) as browser:
+        for more in ({"position": [1, 2]}, {}, {"position": [1, 2, "3"]}, {"position": [5, 6, 7]}):
+            browser.send(msgspec.msgpack.encode({**CAMERA, **more}))
+        deadline, seen = time.monotonic() + 60.0, set()
+        while (5, 6, 7) not in seen:
+            assert time.monotonic() < deadline
+            seen |= {tuple(each.camera.position) for each in page.get_clients().values()}
+    assert seen <= {(3, 0, 1), (5, 6, 7)}

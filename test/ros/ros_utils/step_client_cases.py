@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """StepClient against simulators that run, restart, hang, or hold several robots."""
 
 import os
@@ -8,7 +7,6 @@ import unittest
 import xmlrpc.client
 
 import rosgraph
-import rostest
 
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils.service_client import ServiceGone, ServiceHangs
@@ -137,7 +135,3 @@ def simulator_process(master_uri):
     """Process id of the simulator under a master."""
     uri = rosgraph.Master("/step_client", master_uri).lookupNode("/gazebo")
     return xmlrpc.client.ServerProxy(uri).getPid("/step_client")[2]
-
-
-if __name__ == "__main__":
-    rostest.rosrun("cartpole", "step_client", "__main__")

@@ -1,10 +1,8 @@
-#!/usr/bin/env python3
 """Links, models and contacts over ROS are bit-identical to those in-process."""
 
 import importlib.util
 import unittest
 
-import rostest
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from support.robots.arm_and_box import (
     ARM,
@@ -145,6 +143,3 @@ class OnMujoco(StepState):
 
 
 del StepState  # a base of the two, and no test by itself
-
-if __name__ == "__main__":
-    rostest.rosrun("cartpole", "step_state", "__main__")
