@@ -68,6 +68,8 @@ def main(folder: Path, out: Path) -> None:
     run = open_run(folder)
     plane = PLANES[run.env_id.rpartition(":")[2]]
     policy = load_learned(run)
+    if policy.network is None:
+        sys.exit(f"{folder}: a policy of its kind can't be plotted")
 
     angles = np.linspace(-plane.angle, plane.angle, POINTS)
     velocities = np.linspace(-plane.velocity, plane.velocity, POINTS)

@@ -151,7 +151,7 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
     """
     if path.is_dir():
         run = open_run(path)
-        wrapper = run.wrapper
+        wrapper: str | None = run.wrapper
         learned = load_learned(run, which, _in_process({**run.env_kwargs, **options}))
         env, env_id, act = learned.env, run.env_id, learned.act
     else:

@@ -76,7 +76,7 @@ def commands() -> Iterator[Command]:
                     if found := STARTS.match(line.strip()):
                         words = shlex.split(line.strip()[found.start() :], comments=True)
                         words = words[words[0] == "./ws" :]
-                        if words[0] == "--with":  # run by test_ws_with.py
+                        if words[0] in ("--with", "env"):  # run by test_ws_with.py; a variable
                             words = words[2:]
                         yield Command(page, tuple(words))
 
