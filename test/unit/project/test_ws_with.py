@@ -12,8 +12,6 @@ from pathlib import Path
 import psutil
 import pytest
 
-from tools.user_packages.find import look_through
-
 pytestmark = pytest.mark.slow  # what one test has built is there for the next
 XML = """<package format="2"><name>{name}</name><version>0.0.1</version><description>d</description>
 <maintainer email="a@example.com">a</maintainer><license>BSD</license>
@@ -349,8 +347,12 @@ def test_what_a_killed_ws_builds_on_keeps_the_next_one_waiting(root, tmp_path):
         ("add_custom_target(x)", "robot.urdf", False),
     ],
 )
-def test_what_cmake_makes_something_of(tmp_path, cmake, source, made):
+def test_what_cmake_makes_something_of(root, tmp_path, monkeypatch, cmake, source, made):
+    monkeypatch.syspath_prepend(root)
+    monkeypatch.syspath_prepend("/usr/lib/python3/dist-packages")
+    from tools.user_packages import find
+
     folder = package(tmp_path, "my_made", f"{cmake}\n")
     (folder / "code.cpp").rename(folder / source)
-    found = look_through([tmp_path], [], tmp_path / "root")
+    found = find.look_through([tmp_path], [], tmp_path / "root")
     assert found.packages["my_made"].is_made is made
