@@ -151,22 +151,18 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
     """
     if path.is_dir():
         run = open_run(path)
-        wrapper: str | None = run.wrapper
+        _check_bare(path, run.wrapper)
         learned = load_learned(run, which, _in_process({**run.env_kwargs, **options}))
         env, env_id, act = learned.env, run.env_id, learned.act
     else:
         exported = open_exported(path)
-        wrapper = exported.metadata.get("wrapper")
+        _check_bare(path, exported.metadata.get("wrapper"))
         env_id, act = exported.metadata["env_id"], exported.act
         recorded = {**exported.metadata["env_kwargs"], **options}
         sees_dict = exported.metadata["observation_space"].get("kind") == "Dict"
         env = make_environment(env_id, _in_process(recorded), keep_dict=sees_dict)
         _check_same(path, exported.metadata, env)
     try:
-        if wrapper:
-            raise RobotEnvError(
-                f"{path} learned through the wrapper {wrapper}, which a robot hasn't"
-            )
         base = env.unwrapped
         if not isinstance(base, RobotEnv):
             raise RobotEnvError(
@@ -177,6 +173,11 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
         return Deployed(base.scene.robots[0], base.task, _of_task(env, act), base.control_period)
     finally:
         env.close()
+
+
+def _check_bare(path: Path, wrapper: str | None) -> None:
+    if wrapper:
+        raise RobotEnvError(f"{path} learned through the wrapper {wrapper}, which a robot hasn't")
 
 
 def _in_process(options: dict[str, Any]) -> dict[str, Any]:

@@ -77,7 +77,10 @@ def scratch_folder(parent: str | None = None) -> Iterator[Path]:
 
 @functools.cache
 def _sweep(place: Path) -> None:
-    """Removes the temporary folders that no process holds; others' users can't be opened."""
-    for folder in place.glob("*".join(SCRATCH)):
+    """Removes the temporary folders that no process holds; others' users can't be opened.
+
+    It knows them by the form of `mkdtemp`'s names.
+    """
+    for folder in place.glob(("[a-z0-9_]" * 8).join(SCRATCH)):
         with suppress(OSError), locked_folder(folder):
             shutil.rmtree(folder, ignore_errors=True)

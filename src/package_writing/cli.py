@@ -86,7 +86,8 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument(
         "--standalone", action="store_true",
-        help="write the robot's URDF expanded, with all its meshes, so that it needs no other package",
+        help="write the robot's URDF expanded, with all its meshes but without their textures, so that it "
+             "needs no other package",
     )  # fmt: skip
     _add_robot_options(parser)
     return parser

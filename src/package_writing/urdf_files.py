@@ -1,6 +1,7 @@
 """Copies a URDF or xacro file with the files it includes, and meshes with relative paths."""
 
 import glob
+import itertools
 import os
 import re
 import shutil
@@ -16,6 +17,7 @@ from robot_envs.files import PACKAGE, locate
 FOUND = re.compile(r"\$\(find\s+([\w.-]+)\s*\)([^\"'<>]*)")  # $(find PACKAGE)/PLACE
 NAMED = re.compile(r"package://([\w.-]+)/")
 MESH = re.compile(r"""(<mesh\s[^>]*?filename\s*=\s*)(["'])([^"'$]+)\2""")
+MATERIALS = re.compile(r"^mtllib[ \t]+([^/\\\n]*\S)[ \t\r]*$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -56,10 +58,11 @@ def copy_urdf(
         arguments = {} if standalone else arguments
         own = _own(texts)
         top = Path(os.path.commonpath([each.parent for each in own]))
+        taken: dict[Path, Path] = {}
         for each in own:
             target = folder / "urdf" / each.relative_to(top)
             target.parent.mkdir(parents=True, exist_ok=True)
-            text = _with_meshes(texts[each], each, package, folder, standalone)
+            text = _with_meshes(texts[each], each, package, folder, taken, standalone)
             target.write_text(text, encoding="utf-8", errors="surrogateescape")
         copy = folder / "urdf" / path.relative_to(top)
         xml = expand(copy, arguments)
@@ -117,8 +120,13 @@ def _own(texts: Mapping[Path, str]) -> list[Path]:
     return [files[0], *own]
 
 
-def _with_meshes(text: str, source: Path, package: str, folder: Path, every: bool) -> str:
-    """Copies a text's meshes, also those of other packages if `every`; returns it with their new places."""
+def _with_meshes(
+    text: str, source: Path, package: str, folder: Path, taken: dict[Path, Path], every: bool
+) -> str:
+    """Copies a text's meshes, also those of other packages if `every`; returns it with their new places.
+
+    `taken` says from which folder each folder of copies comes: two may have files of one name.
+    """
 
     def moved(match: re.Match[str]) -> str:
         mesh = _mesh(source, match[3], every)
@@ -127,13 +135,23 @@ def _with_meshes(text: str, source: Path, package: str, folder: Path, every: boo
         place = PurePath(match[3].removeprefix(PACKAGE).removeprefix("file://"))
         last = place.parts[-2:] if place.is_absolute() else place.parts
         parts = [part for part in last if part not in ("..", "meshes")]
-        copy = Path("meshes", *parts)
+        origin, wanted = mesh.parent.resolve(), Path("meshes", *parts[:-1])
+        places = itertools.chain([wanted], (wanted / str(n) for n in itertools.count(2)))
+        copy = next(each for each in places if taken.setdefault(each, origin) == origin) / parts[-1]
         (folder / copy).parent.mkdir(parents=True, exist_ok=True)
-        for each in mesh.parent.glob(f"{glob.escape(mesh.stem)}.*"):  # also its material file
+        for each in _parts(mesh):
             shutil.copyfile(each, (folder / copy).with_name(each.name))
         return f"{match[1]}{match[2]}{PACKAGE}{package}/{copy}{match[2]}"
 
     return MESH.sub(moved, text)
+
+
+def _parts(mesh: Path) -> list[Path]:
+    """Returns a mesh's files: itself, those of its name, and the material files that an OBJ names."""
+    text = mesh.read_text(errors="replace") if mesh.suffix.lower() == ".obj" else ""
+    named = [mesh.with_name(PurePath(name).name) for name in MATERIALS.findall(text)]
+    alike = mesh.parent.glob(f"{glob.escape(mesh.stem)}.*")
+    return [*alike, *(each for each in named if each.is_file())]
 
 
 def _mesh(source: Path, name: str, every: bool) -> Path | None:

@@ -156,7 +156,7 @@ class RobotEnv(DrawnEnv):
     def _judge_in(self, backend: RobotBackend) -> Task | Unjudged:
         """Lets the backend tell what the task sees; returns what judges its states."""
         task = self.task
-        if backend.complete or not self._hides:
+        if not self._hides or backend.complete:
             backend.look(both(task.query, task.reward_query))
             return task
         backend.look(task.query)

@@ -20,7 +20,7 @@ class Scene:
     """What is in a world besides the models of its file.
 
     Args:
-        robots: one or several; the first one defines world, engine and control period.
+        robots: one or several; the first one defines world, engine, physics_step and control period.
         objects: of the task.
 
     Raises:

@@ -141,6 +141,8 @@ def _is_camera(message: messages.ViewerCameraMessage) -> bool:
     numbers = [*(n for each in vectors for n in each), message.fov, message.near, message.far]
     return [len(each) for each in vectors] == [4, 3, 3, 3] and (
         all(type(n) in (int, float) and abs(n) <= LARGEST for n in numbers)
+        and list(message.look_at) != list(message.position)
+        and any(message.up_direction)
         and all(type(side) is int and 0 <= side <= LARGEST_SIDE for side in sides)
     )
 

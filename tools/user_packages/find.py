@@ -16,14 +16,19 @@ OURS = ("cartpole", "bullet_gazebo_msgs")  # whose own files are what ws was cal
 STAND_IN = "gazebo_ros"
 GAZEBO = re.compile(r"gazebo|gazebo_dev|libgazebo.*")  # what a package for Gazebo itself depends on
 MAKES = re.compile(
-    r"^\s*(generate_messages|generate_dynamic_reconfigure_options|pybind11_add_module|configure_file"
-    r"|add_(executable|library|custom_command|custom_target)|catkin_add_env_hooks)\s*\(",
+    r"^\s*(generate_messages|generate_dynamic_reconfigure_options|configure_file|add_custom_target"
+    r"|(\w+_)?add_(executable|library|module)|add_custom_command|catkin_add_env_hooks)\s*\(",
+    re.IGNORECASE | re.MULTILINE,
+)
+BUILDS = re.compile(  # whatever its sources are
+    r"^\s*((\w+_)?add_(executable|library|module)|add_custom_command)\s*\(",
     re.IGNORECASE | re.MULTILINE,
 )
 MAKEFILES = ("CMakeLists.txt", "package.xml", "setup.py")
 SOURCES = {
     *(".msg", ".srv", ".action", ".cfg", ".cmake", ".in", ".em"),
     *(".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx"),
+    *(".cu", ".cuh", ".f90", ".proto", ".pyx", ".pxd", ".ui", ".qrc"),
 }
 SETUP = re.compile(r"^\s*catkin_python_setup\s*\(", re.IGNORECASE | re.MULTILINE)
 PLAIN_SETUP = re.compile(r"package_dir\s*=\s*\{\s*(['\"])\1\s*:\s*(['\"])src/?\2")
@@ -167,7 +172,8 @@ def _read(path: Path) -> Package:
         # A setup.py with the usual folder needs nothing but that folder.
         usual = setup.is_file() and PLAIN_SETUP.search(setup.read_text(errors="replace"))
         unusual = bool(SETUP.search(text) and not usual)
-        has_sources = unusual or any(each.suffix in SOURCES for each in source_files(path))
+        has_sources = unusual or bool(BUILDS.search(text))
+        has_sources |= any(each.suffix in SOURCES for each in source_files(path))
         is_made = unusual or (has_sources and bool(MAKES.search(text)))
     has_cmake = cmake.is_file() and not is_ros2
     return Package(xml.name, path, frozenset(depends), has_cmake, has_sources, is_made, is_ros2)

@@ -58,6 +58,7 @@ class Camera:
                 raise ValueError(f"a camera has no {name!r}; it has {', '.join(RANGES)}")
             (low, high), like, found = RANGES[name], getattr(self, name), np.array(value)
             fits = found.shape == np.shape(like) and found.dtype.kind in "bif"
+            fits = fits and (isinstance(value, bool) or not isinstance(like, bool))
             if not fits or (np.clip(found, low, high) != found).any():
                 raise ValueError(
                     f"a camera's {name} is like {like}, in [{low:g}, {high:g}]: {value!r}"

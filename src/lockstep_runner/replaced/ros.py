@@ -113,13 +113,14 @@ class _Waiting:
 
         silence = max(0.0, min(limit, SILENCE - last.silence))
         came = wait(silence)
-        last.silence = 0.0 if came else last.silence + silence
+        last.silence += silence
         if not came and last.silence >= SILENCE:
             tell_once(f"silence {name}", f"no message on {name} in {SILENCE:g} s: {_why(name)}")
         if not came and not (limit > silence and wait(limit - silence)):
             raise rospy.ROSException(f"timeout exceeded while waiting for message on topic {topic}")
         if rospy.is_shutdown():
             raise rospy.exceptions.ROSInterruptException("rospy shutdown")
+        last.silence = 0.0
         return last.message
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
@@ -146,16 +147,24 @@ class CallbackList:
         self._own, self._users = own, users
 
     def call(self, event: str, training: Any, *arguments: Any) -> None:
-        """Calls the method of an event; all of the user's hear of it, whatever another one raises."""
+        """Calls the method of an event; all of the user's hear of it, whatever another one raises.
+
+        Of several failures the first one propagates.
+        """
         with ExitStack() as users:
             for each in reversed(self._users):
-                users.callback(self._call_user, each, event, training, *arguments)
+                users.push(partial(self._call_user, each, event, training, arguments))
             for own in self._own:
                 getattr(own, event)(training, *arguments)
 
-    def _call_user(self, user: Callback, event: str, training: Any, *arguments: Any) -> None:
+    @staticmethod
+    def _call_user(
+        user: Callback, event: str, training: Any, arguments: tuple[Any, ...], *raised: Any
+    ) -> None:
+        """Calls one; `raised` is the exception so far, as __exit__ receives it."""
         try:
             getattr(user, event)(training, *arguments)
         except Exception as error:
             text = f"the callback {type(user).__name__} failed in {event}(): {error_line(error)}"
-            raise EnvironmentFailure(text) from error
+            if raised[1] is None:
+                raise EnvironmentFailure(text) from error

@@ -49,23 +49,30 @@ def make_environment(
     """
     import_module_of(env_id)
     wrap = imported(wrapper, "--wrapper") if wrapper else lambda env: env
-    try:
-        env: gymnasium.Env[Any, Any] = wrap(gymnasium.make(env_id, **(options or {})))
-        if not isinstance(env, gymnasium.Env):
-            raise TypeError(f"--wrapper {wrapper} returns {env!r}, which is no gymnasium.Env")
-    except gymnasium.error.DependencyNotInstalled as error:
-        extras = errors.hints.extras  # else Gymnasium's own text names the command
-        hint = f" ({extras} may install them)" if extras else ""
-        raise WorkbenchError(f"{env_id} needs more packages{hint}: {error}") from error
-    except gymnasium.error.UnregisteredEnv as error:
-        hint = "" if module_of(env_id) else f" {FORM}"
-        raise WorkbenchError(f"can't make {env_id}: {error}{hint}") from error
-    except _REFUSED as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise WorkbenchError(f"can't make {env_id}: {reason}") from error
-    except (Exception, SystemExit) as error:
-        raise EnvironmentFailure(f"can't make {env_id}: {error_line(error)}") from error
-    return CheckedEnvironment(_suited(env, env_id, keep_dict), env_id, which)
+    with ExitStack() as refused:
+        try:
+            env: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **(options or {}))
+            refused.callback(env.close)
+            env = wrap(env)
+            if not isinstance(env, gymnasium.Env):
+                raise TypeError(f"--wrapper {wrapper} returns {env!r}, which is no gymnasium.Env")
+            refused.pop_all()
+            refused.callback(env.close)  # through the wrapper
+        except gymnasium.error.DependencyNotInstalled as error:
+            extras = errors.hints.extras  # else Gymnasium's own text names the command
+            hint = f" ({extras} may install them)" if extras else ""
+            raise WorkbenchError(f"{env_id} needs more packages{hint}: {error}") from error
+        except gymnasium.error.UnregisteredEnv as error:
+            hint = "" if module_of(env_id) else f" {FORM}"
+            raise WorkbenchError(f"can't make {env_id}: {error}{hint}") from error
+        except _REFUSED as error:
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise WorkbenchError(f"can't make {env_id}: {reason}") from error
+        except (Exception, SystemExit) as error:
+            raise EnvironmentFailure(f"can't make {env_id}: {error_line(error)}") from error
+        suited = _suited(env, env_id, keep_dict)
+        refused.pop_all()
+    return CheckedEnvironment(suited, env_id, which)
 
 
 def _suited(env: gymnasium.Env[Any, Any], env_id: str, keep_dict: bool) -> gymnasium.Env[Any, Any]:
@@ -80,7 +87,6 @@ def _suited(env: gymnasium.Env[Any, Any], env_id: str, keep_dict: bool) -> gymna
     if keeps and (isinstance(space, spaces.Dict) or is_image(space)):
         return env
     if not space.is_np_flattenable:
-        env.close()
         raise WorkbenchError(
             f"{env_id} observes {space}; agents learn only from vectors of numbers"
         )

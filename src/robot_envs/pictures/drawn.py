@@ -59,6 +59,8 @@ class RobotPicture:
         self._size = (int(width), int(height))
         if isinstance(camera, Mapping):
             Camera().changed(camera)
+        elif not isinstance(camera, Camera | None):
+            raise ValueError(f"a camera is a Camera(...), or some of its fields, not {camera!r}")
         self._camera = camera
         self._place = lambda: Placement(robot, base, beside)
         self._loaded: tuple[Placement, Camera, Renderer] | None = None

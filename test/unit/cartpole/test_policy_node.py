@@ -1,6 +1,7 @@
 """The command policy_node.py: what it makes of its arguments, and which policies it takes."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -109,3 +110,14 @@ def test_without_a_master_it_says_so(run: Path, monkeypatch, capsys) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
     assert policy_node.main([str(run)]) == 1
     assert "there is no ROS master at http://127.0.0.1:1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("opens", ["open_run", "open_exported"])
+def test_a_policy_behind_a_wrapper_is_refused_before_there_is_an_environment(
+    opens: str, tmp_path: Path, monkeypatch
+) -> None:
+    found = SimpleNamespace(wrapper="mine:wrap", metadata={"wrapper": "mine:wrap"})
+    monkeypatch.setattr(policy_node, opens, lambda path: found)
+    path = tmp_path if opens == "open_run" else tmp_path / "policy.pt"
+    with pytest.raises(RobotEnvError, match="learned through the wrapper mine:wrap"):
+        policy_node.load(path, "best", {})

@@ -81,7 +81,7 @@ def test_temporary_folders_of_killed_processes_go_with_the_next_one(tmp_path) ->
     (lives, kept), (killed, left) = made(tmp_path), made(tmp_path)
     killed.send_signal(signal.SIGKILL)
     killed.wait()
-    users, link = tmp_path / "cartpole_notes", tmp_path / "away".join(SCRATCH)
+    users, link = tmp_path / "results".join(SCRATCH), tmp_path / "far_away".join(SCRATCH)
     users.mkdir()
     link.symlink_to(users)
     with scratch_folder(str(tmp_path)) as own:

@@ -40,3 +40,21 @@ def test_silence_is_explained_once(
         told = capsys.readouterr().err
         assert (reason in told) is (count == (3 if timeout < 10 else 1)), told
         assert told.count("\n") <= 1
+
+
+def test_silence_ends_with_a_late_message(runner, monkeypatch):
+    monkeypatch.setattr(rospy, "Subscriber", lambda *_: None)
+    monkeypatch.setattr(ros._Last, "latched", lambda self: False)
+    monkeypatch.setattr(ros, "_why", str)
+    runner.topics.changed = lambda: None
+    spans = []
+
+    def wait_for(span, done, topics):
+        spans.append(span)
+        return len(spans) % 2 == 0  # each message comes after the first wait
+
+    monkeypatch.setattr(runner, "wait", wait_for)
+    wait = ros._Waiting(runner, rospy.wait_for_message)
+    for _ in range(2):
+        wait("/turtle/scan", LaserScan, 25.0)
+    assert spans == [ros.SILENCE, 25.0 - ros.SILENCE] * 2

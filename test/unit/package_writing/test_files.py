@@ -16,6 +16,8 @@ from support.robots.new_robots import (
     robot,
 )
 
+from package_writing.urdf_files import copy_urdf
+
 ROBOTS = Path(__file__).resolve().parents[2] / "data/robots"
 
 
@@ -134,3 +136,26 @@ def test_a_standalone_package_needs_no_other(new, tmp_path, described, start):
         assert getattr(made.links.links["rod"], shapes)[0].mesh == str(copy)
     assert "their_description" not in (folder / "package.xml").read_text()
     assert f"./ws --with {folder} test" in told and argument not in told
+
+
+def test_meshes_of_one_name_stay_apart(tmp_path):
+    shapes = ""
+    for size, owner in enumerate(("arm", "gripper"), start=1):
+        meshes = tmp_path / owner / "meshes"
+        meshes.mkdir(parents=True)
+        (meshes / "base.stl").write_bytes(binary_stl(size))
+        (meshes / "cup.obj").write_text(f"mtllib paint.mtl\n# {owner}\n")
+        (meshes / "paint.mtl").write_text(owner)
+        for name in ("base.stl", "cup.obj"):
+            shapes += f'<visual><geometry><mesh filename="{meshes}/{name}"/></geometry></visual>'
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(robot(LINK.format("base", shapes)))
+    copied = copy_urdf(urdf, {}, "mine", tmp_path / "mine", standalone=True)
+    places = re.findall('filename="package://mine/(.*?)"', copied.xml)
+    assert places == [
+        *("meshes/base.stl", "meshes/cup.obj", "meshes/2/base.stl", "meshes/2/cup.obj")
+    ]
+    for size, place, owner in ((1, "meshes", "arm"), (2, "meshes/2", "gripper")):
+        folder = tmp_path / "mine" / place
+        assert (folder / "base.stl").read_bytes() == binary_stl(size)
+        assert (folder / "paint.mtl").read_text() == owner

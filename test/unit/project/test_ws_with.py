@@ -12,6 +12,8 @@ from pathlib import Path
 import psutil
 import pytest
 
+from tools.user_packages.find import look_through
+
 pytestmark = pytest.mark.slow  # what one test has built is there for the next
 XML = """<package format="2"><name>{name}</name><version>0.0.1</version><description>d</description>
 <maintainer email="a@example.com">a</maintainer><license>BSD</license>
@@ -335,3 +337,20 @@ def test_what_a_killed_ws_builds_on_keeps_the_next_one_waiting(root, tmp_path):
         assert "building your package slow" in second.stderr.readline()
         (tmp_path / "go").write_text("its own\n")
         assert "slow: done" in second.stderr.read()
+
+
+@pytest.mark.parametrize(
+    ("cmake", "source", "made"),
+    [
+        ("cuda_add_library(x k.cu)", "k.cu", True),
+        ("add_custom_command(OUTPUT x COMMAND y)", "x.odd", True),
+        ("add_library(x INTERFACE)", "x.odd", True),
+        ("add_custom_target(x)", "robot.proto", True),
+        ("add_custom_target(x)", "robot.urdf", False),
+    ],
+)
+def test_what_cmake_makes_something_of(tmp_path, cmake, source, made):
+    folder = package(tmp_path, "my_made", f"{cmake}\n")
+    (folder / "code.cpp").rename(folder / source)
+    found = look_through([tmp_path], [], tmp_path / "root")
+    assert found.packages["my_made"].is_made is made

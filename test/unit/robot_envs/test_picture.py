@@ -146,3 +146,8 @@ def test_a_file_that_cannot_be_read_is_an_error_of_one_line(tmp_path):
     with pytest.raises(RobotEnvError, match="the robot 'pendulum'"):
         picture({"hinge": 0.0})
     picture.close()
+
+
+def test_what_is_no_camera_is_refused():
+    with pytest.raises(ValueError, match="a camera is a Camera.*not 'near'"):
+        RobotPicture(ROVER_ROBOT, camera="near")

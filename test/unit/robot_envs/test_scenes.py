@@ -66,6 +66,21 @@ def test_what_a_reward_sees_the_policy_does_not(make) -> None:
         make("rover", Peeking()).reset(seed=0)
 
 
+def test_a_backend_of_the_users_own_need_not_say_that_it_is_complete() -> None:
+    class Plain:
+        def __init__(self) -> None:
+            self._plant = FakePlant()
+
+        def __getattr__(self, name):
+            if name == "complete":
+                raise AttributeError(name)
+            return getattr(self._plant, name)
+
+    env = RobotEnv(ROBOT, BalanceTask(), Plain())
+    env.reset(seed=0)
+    assert env.step(1)[1] > 0.0
+
+
 def test_a_world_of_joints_alone_rewards_nothing_and_says_so() -> None:
     plant = FakePlant()
     plant.complete = False

@@ -184,6 +184,7 @@ CAMERA = {
         {"position": "far"}, {"position": [1, 2]}, {"position": [1, 2, "3"]}, {"look_at": None},
         {"position": [1e300, 0, 0]}, {"wxyz": [float("nan"), 0, 0, 1]}, {"fov": "1"}, {"far": []},
         {"up_direction": [[1], [2], [3]]}, {"image_height": 10**9}, {"image_width": -1}, {"fov": True},
+        {"look_at": [3, 0, 1.0]}, {"up_direction": [0, 0.0, 0]},
     ],
 )  # fmt: skip
 def test_a_camera_that_cant_be_calculated_with_isnt_taken(bad):

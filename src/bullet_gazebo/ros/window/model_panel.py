@@ -1,5 +1,6 @@
 """The page's list of models; the chosen one is followed, and its joints can be moved."""
 
+import contextlib
 import html
 import math
 import threading
@@ -204,8 +205,9 @@ class ModelPanel:
         if np.abs(way).max() > 0.0:
             self._world.position = (0.0, 0.0, 0.0)
             for client in self._server.get_clients().values() if is_there else ():
-                # This moves the point that it looks at, too.
-                client.camera.position = client.camera.position + way
+                with contextlib.suppress(ValueError):  # the page's camera looks nowhere
+                    # This moves the point that it looks at, too.
+                    client.camera.position = client.camera.position + way
 
 
 def _range(joint: Joint) -> tuple[float, float]:

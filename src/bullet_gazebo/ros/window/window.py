@@ -147,7 +147,8 @@ class Window:
         for client in self._server.get_clients().values():
             ways = np.abs(client.camera.position - np.array([before, UNKNOWN])).max(axis=1)
             if ways.min() < UNTOUCHED:
-                client.camera.position, client.camera.look_at = camera.eye, camera.target
+                with contextlib.suppress(ValueError):  # the page's camera looks nowhere
+                    client.camera.position, client.camera.look_at = camera.eye, camera.target
 
     def _touch(self, message: SceneContacts | None) -> None:
         """Shows contact points; None leaves the old ones."""

@@ -57,6 +57,7 @@ def test_fields_are_changed_by_their_names():
         ({"target": [0.0, 1.0]}, "target is like (0.0, 0.0, 0.0), in"),
         ({"target": 1.0}, "target is like (0.0, 0.0, 0.0), in"),
         ({"follows": 2}, "follows is like True, in [0, 1]: 2"),
+        ({"follows": 1}, "follows is like True, in [0, 1]: 1"),
     ],
 )
 def test_fields_that_no_camera_has_are_refused(fields, text):

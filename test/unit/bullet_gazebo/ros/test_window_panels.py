@@ -2,6 +2,7 @@
 
 import sys
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.visuals import VisibleModel
 from bullet_gazebo.ros.window.model_panel import NONE, ModelPanel
 from bullet_gazebo.ros.window.panels import ONLY_STEPS, TimePanel
+from bullet_gazebo.ros.window.window import Window
 
 ROUNDS = 300
 SWITCH = 1e-5  # [s] after which another thread has its turn
@@ -231,3 +233,35 @@ def test_a_world_in_lockstep_says_so_and_has_nothing_to_pause(server):
     panel.show(601.0, 1.0, False, False)
     assert "601.000 s</b> &nbsp; real-time factor 1.00" in status.content
     assert (pause.label, is_off(), panel.stands) == ("Pause", False, False)
+
+
+class Odd:
+    """A page whose camera viser refuses to move; a page may say anything of its camera."""
+
+    @property
+    def camera(self):
+        return self
+
+    @property
+    def position(self):
+        return np.zeros(3)
+
+    @position.setter
+    def position(self, place):
+        raise ValueError("Camera look_at cannot equal position")
+
+
+def test_a_camera_that_cant_be_moved_ends_nothing(server):
+    world = server.scene.add_frame("/world")
+    panel = ModelPanel(server, world, None, NoControllers(), None, lambda: True)
+    panel.set_models([VisibleModel(0, "arm", [Link("base")], [])])
+    panel._followed, world.position = "arm", (1.0, 0.0, 0.0)
+    server.get_clients = lambda: {0: Odd()}
+    panel.follow({})
+    assert tuple(world.position) == (0.0, 0.0, 0.0)
+    model = SimpleNamespace(name="arm", number=3, static=False, corners=lambda links: np.eye(3))
+    picture = SimpleNamespace(links={"arm": None}, models={"arm": model})
+    server.initial_camera.position = (0.0, 0.0, 0.0)
+    window = SimpleNamespace(_picture=picture, _aimed=set(), _server=server)
+    Window._aim(window)
+    assert window._aimed == {3}

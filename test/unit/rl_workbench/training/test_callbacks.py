@@ -10,6 +10,7 @@ from support.training.training_runs import rows, small, summary
 import rl_workbench
 from rl_workbench import Callback, WorkbenchError, cli
 from rl_workbench.starting import Interrupt
+from rl_workbench.training.callbacks import CallbackList
 from rl_workbench.training.pg import PolicyGradientTraining
 from rl_workbench.training.training import Training
 
@@ -158,3 +159,14 @@ def test_a_training_from_python(tmp_path: Path) -> None:
     assert summary(folder)["episodes"] == 3 == len(seen.of("episode"))
     with pytest.raises(WorkbenchError, match="unknown parameter 'gama'; did you mean gamma"):
         rl_workbench.train("reinforce", gama=1)
+
+
+def test_the_first_of_several_failures_is_told() -> None:
+    class First(Stopping):
+        pass
+
+    users = CallbackList([], [First("on_step"), Stopping("on_step")])
+    with pytest.raises(WorkbenchError, match="First failed"):
+        users.call("on_step", None)
+    with pytest.raises(ZeroDivisionError):
+        CallbackList([First("on_step")], [Stopping("on_step")]).call("on_step", None)

@@ -116,3 +116,24 @@ def test_which_options_name_a_robot_that_is_shared(monkeypatch) -> None:
     same = {"backend": ["ros", "ros-realtime"]}
     monkeypatch.setattr(env.unwrapped, "same_robot_options", same, raising=False)
     assert robot_options(env, given) == {"backend": ["ros", "ros", "ros-realtime"]}
+
+
+def failing(env: gymnasium.Env) -> gymnasium.Env:
+    raise ValueError("not this one")
+
+
+def nothing(env: gymnasium.Env) -> None:
+    """Returns no environment."""
+
+
+@pytest.mark.parametrize("why", ["failing", "nothing", "image"])
+def test_a_refused_environment_is_closed(monkeypatch, why: str) -> None:
+    closed = []
+    kind = gymnasium.registry[POLE].entry_point
+    monkeypatch.setattr(kind, "close", lambda self: closed.append("once"))
+    if why == "image":
+        image = gymnasium.spaces.Box(0, 255, (64, 64, 3), np.uint8)
+        monkeypatch.setattr(kind, "observation_space", image)
+    with pytest.raises(WorkbenchError):
+        make_environment(POLE, wrapper="" if why == "image" else f"{__name__}:{why}")
+    assert closed == ["once"]
