@@ -1,7 +1,8 @@
 """The clockwork: ties physics and control together, tick by tick (docs/architecture.md, "One tick")."""
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Protocol
 
 from bullet_gazebo.applied_forces import AppliedForces
@@ -68,6 +69,9 @@ class Simulator:
         self.listeners: list[Callable[[int], None]] = []
         # Called under the lock after something other than time has moved bodies, or time was reset.
         self.moved: list[Callable[[], None]] = []
+        # Called under the lock before each advance, and how many moves are still told of as one.
+        self.before_advance: list[Callable[[], None]] = []
+        self._moves_under_way = 0
         # Called under the lock with a seed from which all random numbers start again.
         self.reseeded: list[Callable[[int], None]] = []
         # What sends messages after the ticks, and whether those who step the world call them.
@@ -164,6 +168,8 @@ class Simulator:
             )
         if ticks < 1:
             raise ValueError(f"ticks is {ticks}: at least 1 is needed")
+        for prepare in self.before_advance:
+            prepare()
         passed = 0
         for passed in range(1, ticks + 1):  # noqa: B007 - used behind the loop
             self._tick()
@@ -281,9 +287,20 @@ class Simulator:
         for listener in self.reseeded:
             listener(seed)
 
+    @contextmanager
+    def one_move(self) -> Iterator[None]:
+        """Tells of all moves in the block at its end, as one; the caller holds the lock."""
+        self._moves_under_way += 1
+        try:
+            yield
+        finally:
+            self._moves_under_way -= 1
+            self._tell_of_move()
+
     def _tell_of_move(self) -> None:
-        for listener in self.moved:
-            listener()
+        if self._moves_under_way == 0:
+            for listener in self.moved:
+                listener()
 
     def _joints_moved(self, model: Model) -> None:
         for robot in self._robots_of.get(model, ()):

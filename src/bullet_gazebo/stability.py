@@ -99,6 +99,7 @@ class StabilityWatch:
         A motor may well press on another model, as a gripper does, so that is no warning.
         """
         pushing = {}
+        touching: list[Contact] | None = None
         for joint in self._hardware.at_their_limits():
             since, place = self._pushing.get(joint.name, (now, joint.position))
             if now < since or abs(joint.position - place) > STILL:
@@ -106,7 +107,8 @@ class StabilityWatch:
             pushing[joint.name] = since, place
             if now - since < STALLED or ("stalled", joint.name) in self._logged:
                 continue
-            for own, text in self._stops(joint.name, contacts()):
+            touching = contacts() if touching is None else touching
+            for own, text in self._stops(joint.name, touching):
                 self._logged.add(("stalled", joint.name))
                 self._log(logging.WARNING if own else logging.INFO, text)
                 break

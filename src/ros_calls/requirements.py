@@ -5,6 +5,7 @@ install packages that only pip has.
 """
 
 import importlib.util
+import platform
 import shlex
 import sys
 import sysconfig
@@ -14,7 +15,8 @@ FILE = "requirements/base.txt"
 PAGE = "docs/catkin.md"
 
 # For the simulator (PyBullet, meshes of all kinds), for its window, and for all programs.
-SIMULATOR = ("collada", "numpy", "pybullet", "scipy", "trimesh", "xacro", "yaml")
+RAYS = ("embreex",) if platform.machine() == "x86_64" else ()  # elsewhere it has no wheel
+SIMULATOR = (*RAYS, "collada", "numpy", "pybullet", "scipy", "trimesh", "vhacdx", "xacro", "yaml")
 WINDOW = (*SIMULATOR, "PIL", "viser", "websockets")
 ALL = (
     *WINDOW,

@@ -40,7 +40,7 @@ def test_to_a_training(scenario: Scenario, whole, tmp_path: Path, name: str) -> 
             if sent in FATAL and ran:
                 assert training.code() in (-sent, 0), training.output
             elif sent in ENDING and training.code() == 128 + sent:
-                assert f"--resume {shlex.quote(str(run))} goes on" in training.ended(128 + sent)
+                assert f"--resume {shlex.quote(str(run))} continues" in training.ended(128 + sent)
                 assert summary(run)["interrupted"]
             else:
                 training.ended()

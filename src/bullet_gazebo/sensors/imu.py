@@ -19,6 +19,7 @@ from bullet_gazebo.physics.pose import (
 
 NANOSECONDS = 1_000_000_000
 HERE = Pose()
+LONGEST_STEP = 0.01  # [s]
 
 
 class LinkMotion(NamedTuple):
@@ -50,28 +51,30 @@ class Imu:
 
     Args:
         feels_gravity: whether it measures +9.8 m/s² upwards at rest, as real ones do.
+        rate: of the measurements [Hz]; 0 is every step. An older one is not compared with.
     """
 
-    def __init__(self, feels_gravity: bool) -> None:
+    def __init__(self, feels_gravity: bool, rate: float = 0.0) -> None:
         self._feels_gravity = feels_gravity
-        self._last: tuple[int, int, Vector] | None = None  # time [ns], moves, velocity [m/s]
+        self._longest = 1.5 * NANOSECONDS * max(1.0 / rate if rate else 0.0, LONGEST_STEP)  # [ns]
+        self._last: tuple[int, int, Vector] | None = None  # time [ns], jumps, velocity [m/s]
 
     def measure(
-        self, now: int, moves: int, motion: LinkMotion, gravity: Vector
+        self, now: int, jumps: int, motion: LinkMotion, gravity: Vector
     ) -> InertialSample | None:
         """Returns a measurement; None for the first one, which has none to compare with.
 
         Args:
             now: time [ns].
-            moves: counts what has moved bodies besides time: across such a move there is no acceleration.
+            jumps: counts what has moved bodies besides time: across such a move there is no acceleration.
             motion: of the sensor.
             gravity: of the world [m/s²].
         """
-        last, self._last = self._last, (now, moves, motion.linear)
-        if last is None:
+        last, self._last = self._last, (now, jumps, motion.linear)
+        if last is None or (last[1] == jumps and now - last[0] > self._longest):
             return None
         acceleration: Vector = (0.0, 0.0, 0.0)
-        if moves == last[1] and now > last[0]:
+        if jumps == last[1] and now > last[0]:
             seconds = (now - last[0]) / NANOSECONDS
             acceleration = scale(subtract(motion.linear, last[2]), 1.0 / seconds)
         if self._feels_gravity:
@@ -80,10 +83,6 @@ class Imu:
         return InertialSample(
             motion.pose.orientation, rotate(back, motion.angular), rotate(back, acceleration)
         )
-
-    def forget(self) -> None:
-        """Forgets the last measurement, after a time without listeners."""
-        self._last = None
 
 
 def with_noise(

@@ -62,7 +62,8 @@ class Laser:
         self.horizontal = _fan(ray, "horizontal", where, 640)
         self.vertical = _fan(ray, "vertical", where, 1)
         rays = self.horizontal.samples * self.vertical.samples
-        if rays > MOST_RAYS:
+        readings = self.horizontal.readings * self.vertical.readings
+        if max(rays, readings) > MOST_RAYS:
             raise DescriptionError(
                 f"{where} has {rays} rays; up to {MOST_RAYS} are cast (MOST_RAYS)"
             )

@@ -89,11 +89,9 @@ class PinholeCamera:
 
 
 def noisy(
-    picture: np.ndarray, noise: Noise | None, bias: float, random: np.random.Generator
+    picture: np.ndarray, noise: Noise, bias: float, random: np.random.Generator
 ) -> np.ndarray:
     """Returns a picture of uint8 with noise, whose unit is the whole range of a channel."""
-    if noise is None:
-        return picture
     values = noise.applied(picture / 255.0, bias, random)
     return np.rint(255.0 * np.clip(values, 0.0, 1.0)).astype(np.uint8)
 

@@ -5,42 +5,53 @@ drift), whoever listens: a late or second listener changes no measurement. After
 all that is heard measures at once. See docs/contract/sensors.md 0.4.
 """
 
+import threading
 from collections.abc import Callable
 
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 
 Measure = Callable[[int], None]
+LONG_AGO = -(10**18)  # [ns]
 
 
 class SensorClock:
     """The clock of one sensor. `Schedule.add` makes it."""
 
     def __init__(
-        self, schedule: "Schedule", rate: float, measure: Measure, at_once: bool, now: int
+        self,
+        schedule: "Schedule",
+        rate: float,
+        measure: Measure,
+        listens: Callable[[], bool],
+        at_once: bool,
+        now: int,
     ) -> None:
         self._schedule = schedule
-        self.at_once = at_once
         self.period = round(NANOSECONDS / rate) if rate > 0.0 else 0  # [ns]
         self.measure = measure
-        self.begin = self.last = now  # [ns]
+        self.listens = listens
+        self.at_once = at_once
+        self.begin = now  # [ns]
+        self.last: int | None = (
+            None  # time of the last measurement [ns], if nothing was moved since
+        )
         self.heard = False
+        self.has_newcomer = False
         self.plan(now)
 
-    def hear(self, is_heard: bool) -> None:
-        """Says whether somebody listens.
-
-        The caller doesn't hold the simulator's lock.
-        """
-        self._schedule.hear(self, is_heard)
+    def look(self, somebody_came: bool = False) -> None:
+        """Says that listeners may have come or gone. It takes no lock, so rospy's callbacks may call it."""
+        self.has_newcomer = self.has_newcomer or somebody_came
+        self._schedule.look()
 
     def end(self) -> None:
-        """Ends the measurements."""
-        self._schedule.remove(self)
+        """Ends the measurements. The caller doesn't hold the simulator's lock."""
+        self._schedule.end(self)
 
     def plan(self, now: int) -> None:
         """Finds the first due time after `now` [ns]."""
-        passed = (now - self.begin) // self.period if self.period else now - self.begin
-        self.due = self.begin + (passed + 1) * (self.period or 1)
+        period = self.period or 1
+        self.due = self.begin + ((now - self.begin) // period + 1) * period
 
 
 class Schedule:
@@ -50,42 +61,73 @@ class Schedule:
         self._sim = sim
         self._clocks: list[SensorClock] = []
         self._due = 0
-        self.moves = 0  # how often something other than time has moved bodies
-        self.moved_at = -1  # when it did so last [ns]
+        self._is_looking = False
+        self.moves = 0  # how often something other than time has moved bodies since the last seed
+        self.jumps = 0  # the same since the beginning
+        self.moved_at = LONG_AGO  # when it did so last [ns]
         self.prepare: list[Callable[[], None]] = []  # called before the measurements of one time
         sim.moved.append(self._moved)
+        sim.before_advance.append(self._catch_up)
 
-    def add(self, rate: float, measure: Measure, at_once: bool = True) -> SensorClock:
+    def add(
+        self, rate: float, measure: Measure, listens: Callable[[], bool], at_once: bool = True
+    ) -> SensorClock:
         """Returns a clock that calls `measure` with the time [ns], under the simulator's lock.
 
         Args:
             rate: in Hz of simulated time; 0 is every step.
             measure: takes a measurement and sends it.
+            listens: returns whether somebody listens; called under the simulator's lock.
             at_once: whether it measures as soon as somebody listens, if a period has passed since the last
-                measurement.
+                measurement or something was moved.
         """
         with self._sim.lock:
-            clock = SensorClock(self, rate, measure, at_once, self._sim.now)
+            clock = SensorClock(self, rate, measure, listens, at_once, self._sim.now)
             self._clocks.append(clock)
         return clock
 
-    def remove(self, clock: SensorClock) -> None:
+    def end(self, clock: SensorClock) -> None:
         with self._sim.lock:
+            self.fail(clock)
+
+    def fail(self, clock: SensorClock) -> None:
+        """Ends a clock, if it hasn't ended; the caller holds the simulator's lock."""
+        if clock in self._clocks:
             self._clocks.remove(clock)
-            self._listen()
+            self._take_part()
 
-    def hear(self, clock: SensorClock, is_heard: bool) -> None:
+    def look(self) -> None:
+        """Looks soon, in a thread of its own, who listens."""
+        if not self._is_looking:
+            self._is_looking = True
+            threading.Thread(target=self._look, name="sensors' listeners", daemon=True).start()
+
+    def _look(self) -> None:
         with self._sim.lock:
-            if clock not in self._clocks or clock.heard == is_heard:
-                return
-            clock.heard = is_heard
-            now = self._sim.now
-            clock.plan(now)
-            self._listen()
-            if is_heard and clock.at_once and now - clock.last > clock.period:
-                self._take([clock])
+            self._catch_up()
 
-    def _listen(self) -> None:
+    def _catch_up(self) -> None:
+        if self._is_looking:
+            self.review()
+
+    def review(self) -> None:
+        """Finds out who listens; the caller holds the simulator's lock."""
+        self._is_looking = False
+        now = self._sim.now
+        fresh = []
+        for clock in self._clocks:
+            was_heard, clock.heard = clock.heard, clock.listens()
+            came = clock.has_newcomer or not was_heard
+            clock.has_newcomer = False
+            if clock.heard and not was_heard:
+                clock.plan(now)
+            is_old = clock.last is None or now - clock.last >= max(clock.period, 1)
+            if clock.heard and came and clock.at_once and is_old:
+                fresh.append(clock)
+        self._take_part()
+        self._take(fresh)
+
+    def _take_part(self) -> None:
         """Takes part in the ticks while something is heard."""
         heard = [clock.due for clock in self._clocks if clock.heard]
         self._due = min(heard, default=0)
@@ -99,23 +141,26 @@ class Schedule:
         self._take([clock for clock in self._clocks if clock.heard and now >= clock.due])
 
     def _take(self, clocks: list[SensorClock]) -> None:
+        if not clocks:
+            return
         for prepare in self.prepare:
             prepare()
         now = self._sim.now
         for clock in clocks:
             clock.last = now
             clock.plan(now)
-        self._due = min(clock.due for clock in self._clocks if clock.heard)
+        self._due = min((clock.due for clock in self._clocks if clock.heard), default=0)
         for clock in clocks:
             clock.measure(now)
 
     def _moved(self) -> None:
         """Measures afresh all that is heard, after a service has moved bodies or reset time."""
         self.moves += 1
+        self.jumps += 1
         now = self.moved_at = self._sim.now
         for clock in self._clocks:
-            if now < clock.last:
-                clock.begin = clock.last = now
-        heard = [clock for clock in self._clocks if clock.heard]
-        if heard:
-            self._take(heard)
+            if now < clock.begin or (clock.last is not None and now < clock.last):
+                clock.begin = now
+            clock.last = None
+            clock.plan(now)
+        self._take([clock for clock in self._clocks if clock.heard])

@@ -25,11 +25,13 @@ class Sensing:
         self.visuals = RayScene(sim.world, visuals=True)
         self.schedule.prepare += [self.collisions.expire, self.visuals.expire]
         self._seed = seed
+        self.seeds = 0  # how often it has got a seed since
         sim.reseeded.append(self._reseed)
 
     def _reseed(self, seed: int) -> None:
         """Draws the same noise from now on as after any other time with this seed."""
         self._seed = seed
+        self.seeds += 1
         self.schedule.moves = 0
 
     def noise(self, model: Model, name: str, now: int) -> np.random.Generator:

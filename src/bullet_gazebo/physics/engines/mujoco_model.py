@@ -137,9 +137,10 @@ class ModelWriter:
     def _keep_apart(self) -> None:
         """Excludes contacts of links but those that can meet and didn't overlap at first."""
         meet = {frozenset((a.name, b.name)) for a, b in self.model.pairs_that_collide()}
+        meet -= self.overlapping
         solid = [name for name, link in self.model.links.items() if link.collisions]
         for a, b in combinations(solid, 2):
-            if frozenset((a, b)) not in meet - self.overlapping:
+            if frozenset((a, b)) not in meet:
                 self.spec.add_exclude(bodyname1=f"{self.key}:{a}", bodyname2=f"{self.key}:{b}")
 
 

@@ -6,13 +6,14 @@ A limited child process reads them (`mesh_program`, `mesh_looks`) and takes them
 import json
 import os
 from collections.abc import Iterable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from io import BytesIO
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import NamedTuple
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -122,14 +123,17 @@ def in_pieces(mesh: Mesh) -> Mesh:
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     kept = Path(cache, "bullet_gazebo", "meshes", f"{PIECES}-{mesh.digest}")
     try:
-        pieces = read_arrays(kept.read_bytes())
-    except (OSError, ValueError, EOFError):
+        mark, content = kept.read_bytes().split(b"\n", 1)
+        if mark != PIECES.encode():  # a file that was cut off
+            raise ValueError(mark)
+        pieces = read_arrays(content)
+    except (OSError, ValueError, EOFError, BadZipFile):
         data = json.dumps(["pieces", "", None]).encode() + b"\n"
         try:
             answer = _process.ask(data + written((mesh.vertices, mesh.faces)))
         except RequestRefused as error:
             raise DescriptionError(str(error)) from error
-        _keep(kept, answer)
+        _keep(kept, PIECES.encode() + b"\n" + answer)
         pieces = read_arrays(answer)
     return _of_pieces(mesh, pieces) if pieces else mesh
 
@@ -142,9 +146,12 @@ def _keep(path: Path, data: bytes) -> None:
     """Writes a file all at once; where that is not possible, none."""
     with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with NamedTemporaryFile(dir=path.parent, delete=False) as file:
+        with NamedTemporaryFile(dir=path.parent, delete=False) as file, ExitStack() as failed:
+            failed.callback(os.unlink, file.name)
             file.write(data)
-        os.replace(file.name, path)
+            file.flush()
+            os.replace(file.name, path)
+            failed.pop_all()
 
 
 def read_look(path: str) -> MeshLook:

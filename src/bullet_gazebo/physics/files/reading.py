@@ -27,6 +27,7 @@ MAX_FILES = 1000  # different ones
 MAX_MESH_BYTES = 400_000_000  # of different mesh files, which take about twice that of memory
 MAX_MODELS = 5000  # in a world, or nested in a model
 MAX_CONCAVE = 100  # different meshes of a model in convex pieces; each takes seconds
+MAX_SPLITTING = 120.0  # [s] of wall time for these; the rest keep their hulls
 MAX_SECONDS = 60.0  # [s] of computing, however busy the machine is otherwise
 
 
@@ -155,6 +156,7 @@ class Reading:
         if not model.collides_with_itself:
             return
         found: dict[Mesh, Mesh] = {}
+        end = time.monotonic() + MAX_SPLITTING
         for link in model.links.values():
             for number, shape in enumerate(link.collisions):
                 if shape.solid is None:
@@ -165,6 +167,8 @@ class Reading:
                     try:
                         if len(found) > MAX_CONCAVE:
                             raise DescriptionError(f"{MAX_CONCAVE} meshes were split before it")
+                        if time.monotonic() > end:
+                            raise DescriptionError(f"others took {MAX_SPLITTING:g} s")
                         found[shape.solid] = in_pieces(shape.solid)
                     except DescriptionError as error:
                         model.warnings.append(

@@ -7,6 +7,7 @@ one, with links and joints named `nested::name`. Links of a static model need no
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -76,15 +77,28 @@ def open_include(include: Element, context: FileContext) -> tuple[Element, FileC
 
 
 def _open(uri: str, context: FileContext) -> tuple[Element, FileContext]:
-    with files_named_by_a_model(f"'{shown(uri)}'"):
-        try:
-            found = context.resources.find(uri, context.folder)
-        except DescriptionError:
-            name = uri.removeprefix(MODEL_URI).strip("/") if uri.startswith(MODEL_URI) else ""
-            for element in context.reading.open(OWN_MODELS):
-                if element.get("folder") == name:
-                    return element, replace(context, version=(1, 6), folder=None)
+    """Opens a file of the user's; in place of one that can't be read, our own model of that name."""
+    try:
+        return _open_file(uri, context)
+    except LimitExceeded:
+        raise
+    except DescriptionError:
+        name = uri.removeprefix(MODEL_URI).strip("/") if uri.startswith(MODEL_URI) else ""
+        if name not in own_models():
             raise
+        return own_models()[name], replace(context, version=(1, 6), folder=None)
+
+
+@cache
+def own_models() -> dict[str, Element]:
+    """Returns the models of Gazebo's database that have a simple shape here, by their folders' names."""
+    root = Reading().open(OWN_MODELS)
+    return {element.get("folder", ""): element for element in root}
+
+
+def _open_file(uri: str, context: FileContext) -> tuple[Element, FileContext]:
+    with files_named_by_a_model(f"'{shown(uri)}'"):
+        found = context.resources.find(uri, context.folder)
         path = _model_file(found, context.reading) if found.is_dir() else found
     root = context.reading.open(path)
     with place(str(path)):
@@ -237,7 +251,7 @@ def _read_parts(model: Element, context: FileContext, static: bool, depth: int) 
         raise LimitExceeded(f"models are nested more than {MAX_NESTING} deep (MAX_NESTING)")
     context.reading.model()
     parts, frames = _Parts(), Frames()
-    if model.get("folder") and not truth(model.get("exact")):
+    if model.get("folder") in own_models() and not truth(model.get("exact")):
         parts.stand_ins.append(model.get("folder", ""))
     nested = list(_nested(model, context, static, depth))
     _name_frames(model, frames)

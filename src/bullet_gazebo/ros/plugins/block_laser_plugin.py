@@ -23,7 +23,7 @@ class BlockLaserPlugin:
         self._directions = self._topic.laser.directions().reshape(-1, 3)
 
     def shutdown(self) -> None:
-        self._topic.close()
+        """The context closes its topics."""
 
     def _message(self, scan: Scan, now: int, random: np.random.Generator) -> PointCloud:
         ranges, intensities = scan.ranges.ravel(), scan.intensities.ravel()

@@ -9,7 +9,7 @@ from gazebo_msgs.msg import ContactsState
 from std_msgs.msg import Header
 
 from bullet_gazebo.physics.lumping import LUMPED
-from bullet_gazebo.ros.common.messages import to_contact_state, to_time
+from bullet_gazebo.ros.common.messages import NANOSECONDS, to_contact_state, to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
     SensorTopic,
@@ -41,17 +41,19 @@ class BumperPlugin:
         namespace = namespace_of(context, absent="", empty="/")
         self._frame = frame_of(namespace, context.text("frameName", "world"))
         topic = topic_in(namespace, context.text("bumperTopicName", "bumper_states"))
-        self._topic = SensorTopic(context, topic, ContactsState, sensor.rate, self._measure)
+        SensorTopic(context, topic, ContactsState, sensor.rate, self._measure)
 
     def shutdown(self) -> None:
-        self._topic.close()
+        """The context closes its topics."""
 
     def _measure(self, now: int) -> ContactsState:
-        # What a service has just moved has touched nothing where it is now.
-        is_stale = self._context.sensing.schedule.moved_at == now
+        # Contacts are those of the last step, which may have been before a service moved something.
+        sim = self._context.sim
+        step = round(sim.world.time_step * NANOSECONDS)
+        is_stale = now - self._context.sensing.schedule.moved_at <= step
         pairs = []
         if self._collisions and not is_stale:
-            pairs = contact_pairs(self._context.sim.world, self._collisions)
+            pairs = contact_pairs(sim.world, self._collisions)
         header = Header(stamp=to_time(now), frame_id=self._frame)
         return ContactsState(header, [to_contact_state(pair) for pair in pairs])
 

@@ -31,11 +31,9 @@ class Triggers:
         self._context = context
         self._take = take
         self._waiting = 0
-        self._subscriber = rospy.Subscriber(topic, Empty, self._on_message, tcp_nodelay=True)
+        subscriber = rospy.Subscriber(topic, Empty, self._on_message, tcp_nodelay=True)
+        context.closing(subscriber.unregister)
         context.on_update(self._update)
-
-    def close(self) -> None:
-        self._subscriber.unregister()
 
     def _on_message(self, _: Empty) -> None:
         with self._context.sim.lock:
@@ -71,10 +69,7 @@ class CameraPlugin:
             self._triggers = Triggers(context, topic, self._take)
 
     def shutdown(self) -> None:
-        if self._triggers is not None:
-            self._triggers.close()
-        self._outputs.close()
-        self._topics.close()
+        """The context closes its topics."""
 
     def _on_clock(self, now: int) -> None:
         if self._triggers is None:

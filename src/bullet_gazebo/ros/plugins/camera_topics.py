@@ -66,11 +66,10 @@ class CameraTopics:
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
         self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)
         service = topic_in(scope, f"{own}set_camera_info")
-        self._service = None
+        self._key = f"{context.key}/{own}"
         with suppress(rospy.ServiceException):  # another camera below the same name offers it
-            self._service = rospy.Service(service, SetCameraInfo, self._set)
-        random = context.sensing.bias(context.model, context.key)
-        self._bias = 0.0 if camera.noise is None else camera.noise.draw_bias(random)
+            offered = rospy.Service(service, SetCameraInfo, self._set)
+            context.closing(offered.shutdown)
 
     @property
     def wants_colour(self) -> bool:
@@ -84,8 +83,7 @@ class CameraTopics:
         """Publishes what is heard of a picture at a time [ns]."""
         header = self.header(now)
         if self.wants_colour:
-            random = self._context.sensing.noise(self._context.model, self._context.key, now)
-            seen = noisy(picture.colours, self._camera.noise, self._bias, random)
+            seen = self._with_noise(picture.colours, now)
             if self._image.is_heard:
                 self._image.publish(to_image(seen, self._camera.format, header))
             if self._jpeg.is_heard:
@@ -94,9 +92,12 @@ class CameraTopics:
             self.info.header = header
             self._info.publish(self.info)
 
-    def close(self) -> None:
-        if self._service is not None:
-            self._service.shutdown()
+    def _with_noise(self, seen: np.ndarray, now: int) -> np.ndarray:
+        noise, sensing, model = self._camera.noise, self._context.sensing, self._context.model
+        if noise is None:
+            return seen
+        bias = noise.draw_bias(sensing.bias(model, self._key))
+        return noisy(seen, noise, bias, sensing.noise(model, self._key, now))
 
     def _set(self, request: object) -> SetCameraInfoResponse:
         """Takes over a calibration."""

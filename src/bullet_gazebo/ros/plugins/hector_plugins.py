@@ -4,7 +4,8 @@ They publish without subscribers, at `updateRate` (absent: every step), and have
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 import numpy as np
 import rospy
@@ -35,6 +36,7 @@ class HectorSensor:
     Args:
         context: the plugin's.
         default: rate [Hz] without `<updateRate>`; 0 is every step.
+        errors: whose drift begins again when time does, and with a new seed.
         send: publishes the measurement of a motion at a time [ns], some time [s] after the last one.
     """
 
@@ -42,6 +44,7 @@ class HectorSensor:
         self,
         context: PluginContext,
         default: float,
+        errors: Sequence[DriftingError],
         send: Callable[[LinkMotion, int, float], None],
     ) -> None:
         self._context = context
@@ -50,21 +53,21 @@ class HectorSensor:
         if self.link not in context.model.link_names:
             raise DescriptionError(f"<bodyName>: the model has no link '{self.link}'")
         self.namespace = namespace_of(context, absent="", empty="")
+        self._errors = errors
+        self._seeds = context.sensing.seeds
         self._last = context.sim.now
-        self._clock = context.clock(context.number("updateRate", default), self._measure)
-
-    def start(self) -> None:
-        """Begins to measure."""
-        self._clock.hear(True)
+        context.clock(context.number("updateRate", default), self._measure)
 
     def random(self, now: int) -> np.random.Generator:
         """Returns what draws the errors of a measurement at a time [ns]."""
         return self._context.sensing.noise(self._context.model, self._context.key, now)
 
-    def close(self) -> None:
-        self._clock.end()
-
     def _measure(self, now: int) -> None:
+        seeds = self._context.sensing.seeds
+        if now < self._last or seeds != self._seeds:
+            self._seeds = seeds
+            for error in self._errors:
+                error.restart()
         seconds = max(now - self._last, 0) / NANOSECONDS
         self._last = now
         self._send(motion_of(self._context.model, self.link), now, seconds)
@@ -79,21 +82,22 @@ class HectorImuPlugin:
             DriftingError(_reader(context), prefix) for prefix in ("accel", "rate", "yaw")
         )
         self._turn = from_rpy(*numbers(context.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
-        self._imu = Imu(feels_gravity=True)
-        self._sensor = sensor = HectorSensor(context, 0.0, self._publish)
+        self._imu = Imu(True, context.number("updateRate", 0.0))
+        self._sensor = sensor = HectorSensor(
+            context, 0.0, (self._accel, self._rate, self._yaw), self._publish
+        )
         self._frame = context.text("frameId", sensor.link).lstrip("/")
         topic = topic_in(sensor.namespace, context.text("topicName", "imu"))
         self._publisher = rospy.Publisher(
             topic, ImuMsg, queue_size=queue_of(context, 10), tcp_nodelay=True
         )
         service = context.text("serviceName", f"{topic}/calibrate")
-        self._service = rospy.Service(topic_in(sensor.namespace, service), Empty, self._calibrate)
-        sensor.start()
+        with suppress(rospy.ServiceException):  # another robot's has the name
+            offered = rospy.Service(topic_in(sensor.namespace, service), Empty, self._calibrate)
+            context.closing(offered.shutdown)
 
     def shutdown(self) -> None:
-        self._service.shutdown()
-        self._publisher.unregister()
-        self._sensor.close()
+        """The context closes its topics."""
 
     def _calibrate(self, _: object) -> EmptyResponse:
         with self._context.sim.lock:
@@ -101,8 +105,8 @@ class HectorImuPlugin:
         return EmptyResponse()
 
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
-        sim, moves = self._context.sim, self._context.sensing.schedule.moves
-        sample = self._imu.measure(now, moves, motion, sim.world.gravity)
+        sim, jumps = self._context.sim, self._context.sensing.schedule.jumps
+        sample = self._imu.measure(now, jumps, motion, sim.world.gravity)
         if sample is None:
             return
         random = self._sensor.random(now)
@@ -143,7 +147,9 @@ class HectorGpsPlugin:
         self._east = EQUATOR / math.sqrt(share) * math.cos(math.radians(self._latitude))
         self._error = DriftingError(_reader(context), "")
         self._velocity_error = DriftingError(_reader(context), "velocity")
-        self._sensor = sensor = HectorSensor(context, GPS_RATE, self._publish)
+        self._sensor = sensor = HectorSensor(
+            context, GPS_RATE, (self._error, self._velocity_error), self._publish
+        )
         self._frame = context.text("frameId", "/world")
         fix = topic_in(sensor.namespace, context.text("topicName", "fix"))
         self._fix = rospy.Publisher(
@@ -153,12 +159,9 @@ class HectorGpsPlugin:
         self._velocity = rospy.Publisher(
             velocity, Vector3Stamped, queue_size=queue_of(context, 10), tcp_nodelay=True
         )
-        sensor.start()
 
     def shutdown(self) -> None:
-        self._fix.unregister()
-        self._velocity.unregister()
-        self._sensor.close()
+        """The context closes its topics."""
 
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
         random = self._sensor.random(now)
@@ -202,7 +205,7 @@ class HectorMagneticPlugin:
         turn = heading - declination
         self._field = (across * math.cos(turn), across * math.sin(turn), down)
         self._error = DriftingError(_reader(context), "")
-        self._sensor = sensor = HectorSensor(context, 0.0, self._publish)
+        self._sensor = sensor = HectorSensor(context, 0.0, (self._error,), self._publish)
         self._frame = context.text("frameId", sensor.link).lstrip("/")
         self._is_field = truth(context.text("useMagneticFieldMsgs", "false"))
         topic = topic_in(sensor.namespace, context.text("topicName", "magnetic"))
@@ -210,11 +213,9 @@ class HectorMagneticPlugin:
         self._publisher = rospy.Publisher(
             topic, kind, queue_size=queue_of(context, 1), tcp_nodelay=True
         )
-        sensor.start()
 
     def shutdown(self) -> None:
-        self._publisher.unregister()
-        self._sensor.close()
+        """The context closes its topics."""
 
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
         field = rotate(conjugate(motion.pose.orientation), self._field)

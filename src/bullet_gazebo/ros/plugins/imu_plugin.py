@@ -4,6 +4,8 @@
 `updateRate` (0: every step), `gaussianNoise` (0) and `rpyOffset` are read.
 """
 
+from contextlib import suppress
+
 import rospy
 from sensor_msgs.msg import Imu as ImuMsg
 from std_srvs.srv import Empty, EmptyResponse
@@ -23,27 +25,30 @@ class ImuPlugin:
     def __init__(self, context: PluginContext) -> None:
         self._context = context
         self._model, self._link = _link_of(context)
-        self._imu = Imu(feels_gravity=False)
         self._frame = context.text("frameName", context.text("bodyName", "")).lstrip("/")
         self._deviation = context.number("gaussianNoise", 0.0)
         rpy = context.text("rpyOffset", "0 0 0")
         self._turn = from_rpy(*numbers(rpy, "<rpyOffset>", 3))
         namespace = namespace_of(context, absent="", empty="/")
         service = topic_in(namespace, context.text("serviceName", "/default_imu"))
-        self._service = rospy.Service(service, Empty, lambda request: EmptyResponse())
+        with suppress(
+            rospy.ServiceException
+        ):  # it does nothing, and another robot's may have the name
+            offered = rospy.Service(service, Empty, lambda request: EmptyResponse())
+            context.closing(offered.shutdown)
         topic = topic_in(namespace, context.text("topicName", "/default_imu"))
         rate = context.number("updateRate", 0.0)
-        self._topic = SensorTopic(context, topic, ImuMsg, rate, self._measure, self._imu.forget)
+        self._imu = Imu(feels_gravity=False, rate=rate)
+        SensorTopic(context, topic, ImuMsg, rate, self._measure, at_once=False)
 
     def shutdown(self) -> None:
-        self._service.shutdown()
-        self._topic.close()
+        """The context closes its topics."""
 
     def _measure(self, now: int) -> ImuMsg | None:
         context = self._context
         motion = motion_of(self._model, self._link)
-        gravity, moves = context.sim.world.gravity, context.sensing.schedule.moves
-        sample = self._imu.measure(now, moves, motion, gravity)
+        gravity, jumps = context.sim.world.gravity, context.sensing.schedule.jumps
+        sample = self._imu.measure(now, jumps, motion, gravity)
         if sample is None:
             return None
         sample = sample._replace(orientation=multiply(self._turn, sample.orientation))

@@ -30,7 +30,6 @@ class ImuSensorPlugin:
     def __init__(self, context: PluginContext) -> None:
         self._context = context
         self._sensor = sensor = sensor_of(context, ("imu",))
-        self._imu = Imu(feels_gravity=True)
         self._frame = context.text("frameName", "").lstrip("/")
         if not self._frame:
             raise DescriptionError("<frameName> is missing")
@@ -39,9 +38,8 @@ class ImuSensorPlugin:
         if truth(context.text("initialOrientationAsReference", "false")):
             start = motion_of(context.model, sensor.link, sensor.pose).pose.orientation
             self._turn = multiply(self._turn, conjugate(start))
-        random = context.sensing.bias(context.model, context.key)
         self._noise = [
-            (part, axis, noise, noise.draw_bias(random))
+            (part, axis, noise)
             for part in PARTS
             for axis, noise in enumerate(_noise_of(context, part))
             if noise is not None
@@ -51,23 +49,25 @@ class ImuSensorPlugin:
             namespace_of(context, absent=MODEL, empty="/"), context.text("topicName", "imu_data")
         )
         rate = min(rates, default=0.0)
-        self._topic = SensorTopic(context, name, ImuMsg, rate, self._measure, self._imu.forget)
+        self._imu = Imu(feels_gravity=True, rate=rate)
+        SensorTopic(context, name, ImuMsg, rate, self._measure, at_once=False)
 
     def shutdown(self) -> None:
-        self._topic.close()
+        """The context closes its topics."""
 
     def _measure(self, now: int) -> ImuMsg | None:
         context, sensor = self._context, self._sensor
         motion = motion_of(context.model, sensor.link, sensor.pose)
-        gravity, moves = context.sim.world.gravity, context.sensing.schedule.moves
-        sample = self._imu.measure(now, moves, motion, gravity)
+        gravity, jumps = context.sim.world.gravity, context.sensing.schedule.jumps
+        sample = self._imu.measure(now, jumps, motion, gravity)
         if sample is None:
             return None
         random = context.sensing.noise(context.model, context.key, now)
         sample = sample._replace(orientation=multiply(self._turn, sample.orientation))
-        for part, axis, noise, bias in self._noise:
+        biases = context.sensing.bias(context.model, context.key) if self._noise else random
+        for part, axis, noise in self._noise:
             values = list(getattr(sample, part))
-            values[axis] = float(noise.applied(values[axis], bias, random))
+            values[axis] = float(noise.applied(values[axis], noise.draw_bias(biases), random))
             sample = sample._replace(**{part: tuple(values)})
         return to_imu(
             with_noise(sample, self._deviation, random), now, self._frame, self._deviation

@@ -21,7 +21,7 @@ class LaserPlugin:
         self._topic = LaserTopic(context, LaserScan, self._message, "/world", empty=MODEL)
 
     def shutdown(self) -> None:
-        self._topic.close()
+        """The context closes its topics."""
 
     def _message(self, scan: Scan, now: int, random: np.random.Generator) -> LaserScan:
         laser = self._topic.laser

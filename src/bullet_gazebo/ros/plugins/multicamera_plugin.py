@@ -44,7 +44,6 @@ class MulticameraPlugin:
                 context, camera, self._topics, scope, (names[0], names[1]), baseline, f"{side}/",
             )))  # fmt: skip
         if not self._eyes:
-            self._topics.close()
             raise DescriptionError("no <camera> has left or right in its name")
         self._triggers = None
         if self.is_triggered:
@@ -52,11 +51,7 @@ class MulticameraPlugin:
             self._triggers = Triggers(context, topic, self._take)
 
     def shutdown(self) -> None:
-        if self._triggers is not None:
-            self._triggers.close()
-        for _, topics in self._eyes:
-            topics.close()
-        self._topics.close()
+        """The context closes its topics."""
 
     def _on_clock(self, now: int) -> None:
         if self._triggers is None:

@@ -48,12 +48,10 @@ class P3dPlugin:
         namespace = namespace_of(context, absent="", empty="/")
         self._frame = frame_of(namespace, frame)
         rate = context.number("updateRate", 0.0)
-        self._topic = SensorTopic(
-            context, topic_in(namespace, topic), Odometry, rate, self._measure
-        )
+        SensorTopic(context, topic_in(namespace, topic), Odometry, rate, self._measure)
 
     def shutdown(self) -> None:
-        self._topic.close()
+        """The context closes its topics."""
 
     def _measure(self, now: int) -> Odometry:
         pose, linear, angular = self._relative(motion_of(self._context.model, self._link))

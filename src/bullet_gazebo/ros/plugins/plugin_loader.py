@@ -9,6 +9,7 @@ import importlib
 import os
 import pkgutil
 import re
+import threading
 import traceback
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -60,6 +61,8 @@ class PluginContext:
     sensor: Sensor | None = None
     _updates: list[Update] = field(default_factory=list, repr=False)
     _clocks: list[SensorClock] = field(default_factory=list, repr=False)
+    _closers: list[Callable[[], None]] = field(default_factory=list, repr=False)
+    _is_made: threading.Event = field(default_factory=threading.Event, repr=False)
 
     @property
     def key(self) -> str:
@@ -76,10 +79,16 @@ class PluginContext:
         """Returns the number in the plugin's child element `tag`; a faulty one is a DescriptionError."""
         return value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)
 
-    def clock(self, rate: float, measure: Update, at_once: bool = True) -> SensorClock:
-        """Calls `measure` with the simulated time [ns] at a rate [Hz; 0 is every step], while it is heard.
+    def clock(
+        self,
+        rate: float,
+        measure: Update,
+        listens: Callable[[], bool] = lambda: True,
+        at_once: bool = True,
+    ) -> SensorClock:
+        """Calls `measure` with the simulated time [ns], at a rate in Hz, while somebody listens.
 
-        Arguments are those of `Schedule.add`, the rest is as for `on_update`.
+        It begins when the plugin is made. See `Schedule.add` for the arguments, and else `on_update`.
         """
 
         def guarded(now: int) -> None:
@@ -87,11 +96,23 @@ class PluginContext:
                 measure(now)
             except BaseException:  # noqa: BLE001 - a user's code must not stop the world
                 self.report("measures no more, because it raised")
-                clock.heard = False
+                self.sensing.schedule.fail(clock)
 
-        clock = self.sensing.schedule.add(rate, guarded, at_once)
+        clock = self.sensing.schedule.add(
+            rate, guarded, lambda: self._is_made.is_set() and listens(), at_once
+        )
         self._clocks.append(clock)
         return clock
+
+    def closing(self, close: Callable[[], None]) -> None:
+        """Calls `close` when the plugin ends, or can't be made; the last one first."""
+        self._closers.append(close)
+
+    def made(self) -> None:
+        """Lets the clocks begin: the plugin can measure now."""
+        self._is_made.set()
+        for clock in self._clocks:
+            clock.look()
 
     def on_update(self, update: Update) -> None:
         """Calls `update` before each physics step with the simulated time after it [ns].
@@ -113,9 +134,12 @@ class PluginContext:
             self.sim.listeners = [*self.sim.listeners, guarded]
 
     def release(self) -> None:
-        """Ends the updates and clocks."""
+        """Ends the updates and clocks, and closes what was opened."""
         for clock in self._clocks:
             clock.end()
+        for close in self._closers[::-1]:
+            close()
+        self._closers.clear()
         with self.sim.lock:
             self.sim.listeners = [each for each in self.sim.listeners if each not in self._updates]
 
@@ -177,6 +201,7 @@ class PluginRegistry:
             )  # fmt: skip
             try:
                 loaded.append((context, factory(context)))
+                context.made()
             except DescriptionError as error:
                 rospy.logerr(
                     "Model '%s': the plugin %s is left out: %s", model.name, plugin.filename, error

@@ -25,7 +25,7 @@ class RangePlugin:
         self._field_of_view = context.number("fov", 0.05)
 
     def shutdown(self) -> None:
-        self._topic.close()
+        """The context closes its topics."""
 
     def _message(self, scan: Scan, now: int, random: np.random.Generator) -> Range:
         laser = self._topic.laser

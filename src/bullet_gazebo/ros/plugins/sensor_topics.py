@@ -11,11 +11,11 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.physics.description import DescriptionError, Sensor
 from bullet_gazebo.ros.common.messages import to_time
-from bullet_gazebo.ros.common.publishing import SubscriberCount
 from bullet_gazebo.ros.plugins.control_plugin import find_param
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.sensors.imu import InertialSample
 from bullet_gazebo.sensors.laser import KINDS, Laser, Scan
+from bullet_gazebo.sensors.schedule import SensorClock
 from bullet_gazebo.sensors.sensing import sensor_pose
 
 LOCKSTEP_QUEUE = 100  # messages of a sensor
@@ -71,23 +71,46 @@ def queue_of(context: PluginContext, size: int) -> int:
 class Topic:
     """A topic of a sensor; see `SensorTopics.advertise`."""
 
-    def __init__(self, name: str, kind: type, queue: int, latch: bool, changed: Callable[[], None]):
-        self._subscribers = SubscriberCount(changed)
+    def __init__(
+        self, name: str, kind: type, queue: int, latch: bool, newcomers: "Newcomers"
+    ) -> None:
         self._publisher = rospy.Publisher(
-            name, kind, subscriber_listener=self._subscribers, queue_size=queue, latch=latch,
+            name,
+            kind,
+            subscriber_listener=newcomers,
+            queue_size=queue,
+            latch=latch,
             tcp_nodelay=True,
-        )  # fmt: skip
+        )
 
     @property
     def is_heard(self) -> bool:
         """Whether it has subscribers."""
-        return self._subscribers.size > 0
+        topic = self._publisher.impl  # get_num_connections() takes a lock that callbacks hold
+        return topic is not None and topic.has_connections()
 
     def publish(self, message: Any) -> None:
         self._publisher.publish(message)
 
     def close(self) -> None:
         self._publisher.unregister()
+
+
+class Newcomers(rospy.SubscribeListener):
+    """Tells a clock that subscribers have come or gone.
+
+    rospy calls it with locks of its own held, also from a tick that finds a subscriber gone.
+    """
+
+    def __init__(self, clock: SensorClock) -> None:
+        super().__init__()
+        self._clock = clock
+
+    def peer_subscribe(self, *_: object) -> None:
+        self._clock.look(somebody_came=True)
+
+    def peer_unsubscribe(self, *_: object) -> None:
+        self._clock.look()
 
 
 class SensorTopics:
@@ -97,8 +120,7 @@ class SensorTopics:
         context: the plugin's.
         rate: in Hz of simulated time; 0 is every step.
         measure: takes a measurement at the given time [ns] and publishes it.
-        unheard: called when the last subscriber has gone. Such a sensor compares measurements, so the first
-            one of a subscriber comes when it is due, not at once.
+        at_once: whether a new subscriber gets a measurement at once.
     """
 
     def __init__(
@@ -106,34 +128,25 @@ class SensorTopics:
         context: PluginContext,
         rate: float,
         measure: Callable[[int], None],
-        unheard: Callable[[], None] | None = None,
+        at_once: bool = True,
     ) -> None:
-        self._unheard = unheard
-        self._waking: list[Topic] = []
-        self._topics: list[Topic] = []
-        self._clock = context.clock(rate, measure, at_once=unheard is None)
         self._context = context
+        self._waking: list[Topic] = []
+        self._clock = context.clock(rate, measure, self._is_heard, at_once)
 
     def advertise(
         self, name: str, kind: type, queue: int = 1, latch: bool = False, wakes: bool = True
     ) -> Topic:
         """Returns a topic; its subscribers start the measurements if it `wakes` the sensor."""
-        topic = Topic(name, kind, queue_of(self._context, queue), latch, self._hear)
-        self._topics.append(topic)
+        size = queue_of(self._context, queue)
+        topic = Topic(name, kind, size, latch, Newcomers(self._clock))
+        self._context.closing(topic.close)
         if wakes:
             self._waking.append(topic)
-            self._hear()  # somebody may have come before it was in the list
         return topic
 
-    def close(self) -> None:
-        for topic in self._topics:
-            topic.close()
-
-    def _hear(self) -> None:
-        is_heard = any(topic.is_heard for topic in self._waking)
-        if not is_heard and self._unheard is not None:
-            self._unheard()
-        self._clock.hear(is_heard)
+    def _is_heard(self) -> bool:
+        return any(topic.is_heard for topic in self._waking)
 
 
 class SensorTopic:
@@ -146,14 +159,11 @@ class SensorTopic:
         kind: type,
         rate: float,
         measure: Callable[[int], Any],
-        unheard: Callable[[], None] | None = None,
+        at_once: bool = True,
     ) -> None:
         self._measure = measure
-        self._topics = SensorTopics(context, rate, self._send, unheard)
-        self._topic = self._topics.advertise(name, kind)
-
-    def close(self) -> None:
-        self._topics.close()
+        topics = SensorTopics(context, rate, self._send, at_once)
+        self._topic = topics.advertise(name, kind)
 
     def _send(self, now: int) -> None:
         message = self._measure(now)
@@ -188,27 +198,22 @@ class LaserTopic:
         self.laser = Laser(sensor)
         sensing = context.sensing
         self._scene = sensing.visuals if self.laser.sees_visuals else sensing.collisions
-        self._bias = self.laser.draw_bias(sensing.bias(context.model, context.key))
         namespace = namespace_of(context, absent="", empty=empty)
         self.frame = frame_of(namespace, context.text("frameName", "/world"))
-        self._topic = None
         topic = context.plugin.element.findtext("topicName", name).strip()
         if topic:
             rate = min((each for each in (own_rate, sensor.rate) if each > 0.0), default=0.0)
             full = topic_in(namespace, topic)
-            self._topic = SensorTopic(context, full, kind, rate, self._measure)
+            SensorTopic(context, full, kind, rate, self._measure)
         else:
             rospy.logwarn("Sensor '%s': its <topicName> is empty", sensor.name)
-
-    def close(self) -> None:
-        if self._topic is not None:
-            self._topic.close()
 
     def _measure(self, now: int) -> Any:
         model = self._context.model
         random = self._context.sensing.noise(model, self._context.key, now)
-        pose = sensor_pose(model, self._sensor)
-        return self._message(self.laser.measure(self._scene, pose, self._bias, random), now, random)
+        bias = self.laser.draw_bias(self._context.sensing.bias(model, self._context.key))
+        scan = self.laser.measure(self._scene, sensor_pose(model, self._sensor), bias, random)
+        return self._message(scan, now, random)
 
 
 def to_imu(sample: InertialSample, now: int, frame: str, deviation: float) -> Imu:

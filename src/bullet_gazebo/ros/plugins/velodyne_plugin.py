@@ -51,7 +51,7 @@ class VelodynePlugin:
         )
 
     def shutdown(self) -> None:
-        self._topic.close()
+        """The context closes its topics."""
 
     def _message(self, scan: Scan, now: int, random: np.random.Generator) -> PointCloud2:
         ranges, intensities = scan.ranges.T, scan.intensities.T

@@ -212,6 +212,14 @@ class StepService:
         sim = self._sim
         if request.reset != StepWorldRequest.NONE or plan.placed_models or plan.placed_joints:
             self._knows_contacts = False
+        if request.reset != StepWorldRequest.NONE or plan.placed_models or plan.placed_joints:
+            with sim.one_move():
+                self._place(request, plan)
+        plan.commanded.send(list(request.commands))
+        plan.commanded.hold(request.joint_commands)
+
+    def _place(self, request: StepWorldRequest, plan: StepPlan) -> None:
+        sim = self._sim
         if request.reset != StepWorldRequest.NONE:
             if request.seed:
                 seed_random_numbers(request.seed, tell=False)
@@ -221,8 +229,6 @@ class StepService:
             sim.place_model(model, pose, twist)
         for model, (positions, velocities) in plan.placed_joints.items():
             sim.set_joint_states(model, positions, velocities)
-        plan.commanded.send(list(request.commands))
-        plan.commanded.hold(request.joint_commands)
 
     def _advance(self, ticks: int, commanded: Commanded, of_joints: Sequence[float]) -> None:
         """Lets time pass; the joints are commanded before each tick."""

@@ -22,10 +22,9 @@ def box(name="box", pose="0 0 0.5 0 0 0", more=""):
     return BOX.format(name=name, pose=pose, more=more)
 
 
-def world(*parts):
-    return parse_world(
-        f'<sdf version="1.6"><world name="w">{"".join(parts)}</world></sdf>', Resources()
-    )
+def world(*parts, resources=None):
+    text = f'<sdf version="1.6"><world name="w">{"".join(parts)}</world></sdf>'
+    return parse_world(text, resources or Resources())
 
 
 def test_the_empty_world_has_gazebos_defaults():
@@ -75,6 +74,12 @@ def test_a_model_of_gazebos_database_has_its_size_and_mass(new_engine, folder):
     for _ in range(200):
         made.step()
     assert stands.state()[0].position == pytest.approx(before.position, abs=2e-3)
+
+
+def test_in_place_of_a_broken_file_of_the_users_ours_is_taken(tmp_path):
+    (tmp_path / "ground_plane").mkdir()
+    found = world(INCLUDE.format("ground_plane"), resources=Resources(models=(tmp_path,)))
+    assert list(found.models) == ["ground_plane"] and found.warnings == []
 
 
 def test_ground_plane_and_sun_are_found_inside_of_a_model_too(new_engine):

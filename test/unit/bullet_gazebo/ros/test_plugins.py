@@ -189,3 +189,34 @@ def test_an_update_that_would_wait_for_itself_is_told(setting, call: str) -> Non
 def test_a_bumper_finds_its_collision_in_every_spelling(name, found):
     collisions = ["left_pad", "left", "base_fixed_joint_lump__left_collision_1"]
     assert collision_named(name, "base", collisions) == found
+
+
+CLOCKED = """
+closed = []
+class Clocked:
+    def __init__(self, context):
+        context.closing(lambda: closed.append("topic"))
+        context.clock(100.0, self.measure)
+        if "{place}" == "constructor":
+            raise ValueError("on purpose")
+    def measure(self, now):
+        closed.append(now)
+        if now == 20_000_000:
+            raise ValueError("on purpose")
+    def shutdown(self): pass
+"""
+
+
+@pytest.mark.parametrize("place", ["constructor", "measure"])
+def test_a_clock_ends_with_its_plugin_or_its_fault_and_what_is_open_is_closed(setting, place):
+    name = f"clocked_{place}"
+    setting.write(name, CLOCKED.replace("{place}", place))
+    setting.places = {f"lib{name}.so": f"{name}:Clocked"}
+    model = setting.spawn(name)
+    with setting.sim.lock:
+        setting.sim.advance(40)
+    closed = sys.modules[name].closed
+    assert closed == (["topic"] if place == "constructor" else [0, 10_000_000, 20_000_000])
+    assert len(setting.errors) == 1 and setting.sim.listeners == []
+    setting.delete(model)
+    assert closed[-1] == "topic" and closed.count("topic") == 1 and len(setting.errors) == 1

@@ -1,5 +1,7 @@
 """When sensors measure (docs/contract/sensors.md 0.4)."""
 
+import threading
+
 import pytest
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
@@ -7,8 +9,33 @@ from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.sensors.schedule import Schedule
 
 MS = 1_000_000
+AT_REST = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 BALL = """<robot name="ball"><link name="b"><inertial><mass value="1"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
+
+
+class Sensor:
+    """A sensor with listeners, and the times of its measurements."""
+
+    def __init__(self, sim, schedule, rate, measure=None, **options):
+        self._sim, self._schedule = sim, schedule
+        self.times = []
+        self.listeners = 0
+        measure = measure or self.times.append
+        self.clock = schedule.add(rate, measure, lambda: self.listeners > 0, **options)
+
+    def come(self):
+        self.listeners += 1
+        self.clock.has_newcomer = True
+        self._review()
+
+    def go(self):
+        self.listeners -= 1
+        self._review()
+
+    def _review(self):
+        with self._sim.lock:
+            self._schedule.review()
 
 
 @pytest.fixture
@@ -16,78 +43,144 @@ def schedule(sim):
     return Schedule(sim)
 
 
+@pytest.fixture
+def make(sim, schedule):
+    return lambda *args, **options: Sensor(sim, schedule, *args, **options)
+
+
 def advance(sim, ticks):
     with sim.lock:
         sim.advance(ticks)
 
 
-def test_measurements_come_with_the_period_and_do_not_drift(sim, schedule):
-    times = []
-    schedule.add(300.0, times.append).hear(True)  # every 3.333333 ms
+def test_measurements_come_with_the_period_and_do_not_drift(sim, make):
+    sensor = make(300.0)  # every 3.333333 ms
+    sensor.come()
     advance(sim, 100)
-    assert times == [-(-k * 3_333_333 // MS) * MS for k in range(1, 31)]
+    assert sensor.times == [0, *(-(-k * 3_333_333 // MS) * MS for k in range(1, 31))]
 
 
-def test_without_a_rate_every_step_is_measured(sim, schedule):
-    times = []
-    schedule.add(0.0, times.append).hear(True)
+def test_without_a_rate_every_step_is_measured(sim, make):
+    sensor = make(0.0)
+    sensor.come()
     advance(sim, 3)
-    assert times == [MS, 2 * MS, 3 * MS]
+    assert sensor.times == [0, MS, 2 * MS, 3 * MS]
 
 
-def test_nobody_listening_costs_the_tick_nothing(sim, schedule):
+def test_nobody_listening_costs_the_tick_nothing(sim, make):
     before = list(sim.listeners)
-    times = []
-    clock = schedule.add(100.0, times.append)
+    sensor = make(100.0)
     advance(sim, 50)
-    assert sim.listeners == before and not times
-    clock.hear(True)
+    assert sim.listeners == before and not sensor.times
+    sensor.come()
     assert sim.listeners != before
-    clock.hear(False)
+    sensor.go()
     assert sim.listeners == before
 
 
-def test_a_late_listener_gets_a_measurement_at_once_and_changes_no_later_one(sim, schedule):
-    times = []
+def test_a_newcomer_gets_a_measurement_at_once_and_changes_no_later_one(sim, make):
     advance(sim, 4)
-    clock = schedule.add(100.0, times.append)
+    sensor = make(100.0)
     advance(sim, 13)
-    clock.hear(True)
+    sensor.come()
     advance(sim, 12)
-    assert times == [17 * MS, 24 * MS]
-    clock.hear(False)
-    clock.hear(True)  # less than a period after the last measurement
-    assert times == [17 * MS, 24 * MS]
+    assert sensor.times == [17 * MS, 24 * MS]
+    sensor.come()  # less than a period after the last measurement
+    assert sensor.times == [17 * MS, 24 * MS]
+    advance(sim, 5)
+    sensor.go()
+    sensor.go()
+    advance(sim, 20)
+    sensor.come()
+    assert sensor.times[2:] == [34 * MS, 54 * MS]
 
 
-def test_sensors_measure_in_the_order_in_which_they_were_added(sim, schedule):
+def test_one_that_compares_measurements_begins_when_it_is_due(sim, make):
+    sensor = make(100.0, at_once=False)
+    advance(sim, 13)
+    sensor.come()
+    advance(sim, 10)
+    assert sensor.times == [20 * MS]
+
+
+def test_sensors_measure_in_the_order_in_which_they_were_added(sim, make):
     order = []
-    second = schedule.add(100.0, lambda now: order.append("first"))
-    first = schedule.add(200.0, lambda now: order.append("second"))
-    first.hear(True)
-    second.hear(True)
+    second = make(100.0, lambda now: order.append("first"), at_once=False)
+    first = make(200.0, lambda now: order.append("second"), at_once=False)
+    first.come()
+    second.come()
     advance(sim, 10)
     assert order == ["second", "first", "second"]
 
 
-def test_resets_and_moves_measure_at_once_what_is_heard(sim, schedule):
-    times = []
+def test_resets_and_moves_measure_at_once_what_is_heard(sim, make):
     with sim.lock:
         model = sim.world.spawn("ball", parse_urdf(BALL), Pose())
-    schedule.add(100.0, times.append).hear(True)
+    sensor = make(100.0, at_once=False)
+    sensor.come()
     advance(sim, 15)
     sim.reset_world()
     with sim.lock:
-        sim.place_model(model, Pose((0.0, 0.0, 1.0)), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    assert times == [10 * MS, 15 * MS, 15 * MS]
+        sim.place_model(model, Pose((0.0, 0.0, 1.0)), AT_REST)
+    assert sensor.times == [10 * MS, 15 * MS, 15 * MS]
     sim.reset_simulation()
     advance(sim, 10)
-    assert times[3:] == [0, 10 * MS]
+    assert sensor.times[3:] == [0, 10 * MS]
 
 
-def test_a_clock_that_has_ended_measures_no_more(sim, schedule):
-    clock = schedule.add(100.0, lambda now: pytest.fail("measured"))
-    clock.hear(True)
-    clock.end()
-    clock.hear(True)  # from a thread of rospy's that was late
+def test_several_moves_of_one_request_measure_once(sim, make):
+    with sim.lock:
+        model = sim.world.spawn("ball", parse_urdf(BALL), Pose())
+    sensor = make(100.0, at_once=False)
+    sensor.come()
+    with sim.lock, sim.one_move():
+        sim.reset(everything=False)
+        sim.place_model(model, Pose((0.0, 0.0, 1.0)), AT_REST)
+    assert sensor.times == [0]
+
+
+def test_who_comes_after_a_reset_gets_what_there_is_now(sim, make):
+    sensor = make(10.0)
+    sensor.come()
+    sensor.go()
     advance(sim, 20)
+    sim.reset_simulation()
+    sensor.come()
+    assert sensor.times == [0, 0]
+
+
+def test_a_clock_that_has_ended_measures_no_more(sim, make):
+    sensor = make(100.0, lambda now: pytest.fail("measured"), at_once=False)
+    sensor.come()
+    sensor.clock.end()
+    sensor.clock.end()
+    sensor.clock.look(somebody_came=True)  # by a thread of rospy's that was late
+    advance(sim, 20)
+
+
+def test_one_that_fails_ends_and_the_world_goes_on(sim, schedule, make):
+    def fail(now):
+        schedule.fail(sensor.clock)
+
+    sensor = make(100.0, fail, at_once=False)
+    other = make(100.0, at_once=False)
+    sensor.come()
+    advance(sim, 30)
+    assert sim.now == 30 * MS
+    other.come()
+    advance(sim, 10)
+    assert other.times == [40 * MS]
+
+
+def test_a_callback_that_looks_under_the_worlds_lock_does_not_wait_for_it(sim, make):
+    """rospy finds a subscriber gone while a tick publishes."""
+    sensor = make(100.0)
+    with sim.lock:
+        sensor.listeners = 1
+        sensor.clock.look(somebody_came=True)
+        sim.advance(10)  # looks first
+    assert sensor.times == [0, 10 * MS]
+    for thread in threading.enumerate():
+        if thread.name == "sensors' listeners":
+            thread.join(60.0)
+    assert sensor.times == [0, 10 * MS]
