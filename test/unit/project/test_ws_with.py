@@ -322,16 +322,16 @@ def test_what_a_killed_ws_builds_on_keeps_the_next_one_waiting(root, tmp_path):
     command = [root / "ws", "--with", tmp_path, "true"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as first:
         assert "building your package slow" in first.stderr.readline()
-        below = psutil.Process(first.pid).children(recursive=True)
-        for each in below:
+        read_by_cmake = open(tmp_path / "go", "w")  # noqa: SIM115 - returns when cmake reads it
+        for each in psutil.Process(first.pid).children(recursive=True):
             if "user_packages" in " ".join(each.cmdline()):
                 each.kill()
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as second:
+    with read_by_cmake, subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as second:
         line = second.stderr.readline()
         if "waiting for another ws that builds your packages" not in line:
             second.kill()  # it would wait for the test
         assert "waiting" in line
-        (tmp_path / "go").write_text("the first one's cmake\n")
+        read_by_cmake.close()
         assert "building your package slow" in second.stderr.readline()
         (tmp_path / "go").write_text("its own\n")
         assert "slow: done" in second.stderr.read()
