@@ -14,10 +14,7 @@ from cartpole.workbench import ros_options
 from rl_workbench.errors import WorkbenchError, error_line
 from rl_workbench.starting import Interrupt, run_command
 from rl_workbench.tools.flags import WHICH, env_options, number
-from rl_workbench.tools.policies import load_learned
 from rl_workbench.tools.runs import open_run
-from rl_workbench.tools.torchscript import described, open_exported
-from rl_workbench.training.environments import as_float32, make_environment
 from robot_envs.backends import IN_PROCESS, LOCKSTEP, REALTIME, need_ros
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError
@@ -149,6 +146,11 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
         WorkbenchError: if there is no such policy or environment.
         RobotEnvError: if its environment doesn't have exactly one robot.
     """
+    # They import torch, for which --help need not wait.
+    from rl_workbench.tools.policies import load_learned
+    from rl_workbench.tools.torchscript import open_exported
+    from rl_workbench.training.environments import make_environment
+
     if path.is_dir():
         run = open_run(path)
         _check_bare(path, run.wrapper)
@@ -190,6 +192,8 @@ def _in_process(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _check_same(path: Path, metadata: dict[str, Any], env: gymnasium.Env[Any, Any]) -> None:
+    from rl_workbench.tools.torchscript import described
+
     found = {"observation_space": env.observation_space, "action_space": env.action_space}
     for name, space in found.items():
         if metadata[name] != described(space):
@@ -202,6 +206,8 @@ def _check_same(path: Path, metadata: dict[str, Any], env: gymnasium.Env[Any, An
 
 def _of_task(env: gymnasium.Env[Any, Any], act: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Returns the policy as a function of the task's observations, which the training may have flattened."""
+    from rl_workbench.training.environments import as_float32
+
     own = env.unwrapped.observation_space
     if env.observation_space == own:
         return lambda observation: act(as_float32(observation))

@@ -1,5 +1,7 @@
 """The command policy_node.py: what it makes of its arguments, and which policies it takes."""
 
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,6 +15,7 @@ from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools import torchscript
 from robot_envs.errors import RobotEnvError
 
 ROBOT_RUN = {"env_id": "cartpole/Balance-v0", "episodes": 2, "eval_frequency": 0}
@@ -57,7 +60,7 @@ def test_policies_of_other_environments_are_refused(tmp_path: Path) -> None:
 
 
 def test_an_exported_policy_of_another_task_is_refused(exported: Path, monkeypatch) -> None:
-    monkeypatch.setattr(policy_node, "open_exported", renamed("cartpole/SwingUp-v0"))
+    monkeypatch.setattr(torchscript, "open_exported", renamed("cartpole/SwingUp-v0"))
     with pytest.raises(
         WorkbenchError, match="another observation space than cartpole/SwingUp-v0 has"
     ):
@@ -117,7 +120,14 @@ def test_a_policy_behind_a_wrapper_is_refused_before_there_is_an_environment(
     opens: str, tmp_path: Path, monkeypatch
 ) -> None:
     found = SimpleNamespace(wrapper="mine:wrap", metadata={"wrapper": "mine:wrap"})
-    monkeypatch.setattr(policy_node, opens, lambda path: found)
+    for module in (policy_node, torchscript):
+        monkeypatch.setattr(module, opens, lambda path: found, raising=False)
     path = tmp_path if opens == "open_run" else tmp_path / "policy.pt"
     with pytest.raises(RobotEnvError, match="learned through the wrapper mine:wrap"):
         policy_node.load(path, "best", {})
+
+
+def test_help_waits_for_no_torch() -> None:
+    code = "import sys, cartpole.policy_node; print('torch' in sys.modules)"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert told.stdout.split() == ["False"]
