@@ -202,4 +202,5 @@ def test_a_page_with_such_a_camera_is_none(page):
         while (5, 6, 7) not in seen:
             assert time.monotonic() < deadline
             seen |= {tuple(each.camera.position) for each in page.get_clients().values()}
-    assert seen <= {(3, 0, 1), (5, 6, 7)}
+    # `{}` is a good one, which may be seen in between.
+    assert seen <= {(3, 0, 1), tuple(CAMERA["position"]), (5, 6, 7)}
