@@ -85,10 +85,6 @@ class Laser:
         fans = self.horizontal, self.vertical
         return _directions(*(fan.angles(fan.readings) for fan in fans))
 
-    def draw_bias(self, random: np.random.Generator) -> float:
-        """Returns the bias of its ranges [m]."""
-        return 0.0 if self.noise is None else self.noise.draw_bias(random)
-
     def measure(
         self, scene: RayScene, pose: Pose, bias: float, random: np.random.Generator
     ) -> Scan:

@@ -35,6 +35,7 @@ class Target(NamedTuple):
     link: str
     shape: Shape
     piece: Piece | None = None
+    number: int = 0  # of the piece in its file
 
     def corners(self) -> np.ndarray:
         """Returns the corners (3 n, 3) of its triangles, in the shape's frame [m]."""
@@ -245,8 +246,7 @@ class RayScene:
             apart.append(index)
             self._surround(index, corners)
             if shape.kind == "mesh":
-                # Pieces of a file are told apart by their triangles' place in it: it is the target's.
-                key = shape.solid or shape.mesh, shape.size, _number(targets, index)
+                key = shape.solid or shape.mesh, shape.size, target.number
                 self._meshes[key] = kept.get(key) or self._meshes.get(key) or Triangles([corners])
                 self._apart_meshes[index] = self._meshes[key]
         self._still, self._apart = np.array(still, int), np.array(apart, int)
@@ -297,19 +297,12 @@ def _seen(model: Model, link: Link) -> Iterator[Target]:
             yield Target(model, link.name, shape)
             continue
         try:
-            yield from (Target(model, link.name, shape, piece) for piece in pieces_of(shape))
+            for number, piece in enumerate(pieces_of(shape)):
+                yield Target(model, link.name, shape, piece, number)
         except DescriptionError as error:
             logger.warning(
                 "model '%s', link '%s' isn't seen whole: %s", model.name, link.name, error
             )
-
-
-def _number(targets: Sequence[Target], index: int) -> int:
-    """Returns which of its shape's targets this one is."""
-    shape, number = targets[index].shape, 0
-    while number < index and targets[index - number - 1].shape is shape:
-        number += 1
-    return number
 
 
 class _Met(NamedTuple):

@@ -10,20 +10,17 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import LaserTopic
+from bullet_gazebo.ros.plugins.sensor_topics import LaserTopic, SensorPlugin
 from bullet_gazebo.sensors.laser import Scan
 
 
-class BlockLaserPlugin:
+class BlockLaserPlugin(SensorPlugin):
     """Publishes all rays' points and intensities; those out of range are infinite."""
 
     def __init__(self, context: PluginContext) -> None:
         self._topic = LaserTopic(context, PointCloud, self._message, "/world", empty="/")
         self._deviation = context.number("gaussianNoise", 0.0)
         self._directions = self._topic.laser.directions().reshape(-1, 3)
-
-    def shutdown(self) -> None:
-        """The context closes its topics."""
 
     def _message(self, scan: Scan, now: int, random: np.random.Generator) -> PointCloud:
         ranges, intensities = scan.ranges.ravel(), scan.intensities.ravel()

@@ -12,6 +12,7 @@ from bullet_gazebo.physics.lumping import LUMPED
 from bullet_gazebo.ros.common.messages import NANOSECONDS, to_contact_state, to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
+    SensorPlugin,
     SensorTopic,
     frame_of,
     namespace_of,
@@ -21,7 +22,7 @@ from bullet_gazebo.ros.plugins.sensor_topics import (
 from bullet_gazebo.state import contact_pairs
 
 
-class BumperPlugin:
+class BumperPlugin(SensorPlugin):
     """Publishes what the collisions of `<contact>` touched in the last step, also if that is nothing."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -42,9 +43,6 @@ class BumperPlugin:
         self._frame = frame_of(namespace, context.text("frameName", "world"))
         topic = topic_in(namespace, context.text("bumperTopicName", "bumper_states"))
         SensorTopic(context, topic, ContactsState, sensor.rate, self._measure)
-
-    def shutdown(self) -> None:
-        """The context closes its topics."""
 
     def _measure(self, now: int) -> ContactsState:
         # Contacts are those of the last step, which may have been before a service moved something.

@@ -1,41 +1,85 @@
-"""libgazebo_ros_camera.so and libgazebo_ros_triggered_camera.so (docs/contract/sensors.md 4a, 11.6).
+"""libgazebo_ros_camera.so, ..._multicamera.so and both triggered (docs/contract/sensors.md 4a, 4c, 11.6).
 
 `cameraName`, `imageTopicName` (image_raw), `cameraInfoTopicName` (camera_info), `frameName`, `updateRate`,
-`hackBaseline`, `Cx`, `Cy`, `focalLength`, `distortionK1` ... `distortionT2` are read; by the second also
-`triggerTopicName` (image_trigger), whose every message takes one picture.
+`hackBaseline`, `Cx`, `Cy`, `focalLength`, `distortionK1` ... `distortionT2` are read; of a triggered camera
+also `triggerTopicName` (image_trigger), whose every message takes one picture. Of a multicamera's cameras,
+those with "left" or "right" in their names have topics, below left/ or right/; the right one has a baseline.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterator
 
 import rospy
 from std_msgs.msg import Empty
 
+from bullet_gazebo.physics.description import DescriptionError, Sensor
 from bullet_gazebo.ros.plugins.camera_topics import CameraTopics, rate_of, scope_of
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import SensorTopics, sensor_of, topic_in
-from bullet_gazebo.sensors.pinhole import camera_of
+from bullet_gazebo.ros.plugins.sensor_topics import (
+    SensorPlugin,
+    SensorTopics,
+    sensor_of,
+    topic_in,
+)
+from bullet_gazebo.sensors.pinhole import PinholeCamera, camera_of
 
-KINDS = ("camera",)
+MULTICAMERA = "multicamera"
+SIDES = ("left/", "right/")
 
 
-class Triggers:
-    """Takes one picture for each message of a topic, at the next step.
+class CameraPlugin(SensorPlugin):
+    """Publishes the pictures of its cameras, of one time, while somebody looks at one of them."""
 
-    Args:
-        context: the plugin's.
-        topic: its full name.
-        take: takes a picture at a time [ns].
-    """
+    kind = "camera"  # of sensor
 
-    def __init__(self, context: PluginContext, topic: str, take: Callable[[int], None]) -> None:
+    def __init__(self, context: PluginContext) -> None:
         self._context = context
-        self._take = take
+        self._sensor = sensor = sensor_of(context, (self.kind,))
+        topics = SensorTopics(context, rate_of(context, sensor), self._on_clock)
+        self._scope = scope = scope_of(context)
+        baseline = context.number("hackBaseline", 0.0)
+        names = (
+            context.text("imageTopicName", "image_raw"),
+            context.text("cameraInfoTopicName", "camera_info"),
+        )
+        self._eyes = [
+            (camera, CameraTopics(
+                context, camera, topics, scope, (side + names[0], side + names[1]),
+                0.0 if side == SIDES[0] else baseline, side,
+            ))
+            for side, camera in _cameras(sensor)
+        ]  # fmt: skip
+
+    def _on_clock(self, now: int) -> None:
+        self._take(now)
+
+    def _take(self, now: int) -> None:
+        link = self._context.model.link_state(self._sensor.link)[0]
+        scene = self._context.sensing.visuals
+        for camera, topics in self._eyes:
+            topics.send(camera.picture(scene, link, topics.wants_colour), now)
+
+
+class MulticameraPlugin(CameraPlugin):
+    """As the camera, for several."""
+
+    kind = MULTICAMERA
+
+
+class TriggeredCameraPlugin(CameraPlugin):
+    """Publishes pictures once for each trigger, at the next step."""
+
+    def __init__(self, context: PluginContext) -> None:
+        super().__init__(context)
         self._waiting = 0
-        subscriber = rospy.Subscriber(topic, Empty, self._on_message, tcp_nodelay=True)
-        context.closing(subscriber.unregister)
+        topic = topic_in(self._scope, context.text("triggerTopicName", "image_trigger"))
+        trigger = rospy.Subscriber(topic, Empty, self._on_trigger, tcp_nodelay=True)
+        context.closing(trigger.unregister)
         context.on_update(self._update)
 
-    def _on_message(self, _: Empty) -> None:
+    def _on_clock(self, now: int) -> None:
+        """Triggers take pictures, not the clock."""
+
+    def _on_trigger(self, _: Empty) -> None:
         with self._context.sim.lock:
             self._waiting += 1
 
@@ -46,48 +90,29 @@ class Triggers:
             self._take(now)
 
 
-class CameraPlugin:
-    """Publishes pictures while somebody looks at them."""
+class TriggeredMulticameraPlugin(TriggeredCameraPlugin):
+    """As the triggered camera, for several."""
 
-    is_triggered = False
-
-    def __init__(self, context: PluginContext) -> None:
-        self._context = context
-        self._sensor = sensor = sensor_of(context, KINDS)
-        self._camera = camera_of(sensor)
-        scope = scope_of(context)
-        self._topics = SensorTopics(context, rate_of(context, sensor), self._on_clock)
-        names = (
-            context.text("imageTopicName", "image_raw"),
-            context.text("cameraInfoTopicName", "camera_info"),
-        )
-        baseline = context.number("hackBaseline", 0.0)
-        self._outputs = CameraTopics(context, self._camera, self._topics, scope, names, baseline)
-        self._triggers = None
-        if self.is_triggered:
-            topic = topic_in(scope, context.text("triggerTopicName", "image_trigger"))
-            self._triggers = Triggers(context, topic, self._take)
-
-    def shutdown(self) -> None:
-        """The context closes its topics."""
-
-    def _on_clock(self, now: int) -> None:
-        if self._triggers is None:
-            self._take(now)
-
-    def _take(self, now: int) -> None:
-        link = self._context.model.link_state(self._sensor.link)[0]
-        scene = self._context.sensing.visuals
-        self._outputs.send(self._camera.picture(scene, link, self._outputs.wants_colour), now)
+    kind = MULTICAMERA
 
 
-class TriggeredCameraPlugin(CameraPlugin):
-    """Publishes one picture for each trigger."""
-
-    is_triggered = True
+def _cameras(sensor: Sensor) -> Iterator[tuple[str, PinholeCamera]]:
+    """Yields each camera that has topics, with the prefix of its topics."""
+    if sensor.kind != MULTICAMERA:
+        yield "", camera_of(sensor)
+        return
+    names = [(element, element.get("name", "")) for element in sensor.element.findall("camera")]
+    sides = [(side, *each) for each in names for side in SIDES if side[:-1] in each[1]]
+    if not sides:
+        raise DescriptionError("no <camera> has left or right in its name")
+    for side, element, name in sides:
+        where = f"sensor '{sensor.name}', camera '{name}'"
+        yield side, PinholeCamera(element, sensor.pose, where)
 
 
 LIBRARIES = {
     "libgazebo_ros_camera.so": CameraPlugin,
+    "libgazebo_ros_multicamera.so": MulticameraPlugin,
     "libgazebo_ros_triggered_camera.so": TriggeredCameraPlugin,
+    "libgazebo_ros_triggered_multicamera.so": TriggeredMulticameraPlugin,
 }

@@ -14,7 +14,7 @@ from std_msgs.msg import Header
 from bullet_gazebo.physics.files.elements import truth
 from bullet_gazebo.ros.plugins.camera_topics import QUEUE, CameraTopics, rate_of, scope_of
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import SensorTopics, sensor_of, topic_in
+from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, SensorTopics, sensor_of, topic_in
 from bullet_gazebo.sensors.pinhole import camera_of
 
 KINDS = ("depth", "depth_camera", "rgbd_camera")
@@ -28,7 +28,7 @@ POINT = np.dtype(
 )  # fmt: skip
 
 
-class DepthCameraPlugin:
+class DepthCameraPlugin(SensorPlugin):
     """Publishes depths along the optical axis [m], and clouds in optical axes: x right, y down, z ahead."""
 
     is_organised = False  # whether a cloud has the picture's rows
@@ -63,9 +63,6 @@ class DepthCameraPlugin:
         rows, columns = np.indices((camera.height, camera.width))
         self._across = (columns - (camera.width - 1) / 2.0) / camera.focal_length
         self._down = (rows - (camera.height - 1) / 2.0) / camera.focal_length
-
-    def shutdown(self) -> None:
-        """The context closes its topics."""
 
     def _measure(self, now: int) -> None:
         link = self._context.model.link_state(self._sensor.link)[0]

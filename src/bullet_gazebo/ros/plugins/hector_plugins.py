@@ -20,7 +20,7 @@ from bullet_gazebo.physics.files.elements import numbers, truth
 from bullet_gazebo.physics.pose import conjugate, from_rpy, multiply, rotate
 from bullet_gazebo.ros.common.messages import NANOSECONDS, to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import namespace_of, queue_of, topic_in
+from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, namespace_of, queue_of, topic_in
 from bullet_gazebo.sensors.drift import DriftingError
 from bullet_gazebo.sensors.imu import Imu, LinkMotion, motion_of
 
@@ -73,7 +73,7 @@ class HectorSensor:
         self._send(motion_of(self._context.model, self.link), now, seconds)
 
 
-class HectorImuPlugin:
+class HectorImuPlugin(SensorPlugin):
     """Feels gravity: +9.8 m/s² upwards at rest."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -95,9 +95,6 @@ class HectorImuPlugin:
         with suppress(rospy.ServiceException):  # another robot's has the name
             offered = rospy.Service(topic_in(sensor.namespace, service), Empty, self._calibrate)
             context.closing(offered.shutdown)
-
-    def shutdown(self) -> None:
-        """The context closes its topics."""
 
     def _calibrate(self, _: object) -> EmptyResponse:
         with self._context.sim.lock:
@@ -129,7 +126,7 @@ class HectorImuPlugin:
         )
 
 
-class HectorGpsPlugin:
+class HectorGpsPlugin(SensorPlugin):
     """Latitude, longitude [degrees] and altitude [m] on WGS84; velocities north, west and up [m/s]."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -160,9 +157,6 @@ class HectorGpsPlugin:
             velocity, Vector3Stamped, queue_size=queue_of(context, 10), tcp_nodelay=True
         )
 
-    def shutdown(self) -> None:
-        """The context closes its topics."""
-
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
         random = self._sensor.random(now)
         place = self._error.applied(np.array(motion.pose.position), seconds, random)
@@ -191,7 +185,7 @@ class HectorGpsPlugin:
         return x * cosine + y * sine, -x * sine + y * cosine
 
 
-class HectorMagneticPlugin:
+class HectorMagneticPlugin(SensorPlugin):
     """The magnetic field of the earth in the sensor's axes, scaled to `magnitude`."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -213,9 +207,6 @@ class HectorMagneticPlugin:
         self._publisher = rospy.Publisher(
             topic, kind, queue_size=queue_of(context, 1), tcp_nodelay=True
         )
-
-    def shutdown(self) -> None:
-        """The context closes its topics."""
 
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
         field = rotate(conjugate(motion.pose.orientation), self._field)

@@ -15,11 +15,17 @@ from bullet_gazebo.physics.files.elements import numbers
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import from_rpy, multiply
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import SensorTopic, namespace_of, to_imu, topic_in
+from bullet_gazebo.ros.plugins.sensor_topics import (
+    SensorPlugin,
+    SensorTopic,
+    namespace_of,
+    to_imu,
+    topic_in,
+)
 from bullet_gazebo.sensors.imu import Imu, motion_of, with_noise
 
 
-class ImuPlugin:
+class ImuPlugin(SensorPlugin):
     """Publishes orientation, angular velocity and acceleration of a link."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -40,9 +46,6 @@ class ImuPlugin:
         rate = context.number("updateRate", 0.0)
         self._imu = Imu(feels_gravity=False, rate=rate)
         SensorTopic(context, topic, ImuMsg, rate, self._measure, at_once=False)
-
-    def shutdown(self) -> None:
-        """The context closes its topics."""
 
     def _measure(self, now: int) -> ImuMsg | None:
         context = self._context

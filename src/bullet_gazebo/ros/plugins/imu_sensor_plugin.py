@@ -12,6 +12,7 @@ from bullet_gazebo.physics.pose import conjugate, from_rpy, multiply
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
     MODEL,
+    SensorPlugin,
     SensorTopic,
     namespace_of,
     sensor_of,
@@ -24,7 +25,7 @@ from bullet_gazebo.sensors.noise import Noise, read_noise
 PARTS = ("angular_velocity", "linear_acceleration")
 
 
-class ImuSensorPlugin:
+class ImuSensorPlugin(SensorPlugin):
     """Publishes what an IMU measures, in its own axes."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -51,9 +52,6 @@ class ImuSensorPlugin:
         rate = min(rates, default=0.0)
         self._imu = Imu(feels_gravity=True, rate=rate)
         SensorTopic(context, name, ImuMsg, rate, self._measure, at_once=False)
-
-    def shutdown(self) -> None:
-        """The context closes its topics."""
 
     def _measure(self, now: int) -> ImuMsg | None:
         context, sensor = self._context, self._sensor

@@ -10,18 +10,15 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import MODEL, LaserTopic
+from bullet_gazebo.ros.plugins.sensor_topics import MODEL, LaserTopic, SensorPlugin
 from bullet_gazebo.sensors.laser import Scan
 
 
-class LaserPlugin:
+class LaserPlugin(SensorPlugin):
     """Publishes the scans of a laser."""
 
     def __init__(self, context: PluginContext) -> None:
         self._topic = LaserTopic(context, LaserScan, self._message, "/world", empty=MODEL)
-
-    def shutdown(self) -> None:
-        """The context closes its topics."""
 
     def _message(self, scan: Scan, now: int, random: np.random.Generator) -> LaserScan:
         laser = self._topic.laser

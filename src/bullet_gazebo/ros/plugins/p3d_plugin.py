@@ -21,13 +21,19 @@ from bullet_gazebo.physics.pose import (
 )
 from bullet_gazebo.ros.common.messages import to_time, to_twist_msg
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import SensorTopic, frame_of, namespace_of, topic_in
+from bullet_gazebo.ros.plugins.sensor_topics import (
+    SensorPlugin,
+    SensorTopic,
+    frame_of,
+    namespace_of,
+    topic_in,
+)
 from bullet_gazebo.sensors.imu import LinkMotion, motion_of
 
 WORLDS = ("world", "/world", "map", "/map")
 
 
-class P3dPlugin:
+class P3dPlugin(SensorPlugin):
     """Publishes where a link is and how fast it moves, in the world or as seen from another link."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -49,9 +55,6 @@ class P3dPlugin:
         self._frame = frame_of(namespace, frame)
         rate = context.number("updateRate", 0.0)
         SensorTopic(context, topic_in(namespace, topic), Odometry, rate, self._measure)
-
-    def shutdown(self) -> None:
-        """The context closes its topics."""
 
     def _measure(self, now: int) -> Odometry:
         pose, linear, angular = self._relative(motion_of(self._context.model, self._link))

@@ -10,11 +10,11 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import LaserTopic
+from bullet_gazebo.ros.plugins.sensor_topics import LaserTopic, SensorPlugin
 from bullet_gazebo.sensors.laser import Laser, Scan
 
 
-class RangePlugin:
+class RangePlugin(SensorPlugin):
     """Publishes the smallest range, at most the largest that the sensor measures."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -23,9 +23,6 @@ class RangePlugin:
         self._deviation = context.number("gaussianNoise", 0.0)
         self._is_sound = context.text("radiation", "infrared") == "ultrasound"
         self._field_of_view = context.number("fov", 0.05)
-
-    def shutdown(self) -> None:
-        """The context closes its topics."""
 
     def _message(self, scan: Scan, now: int, random: np.random.Generator) -> Range:
         laser = self._topic.laser

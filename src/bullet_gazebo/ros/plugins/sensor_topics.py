@@ -68,6 +68,13 @@ def queue_of(context: PluginContext, size: int) -> int:
     return max(size, LOCKSTEP_QUEUE) if context.sim.lockstep else size
 
 
+class SensorPlugin:
+    """A plugin whose topics, services and clocks are the context's, which closes them."""
+
+    def shutdown(self) -> None:
+        """Nothing is left to be closed."""
+
+
 class Topic:
     """A topic of a sensor; see `SensorTopics.advertise`."""
 
@@ -211,7 +218,9 @@ class LaserTopic:
     def _measure(self, now: int) -> Any:
         model = self._context.model
         random = self._context.sensing.noise(model, self._context.key, now)
-        bias = self.laser.draw_bias(self._context.sensing.bias(model, self._context.key))
+        noise, bias = self.laser.noise, 0.0
+        if noise is not None:
+            bias = noise.draw_bias(self._context.sensing.bias(model, self._context.key))
         scan = self.laser.measure(self._scene, sensor_pose(model, self._sensor), bias, random)
         return self._message(scan, now, random)
 

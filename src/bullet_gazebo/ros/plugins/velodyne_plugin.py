@@ -12,7 +12,7 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import LaserTopic
+from bullet_gazebo.ros.plugins.sensor_topics import LaserTopic, SensorPlugin
 from bullet_gazebo.sensors.laser import Scan
 
 POINT = np.dtype(
@@ -35,7 +35,7 @@ FIELDS = [
 ]
 
 
-class VelodynePlugin:
+class VelodynePlugin(SensorPlugin):
     """Publishes the points that lie within the range, column by column, the lowest ring first."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -49,9 +49,6 @@ class VelodynePlugin:
         self._rings = np.broadcast_to(
             np.arange(laser.vertical.readings), self._directions.shape[:2]
         )
-
-    def shutdown(self) -> None:
-        """The context closes its topics."""
 
     def _message(self, scan: Scan, now: int, random: np.random.Generator) -> PointCloud2:
         ranges, intensities = scan.ranges.T, scan.intensities.T
