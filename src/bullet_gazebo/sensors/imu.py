@@ -57,24 +57,24 @@ class Imu:
     def __init__(self, feels_gravity: bool, rate: float = 0.0) -> None:
         self._feels_gravity = feels_gravity
         self._longest = 1.5 * NANOSECONDS * max(1.0 / rate if rate else 0.0, LONGEST_STEP)  # [ns]
-        self._last: tuple[int, int, Vector] | None = None  # time [ns], jumps, velocity [m/s]
+        self._last: tuple[int, int, Vector] | None = None  # time [ns], moves, velocity [m/s]
 
     def measure(
-        self, now: int, jumps: int, motion: LinkMotion, gravity: Vector
+        self, now: int, moves: int, motion: LinkMotion, gravity: Vector
     ) -> InertialSample | None:
         """Returns a measurement; None for the first one, which has none to compare with.
 
         Args:
             now: time [ns].
-            jumps: counts what has moved bodies besides time: across such a move there is no acceleration.
+            moves: counts what has moved bodies besides time: across such a move there is no acceleration.
             motion: of the sensor.
             gravity: of the world [m/s²].
         """
-        last, self._last = self._last, (now, jumps, motion.linear)
-        if last is None or (last[1] == jumps and now - last[0] > self._longest):
+        last, self._last = self._last, (now, moves, motion.linear)
+        if last is None or (last[1] == moves and now - last[0] > self._longest):
             return None
         acceleration: Vector = (0.0, 0.0, 0.0)
-        if jumps == last[1] and now > last[0]:
+        if moves == last[1] and now > last[0]:
             seconds = (now - last[0]) / NANOSECONDS
             acceleration = scale(subtract(motion.linear, last[2]), 1.0 / seconds)
         if self._feels_gravity:

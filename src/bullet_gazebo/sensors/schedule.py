@@ -62,8 +62,7 @@ class Schedule:
         self._clocks: list[SensorClock] = []
         self._due = 0
         self._is_looking = False
-        self.moves = 0  # how often something other than time has moved bodies since the last seed
-        self.jumps = 0  # the same since the beginning
+        self.moves = 0  # how often something other than time has moved bodies
         self.moved_at = LONG_AGO  # when it did so last [ns]
         self.prepare: list[Callable[[], None]] = []  # called before the measurements of one time
         sim.moved.append(self._moved)
@@ -156,7 +155,6 @@ class Schedule:
     def _moved(self) -> None:
         """Measures afresh all that is heard, after a service has moved bodies or reset time."""
         self.moves += 1
-        self.jumps += 1
         now = self.moved_at = self._sim.now
         for clock in self._clocks:
             if now < clock.begin or (clock.last is not None and now < clock.last):

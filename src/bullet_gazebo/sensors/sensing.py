@@ -25,18 +25,18 @@ class Sensing:
         self.visuals = RayScene(sim.world, visuals=True)
         self.schedule.prepare += [self.collisions.expire, self.visuals.expire]
         self._seed = seed
+        self._seeded_at = 0  # the number of moves before
         self.seeds = 0  # how often it has got a seed since
         sim.reseeded.append(self._reseed)
 
     def _reseed(self, seed: int) -> None:
         """Draws the same noise from now on as after any other time with this seed."""
-        self._seed = seed
+        self._seed, self._seeded_at = seed, self.schedule.moves
         self.seeds += 1
-        self.schedule.moves = 0
 
     def noise(self, model: Model, name: str, now: int) -> np.random.Generator:
         """Returns what draws the noise of the measurement at `now` [ns] by the sensor or plugin `name`."""
-        return generator(self._seed, model.name, name, self.schedule.moves, now)
+        return generator(self._seed, model.name, name, self.schedule.moves - self._seeded_at, now)
 
     def bias(self, model: Model, name: str) -> np.random.Generator:
         """Returns what draws its biases, once."""

@@ -102,8 +102,8 @@ class HectorImuPlugin(SensorPlugin):
         return EmptyResponse()
 
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
-        sim, jumps = self._context.sim, self._context.sensing.schedule.jumps
-        sample = self._imu.measure(now, jumps, motion, sim.world.gravity)
+        sim, moves = self._context.sim, self._context.sensing.schedule.moves
+        sample = self._imu.measure(now, moves, motion, sim.world.gravity)
         if sample is None:
             return
         random = self._sensor.random(now)

@@ -50,8 +50,8 @@ class ImuPlugin(SensorPlugin):
     def _measure(self, now: int) -> ImuMsg | None:
         context = self._context
         motion = motion_of(self._model, self._link)
-        gravity, jumps = context.sim.world.gravity, context.sensing.schedule.jumps
-        sample = self._imu.measure(now, jumps, motion, gravity)
+        gravity, moves = context.sim.world.gravity, context.sensing.schedule.moves
+        sample = self._imu.measure(now, moves, motion, gravity)
         if sample is None:
             return None
         sample = sample._replace(orientation=multiply(self._turn, sample.orientation))

@@ -56,8 +56,8 @@ class ImuSensorPlugin(SensorPlugin):
     def _measure(self, now: int) -> ImuMsg | None:
         context, sensor = self._context, self._sensor
         motion = motion_of(context.model, sensor.link, sensor.pose)
-        gravity, jumps = context.sim.world.gravity, context.sensing.schedule.jumps
-        sample = self._imu.measure(now, jumps, motion, gravity)
+        gravity, moves = context.sim.world.gravity, context.sensing.schedule.moves
+        sample = self._imu.measure(now, moves, motion, gravity)
         if sample is None:
             return None
         random = context.sensing.noise(context.model, context.key, now)
