@@ -81,7 +81,7 @@ class ControlledRobot:
         self._efforts = [0.0] * len(indices)
         moved = {drive.joint.name for drive, _ in self._drives if drive.pid is None}
         # What a motor drives is as fast as its command.
-        self.watched = [index for name, index in indices.items() if name not in moved]
+        self._watched = [index for name, index in indices.items() if name not in moved]
         self._others = [index for name, index in indices.items() if name not in hardware.joints]
         self.watch = StabilityWatch(model, hardware, manager, log)
         self._read_ahead = (
@@ -152,7 +152,7 @@ class ControlledRobot:
     def _contain(self, states: JointStates) -> None:
         """Removes energy that came from nowhere, as ODE's solver loses it, and reads the new state."""
         names = self.model.joint_names
-        blown = [names[index] for index in self.watched if not abs(states[index][1]) < self._fast]
+        blown = [names[index] for index in self._watched if not abs(states[index][1]) < self._fast]
         self.watch.blown_up(blown, self._fast)
         # A shaking joint keeps half of its speed, which its gains brake in the next step. At rest it would
         # be pushed the same way forever.

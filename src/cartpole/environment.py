@@ -108,7 +108,7 @@ class CartPoleEnv(RobotEnv):
         **options: Any,
     ) -> None:
         noise = _by_joint(sensor_noise)
-        if not isinstance(camera, Camera):
+        if camera is None or isinstance(camera, Mapping):
             camera = CAMERA.changed(camera or {})
         super().__init__(ROBOT, task, backend, sensor_noise=noise, camera=camera, **options)
 

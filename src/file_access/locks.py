@@ -77,7 +77,7 @@ def scratch_folder(parent: str | None = None) -> Iterator[Path]:
 
 @functools.cache
 def _sweep(place: Path) -> None:
-    """Removes the temporary folders that no process holds; others' users can't be opened.
+    """Removes the temporary folders that no process holds; other users' can't be opened.
 
     It knows them by the form of `mkdtemp`'s names.
     """

@@ -119,14 +119,12 @@ def write(request: PackageRequest, made: Path) -> list[str]:
 
 
 def _try_out(name: str, made: Path) -> None:
-    """Makes the package's environment and takes a step in it, in a process of its own.
+    """Makes the package's environment and takes a step in it, in a process of its own; not without ROS.
 
     Raises:
         CannotWrite: if that fails.
     """
-    if (
-        importlib.util.find_spec("rospkg") is None
-    ):  # without ROS nothing finds the package by its name
+    if importlib.util.find_spec("rospkg") is None:  # without ROS nothing finds it by its name
         return
     paths = os.environ.get("ROS_PACKAGE_PATH", "")
     environment = {

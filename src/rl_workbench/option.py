@@ -209,7 +209,7 @@ def _converted(kind: Any, value: Any) -> Any:
         return _numbers(value, get_args(kind)[0])
     readers: dict[Any, Callable[[Any], Any]]
     readers = {bool: _switch, int: _whole, float: _number, str: str, Any: plain_value}
-    return readers.get(kind, _mapping)(value)
+    return readers.get(kind, mapping)(value)
 
 
 def _switch(value: Any) -> bool:
@@ -253,8 +253,12 @@ def _numbers(value: Any, kind: type) -> tuple[Any, ...]:
         raise ValueError(example) from None
 
 
-def _mapping(value: Any) -> dict[str, Any]:
-    """Reads a mapping, or a text such as `control_period=0.02, variation={mass: 0.2, gain: [0.9, 1.1]}`."""
+def mapping(value: Any) -> dict[str, Any]:
+    """Reads a mapping, or a text such as `control_period=0.02, variation={mass: 0.2, gain: [0.9, 1.1]}`.
+
+    Raises:
+        ValueError: if it is neither; the text is what it should have been.
+    """
     if isinstance(value, str):
         pairs = [pair.partition("=") for pair in _split(value)]
         try:

@@ -20,14 +20,7 @@ from robot_envs.task import GoalTask, Task, Unjudged
 from robot_envs.variation import Randomisation
 from robot_envs.variation.imperfections import Actuator, Noise, Sensor
 from robot_envs.variation.randomisation import UniformRandomisation
-from robot_envs.world_state import (
-    Commands,
-    InitialState,
-    StateQuery,
-    WorldState,
-    both,
-    part_of,
-)
+from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState, both, part_of
 
 RESET_OPTIONS = ("initial_state", "goal")
 

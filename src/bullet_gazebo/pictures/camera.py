@@ -12,6 +12,7 @@ from bullet_gazebo.physics.pose import Vector
 NEAR, FAR = 0.02, 100.0  # clipping planes, as multiples of the camera's distance
 MARGIN = 1.1  # factor on the width and height that an overview must show
 THIRD = 2.8  # the same, for a robot that fills a third of the picture
+ASPECT = 4.0 / 3.0  # of what a browser's window shows beside the panel
 RANGES = {  # of each number of a field that a user names
     "target": (-1e6, 1e6), "distance": (1e-3, 1e6), "yaw": (-360.0, 360.0), "pitch": (-90.0, 90.0),
     "view": (1.0, 170.0), "follows": (0, 1),

@@ -48,16 +48,18 @@ def add_job_flags(parser: argparse.ArgumentParser) -> None:
 
 def env_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """Returns the options of the environment, with values as `train` reads them."""
-    return key_values(arguments.env_kwargs, "--env-kwargs")
+    return typed_values(arguments.env_kwargs, "--env-kwargs")
 
 
-def key_values(words: Sequence[str], flag: str) -> dict[str, Any]:
-    """Returns the values of a flag's words KEY=VALUE."""
-    from rl_workbench.option import Options
-    from rl_workbench.training.options import RunOptions
+def typed_values(words: Sequence[str], flag: str) -> dict[str, Any]:
+    """Returns the values of a flag's words KEY=VALUE, as YAML reads them."""
+    from rl_workbench.option import mapping
 
-    read = Options(RunOptions).read({"env_kwargs": ",".join(words)}, flag)
-    return dict(read.get("env_kwargs", {}))
+    text = ",".join(words)
+    try:
+        return mapping(text)
+    except ValueError as error:
+        raise WorkbenchError(f"{flag} must be {error}, not {text!r}") from error
 
 
 def number(lowest: int) -> Any:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 from file_access.locks import scratch_folder
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
-from rl_workbench.tools.flags import POLICIES, add_policy_flags, env_options, key_values, number
+from rl_workbench.tools.flags import POLICIES, add_policy_flags, env_options, number, typed_values
 from rl_workbench.training.progress import tell
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def _policy(
 
     options = {**env_options(arguments), "render_mode": "rgb_array"}
     if arguments.camera:
-        options["camera"] = key_values(arguments.camera, "--camera")
+        options["camera"] = typed_values(arguments.camera, "--camera")
     if arguments.size:
         sized = dict(zip(("width", "height"), arguments.size, strict=True))
         try:

@@ -29,10 +29,7 @@ from rl_workbench.tools.ranges import OptionRange, read_ranges
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.options import (
-    RunOptions,
-    known_options,
-)
+from rl_workbench.training.options import RunOptions, known_options
 from rl_workbench.training.progress import tell
 from rl_workbench.training.scalar_log import EVALUATION
 from rl_workbench.training.train import choose

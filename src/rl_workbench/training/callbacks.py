@@ -1,8 +1,6 @@
 """Callbacks for the events of a training, among them the scalar log and the learning curve's picture."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
@@ -151,20 +149,18 @@ class CallbackList:
 
         Of several failures the first one propagates.
         """
-        with ExitStack() as users:
-            for each in reversed(self._users):
-                users.push(partial(self._call_user, each, event, training, arguments))
+        failures: list[tuple[str, Exception]] = []
+        try:
             for own in self._own:
                 getattr(own, event)(training, *arguments)
-
-    @staticmethod
-    def _call_user(
-        user: Callback, event: str, training: Any, arguments: tuple[Any, ...], *raised: Any
-    ) -> None:
-        """Calls one; `raised` is the exception so far, as __exit__ receives it."""
-        try:
-            getattr(user, event)(training, *arguments)
-        except Exception as error:
-            text = f"the callback {type(user).__name__} failed in {event}(): {error_line(error)}"
-            if raised[1] is None:
-                raise EnvironmentFailure(text) from error
+        finally:
+            for user in self._users:
+                try:
+                    getattr(user, event)(training, *arguments)
+                except Exception as error:  # noqa: BLE001 - the others hear of it first
+                    name = type(user).__name__
+                    text = f"the callback {name} failed in {event}(): {error_line(error)}"
+                    failures.append((text, error))
+        if failures:
+            text, cause = failures[0]
+            raise EnvironmentFailure(text) from cause

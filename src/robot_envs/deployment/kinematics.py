@@ -3,13 +3,7 @@
 from collections.abc import Mapping
 
 from bullet_gazebo.physics.dynamics import link_poses
-from bullet_gazebo.physics.pose import (
-    Pose,
-    conjugate,
-    multiply,
-    scale,
-    subtract,
-)
+from bullet_gazebo.physics.pose import Pose, conjugate, multiply, scale, subtract
 from bullet_gazebo.state import SCOPE
 from file_access.text import did_you_mean
 from robot_envs.errors import RobotEnvError

@@ -12,7 +12,7 @@ import viser
 from bullet_gazebo.physics.description import Link, Shape
 from bullet_gazebo.physics.files.world_file import empty_world
 from bullet_gazebo.physics.pose import IDENTITY, ZERO
-from bullet_gazebo.pictures.camera import CameraLike, overview
+from bullet_gazebo.pictures.camera import ASPECT, CameraLike, overview
 from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.visuals import VisibleModel, visible_model
 from robot_envs.pictures.placement import Placement
@@ -20,7 +20,6 @@ from web_viewer.address import LOOPBACK, find_address
 from web_viewer.server import serve, stop
 
 WORLD = "/world"  # node
-ASPECT = 4.0 / 3.0  # of what a browser's window shows beside the panel
 GAP = 0.15  # between robots, as a share of what one of them can reach
 LOW = 0.9  # of a caption, from the middle of what the camera sees to its lower edge
 

@@ -47,10 +47,10 @@ class Start:
     @property
     def is_orphan(self) -> bool:
         """Returns whether it still runs although its caller was killed."""
-        members = family(self.token).values()
+        members = family(self.token).values() if self.caller else ()
         # A process that is younger than they are has the id only since the caller's end.
         eldest = min(map(_began, members), default=math.inf)
-        return bool(self.caller and members) and not _lives(self.caller, eldest)
+        return bool(members) and not _lives(self.caller, eldest)
 
 
 def _starts(mark: str) -> list[Start]:

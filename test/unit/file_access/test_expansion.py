@@ -71,16 +71,11 @@ def test_a_file_that_is_missing_is_told_once(bad, tmp_path):
     assert refused(str(tmp_path / "none")) == f"{tmp_path}/none: No such file or directory"
     path = bad('<xacro:include filename="none.xacro"/>')
     assert refused(path) == f"{path}: No such file or directory: {tmp_path}/none.xacro"
+    path = bad('<xacro:include filename="$(find no_such_package)/a.xacro"/>')
+    assert refused(path) == f"{path}: package 'no_such_package' not found on ROS_PACKAGE_PATH"
 
 
 @pytest.mark.slow
-def test_a_missing_package_is_told_once(bad):
-    path = bad('<xacro:include filename="$(find no_such_package)/a.xacro"/>')
-    with pytest.raises(CannotExpand) as caught:
-        expand(path)
-    assert str(caught.value) == f"{path}: package 'no_such_package' not found on ROS_PACKAGE_PATH"
-
-
 def test_a_bomb_of_macros(bad):
     """Each macro calls the one before ten times."""
     macros = '<xacro:macro name="m0"><link/></xacro:macro>' + "".join(

@@ -1,7 +1,6 @@
 """What docs/security.md promises about files, imports and folders."""
 
 import ast
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -69,10 +68,3 @@ def test_the_contents_of_a_file_are_not_given_back(entity: str, name: str, tmp_p
         spawn(entity.format(f"file://{tmp_path}/{name}"))
     assert name in str(raised.value)
     assert "s3same" not in str(raised.value) and "hunter2" not in str(raised.value)
-
-
-def test_the_parameter_that_runs_code_is_named_as_it_is() -> None:
-    page = (ROOT / "docs/security.md").read_text(encoding="utf-8")
-    loader = (ROOT / "src/bullet_gazebo/ros/plugins/plugin_loader.py").read_text(encoding="utf-8")
-    (name,) = re.findall(r"registered in the parameter `/gazebo/(\w+)`", page)
-    assert f'PARAMETER = "~{name}"' in loader

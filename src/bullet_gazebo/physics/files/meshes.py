@@ -6,12 +6,11 @@ A limited child process reads them (`mesh_program`, `mesh_looks`) and takes them
 import json
 import os
 from collections.abc import Iterable
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from io import BytesIO
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import NamedTuple
 from zipfile import BadZipFile
 
@@ -21,6 +20,7 @@ from bullet_gazebo.physics.description import Color, DescriptionError, Mesh
 from bullet_gazebo.physics.files.elements import place
 from bullet_gazebo.physics.files.hull import is_solid
 from file_access.limited import LimitedProcess, Limits, RequestRefused
+from file_access.locks import scratch_folder
 
 SUFFIXES = (".stl", ".dae", ".obj")
 PLAIN = (".stl",)  # of files that have no materials
@@ -146,12 +146,9 @@ def _keep(path: Path, data: bytes) -> None:
     """Writes a file all at once; where that is not possible, none."""
     with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with NamedTemporaryFile(dir=path.parent, delete=False) as file, ExitStack() as failed:
-            failed.callback(os.unlink, file.name)
-            file.write(data)
-            file.flush()
-            os.replace(file.name, path)
-            failed.pop_all()
+        with scratch_folder(str(path.parent)) as folder:
+            (folder / path.name).write_bytes(data)
+            os.replace(folder / path.name, path)
 
 
 def read_look(path: str) -> MeshLook:

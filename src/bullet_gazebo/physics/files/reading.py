@@ -26,8 +26,9 @@ MeshFile = tuple[str, Mesh | None]
 MAX_FILES = 1000  # different ones
 MAX_MESH_BYTES = 400_000_000  # of different mesh files, which take about twice that of memory
 MAX_MODELS = 5000  # in a world, or nested in a model
-MAX_CONCAVE = 100  # different meshes of a model in convex pieces; each takes seconds
-MAX_SPLITTING = 120.0  # [s] of wall time for these; the rest keep their hulls
+MAX_SPLITTING = (
+    120.0  # [s] of wall time for a model's convex pieces; the other meshes keep their hulls
+)
 MAX_SECONDS = 60.0  # [s] of computing, however busy the machine is otherwise
 
 
@@ -165,8 +166,6 @@ class Reading:
                 if shape.solid not in found:
                     found[shape.solid] = shape.solid
                     try:
-                        if len(found) > MAX_CONCAVE:
-                            raise DescriptionError(f"{MAX_CONCAVE} meshes were split before it")
                         if time.monotonic() > end:
                             raise DescriptionError(f"others took {MAX_SPLITTING:g} s")
                         found[shape.solid] = in_pieces(shape.solid)

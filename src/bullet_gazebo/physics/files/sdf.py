@@ -6,10 +6,11 @@ one, with links and joints named `nested::name`. Links of a static model need no
 
 import re
 from collections.abc import Iterator
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 from bullet_gazebo.physics.description import (
     DescriptionError,
@@ -93,6 +94,13 @@ def _open(uri: str, context: FileContext) -> tuple[Element, FileContext]:
 def own_models() -> dict[str, Element]:
     """Returns the models of Gazebo's database that have a simple shape here, by their folders' names."""
     root = Reading().open(OWN_MODELS)
+    for model in root.iterfind("model[@rgba]"):
+        for link in model.findall("link"):
+            for visual in map(deepcopy, link.findall("collision")):
+                visual.tag = "visual"
+                diffuse = SubElement(SubElement(visual, "material"), "diffuse")
+                diffuse.text = model.get("rgba")
+                link.append(visual)
     return {element.get("folder", ""): element for element in root}
 
 
@@ -164,7 +172,6 @@ class _Parts:
     plugins: list[Plugin] = field(default_factory=list)
     sensors: list[Sensor] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
     stand_ins: list[str] = field(default_factory=list)
 
 
@@ -238,7 +245,7 @@ def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
         )
     model = ModelDescription(name, links, joints, roots[0], poses[roots[0]])
     model.islands = {root: poses[root].relative_to(poses[roots[0]]) for root in roots[1:]}
-    model.plugins, model.warnings, model.left_out = parts.plugins, parts.warnings, parts.left_out
+    model.plugins, model.warnings = parts.plugins, parts.warnings
     model.static, model.sensors, model.stand_ins = static, parts.sensors, parts.stand_ins
     detach_from_world(model)
     mend_moments(model)
@@ -307,7 +314,6 @@ def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
     parts.plugins += inner.plugins
     parts.sensors += [replace(each, link=f"{prefix}::{each.link}") for each in inner.sensors]
     parts.warnings += inner.warnings
-    parts.left_out += inner.left_out
     parts.stand_ins += inner.stand_ins
 
 

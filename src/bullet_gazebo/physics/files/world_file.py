@@ -18,13 +18,14 @@ from bullet_gazebo.physics.files.sdf import (
     FileContext,
     first_entity,
     open_include,
+    own_models,
     read_model,
     renamed,
     sdf_version,
 )
 from bullet_gazebo.physics.files.sdf_parts import read_color, read_pose, value
 from bullet_gazebo.physics.files.urdf import read_urdf
-from bullet_gazebo.physics.pose import Pose, Vector
+from bullet_gazebo.physics.pose import Vector
 from bullet_gazebo.physics.world import GRAVITY, TIME_STEP, ground_plane
 
 UPDATE_RATE = 1000.0  # [Hz], SDF's default
@@ -49,23 +50,8 @@ class WorldDescription:
 
 def empty_world() -> WorldDescription:
     """Returns a world with a ground plane and a sun."""
-    return WorldDescription(models={"ground_plane": ground_plane()}, lights={"sun": sun()})
-
-
-def sun() -> Light:
-    """Returns Gazebo's `sun`."""
-    return Light(
-        "sun",
-        diffuse=(0.8, 0.8, 0.8, 1.0),
-        specular=(0.2, 0.2, 0.2, 1.0),
-        attenuation_constant=0.9,
-        attenuation_linear=0.01,
-        attenuation_quadratic=0.001,
-        direction=(-0.5, 0.1, -0.9),
-        pose=Pose((0.0, 0.0, 10.0)),
-        cast_shadows=True,
-        kind="directional",
-    )
+    sun = read_light(own_models()["sun"])
+    return WorldDescription(models={"ground_plane": ground_plane()}, lights={"sun": sun})
 
 
 def load_world(

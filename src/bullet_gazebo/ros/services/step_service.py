@@ -212,7 +212,6 @@ class StepService:
         sim = self._sim
         if request.reset != StepWorldRequest.NONE or plan.placed_models or plan.placed_joints:
             self._knows_contacts = False
-        if request.reset != StepWorldRequest.NONE or plan.placed_models or plan.placed_joints:
             with sim.one_move():
                 self._place(request, plan)
         plan.commanded.send(list(request.commands))

@@ -15,7 +15,7 @@ import viser
 from bullet_gazebo_msgs.msg import SceneContacts, ScenePoses
 from PIL import Image
 
-from bullet_gazebo.pictures.camera import THIRD, Camera, overview
+from bullet_gazebo.pictures.camera import ASPECT, THIRD, Camera, overview
 from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.page_batches import NUMBERS
 from bullet_gazebo.ros.clients.gz import ControlFailed
@@ -30,7 +30,6 @@ from web_viewer.server import open_browser, serve, stop
 
 TITLE = "gzclient"
 CAMERA = Camera((0.0, 0.0, 0.35), 2.5, yaw=36.0, pitch=-18.0, view=75.0)  # while nothing moves
-ASPECT = 4.0 / 3.0  # of a browser's window, beside the panel
 UNTOUCHED, UNKNOWN = 1e-3, (3.0, 3.0, 3.0)  # [m]; viser's, before a browser has told its camera
 ADVICE = "~window"  # parameter: the lines that say where the page is
 CURVES = "~curves"  # parameter: a run folder, or the table of one

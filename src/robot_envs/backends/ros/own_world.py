@@ -58,7 +58,7 @@ class Journal:
         """
         if not self.variation.is_nominal:
             world.vary(self.variation)
-        if self.initial is None:
+        if self.initial is None or self.last is None:
             return
         state = checked(world.reset(self.initial), 0)
         for count, commands in enumerate(self.commands, 1):
@@ -71,12 +71,11 @@ class Journal:
         )
 
 
-def _difference(state: WorldState, last: WorldState | None) -> str:
+def _difference(state: WorldState, last: WorldState) -> str:
     """Returns the first entry of a state that differs from the last one."""
-    now, then = state._asdict(), last._asdict() if last else {}
-    part = next(name for name in now if repr(now[name]) != repr(then.get(name)))
-    one, other = now[part], then.get(part)
-    if isinstance(one, Mapping) and isinstance(other, Mapping) and one.keys() == other.keys():
+    pairs = zip(state._fields, state, last, strict=True)
+    part, one, other = next(each for each in pairs if repr(each[1]) != repr(each[2]))
+    if isinstance(one, Mapping) and isinstance(other, Mapping) and list(one) == list(other):
         name = next(name for name in one if repr(one[name]) != repr(other[name]))
         return f"{part} '{name}': {one[name]}, not {other[name]}"
     return f"{part}: {one}, not {other}"

@@ -26,7 +26,7 @@ from sensor_msgs.msg import (
 from std_msgs.msg import Empty as EmptyMsg
 from std_srvs.srv import Empty
 from support.ros.calls import call, wait_until
-from support.ros.subscribed import wait_until_heard
+from support.ros.subscribed import Listener
 
 SHAPE = "<geometry><box><size>1 1 1</size></box></geometry>"
 RED = "<material><ambient>1 0 0 1</ambient><diffuse>1 0 0 1</diffuse></material>"
@@ -37,27 +37,21 @@ WALL = (
 MS = 1_000_000
 
 
-class Heard:
+class Heard(Listener):
     """The messages of a topic."""
-
-    def __init__(self, name, kind):
-        self.messages = []
-        self._subscriber = rospy.Subscriber(name, kind, self.messages.append, tcp_nodelay=True)
-        wait_until_heard(name)
 
     def after(self, count):
         """Returns the messages when there are as many."""
-        assert wait_until(lambda: len(self.messages) >= count), (
-            self._subscriber.name,
-            self.messages,
-        )
+        assert self.wait_for(lambda messages: len(messages) >= count), self.messages
         return self.messages
 
     def stamps(self, count):
         return [message.header.stamp.to_nsec() for message in self.after(count)]
 
-    def close(self):
-        self._subscriber.unregister()
+    def from_time(self, time):
+        """Returns the newest message when one isn't older than `time` [ns]."""
+        assert self.wait_for(lambda messages: messages[-1].header.stamp.to_nsec() >= time), time
+        return self.messages[-1]
 
 
 class Sensors(unittest.TestCase):
@@ -84,11 +78,11 @@ class Sensors(unittest.TestCase):
     def step(self, ticks, **more):
         answer = call("/gazebo/step_world", StepWorld, StepWorldRequest(ticks=ticks, **more))
         self.assertTrue(answer.success, answer.status_message)
+        return round(1000 * answer.sim_time) * MS
 
     def newest(self, name, kind, ticks=300):
         heard = self.hear(name, kind)
-        self.step(ticks)
-        return heard.after(1)[-1]
+        return heard.from_time(self.step(ticks) - 250 * MS)  # the slowest one has 4 Hz
 
     def test_a_scan_comes_every_hundred_ticks(self):
         heard = self.hear("/scan", LaserScan)
@@ -110,7 +104,7 @@ class Sensors(unittest.TestCase):
             heard = self.hear("/scan", LaserScan)
             self.step(0, reset=StepWorldRequest.SIMULATION, seed=seed)
             self.step(300)
-            wait_until(lambda heard=heard: heard.stamps(1)[-1] == 300 * MS)
+            heard.from_time(300 * MS)
             found = {
                 message.header.stamp.to_nsec(): message.ranges[0] for message in heard.messages
             }
@@ -154,12 +148,10 @@ class Sensors(unittest.TestCase):
 
     def test_one_imu_feels_gravity_and_the_older_one_does_not(self):
         heard = self.hear("/imu_data", Imu)
-        self.step(1000)
-        first = heard.stamps(1)[0]
-        self.assertEqual(first, 40 * MS)  # the first one has none to compare with
-        acceleration = heard.messages[-1].linear_acceleration
-        self.assertAlmostEqual(acceleration.z, 9.8, delta=0.01)
-        self.assertEqual(heard.messages[-1].header.frame_id, "imu")
+        sample = heard.from_time(self.step(1000) - 20 * MS)
+        self.assertEqual(heard.stamps(1)[0], 40 * MS)  # the first one has none to compare with
+        self.assertAlmostEqual(sample.linear_acceleration.z, 9.8, delta=0.01)
+        self.assertEqual(sample.header.frame_id, "imu")
         older = self.newest("/old_imu", Imu).linear_acceleration
         self.assertAlmostEqual(older.z, 0.0, delta=0.01)
 
@@ -195,7 +187,7 @@ class Sensors(unittest.TestCase):
         for triggers, count in ((1, 1), (2, 3)):
             for _ in range(triggers):
                 trigger.publish()
-            wait_until(lambda count=count: self.step(1) or len(heard.messages) >= count)
+            wait_until(lambda count=count: self.step(1) and len(heard.messages) >= count)
             self.assertEqual(len(heard.messages), count)
 
     def test_depths_of_both_depth_cameras(self):
@@ -214,7 +206,7 @@ class Sensors(unittest.TestCase):
         left, right = (self.hear(f"/pair/{side}/image_raw", Image) for side in ("left", "right"))
         self.step(100)
         for heard in (left, right):  # the one that came first has one of time 0, too
-            self.assertTrue(wait_until(lambda heard=heard: heard.stamps(1)[-1] == 100 * MS))
+            heard.from_time(100 * MS)
         edges = []
         for heard in (left, right):
             pixels = np.frombuffer(heard.messages[-1].data, np.uint8).reshape(48, 64, 3)

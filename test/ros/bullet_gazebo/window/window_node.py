@@ -15,11 +15,11 @@ from support.pages.browser import wait_for
 from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count, proxy
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.pictures.camera import THIRD, overview
+from bullet_gazebo.pictures.camera import ASPECT, THIRD, overview
 from bullet_gazebo.pictures.renderer import Renderer
 from bullet_gazebo.pictures.visuals import visible_shapes
 from bullet_gazebo.ros.common.messages import from_pose_msg
-from bullet_gazebo.ros.window.window import ASPECT, CAMERA
+from bullet_gazebo.ros.window.window import CAMERA
 
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 from support.robots.worlds import run
 
 from bullet_gazebo.physics.files import meshes, reading
@@ -28,24 +29,12 @@ ARM = """<robot name="arm"><gazebo><self_collide>true</self_collide></gazebo><li
 <axis xyz="0 1 0"/><limit lower="0" upper="0" effort="100" velocity="1"/></joint>
 <joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="{reach} 0 0"/>
 <axis xyz="0 1 0"/><limit lower="-1" upper="{limit}" effort="100" velocity="1"/></joint></robot>"""
-BOX = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
-SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 
 
 def write_stl(path, *boxes):
     """Write boxes, each given by its lowest corner and its size, as one STL solid."""
-    facets = []
-    for low, size in boxes:
-        corners = np.array(low) + BOX * np.array(size)
-        for a, b, c, d in SIDES:
-            facets += [corners[[a, b, c]], corners[[a, c, d]]]
-    lines = [
-        "facet normal 0 0 0\nouter loop\n"
-        + "".join(f"vertex {x} {y} {z}\n" for x, y, z in facet)
-        + "endloop\nendfacet"
-        for facet in facets
-    ]
-    path.write_text("\n".join(["solid s", *lines, "endsolid s"]))
+    ends = [(low, np.add(low, size)) for low, size in boxes]
+    trimesh.util.concatenate([trimesh.creation.box(bounds=each) for each in ends]).export(path)
     return path
 
 

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import pytest
+from support.robots.worlds import run
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.world_file import empty_world, load_world, parse_world
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.ros.services.spawn_services import fill_world, find_world, read_world
 
 EMPTY = Path(__file__).resolve().parents[4] / "companions/gazebo_ros/worlds/empty.world"
@@ -58,7 +58,7 @@ DATABASE = {  # of Gazebo: mass [kg] if it moves, height [m]
 
 
 @pytest.mark.parametrize("folder", DATABASE)
-def test_a_model_of_gazebos_database_has_its_size_and_mass(new_engine, folder):
+def test_a_model_of_gazebos_database_has_its_size_and_mass(make_world, folder):
     ((name, model),) = world(INCLUDE.format(folder)).models.items()
     mass, height = DATABASE[folder]
     assert model.stand_ins == ([] if folder.startswith("unit_") else [folder])
@@ -67,12 +67,10 @@ def test_a_model_of_gazebos_database_has_its_size_and_mass(new_engine, folder):
     tops = [0.5 if folder.startswith("unit_") else top for top in tops]
     assert max(tops) == pytest.approx(height, abs=1e-3)
     assert (None if model.static else model.links["link"].inertia.mass) == mass
-    made = World(new_engine())
-    made.spawn("ground_plane", ground_plane(), Pose())
+    made = make_world(ground=True)
     stands = made.spawn(name, model, Pose((0.0, 0.0, 0.5 if "unit" in folder else 0.0)))
     before = stands.state()[0]
-    for _ in range(200):
-        made.step()
+    run(made, 200)
     assert stands.state()[0].position == pytest.approx(before.position, abs=2e-3)
 
 
@@ -82,7 +80,7 @@ def test_in_place_of_a_broken_file_of_the_users_ours_is_taken(tmp_path):
     assert list(found.models) == ["ground_plane"] and found.warnings == []
 
 
-def test_ground_plane_and_sun_are_found_inside_of_a_model_too(new_engine):
+def test_ground_plane_and_sun_are_found_inside_of_a_model_too(make_world):
     found = world(
         f'<model name="place"><static>1</static>{INCLUDE.format("sun")}{INCLUDE.format("ground_plane")}'
         f"<include><uri>model://cube_20k</uri><pose>1 0 0 0 0 0</pose></include></model>"
@@ -90,13 +88,12 @@ def test_ground_plane_and_sun_are_found_inside_of_a_model_too(new_engine):
     assert found.warnings == []
     assert set(found.models["place"].links) == {"ground_plane::link", "cube_20k::link"}
     assert found.models["place"].stand_ins == ["cube_20k"]
-    made = World(new_engine())
+    made = make_world()
     made.spawn("place", found.models["place"], Pose())
     ball = made.spawn(
         "ball", world(INCLUDE.format("unit_sphere")).models["unit_sphere"], Pose((-3.0, 0.0, 0.5))
     )
-    for _ in range(200):
-        made.step()
+    run(made, 200)
     assert ball.state()[0].position[2] == pytest.approx(0.5, abs=2e-3)
 
 

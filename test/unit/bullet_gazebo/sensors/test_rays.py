@@ -21,14 +21,6 @@ def fan(count):
     )
 
 
-def test_a_ray_meets_the_face_before_it(world, put):
-    put("box", "box", (1.0, 1.0, 1.0), Pose((2.0, 0.0, 0.0)))
-    scene = RayScene(world)
-    hits = scene.cast(np.zeros(3), X)
-    assert hits.distances[0] == pytest.approx(1.5, abs=1e-6)
-    assert scene.targets[hits.targets[0]].model.name == "box"
-
-
 def test_near_and_far_bound_a_ray(world, put):
     put("box", "box", (1.0, 1.0, 1.0), Pose((2.0, 0.0, 0.5)))
     scene, origin = RayScene(world), np.array([0.0, 0.0, 0.5])
