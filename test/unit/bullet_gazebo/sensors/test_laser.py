@@ -1,4 +1,4 @@
-"""Scans of lasers (docs/contract/sensors.md 2 and 10)."""
+"""Scans of lasers (docs/contract/sensors.md 2)."""
 
 import math
 
