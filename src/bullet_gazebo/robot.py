@@ -141,11 +141,12 @@ class ControlledRobot:
         if self._control_period:
             self._update_in_time(now, round(dt * NANOSECONDS))
         else:
-            self._control(now, dt)
+            self.manager.update(now, dt)
+            if self._softened:
+                self._soften()
 
-    def _control(self, now: int, dt: float) -> None:
-        """Updates the controllers, and softens efforts of gains that are too high for the step."""
-        self.manager.update(now, dt)
+    def _soften(self) -> None:
+        """Divides the efforts of gains that are too high for the step."""
         for joint, share in self._softened:
             joint.command *= share
 
@@ -167,7 +168,8 @@ class ControlledRobot:
         self._waited = period if self._waited is None else self._waited + step
         if self._waited >= period:
             self._waited = 0
-            self._control(now, period / NANOSECONDS)
+            self.manager.update(now, period / NANOSECONDS)
+            self._soften()
 
     def write(self, dt: float) -> None:
         """Clips the commands to the joints' limits and applies them for the next step of `dt` [s].

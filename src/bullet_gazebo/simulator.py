@@ -328,10 +328,10 @@ class Simulator:
         applied = self.applied
         if applied.efforts or applied.wrenches:
             applied.apply(now)
-        looks = now % STALL_CHECK < self._period
         for robot in self.robots:
             robot.update(now, dt)
-            if looks:
+        if now % STALL_CHECK < self._period:
+            for robot in self.robots:
                 robot.watch.report_stalls(now, self.world.engine.contacts)
         for listener in self.listeners:
             listener(now)
