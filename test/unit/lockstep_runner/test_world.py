@@ -72,14 +72,19 @@ def test_a_simulator_that_hangs_is_not_the_scripts(world, answers, monkeypatch):
 
 def test_a_call_left_between_its_halves_is_given_up(world, answers, monkeypatch):
     call = world._call
-    end = call.end
+    end, answered = call.end, threading.Event()
 
     def leave():
+        assert answered.wait(60)  # otherwise the simulator may not have read the request
         monkeypatch.setattr(call, "end", end)
         raise ValueError("of a handler")
 
+    def late():
+        answered.set()
+        return [on_wire(AdvanceWorldResponse(ticks=5))]
+
     monkeypatch.setattr(call, "end", leave)
-    answers += [lambda: [on_wire(AdvanceWorldResponse(ticks=5))], lambda: [on_wire(ANSWER)]]
+    answers += [late, lambda: [on_wire(ANSWER)]]
     with pytest.raises(ValueError, match="of a handler"):
         world.advance(5)
     assert world.advance(1).ticks == 1
