@@ -45,12 +45,12 @@ class DeadReckoning:
         self.y += ahead * sine + left * cosine
         self.yaw += turn
 
-    def move_on_arc(self, ahead: float, turn: float) -> None:
-        """Adds a motion along an arc of the length `ahead` [m] that turns by `turn` [rad]."""
+    def move_on_arc(self, ahead: float, turn: float, left: float = 0.0) -> None:
+        """Adds a motion as `move`, along an arc of that length."""
         # The chord of the arc has the direction half-way.
         half = 0.5 * turn
-        chord = ahead if abs(turn) < STRAIGHT else ahead * math.sin(half) / half
-        self.move(chord, turn)
+        share = 1.0 if abs(turn) < STRAIGHT else math.sin(half) / half
+        self.move(share * ahead, turn, share * left)
 
     @property
     def position(self) -> Triple:

@@ -31,7 +31,8 @@ def _joint(name: str, kind: str, parent: str, child: str, place: str, axis: str 
 def _transmission(joint: str, interface: str) -> str:
     kind = f"hardware_interface/{interface}JointInterface"
     return f"""<transmission name="{joint}_t"><type>transmission_interface/SimpleTransmission</type>
-      <joint name="{joint}"><hardwareInterface>{kind}</hardwareInterface></joint><actuator name="{joint}_m"/></transmission>"""
+      <joint name="{joint}"><hardwareInterface>{kind}</hardwareInterface></joint>
+      <actuator name="{joint}_m"/></transmission>"""
 
 
 def _steered(name: str, place: str) -> str:

@@ -8,6 +8,7 @@ import importlib
 import importlib.util
 
 from bullet_gazebo.control.controllers.base import Controller, Input, Output
+from bullet_gazebo.control.controllers.diff_drive import DiffDriveController
 from bullet_gazebo.control.controllers.forward import (
     EffortGroup,
     EffortJoint,
@@ -36,6 +37,7 @@ BUILT_IN: dict[str, type[Controller]] = {
     controller.type_name: controller
     for controller in (
         JointStateController,
+        DiffDriveController,
         EffortJoint,
         EffortJointPosition,
         EffortJointVelocity,

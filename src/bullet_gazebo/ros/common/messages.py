@@ -13,6 +13,7 @@ from geometry_msgs.msg import (
     Transform,
     TransformStamped,
     Twist,
+    TwistStamped,
     TwistWithCovariance,
     Vector3,
     Wrench,
@@ -25,6 +26,7 @@ from tf2_msgs.msg import TFMessage
 
 from bullet_gazebo.control.controllers.joint_state import JointStateSample
 from bullet_gazebo.control.controllers.pid_controllers import JointControllerSample
+from bullet_gazebo.control.controllers.vehicle import TwistSample
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.drives.odometry import OdometrySample
 from bullet_gazebo.physics import pose as poses
@@ -92,6 +94,17 @@ def to_transform(now: int, frame: str, child: str, pose: Pose) -> TFMessage:
     transform = Transform(Vector3(*pose.position), Quaternion(*pose.orientation))
     header = Header(stamp=to_time(now), frame_id=frame)
     return TFMessage([TransformStamped(header, child, transform)])
+
+
+def to_odometry_transform(sample: OdometrySample) -> TFMessage:
+    """Returns the transform of an odometry."""
+    pose = Pose(sample.position, sample.orientation)
+    return to_transform(sample.stamp, sample.frame, sample.child, pose)
+
+
+def to_twist_stamped(sample: TwistSample) -> TwistStamped:
+    twist = to_twist_msg(((sample.linear, 0.0, 0.0), (0.0, 0.0, sample.angular)))
+    return TwistStamped(Header(stamp=to_time(sample.stamp)), twist)
 
 
 def to_contact_state(pair: ContactPair) -> ContactState:

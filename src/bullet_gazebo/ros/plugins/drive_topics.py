@@ -10,8 +10,13 @@ from tf2_msgs.msg import TFMessage
 
 from bullet_gazebo.drives.odometry import OdometrySample, Period, Triple
 from bullet_gazebo.physics.description import DescriptionError, Joint
-from bullet_gazebo.physics.pose import Pose, to_rpy
-from bullet_gazebo.ros.common.messages import bad_number, to_odometry, to_transform
+from bullet_gazebo.physics.pose import to_rpy
+from bullet_gazebo.ros.common.messages import (
+    bad_number,
+    to_odometry,
+    to_odometry_transform,
+    to_transform,
+)
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
     SensorPlugin,
@@ -119,8 +124,7 @@ class DrivePlugin(SensorPlugin):
             self._odometry.publish(to_odometry(sample))
         if self.tf is not None and tf:
             self._sent = now
-            pose = Pose(sample.position, sample.orientation)
-            self.tf.publish(to_transform(now, self.frame, self.child, pose))
+            self.tf.publish(to_odometry_transform(sample))
 
     def truth(
         self, now: int, pose_covariance: Sequence[float], twist_covariance: Sequence[float]
