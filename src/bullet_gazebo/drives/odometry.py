@@ -8,6 +8,9 @@ from typing import NamedTuple
 Triple = tuple[float, float, float]
 STRAIGHT = 1e-6  # [rad]; below it an arc is a line
 NANOSECONDS = 1_000_000_000
+UNKNOWN = 1e12  # the variance of what is not measured
+POSE = (1e-5, 1e-5, UNKNOWN, UNKNOWN, UNKNOWN, 1e-3)  # covariances of most plugins
+TWIST = (0.0,) * 6
 
 
 class OdometrySample(NamedTuple):
@@ -61,6 +64,37 @@ class DeadReckoning:
     def orientation(self) -> tuple[float, float, float, float]:
         """In the frame of the odometry, as a quaternion x, y, z, w."""
         return (0.0, 0.0, math.sin(0.5 * self.yaw), math.cos(0.5 * self.yaw))
+
+
+class WheelOdometry:
+    """Dead reckoning of two wheels or sides, step by step.
+
+    Args:
+        separation: of the wheels [m].
+    """
+
+    def __init__(self, separation: float) -> None:
+        self._separation = separation
+        self.place = DeadReckoning()
+        self.linear = self.angular = 0.0  # [m/s, rad/s]
+
+    def restart(self) -> None:
+        """Returns to the origin, at rest."""
+        self.place.restart()
+        self.linear = self.angular = 0.0
+
+    def step(self, speeds: Sequence[float], seconds: float) -> None:
+        """Adds the motion of a step of that length [s], at the speeds of both wheels [m/s]."""
+        left, right = speeds
+        self.linear, self.angular = 0.5 * (left + right), (right - left) / self._separation
+        self.place.move(self.linear * seconds, self.angular * seconds)
+
+    def sample(self, now: int, frame: str, child: str) -> OdometrySample:
+        """Returns the odometry at a time [ns]."""
+        return OdometrySample(
+            now, frame, child, self.place.position, self.place.orientation,
+            (self.linear, 0.0, 0.0), (0.0, 0.0, self.angular), POSE, TWIST,
+        )  # fmt: skip
 
 
 class RollingMean:

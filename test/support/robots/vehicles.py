@@ -4,7 +4,8 @@ from collections.abc import Mapping
 
 RADIUS = 0.1  # [m] of the wheels
 TRACK = 0.4  # [m] from the left to the right ones
-BASE = 0.3  # [m] from the rear to the front ones
+BASE = 0.3  # [m] from the rear to the front ones of four wheels
+WHEELBASE = 0.5  # [m] of three wheels
 
 
 def _link(name: str, mass: float, shape: str, inertia: float, rpy: str = "0 0 0") -> str:
@@ -83,4 +84,11 @@ def three_wheels(front: str = "front", **plugins: Mapping[str, object]) -> str:
     """A steered wheel at the front, and two free ones below the middle."""
     half = 0.5 * TRACK
     wheels = [_wheel("left", f"0 {half} 0"), _wheel("right", f"0 {-half} 0")]
-    return _vehicle([_steered(front, f"{BASE} 0 0"), *wheels], plugins)
+    return _vehicle([_steered(front, f"{WHEELBASE} 0 0"), *wheels], plugins)
+
+
+def three_balls(**plugins: Mapping[str, object]) -> str:
+    """A body on balls without friction."""
+    places = ("0.15 0 -0.05", "-0.15 0.1 -0.05", "-0.15 -0.1 -0.05")
+    balls = [_ball(f"ball_{number}", place, 0.0) for number, place in enumerate(places)]
+    return _vehicle(balls, plugins)

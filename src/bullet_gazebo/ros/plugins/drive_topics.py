@@ -8,7 +8,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
-from bullet_gazebo.drives.odometry import OdometrySample, Period, Triple
+from bullet_gazebo.drives.odometry import OdometrySample, Period, Triple, WheelOdometry
 from bullet_gazebo.physics.description import DescriptionError, Joint
 from bullet_gazebo.physics.pose import to_rpy
 from bullet_gazebo.ros.common.messages import (
@@ -28,7 +28,6 @@ from bullet_gazebo.ros.plugins.sensor_topics import (
 
 REPEAT = 1.0  # [s] between two logs of the same complaint
 REST = (0.0, 0.0, 0.0)
-UNKNOWN = 1e12  # the variance of what is not measured
 TRUTHS = {"true": True, "1": True, "false": False, "0": False}
 
 
@@ -59,6 +58,16 @@ def advertised(context: PluginContext, name: str, kind: type, queue: int) -> Top
     return topic
 
 
+def encoder_of(context: PluginContext, separation: float) -> WheelOdometry | None:
+    """Returns what adds up the turns of wheels at that distance [m]; None for the true pose."""
+    source = context.text("odometrySource", "world")
+    if source not in ("world", "encoder"):
+        rospy.logwarn(
+            "Plugin %s: no <odometrySource> is called '%s'", context.plugin.filename, source
+        )
+    return WheelOdometry(separation) if source == "encoder" else None
+
+
 class DrivePlugin(SensorPlugin):
     """Keeps the newest command, and reports odometry after each period and at once after moves.
 
@@ -69,17 +78,23 @@ class DrivePlugin(SensorPlugin):
         namespace: of its topics.
         rate: of its reports [Hz].
         late: see `Period`.
+        base: the frame of the vehicle without `<robotBaseFrame>`.
     """
 
     def __init__(
-        self, context: PluginContext, namespace: str, rate: float, late: bool = True
+        self,
+        context: PluginContext,
+        namespace: str,
+        rate: float,
+        late: bool = True,
+        base: str = "base_footprint",
     ) -> None:
         self.context, self.sim, self.model = context, context.sim, context.model
         self.namespace = namespace
         self.command: Triple = REST  # ahead, to the left [m/s], turning [rad/s]
         self.period = Period(rate, self.sim.now, late)
         self.frame = frame_of(namespace, context.text("odometryFrame", "odom"))
-        self.child = frame_of(namespace, context.text("robotBaseFrame", "base_footprint"))
+        self.child = frame_of(namespace, context.text("robotBaseFrame", base))
         self._odometry: Topic | None = None
         self.tf: Topic | None = None
         self._resets = self.sim.resets
@@ -99,7 +114,7 @@ class DrivePlugin(SensorPlugin):
         with self.sim.lock:
             self.restart()
         context.on_update(self.update)
-        context.on_move(self._moved)
+        context.on_move(self.moved)
 
     def update(self, now: int) -> None:
         """Called in each tick, with its time [ns]."""
@@ -145,13 +160,14 @@ class DrivePlugin(SensorPlugin):
             rospy.logerr_throttle(REPEAT, f"Model '{self.model.name}': cmd_vel is ignored: {fault}")
             return
         with self.sim.lock:
-            self.commanded(message)
+            self.take((message.linear.x, message.linear.y, message.angular.z))
 
-    def commanded(self, message: Twist) -> None:
+    def take(self, command: Triple) -> None:
         """Takes a command, under the simulator's lock."""
-        self.command = (message.linear.x, message.linear.y, message.angular.z)
+        self.command = command
 
-    def _moved(self) -> None:
+    def moved(self) -> None:
+        """Called after a service has moved bodies or reset time."""
         now = self.sim.now
         self.period.time_set_back(now)
         if self.sim.resets != self._resets:

@@ -1,62 +1,33 @@
 """libgazebo_ros_diff_drive.so and libgazebo_ros_skid_steer_drive.so (docs/contract/sensors.md 1 and 6)."""
 
 import logging
-from collections.abc import Sequence
 
-import rospy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from bullet_gazebo.drives.odometry import NANOSECONDS, DeadReckoning, OdometrySample
+from bullet_gazebo.drives.odometry import (
+    NANOSECONDS,
+    POSE,
+    TWIST,
+    UNKNOWN,
+    OdometrySample,
+)
 from bullet_gazebo.drives.wheels import Ramp, side_speeds
 from bullet_gazebo.physics.files.elements import truth
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.drive_topics import (
-    UNKNOWN,
     DrivePlugin,
     LinkTransforms,
     Wheels,
     advertised,
     choice,
+    encoder_of,
     length,
 )
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import MODEL, namespace_of, topic_in
 
-POSE = (1e-5, 1e-5, UNKNOWN, UNKNOWN, UNKNOWN, 1e-3)
-TWIST = (0.0,) * 6
 LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
-
-
-class WheelOdometry:
-    """Dead reckoning of two wheels or sides, step by step.
-
-    Args:
-        separation: of the wheels [m].
-    """
-
-    def __init__(self, separation: float) -> None:
-        self._separation = separation
-        self.place = DeadReckoning()
-        self.linear = self.angular = 0.0  # [m/s, rad/s]
-
-    def restart(self) -> None:
-        """Returns to the origin, at rest."""
-        self.place.restart()
-        self.linear = self.angular = 0.0
-
-    def step(self, speeds: Sequence[float], seconds: float) -> None:
-        """Adds the motion of a step of that length [s], at the speeds of both wheels [m/s]."""
-        left, right = speeds
-        self.linear, self.angular = 0.5 * (left + right), (right - left) / self._separation
-        self.place.move(self.linear * seconds, self.angular * seconds)
-
-    def sample(self, now: int, frame: str, child: str) -> OdometrySample:
-        """Returns the odometry at a time [ns]."""
-        return OdometrySample(
-            now, frame, child, self.place.position, self.place.orientation,
-            (self.linear, 0.0, 0.0), (0.0, 0.0, self.angular), POSE, TWIST,
-        )  # fmt: skip
 
 
 class DiffDrivePlugin(DrivePlugin):
@@ -75,7 +46,7 @@ class DiffDrivePlugin(DrivePlugin):
         )
         self._ramp = Ramp(context.number("wheelAcceleration", 0.0), 2)
         self._driven = self.sim.now  # [ns]
-        self._encoder = self._choose_source()
+        self._encoder = encoder_of(context, self._separation)
         # The original's order is right, left.
         self._joints = self._wheels.joints[::-1]
         self._joint_states = self._transforms = None
@@ -89,14 +60,6 @@ class DiffDrivePlugin(DrivePlugin):
             logging.getLogger("rosout").setLevel(level)
         published = truth(context.text("publishTf", "true"))
         self.begin(odometry=published, tf=published and choice(context, "publishOdomTF", True))
-
-    def _choose_source(self) -> WheelOdometry | None:
-        """Returns what counts the wheels' turns; None for the true pose."""
-        source = self.context.text("odometrySource", "world")
-        if source not in ("world", "encoder"):
-            file = self.context.plugin.filename
-            rospy.logwarn("Plugin %s: no <odometrySource> is called '%s'", file, source)
-        return WheelOdometry(self._separation) if source == "encoder" else None
 
     def update(self, now: int) -> None:
         if self._encoder is not None:

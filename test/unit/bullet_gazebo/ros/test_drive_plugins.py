@@ -9,7 +9,15 @@ from typing import Any
 import pytest
 import rospy
 from geometry_msgs.msg import Twist
-from support.robots.vehicles import RADIUS, TRACK, four_wheels, two_wheels
+from support.robots.vehicles import (
+    RADIUS,
+    TRACK,
+    WHEELBASE,
+    four_wheels,
+    three_balls,
+    three_wheels,
+    two_wheels,
+)
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, to_rpy
@@ -262,3 +270,67 @@ def test_four_wheels_drive_straight_and_turn_by_slipping(track):
     track.sim.reset_simulation()
     track.advance(100)
     assert track.stamps("/odom")[-1] == 91
+
+
+@pytest.mark.parametrize(
+    "library", ["libgazebo_ros_planar_move.so", "libridgeback_ros_force_based_move.so"]
+)
+def test_a_body_is_moved_in_its_own_axes(track, library):
+    elements = {"x_velocity_p_gain": 1000, "y_velocity_p_gain": 1000}
+    track.spawn(three_balls(**{library: elements}))
+    track.advance(300)
+    track.sim.place_model(
+        track.model,
+        Pose((0.0, 0.0, RADIUS), (0.0, 0.0, math.sin(0.5), math.cos(0.5))),
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+    )
+    track.messages["/odom"].clear()
+    track.command(0.2, 0.0, y=0.1)
+    track.advance(2000)
+    x, y, _ = track.model.state()[0].position
+    way = (0.4 * math.cos(1.0) - 0.2 * math.sin(1.0), 0.4 * math.sin(1.0) + 0.2 * math.cos(1.0))
+    assert (x, y) == pytest.approx(way, abs=0.02)
+    odometry = track.messages["/odom"][-1]
+    linear = odometry.twist.twist.linear
+    assert (linear.x, linear.y) == pytest.approx((0.2, 0.1), abs=0.02)
+    assert track.stamps("/odom") == list(range(350, 2301, 50))
+    track.command(0.0, 1.0)
+    assert track.turned(1000) == pytest.approx(1.0, abs=0.1)
+    track.sim.reset_simulation()
+    track.advance(200)
+    assert track.stamps("/odom")[-5:] == [0, 50, 100, 150, 200]
+    assert track.model.state()[0].position[:2] == pytest.approx((0.0, 0.0), abs=0.01)
+
+
+def test_a_planar_move_stops_after_its_time_out(track):
+    track.spawn(two_wheels(**{"libgazebo_ros_planar_move.so": {"cmdTimeout": 0.2}}))
+    track.advance(300)
+    track.command(0.5, 0.0)
+    track.advance(1000)
+    assert track.model.state()[0].position[0] == pytest.approx(0.1, abs=0.01)
+
+
+@pytest.mark.parametrize("speed", [0, 1.0])
+def test_a_tricycle_steers_by_its_front_wheel(track, speed):
+    elements = {
+        "steeringJoint": "front_steering", "actuatedWheelJoint": "front_joint",
+        "encoderWheelLeftJoint": "left_joint", "encoderWheelRightJoint": "right_joint",
+        "actuatedWheelDiameter": 2.0 * RADIUS, "encoderWheelDiameter": 2.0 * RADIUS,
+        "wheelTorque": 20, "steeringSpeed": speed, "publishWheelJointState": "true",
+        "publishWheelTF": "true", "odometrySource": "world",
+    }  # fmt: skip
+    track.spawn(three_wheels(**{"libgazebo_ros_tricycle_drive.so": elements}))
+    track.advance(300)
+    track.command(0.2, 0.0)
+    track.advance(2000)
+    assert track.model.state()[0].position[0] == pytest.approx(0.4, abs=0.03)
+    angle = 0.5
+    track.command(0.2, angle)
+    track.advance(1000)
+    turned = track.turned(3000)
+    assert turned == pytest.approx(3.0 * 0.2 * math.sin(angle) / WHEELBASE, rel=0.1)
+    state = track.messages["/joint_states"][-1]
+    assert state.name == ["front_steering", "front_joint", "left_joint", "right_joint"]
+    assert state.position[0] == pytest.approx(angle, abs=0.02)
+    children = {message.transforms[0].child_frame_id for message in track.messages["/tf"]}
+    assert children == {"base_link", *state.name}
