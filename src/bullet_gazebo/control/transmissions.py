@@ -78,18 +78,24 @@ def read_description(text: str) -> RobotDescription:
 
 
 def distance(robot: Element, joint: str, other: str) -> float:
-    """Returns how far two joints are from each other [m], if they have the same parent."""
+    """Returns how far two joints are from each other [m], as if none above them were turned."""
     return math.dist(_place(robot, joint), _place(robot, other))
 
 
 def _place(robot: Element, joint: str) -> list[float]:
-    origin = robot.find(f"joint[@name='{joint}']/origin")
-    text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
-    try:
-        x, y, z = (float(word) for word in text.split())
-    except ValueError as error:
-        raise ControlError(f"robot_description: joint '{joint}' is at '{text}'") from error
-    return [x, y, z]
+    above = {each.find("child"): each for each in robot.findall("joint")}
+    joints = {child.get("link"): each for child, each in above.items() if child is not None}
+    found = robot.find(f"joint[@name='{joint}']")
+    place = [0.0, 0.0, 0.0]
+    while found is not None:
+        origin, parent = found.find("origin"), found.find("parent")
+        text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
+        try:
+            place = [a + float(b) for a, b in zip(place, text.split(), strict=True)]
+        except ValueError as error:
+            raise ControlError(f"robot_description: a joint is at '{text}'") from error
+        found = None if parent is None else joints.get(parent.get("link"))
+    return place
 
 
 def wheel_radius(robot: Element, joint: str) -> float:

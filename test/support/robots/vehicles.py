@@ -18,15 +18,23 @@ def _wheel(name: str, place: str, parent: str = "base", interface: str = "Veloci
     rim = f'<cylinder radius="{RADIUS}" length="0.04"/>'
     return (
         _link(f"{name}_wheel", 0.5, rim, 0.0025, "1.5707963267948966 0 0")
-        + _joint(f"{name}_joint", "continuous", parent, f"{name}_wheel", place, "0 1 0")
-        + _transmission(f"{name}_joint", interface)
+        + _joint(f"{name}_joint", "continuous", parent, f"{name}_wheel", place, "0 1 0", 50.0)
+        + (_transmission(f"{name}_joint", interface) if interface else "")
     )
 
 
-def _joint(name: str, kind: str, parent: str, child: str, place: str, axis: str = "0 0 1") -> str:
+def _joint(
+    name: str,
+    kind: str,
+    parent: str,
+    child: str,
+    place: str,
+    axis: str = "0 0 1",
+    speed: float = 1.0,
+) -> str:
     return f"""<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
       <origin xyz="{place}"/><axis xyz="{axis}"/>
-      <limit lower="-2" upper="2" effort="20" velocity="50"/></joint>"""
+      <limit lower="-2" upper="2" effort="20" velocity="{speed}"/></joint>"""
 
 
 def _transmission(joint: str, interface: str) -> str:
@@ -36,11 +44,11 @@ def _transmission(joint: str, interface: str) -> str:
       <actuator name="{joint}_m"/></transmission>"""
 
 
-def _steered(name: str, place: str) -> str:
+def _steered(name: str, place: str, interface: str = "Velocity") -> str:
     pivot = _link(f"{name}_fork", 0.2, '<box size="0.02 0.02 0.02"/>', 0.001)
     pivot += _joint(f"{name}_steering", "revolute", "base", f"{name}_fork", place)
     pivot += _transmission(f"{name}_steering", "Position")
-    return pivot + _wheel(name, "0 0 0", f"{name}_fork")
+    return pivot + _wheel(name, "0 0 0", f"{name}_fork", interface)
 
 
 def _ball(name: str, place: str, friction: float) -> str:
@@ -92,3 +100,11 @@ def three_balls(**plugins: Mapping[str, object]) -> str:
     places = ("0.15 0 -0.05", "-0.15 0.1 -0.05", "-0.15 -0.1 -0.05")
     balls = [_ball(f"ball_{number}", place, 0.0) for number, place in enumerate(places)]
     return _vehicle(balls, plugins)
+
+
+def bicycle(**plugins: Mapping[str, object]) -> str:
+    """A driven wheel and a steered one before it, with balls at the sides."""
+    balls = [_ball(f"ball_{y}", f"0 {y} -0.048", 0.0) for y in (0.2, -0.2)]
+    half = 0.5 * WHEELBASE
+    wheels = [_wheel("rear", f"{-half} 0 0"), _steered("front", f"{half} 0 0", "")]
+    return _vehicle([*wheels, *balls], plugins)

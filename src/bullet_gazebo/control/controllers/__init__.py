@@ -29,6 +29,10 @@ from bullet_gazebo.control.controllers.pid_controllers import (
     EffortJointVelocity,
     VelocityJointPosition,
 )
+from bullet_gazebo.control.controllers.steering import (
+    AckermannSteeringController,
+    FourWheelSteeringController,
+)
 from bullet_gazebo.control.errors import ControlError, faults
 
 __all__ = ["BUILT_IN", "Controller", "Input", "Output", "find_type"]
@@ -38,6 +42,8 @@ BUILT_IN: dict[str, type[Controller]] = {
     for controller in (
         JointStateController,
         DiffDriveController,
+        AckermannSteeringController,
+        FourWheelSteeringController,
         EffortJoint,
         EffortJointPosition,
         EffortJointVelocity,

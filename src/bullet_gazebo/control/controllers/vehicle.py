@@ -184,8 +184,11 @@ class VehicleController(Controller):
 
     def wanted(self, now: int) -> Triple:
         """Returns the command in force: rest if the last one is too old."""
-        late = now - self._stamp > self.options.timeout * NANOSECONDS
-        return REST if late else self._wanted
+        return REST if self.is_late(now) else self._wanted
+
+    def is_late(self, now: int) -> bool:
+        """Whether the last command is too old at a time [ns]."""
+        return now - self._stamp > self.options.timeout * NANOSECONDS
 
     def _limit(self, linear: float, angular: float, dt: float) -> tuple[float, float]:
         limits = self.options.linear, self.options.angular

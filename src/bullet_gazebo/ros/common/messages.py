@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import genpy
 from control_msgs.msg import JointControllerState
+from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
 from gazebo_msgs.msg import ContactState
 from geometry_msgs.msg import (
     Point,
@@ -26,6 +27,7 @@ from tf2_msgs.msg import TFMessage
 
 from bullet_gazebo.control.controllers.joint_state import JointStateSample
 from bullet_gazebo.control.controllers.pid_controllers import JointControllerSample
+from bullet_gazebo.control.controllers.steering import SteeringSample
 from bullet_gazebo.control.controllers.vehicle import TwistSample
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.drives.odometry import OdometrySample
@@ -105,6 +107,13 @@ def to_odometry_transform(sample: OdometrySample) -> TFMessage:
 def to_twist_stamped(sample: TwistSample) -> TwistStamped:
     twist = to_twist_msg(((sample.linear, 0.0, 0.0), (0.0, 0.0, sample.angular)))
     return TwistStamped(Header(stamp=to_time(sample.stamp)), twist)
+
+
+def to_four_wheel_steering(sample: SteeringSample) -> FourWheelSteeringStamped:
+    data = FourWheelSteering(
+        front_steering_angle=sample.front, rear_steering_angle=sample.rear, speed=sample.speed
+    )
+    return FourWheelSteeringStamped(Header(stamp=to_time(sample.stamp)), data)
 
 
 def to_contact_state(pair: ContactPair) -> ContactState:

@@ -10,6 +10,7 @@ from typing import Any
 import rospy
 from control_msgs.msg import JointControllerState, JointTrajectoryControllerState, PidState
 from dynamic_reconfigure.encoding import Config
+from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
@@ -23,6 +24,7 @@ from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.control.pid import Gains, Pid, PidSample
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import (
+    to_four_wheel_steering,
     to_joint_controller_state,
     to_joint_state,
     to_odometry,
@@ -42,11 +44,16 @@ OUTPUTS: dict[str, tuple[type, Convert, int]] = {  # kind: message, conversion, 
     "TrajectorySample": (JointTrajectoryControllerState, to_controller_state, 1),
     "OdometrySample": (Odometry, to_odometry, 100),
     "TransformSample": (TFMessage, to_odometry_transform, 100),
+    "SteeringSample": (FourWheelSteeringStamped, to_four_wheel_steering, 100),
     "TwistSample": (TwistStamped, to_twist_stamped, 100),
 }
 INPUTS: dict[str, tuple[type, Convert]] = {  # kind: message, the controller's command
     "Float64": (Float64, lambda message: message.data),
     "Float64MultiArray": (Float64MultiArray, lambda message: message.data),
+    "FourWheelSteering": (
+        FourWheelSteering,
+        lambda message: (message.speed, message.front_steering_angle, message.rear_steering_angle),
+    ),
     "Twist": (Twist, lambda message: (message.linear.x, message.linear.y, message.angular.z)),
 }
 REPEAT = 1.0  # [s] between two logs of the same complaint

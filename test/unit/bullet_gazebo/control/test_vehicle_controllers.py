@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from support.robots.vehicles import RADIUS, TRACK, two_wheels
+from support.robots.vehicles import RADIUS, TRACK, WHEELBASE, bicycle, four_wheels, two_wheels
 from support.robots.worlds import add_robot, start
 
 from bullet_gazebo.control.controllers import BUILT_IN
@@ -171,3 +171,60 @@ def test_wrong_parameters_are_named(sim, wrong, complaint):
     robot = add_robot(sim, "bot", two_wheels())
     with pytest.raises(ControlError, match=complaint):
         BUILT_IN[DIFF["type"]].create("base", DIFF | wrong, robot.hardware)
+
+
+COVARIANCES = {key: DIFF[key] for key in DIFF if "covariance" in key}
+ACKERMANN = COVARIANCES | {
+    "type": "ackermann_steering_controller/AckermannSteeringController",
+    "rear_wheel": "rear_joint",
+    "front_steer": "front_steering",
+}
+CORNERS = [f"{side}_{end}" for end in ("front", "rear") for side in ("left", "right")]
+FOUR = COVARIANCES | {
+    "type": "four_wheel_steering_controller/FourWheelSteeringController",
+    "front_wheel": ["left_front_joint", "right_front_joint"],
+    "rear_wheel": ["left_rear_joint", "right_rear_joint"],
+    "front_steering": ["left_front_steering", "right_front_steering"],
+    "rear_steering": ["left_rear_steering", "right_rear_steering"],
+}
+
+
+def test_a_bicycle_follows_the_circle_of_its_fork(world):
+    track = Track(world, bicycle(), ACKERMANN)
+    assert {
+        claim.hardware_interface: claim.resources
+        for claim in track.robot.manager.listed()[0].claims
+    } == {
+        "hardware_interface::VelocityJointInterface": ("rear_joint",),
+        "hardware_interface::PositionJointInterface": ("front_steering",),
+    }
+    track.advance(1000, 0.2, 0.0, 0.4)
+    before = track.place[2]
+    track.advance(4000, 0.2, 0.0, 0.4)
+    rate = 0.2 * math.tan(0.4) / WHEELBASE
+    assert track.place[2] - before == pytest.approx(4.0 * rate, rel=0.05)
+    sample = track.sent["odom"][-1]
+    assert sample.angular[2] == pytest.approx(rate, rel=0.02)
+    x, y, yaw = track.place
+    half = 0.5 * WHEELBASE  # the odometry is that of the rear wheel
+    rear = (x - half * math.cos(yaw) + half, y - half * math.sin(yaw))
+    assert sample.position[:2] == pytest.approx(rear, abs=0.05)
+
+
+def test_four_steered_wheels_turn_round_their_centre_and_go_crabwise(world):
+    track = Track(world, four_wheels(steered=tuple(CORNERS)), FOUR)
+    track.advance(1000, 0.2, 0.0, 0.3)
+    before = track.place[2]
+    track.advance(3000, 0.2, 0.0, 0.3)
+    assert track.place[2] - before == pytest.approx(0.9, rel=0.05)
+    sample = track.sent["odom"][-1]
+    assert (sample.linear[0], sample.angular[2]) == pytest.approx((0.2, 0.3), abs=0.01)
+    assert sample.position[:2] == pytest.approx(track.place[:2], abs=0.05)
+    track.sim.reset_simulation()
+    for _ in range(20):
+        track.controller.command_axles((0.2, 0.3, 0.3))
+        track.advance(100)
+    x, y, yaw = track.place
+    assert (y / x, yaw) == pytest.approx((math.tan(0.3), 0.0), abs=0.05)
+    steered = track.sent["odom_steer"][-1]
+    assert (steered.front, steered.rear) == pytest.approx((0.3, 0.3), abs=0.01)
