@@ -22,7 +22,7 @@ from bullet_gazebo.control.transmissions import distance, wheel_radius
 from bullet_gazebo.drives.odometry import Triple
 from bullet_gazebo.drives.wheels import SteeredWheels, Steering
 
-WHEELS = 4
+STRAIGHT = 1e-6  # [rad]
 
 
 class SteeringSample(NamedTuple):
@@ -181,5 +181,12 @@ class FourWheelSteeringController(SteeringController):
         super().report(now)
         if self._steer.wanted:
             angles = [joint.position for joint in self.forks]
-            front, rear = 0.5 * (angles[0] + angles[1]), 0.5 * (angles[2] + angles[3])
+            front, rear = axle_angle(*angles[:2]), axle_angle(*angles[2:])
             self._steer.send(SteeringSample(now, front, rear, self._velocity[0]))
+
+
+def axle_angle(left: float, right: float) -> float:
+    """Returns the angle [rad] in the middle of an axle whose wheels go round one centre."""
+    one, other = math.tan(left), math.tan(right)
+    both = one + other
+    return math.atan(2.0 * one * other / both) if abs(both) > STRAIGHT else 0.0

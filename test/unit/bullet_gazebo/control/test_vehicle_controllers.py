@@ -222,6 +222,12 @@ def test_four_steered_wheels_turn_round_their_centre_and_go_crabwise(world):
     assert sample.position[:2] == pytest.approx(track.place[:2], abs=0.05)
     track.sim.reset_simulation()
     for _ in range(20):
+        track.controller.command_axles((0.2, 0.3, -0.2))
+        track.advance(100)
+    steered = track.sent["odom_steer"][-1]
+    assert (steered.front, steered.rear) == pytest.approx((0.3, -0.2), abs=0.01)
+    track.sim.reset_simulation()
+    for _ in range(20):
         track.controller.command_axles((0.2, 0.3, 0.3))
         track.advance(100)
     x, y, yaw = track.place
