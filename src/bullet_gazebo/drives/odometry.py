@@ -127,9 +127,13 @@ class Period:
     """
 
     def __init__(self, rate: float, now: int, late: bool = False) -> None:
-        self._length = round(NANOSECONDS / rate) if rate > 0.0 else 0
         self._late = int(late)
+        self.set_rate(rate)
         self.restart(now)
+
+    def set_rate(self, rate: float) -> None:
+        """Lets the next periods be as long as a rate says [Hz]."""
+        self._length = round(NANOSECONDS / rate) if rate > 0.0 else 0
 
     def restart(self, now: int) -> None:
         """Lets a period begin at `now` [ns]."""

@@ -74,6 +74,8 @@ class Controller(ABC):
         self.inputs: list[Input] = []
         self.outputs: list[Output] = []
         self.pids: dict[str, Pid] = {}  # by namespace below the controller's; tunable while it runs
+        # By name what dynamic_reconfigure changes while it runs: present value, least and most.
+        self.tunables: dict[str, tuple[Any, Any, Any]] = {}
         self.loops: list[Loop] = []  # whose gains the physics step must be able to follow
 
     @classmethod
@@ -101,6 +103,9 @@ class Controller(ABC):
 
     def stopping(self) -> None:
         """Called when the controller is stopped; its joints keep their commands."""
+
+    def tune(self, values: Mapping[str, Any]) -> None:
+        """Takes new values of `tunables`, all of them."""
 
     def joints_moved(self, now: int) -> None:
         """Called when something other than time has changed the joints' state."""

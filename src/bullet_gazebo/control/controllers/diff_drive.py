@@ -1,6 +1,7 @@
 """diff_drive_controller/DiffDriveController (docs/contract/sensors.md 7)."""
 
 from collections.abc import Mapping
+from typing import Any
 
 from bullet_gazebo.control.controllers.base import Output, option
 from bullet_gazebo.control.controllers.vehicle import (
@@ -17,6 +18,8 @@ from bullet_gazebo.control.transmissions import distance, wheel_radius
 from bullet_gazebo.drives.odometry import Triple
 from bullet_gazebo.drives.wheels import side_speeds
 
+LEFT, RIGHT = "left_wheel_radius_multiplier", "right_wheel_radius_multiplier"
+SEPARATION = "wheel_separation_multiplier"
 STATE = "publish_wheel_joint_controller_state"
 
 
@@ -47,11 +50,18 @@ class DiffDriveController(VehicleController):
     interface = VELOCITY
 
     def __init__(
-        self, name: str, options: VehicleOptions, sides: tuple[Side, Side], separation: float
-    ) -> None:
+        self, name: str, options: VehicleOptions, sides: tuple[Side, Side], separation: float,
+        scales: Mapping[str, float],
+    ) -> None:  # fmt: skip
         super().__init__(name, options)
         self._left, self._right = sides
-        self._separation = separation
+        self._measures = (sides[0].radius, sides[1].radius, separation)  # before multipliers
+        self._rescale(scales)
+        self.tunables = {
+            key: (scale, min(scale, 0.5), max(scale, 1.5)) for key, scale in scales.items()
+        }
+        self.tunables["publish_rate"] = (options.rate, 0.0, 2000.0)
+        self.tunables["enable_odom_tf"] = (options.tf, False, True)
         self._joints = sides[0].joints + sides[1].joints
         self.claimed = tuple(sorted(joint.name for joint in self._joints))
         self._wheels = Output("wheel_joint_controller_state", "TrajectorySample")
@@ -74,15 +84,27 @@ class DiffDriveController(VehicleController):
             params, "wheel_radius", name, lambda: wheel_radius(hardware.robot, first[0])
         )
         both = option(params, "wheel_radius_multiplier", name, 1.0)
-        left, right = (
-            Side(joints, radius * option(params, f"{side}_wheel_radius_multiplier", name, both))
-            for side, joints in zip(("left", "right"), sides, strict=True)
-        )
-        separation *= option(params, "wheel_separation_multiplier", name, 1.0)
-        found = cls(name, VehicleOptions.read(params, name), (left, right), separation)
+        scales = {
+            LEFT: option(params, LEFT, name, both),
+            RIGHT: option(params, RIGHT, name, both),
+            SEPARATION: option(params, SEPARATION, name, 1.0),
+        }
+        left, right = (Side(joints, radius) for joints in sides)
+        options = VehicleOptions.read(params, name)
+        found = cls(name, options, (left, right), separation, scales)
         if option(params, STATE, name, default=False):
             found.outputs.append(found._wheels)
         return found
+
+    def _rescale(self, scales: Mapping[str, Any]) -> None:
+        left, right, separation = self._measures
+        self._left.radius, self._right.radius = left * scales[LEFT], right * scales[RIGHT]
+        self._separation = separation * scales[SEPARATION]
+
+    def tune(self, values: Mapping[str, Any]) -> None:
+        self._rescale(values)
+        self.period.set_rate(values["publish_rate"])
+        self.tf_on = values["enable_odom_tf"]
 
     def remember(self) -> None:
         self._left.travel()

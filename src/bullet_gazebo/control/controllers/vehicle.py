@@ -90,14 +90,15 @@ class VehicleController(Controller):
         self.place = DeadReckoning()
         self._means = [RollingMean(options.window) for _ in REST]
         self._velocity: Triple = REST  # ahead, to the left [m/s], turning [rad/s]
-        self._period = Period(options.rate, 0, late=True)
+        self.period = Period(options.rate, 0, late=True)
         self._now = self._sent = -1  # [ns]
         self._halt()
         self._odom = Output("odom", "OdometrySample", whole=True)
         self._tf = Output("/tf", "TransformSample", whole=True)
         self._cmd_out = Output("cmd_vel_out", "TwistSample")
         self.outputs = [self._odom]
-        self.outputs += [self._tf] if options.tf else []
+        self.tf_on = options.tf
+        self.outputs.append(self._tf)
         self.outputs += [self._cmd_out] if options.publish_cmd else []
         self.cmd_vel = Input("cmd_vel", "Twist", self.command)
         self.inputs = [self.cmd_vel]
@@ -148,7 +149,7 @@ class VehicleController(Controller):
         for mean in self._means:
             mean.clear()
         self._velocity = REST
-        self._period.restart(now)
+        self.period.restart(now)
         self.remember()
         self.drive(0.0, 0.0)
 
@@ -160,7 +161,7 @@ class VehicleController(Controller):
         if now < self._stamp:
             self._stamp = now
         self._now = now
-        self._period.time_set_back(now)
+        self.period.time_set_back(now)
         self.report(now)
 
     def update(self, now: int, dt: float) -> None:
@@ -174,7 +175,7 @@ class VehicleController(Controller):
             speeds = [mean.add(part / dt) for mean, part in zip(self._means, motion, strict=True)]
             self._velocity = (speeds[0], speeds[1], speeds[2])
         self.place.move_on_arc(ahead, turn, left)
-        if self._period.is_over(now):
+        if self.period.is_over(now):
             self.report(now)
         linear, _, angular = self.wanted(now)
         limited = self._limit(linear, angular, dt)
@@ -205,7 +206,9 @@ class VehicleController(Controller):
         """Sends the odometry at a time [ns]."""
         if self._odom.wanted:
             self._odom.send(self.sample(now))
-        if self._tf.wanted and now != self._sent:  # tf refuses a second one of the same time
+        if (
+            self.tf_on and self._tf.wanted and now != self._sent
+        ):  # tf refuses a second one of the same time
             self._sent = now
             self._tf.send(self.sample(now))
 

@@ -97,6 +97,8 @@ class ControllerTopics:
             full = rospy.names.ns_join(own, place)
             topics = PidTopics(self._sim, self._thinner, pid, full, self._manager.loops_changed)
             self._closing.callback(topics.shutdown)
+        if controller.tunables:
+            self._closing.callback(self._tuner(controller, own).shutdown)
         if isinstance(controller, JointTrajectoryController):
             self._closing.callback(TrajectoryTopics(self._sim, controller, own).shutdown)
         for port in controller.inputs:
@@ -125,6 +127,24 @@ class ControllerTopics:
 
         output.sink, output.listeners = send, publisher.get_num_connections
         self._closing.callback(setattr, output, "sink", None)
+
+    def _tuner(self, controller: Controller, namespace: str) -> DynamicServer:
+        """Returns the reconfigure server of a controller's own parameters."""
+        initial = {name: value for name, (value, _, _) in controller.tunables.items()}
+        parameters = [
+            Parameter(name, "bool" if isinstance(value, bool) else "double", value, least, most)
+            for name, (value, least, most) in controller.tunables.items()
+        ]
+
+        def apply(config: Config, level: int) -> Config:
+            if level == FIRST:
+                config.update(initial)
+            elif all(math.isfinite(config[name]) for name in initial):
+                with self._sim.lock:
+                    controller.tune(config)
+            return config
+
+        return DynamicServer(parameters, apply, namespace)
 
     def _subscribe(self, port: Input, namespace: str) -> None:
         topic = rospy.names.ns_join(namespace, port.topic)

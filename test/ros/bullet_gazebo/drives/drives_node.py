@@ -6,6 +6,7 @@ import unittest
 import rospy
 import rostest
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
+from dynamic_reconfigure.client import Client as DynamicClient
 from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
 from gazebo_msgs.msg import ModelState
 from gazebo_msgs.srv import GetModelState, SetModelState, SpawnModel, SpawnModelRequest
@@ -14,7 +15,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
 from support.robots.vehicles import RADIUS, TRACK, four_wheels, two_wheels
-from support.ros.calls import call, delete_model, wait_until
+from support.ros.calls import BOUND, call, delete_model, wait_until
 from support.ros.manager import Manager
 from support.ros.subscribed import Listener
 from tf2_msgs.msg import TFMessage
@@ -126,6 +127,10 @@ class Drives(unittest.TestCase):
         command = Twist()
         command.linear.x = 0.2
         self.assertTrue(self.follow(self.publisher("/base/cmd_vel"), command, odometry))
+        tuner = DynamicClient("/base", timeout=BOUND)
+        self.addCleanup(tuner.close)
+        tuned = tuner.update_configuration({"wheel_separation_multiplier": 1.2})
+        self.assertEqual((tuned["wheel_separation_multiplier"], tuned["publish_rate"]), (1.2, 50.0))
         self.step(2000)
         self.assertTrue(commands.wait_for(lambda each: each[-1].twist.linear.x == 0.2))
         self.assertAlmostEqual(odometry.messages[-1].twist.twist.linear.x, 0.2, delta=1e-3)

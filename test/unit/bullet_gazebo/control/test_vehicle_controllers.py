@@ -124,7 +124,7 @@ def test_in_open_loop_the_commands_are_the_odometry(world):
     track = Track(world, two_wheels(), DIFF | {"open_loop": True, "enable_odom_tf": False})
     track.advance(1000, 0.2, 0.0, 0.1)
     assert track.sent["odom"][-1].linear == (0.2, 0.0, 0.0)
-    assert "/tf" not in track.sent
+    assert track.sent["/tf"] == []
 
 
 def test_radius_and_separation_come_from_the_description_or_parameters(world):
@@ -140,6 +140,22 @@ def test_radius_and_separation_come_from_the_description_or_parameters(world):
         assert (left, right) == pytest.approx((-0.5 * TRACK / RADIUS, 0.5 * TRACK / RADIUS))
         track.sim.remove_robot(track.robot)
         track.sim.delete_model(track.model)
+
+
+def test_a_running_controller_is_tuned(world):
+    track = Track(world, two_wheels(), DIFF | {"wheel_separation_multiplier": 1.5})
+    values = {name: value for name, (value, _, _) in track.controller.tunables.items()}
+    assert values["wheel_separation_multiplier"] == 1.5
+    tuned = {"left_wheel_radius_multiplier": 0.5, "publish_rate": 100.0, "enable_odom_tf": False}
+    track.controller.tune(values | tuned)
+    track.controller.command((0.1, 0.0, 0.0))
+    track.advance(100)
+    joints = track.robot.hardware.joints
+    assert (joints["left_joint"].command, joints["right_joint"].command) == pytest.approx(
+        (2.0, 1.0)
+    )
+    assert track.stamps()[1:3] == [31, 41]
+    assert track.sent["/tf"] == []
 
 
 def test_wrong_commands_are_refused(world):
