@@ -49,6 +49,11 @@ class PlanarMovePlugin(DrivePlugin):
             self.report(now)
         self.model.body.set_base_twist((linear, (0.0, 0.0, turn)))
 
+    def report(self, now: int) -> None:
+        super().report(now)
+        if self._seen is None or self._seen.stamp != now:  # nobody has heard it
+            self.sample(now)
+
     def sample(self, now: int) -> OdometrySample:
         found = self.truth(now, POSE, TWIST)
         found = found._replace(position=(*found.position[:2], 0.0))

@@ -69,7 +69,7 @@ class TricyclePlugin(DrivePlugin):
 
     def _drive(self, now: int) -> None:
         ahead, _, angle = self.command
-        seconds, self._driven = (now - self._driven) / NANOSECONDS, now
+        seconds, self._driven = max(now - self._driven, 0) / NANOSECONDS, now
         self._wheel.drive([self._approached(ahead, seconds)])
         self._steer(max(-QUARTER, min(QUARTER, angle)))
 

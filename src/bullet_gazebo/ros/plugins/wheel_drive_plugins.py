@@ -76,7 +76,7 @@ class DiffDrivePlugin(DrivePlugin):
     def _drive(self, now: int) -> None:
         ahead, _, turn = self.command
         targets = side_speeds(ahead, turn, self._separation)
-        seconds, self._driven = (now - self._driven) / NANOSECONDS, now
+        seconds, self._driven = max(now - self._driven, 0) / NANOSECONDS, now
         self._wheels.drive(self._ramp.next(targets, self._wheels.speeds, seconds))
 
     def _joint_state(self, now: int) -> JointState:
