@@ -106,7 +106,7 @@ class Laser:
         shape = self.vertical.samples, self.horizontal.samples
         ranges, intensities = (
             hits.distances.reshape(shape),
-            self._retro(scene, hits.targets).reshape(shape),
+            scene.retro[hits.targets].reshape(shape),
         )
         for axis, fan in enumerate((self.vertical, self.horizontal)):
             ranges, intensities = (_resampled(each, fan, axis) for each in (ranges, intensities))
@@ -116,10 +116,6 @@ class Laser:
             ranges = np.clip(noisy, self.low, self.high)
         ranges = np.where(beyond, np.inf, np.where(before, -np.inf, ranges))
         return Scan(ranges, intensities)
-
-    def _retro(self, scene: RayScene, targets: np.ndarray) -> np.ndarray:
-        retro = np.array([*(target.shape.retro for target in scene.targets), 0.0])
-        return retro[targets]  # that of NONE is the last
 
 
 def _directions(yaws: np.ndarray, pitches: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from sensor_msgs.srv import SetCameraInfo, SetCameraInfoResponse
 from std_msgs.msg import Header
 
 from bullet_gazebo.physics.description import DescriptionError, Sensor
+from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
@@ -33,6 +34,7 @@ BAYER = {  # the channel of each pixel of a two-by-two tile
     "BAYER_GRBG8": (1, 0, 2, 1),
 }  # fmt: skip
 LUMINANCE = (0.299, 0.587, 0.114)
+OPTICAL = Pose(orientation=(-0.5, 0.5, -0.5, 0.5))  # x right, y down, z ahead
 
 
 class CameraTopics:
@@ -64,12 +66,20 @@ class CameraTopics:
         image = topic_in(scope, names[0])
         self._image = topics.advertise(image, Image, QUEUE, latch=True)
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
+        self.show(context, f"{image}/compressed", CompressedImage)
         self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)
         service = topic_in(scope, f"{own}set_camera_info")
         self._key = f"{context.key}/{own}"
         with suppress(rospy.ServiceException):  # another camera below the same name offers it
             offered = rospy.Service(service, SetCameraInfo, self._set)
             context.closing(offered.shutdown)
+
+    def show(self, context: PluginContext, topic: str, kind: type) -> None:
+        """Has windows offer a topic that is in the camera's optical axes."""
+        camera = self._camera
+        view = camera.field_of_view, camera.width / camera.height
+        pose = camera.pose.compose(OPTICAL)
+        context.show(topic, kind._type, pose, view)  # type: ignore[attr-defined]
 
     @property
     def wants_colour(self) -> bool:

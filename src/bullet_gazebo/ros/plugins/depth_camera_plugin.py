@@ -49,8 +49,12 @@ class DepthCameraPlugin(SensorPlugin):
         def named(tag: str, default: str) -> str:
             return topic_in(scope, context.text(tag, default))
 
-        self._depth = topics.advertise(named("depthImageTopicName", "depth/image_raw"), Image)
-        self._cloud = topics.advertise(named("pointCloudTopicName", "points"), PointCloud2)
+        depth = named("depthImageTopicName", "depth/image_raw")
+        cloud = named("pointCloudTopicName", "points")
+        self._depth = topics.advertise(depth, Image)
+        self._cloud = topics.advertise(cloud, PointCloud2)
+        for name, kind in ((depth, Image), (cloud, PointCloud2)):
+            self._pictures.show(context, name, kind)
         self._depth_info = topics.advertise(
             named("depthImageCameraInfoTopicName", "depth/camera_info"),
             CameraInfo,
