@@ -66,8 +66,9 @@ def _link_of(context: PluginContext) -> tuple[Model, str]:
     name = context.text("bodyName", "")
     if not name:
         raise DescriptionError("<bodyName> is missing")
-    if name in context.model.link_names:
-        return context.model, name
+    own = context.among("bodyName", context.model.link_names)
+    if own:
+        return context.model, own
     found = context.sim.world.link(name)
     if found is None:
         raise DescriptionError(f"<bodyName>: there is no link '{name}'")

@@ -141,6 +141,12 @@ class SensorTopics:
         self._waking: list[Topic] = []
         self._clock = context.clock(rate, measure, self._is_heard, at_once)
 
+    def set_rate(self, rate: float) -> None:
+        """Measures at another rate [Hz] from now on; the caller holds the simulator's lock."""
+        now = self._context.sim.now
+        self._clock.set_rate(rate, now, now)
+        self._clock.look()
+
     def advertise(
         self, name: str, kind: type, queue: int = 1, latch: bool = False, wakes: bool = True
     ) -> Topic:
@@ -172,6 +178,11 @@ class SensorTopic:
         topics = SensorTopics(context, rate, self._send, at_once)
         self._topic = topics.advertise(name, kind)
 
+    @property
+    def is_heard(self) -> bool:
+        """Whether it has subscribers."""
+        return self._topic.is_heard
+
     def _send(self, now: int) -> None:
         message = self._measure(now)
         if message is not None:
@@ -201,10 +212,8 @@ class LaserTopic:
     ) -> None:
         self._context = context
         self._message = message
-        self._sensor = sensor = sensor_of(context, KINDS)
+        sensor = sensor_of(context, KINDS)
         self.laser = Laser(sensor)
-        sensing = context.sensing
-        self._scene = sensing.visuals if self.laser.sees_visuals else sensing.collisions
         namespace = namespace_of(context, absent="", empty=empty)
         self.frame = frame_of(namespace, context.text("frameName", "/world"))
         topic = context.plugin.element.findtext("topicName", name).strip()
@@ -217,13 +226,18 @@ class LaserTopic:
             rospy.logwarn("Sensor '%s': its <topicName> is empty", sensor.name)
 
     def _measure(self, now: int) -> Any:
-        model = self._context.model
-        random = self._context.sensing.noise(model, self._context.key, now)
-        noise, bias = self.laser.noise, 0.0
-        if noise is not None:
-            bias = noise.draw_bias(self._context.sensing.bias(model, self._context.key))
-        scan = self.laser.measure(self._scene, sensor_pose(model, self._sensor), bias, random)
-        return self._message(scan, now, random)
+        random = self._context.sensing.noise(self._context.model, self._context.key, now)
+        return self._message(scan_of(self._context, self.laser, random), now, random)
+
+
+def scan_of(context: PluginContext, laser: Laser, random: np.random.Generator) -> Scan:
+    """Returns what a plugin's laser measures now, with noise drawn from `random`."""
+    sensing, model, noise, bias = context.sensing, context.model, laser.noise, 0.0
+    if noise is not None:
+        bias = noise.draw_bias(sensing.bias(model, context.key))
+    assert context.sensor is not None  # checked by sensor_of
+    scene = sensing.visuals if laser.sees_visuals else sensing.collisions
+    return laser.measure(scene, sensor_pose(model, context.sensor), bias, random)
 
 
 def to_imu(sample: InertialSample, now: int, frame: str, deviation: float) -> Imu:
