@@ -25,7 +25,7 @@ from realtime import listening, processor_time, simulator_process
 
 from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
 from bullet_gazebo.physics.files.sdf import parse_sdf
-from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.sensors.laser import Laser
 from bullet_gazebo.sensors.rays import RayScene
@@ -93,7 +93,11 @@ def surroundings(folder: Path, static: bool = True) -> Iterator[tuple[str, str, 
     for index in range(BOXES):
         angle, radius = random.uniform(0.0, 2.0 * math.pi), random.uniform(2.0, 8.0)
         place = radius * math.cos(angle), radius * math.sin(angle), 0.3
-        yield f"box{index}", MODEL.format(static=int(static), shape=box, sensor=""), Pose(place)
+        yield (
+            f"box{index}",
+            MODEL.format(static=int(static), shape=box, sensor=""),
+            Pose(place, from_rpy(*random.uniform(-1.0, 1.0, 3))),
+        )
     ball = trimesh.creation.icosphere(6, 1.0)
     file = folder / "mesh.stl"
     trimesh.Trimesh(ball.vertices, ball.faces[:TRIANGLES]).export(file)
@@ -112,48 +116,45 @@ def least(action: Callable[[], object], rounds: int, count: int = 50) -> float:
     return min(taken)
 
 
-def scans(results: dict[str, float], folder: Path, rounds: int) -> None:
+def scans(results: dict[str, float], folder: Path, rounds: int, static: bool) -> None:
     """A scan in-process, by Embree and by PyBullet's own rays."""
-    for static in (True, False):
-        engine = BulletEngine()
-        world = World(engine)
-        world.spawn("ground", ground_plane(), Pose())
-        for name, text, pose in surroundings(folder, static):
-            world.spawn(name, parse_sdf(text), pose)
-        sdf = MODEL.format(static=1, shape=SHELL, sensor=LASER)
-        model = world.spawn("robot", parse_sdf(sdf), Pose())
-        sensor = model.description.sensors[0]
-        laser, scene, random = Laser(sensor), RayScene(world), np.random.default_rng(0)
-        found = laser.measure(scene, sensor_pose(model, sensor), 0.0, random).ranges
-        assert np.isfinite(found).sum() > RAYS // 4, found
+    engine = BulletEngine()
+    world = World(engine)
+    world.spawn("ground", ground_plane(), Pose())
+    for name, text, pose in surroundings(folder, static):
+        world.spawn(name, parse_sdf(text), pose)
+    sdf = MODEL.format(static=1, shape=SHELL, sensor=LASER)
+    model = world.spawn("robot", parse_sdf(sdf), Pose())
+    sensor = model.description.sensors[0]
+    laser, scene, random = Laser(sensor), RayScene(world), np.random.default_rng(0)
+    client = engine._client._client
 
-        def scan() -> None:
-            scene.expire()
-            laser.measure(scene, sensor_pose(model, sensor), 0.0, random)
+    def scan() -> np.ndarray:
+        scene.expire()
+        return laser.measure(scene, sensor_pose(model, sensor), 0.0, random).ranges
 
-        angles = np.linspace(-3.14159, 3.12414, RAYS)
-        ways = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(RAYS)])
-        start = np.array([0.0, 0.0, 0.3])
-        starts, ends = (start + 0.1 * ways).tolist(), (start + FAR * ways).tolist()
-        where = "" if static else ", all boxes move"
-        results[f"a scan of 360 rays{where} [ms]"] = own = least(scan, rounds)
-        theirs = least(
-            lambda: pybullet.rayTestBatch(starts, ends, physicsClientId=engine._client._client), rounds
-        )
-        results[f"rayTestBatch over it{where}"] = theirs / own
-        results[f"rayTestBatch{where} [ms]"] = theirs
-        engine.close()
+    assert np.isfinite(scan()).sum() > RAYS // 4
+    angles = np.linspace(-3.14159, 3.12414, RAYS)
+    ways = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(RAYS)])
+    start = np.array([0.0, 0.0, 0.3])
+    starts, ends = (start + 0.1 * ways).tolist(), (start + FAR * ways).tolist()
+    where = "" if static else ", all boxes move"
+    own = least(scan, rounds)
+    theirs = least(lambda: pybullet.rayTestBatch(starts, ends, physicsClientId=client), rounds)
+    results[f"a scan of 360 rays{where} [ms]"] = own
+    results[f"rayTestBatch over it{where}"] = theirs / own
+    engine.close()
 
 
 def stepper() -> Callable[..., None]:
     """Takes so many ticks of the active simulator."""
     step = ServiceClient("/gazebo/step_world", StepWorld, persistent=True, timeout=120.0)
 
-    def take(ticks: int, controllers: tuple[str, ...] = (), commands: tuple[float, ...] = ()) -> None:
+    def take(
+        ticks: int, controllers: tuple[str, ...] = (), commands: tuple[float, ...] = ()
+    ) -> None:
         for _ in range(0, ticks, 50):
-            answer = step(
-                StepWorldRequest(ticks=50, controllers=controllers, commands=commands)
-            )
+            answer = step(StepWorldRequest(ticks=50, controllers=controllers, commands=commands))
             assert answer.success, answer.status_message
 
     return take
@@ -227,7 +228,8 @@ def measure(rounds: int, count: int) -> Mapping[str, float]:
     results: dict[str, float] = {}
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        scans(results, folder, rounds)
+        for static in (True, False):
+            scans(results, folder, rounds, static)
         unheard(results, rounds)
         over_ros(results, folder, rounds, count)
     rover(results)

@@ -256,7 +256,9 @@ class RayScene:
     def _find_centres(self) -> None:
         """Finds where the balls are around what isn't part of the still scene."""
         turns, apart = self._turns[self._apart], self._apart
-        self._apart_centres = self._places[apart] + np.einsum("kij,kj->ki", turns, self._centres[apart])
+        self._apart_centres = self._places[apart] + np.einsum(
+            "kij,kj->ki", turns, self._centres[apart]
+        )
 
     def _surround(self, index: int, corners: np.ndarray) -> None:
         """Sets the ball around a target, in the target's frame."""

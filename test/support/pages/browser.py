@@ -189,7 +189,13 @@ class Browser:
             ("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)
         ):  # fmt: skip
             self._do(
-                "Input.dispatchMouseEvent", type=kind, button="left", buttons=1, clickCount=1, x=x, y=y
+                "Input.dispatchMouseEvent",
+                type=kind,
+                button="left",
+                buttons=1,
+                clickCount=1,
+                x=x,
+                y=y,
             )
 
     def _press(self, place):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from PIL import Image
-from support.pages.browser import Browser, wait_for
+from support.pages.browser import Browser
 from support.pages.window_page import Output
 
 from ros_calls.service import ServiceClient
@@ -31,7 +31,9 @@ def parse_args():
     parser.add_argument("--frames", type=int, default=40)
     parser.add_argument("--ticks", type=int, default=200, help="[ms] from one to the next")
     parser.add_argument("--size", default="480x320", help="[pixels]")
-    parser.add_argument("--zoom", type=int, default=4, help="turns of the wheel away from the robot")
+    parser.add_argument(
+        "--zoom", type=int, default=4, help="turns of the wheel away from the robot"
+    )
     parser.add_argument("--tilt", type=int, default=60, help="the camera is lifted by it [pixels]")
     parser.add_argument("--topics", nargs="*", default=["/scan"])
     parser.add_argument("--settle", type=float, default=1.0, help="[s] until a picture is taken")
@@ -59,8 +61,14 @@ def main():
         stack.enter_context(simulation.active())
         add_rover()
         step = ServiceClient("/gazebo/step_world", StepWorld, persistent=True)
-        window = Output("env", *(f"{k}={v}" for k, v in simulation.environment().items() if k.startswith("ROS_")),
-                        "rosrun", "gazebo_ros", "gzclient", "--no-browser")
+        window = Output(
+            "env",
+            *(f"{k}={v}" for k, v in simulation.environment().items() if k.startswith("ROS_")),
+            "rosrun",
+            "gazebo_ros",
+            "gzclient",
+            "--no-browser",
+        )
         stack.callback(window.close)
         address = window.line("is the page").rpartition(" ")[2]
         page = stack.enter_context(Browser(address, size=(width + PANEL, height + 150)))
@@ -74,12 +82,21 @@ def main():
         time.sleep(5.0 * args.settle)
         page.run(f"document.querySelectorAll('{NOTICE}').forEach(e => e.click())")
         for _ in range(args.frames):
-            assert step(StepWorldRequest(ticks=args.ticks, controllers=["wheels"], commands=WHEELS)).success
+            assert step(
+                StepWorldRequest(ticks=args.ticks, controllers=["wheels"], commands=WHEELS)
+            ).success
             time.sleep(args.settle)
             picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
             pictures.append(picture if args.page else picture.crop((0, 0, width, height)))
     frames = [each.quantize(args.colours, dither=Image.Dither.NONE) for each in pictures]
-    frames[0].save(args.out, save_all=True, append_images=frames[1:], duration=args.ticks // 2, loop=0, optimize=True)
+    frames[0].save(
+        args.out,
+        save_all=True,
+        append_images=frames[1:],
+        duration=args.ticks // 2,
+        loop=0,
+        optimize=True,
+    )
     print(f"{args.out}: {args.out.stat().st_size} bytes, {frames[0].width} x {frames[0].height}")
 
 

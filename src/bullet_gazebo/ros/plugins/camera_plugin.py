@@ -108,7 +108,7 @@ def _cameras(sensor: Sensor) -> Iterator[tuple[str, PinholeCamera]]:
         raise DescriptionError("no <camera> has left or right in its name")
     for side, element, name in sides:
         where = f"sensor '{sensor.name}', camera '{name}'"
-        yield side, PinholeCamera(element, sensor.pose, where)
+        yield side, PinholeCamera(element, sensor.pose, where, sensor.link)
 
 
 LIBRARIES = {

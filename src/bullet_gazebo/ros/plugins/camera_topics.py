@@ -72,20 +72,13 @@ class CameraTopics:
         image = topic_in(scope, names[0])
         self._image = topics.advertise(image, Image, QUEUE, latch=True)
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
-        self.show(context, f"{image}/compressed", CompressedImage)
+        show_camera(context, f"{image}/compressed", CompressedImage, camera)
         self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)
         service = topic_in(scope, f"{own}set_camera_info")
         self._key = f"{context.key}/{own}"
         with suppress(rospy.ServiceException):  # another camera below the same name offers it
             offered = rospy.Service(service, SetCameraInfo, self._set)
             context.closing(offered.shutdown)
-
-    def show(self, context: PluginContext, topic: str, kind: type) -> None:
-        """Has windows offer a topic that is in the camera's optical axes."""
-        camera = self._camera
-        view = camera.field_of_view, camera.width / camera.height
-        pose = camera.pose.compose(OPTICAL)
-        context.show(topic, kind._type, pose, view)  # type: ignore[attr-defined]
 
     @property
     def wants_colour(self) -> bool:
@@ -122,6 +115,12 @@ class CameraTopics:
             return SetCameraInfoResponse(False, "the size isn't that of the camera's pictures")
         self.info = given
         return SetCameraInfoResponse(True, "")
+
+
+def show_camera(context: PluginContext, topic: str, kind: type, camera: PinholeCamera) -> None:
+    """Has windows offer a topic in the optical axes of a camera."""
+    view = camera.field_of_view, camera.width / camera.height
+    context.show(topic, kind, camera.link, camera.pose.compose(OPTICAL), view)
 
 
 def scope_of(context: PluginContext) -> str:

@@ -18,6 +18,7 @@ from bullet_gazebo.ros.plugins.camera_topics import (
     offer_rate,
     rate_of,
     scope_of,
+    show_camera,
 )
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, SensorTopics, sensor_of, topic_in
@@ -61,7 +62,7 @@ class DepthCameraPlugin(SensorPlugin):
         self._depth = topics.advertise(depth, Image)
         self._cloud = topics.advertise(cloud, PointCloud2)
         for name, kind in ((depth, Image), (cloud, PointCloud2)):
-            self._pictures.show(context, name, kind)
+            show_camera(context, name, kind, camera)
         self._depth_info = topics.advertise(
             named("depthImageCameraInfoTopicName", "depth/camera_info"),
             CameraInfo,

@@ -296,7 +296,8 @@ class HectorSonarPlugin(SensorPlugin):
 
     def __init__(self, context: PluginContext) -> None:
         self._context = context
-        self._laser = Laser(sensor_of(context, KINDS))
+        sensor = sensor_of(context, KINDS)
+        self._laser = Laser(sensor)
         self._error = DriftingError(_reader(context), "")
         self._timer = timer = HectorTimer(context, SONAR_RATE, (self._error,), self._publish)
         self._frame = context.text("frameId", "/sonar_link")
@@ -304,6 +305,7 @@ class HectorSonarPlugin(SensorPlugin):
         self._publisher = rospy.Publisher(
             topic, Range, queue_size=queue_of(context, 1), tcp_nodelay=True
         )
+        context.show(topic, Range, sensor.link, sensor.pose)
 
     def _publish(self, now: int, seconds: float) -> None:
         laser, random = self._laser, self._timer.random(now)

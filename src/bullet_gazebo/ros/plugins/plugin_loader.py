@@ -142,18 +142,25 @@ class PluginContext:
         """Calls `close` when the plugin ends, or can't be made; the last one first."""
         self._closers.append(close)
 
-    def show(self, topic: str, kind: str, pose: Pose, view: tuple[float, float] = (0, 0)) -> None:
-        """Has windows offer to draw the sensor's measurements.
+    def show(
+        self, topic: str, kind: type, link: str, pose: Pose, view: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
+        """Has windows offer to draw measurements.
 
         Args:
             topic: full name of theirs.
             kind: type of its messages.
-            pose: of the axes that they are in, in the sensor's link.
+            link: which they are taken from.
+            pose: of the axes that they are in, in the link.
             view: of a camera, its horizontal field of view [rad] and its picture's width by height.
         """
-        assert self.sensor is not None
         shown = SceneSensor(
-            topic, kind, self.model.name, self.sensor.link, to_pose_msg(pose), *view
+            topic,
+            kind._type,
+            self.model.name,
+            link,
+            to_pose_msg(pose),
+            *view,  # type: ignore[attr-defined]
         )
 
         def close() -> None:

@@ -221,7 +221,7 @@ class LaserTopic:
             rate = min((each for each in (own_rate, sensor.rate) if each > 0.0), default=0.0)
             full = topic_in(namespace, topic)
             SensorTopic(context, full, kind, rate, self._measure)
-            context.show(full, kind._type, sensor.pose)  # type: ignore[attr-defined]
+            context.show(full, kind, sensor.link, sensor.pose)
         else:
             rospy.logwarn("Sensor '%s': its <topicName> is empty", sensor.name)
 

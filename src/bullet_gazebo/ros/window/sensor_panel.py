@@ -168,9 +168,7 @@ class SensorPanel:
 
     def _add(self, sensor: SceneSensor) -> "SensorView":
         self._made += 1  # a removed node's name would come back
-        return SensorView(
-            self._server, self._folder, sensor, f"{self._below}/sensor{self._made}"
-        )
+        return SensorView(self._server, self._folder, sensor, f"{self._below}/sensor{self._made}")
 
     def listen(self, watched: bool) -> None:
         """Subscribes to what is switched on, while a page is open."""
