@@ -81,6 +81,7 @@ class RayScene:
         self._visuals = visuals
         self.targets: list[Target] = []
         self.retro = np.zeros(1)  # reflectivity of each target
+        self._targets_of: dict[Model, list[Target]] = {}
         self._key: object = None
         self._is_fresh = False
         self._meshes: dict[object, Any] = {}
@@ -177,8 +178,8 @@ class RayScene:
         room = np.einsum("ij,ij->i", ways, ways) - self._radii[apart] ** 2
         # A ray meets a ball if it lies within the cone of tangents. All do that start in it.
         tangents = np.where(room > 0.0, np.sqrt(np.maximum(room, 0.0)), -np.inf)
-        tangents[tangents > far] = np.inf
         least = (tangents - MARGIN * (1.0 + np.abs(tangents))).astype(np.float32)
+        least[tangents > far] = np.inf
         (x, y, z), (dx, dy, dz) = (
             ways.astype(np.float32).T[..., None],
             directions.astype(np.float32).T,
@@ -210,12 +211,13 @@ class RayScene:
     # --- what there is --------------------------------------------------------------------------
 
     def _build(self) -> None:
-        self.targets = targets = [
-            target
+        read, known = _seen if self._visuals else _solid, self._targets_of
+        self._targets_of = {
+            model: known.get(model)
+            or [target for link in model.description.links.values() for target in read(model, link)]
             for model in self._world.models.values()
-            for link in model.description.links.values()
-            for target in (_seen if self._visuals else _solid)(model, link)
-        ]
+        }
+        self.targets = targets = [each for found in self._targets_of.values() for each in found]
         count = len(targets)
         self.retro = np.array([*(target.shape.retro for target in targets), 0.0])  # of NONE, too
         self._kinds = np.array([*(target.shape.kind for target in targets), ""])

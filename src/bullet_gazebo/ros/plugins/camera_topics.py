@@ -70,7 +70,8 @@ class CameraTopics:
         self._frame = frame_of(scope, given)
         self.info = camera_info(context, camera, baseline)
         image = topic_in(scope, names[0])
-        self._image = topics.advertise(image, Image, QUEUE, latch=True)
+        colours = 3 * camera.width * camera.height
+        self._image = topics.advertise(image, Image, QUEUE, latch=True, content=colours)
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
         show_camera(context, f"{image}/compressed", CompressedImage, camera)
         self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)

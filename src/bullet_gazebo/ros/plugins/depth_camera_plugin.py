@@ -57,10 +57,11 @@ class DepthCameraPlugin(SensorPlugin):
         def named(tag: str, default: str) -> str:
             return topic_in(scope, context.text(tag, default))
 
+        pixels = camera.width * camera.height
         depth = named("depthImageTopicName", "depth/image_raw")
         cloud = named("pointCloudTopicName", "points")
-        self._depth = topics.advertise(depth, Image)
-        self._cloud = topics.advertise(cloud, PointCloud2)
+        self._depth = topics.advertise(depth, Image, content=4 * pixels)
+        self._cloud = topics.advertise(cloud, PointCloud2, content=POINT_STEP * pixels)
         for name, kind in ((depth, Image), (cloud, PointCloud2)):
             show_camera(context, name, kind, camera)
         self._depth_info = topics.advertise(

@@ -32,7 +32,7 @@ class ImuPlugin(SensorPlugin):
         self._context = context
         self._model, self._link = _link_of(context)
         self._frame = context.text("frameName", context.text("bodyName", "")).lstrip("/")
-        self._deviation = context.number("gaussianNoise", 0.0)
+        self._deviation = context.deviation()
         rpy = context.text("rpyOffset", "0 0 0")
         self._turn = from_rpy(*numbers(rpy, "<rpyOffset>", 3))
         namespace = namespace_of(context, absent="", empty="/")

@@ -34,7 +34,7 @@ class ImuSensorPlugin(SensorPlugin):
         self._frame = context.text("frameName", "").lstrip("/")
         if not self._frame:
             raise DescriptionError("<frameName> is missing")
-        self._deviation = context.number("gaussianNoise", 0.0)
+        self._deviation = context.deviation()
         self._turn = from_rpy(*numbers(context.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
         if truth(context.text("initialOrientationAsReference", "false")):
             start = motion_of(context.model, sensor.link, sensor.pose).pose.orientation

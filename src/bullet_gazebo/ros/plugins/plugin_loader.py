@@ -32,6 +32,7 @@ from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.ros.common.messages import to_pose_msg
 from bullet_gazebo.ros.common.publishing import Thinner
+from bullet_gazebo.sensors.noise import checked_deviation
 from bullet_gazebo.sensors.schedule import SensorClock
 from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.simulator import Simulator
@@ -82,6 +83,10 @@ class PluginContext:
     def number(self, tag: str, default: float) -> float:
         """Returns the number in the plugin's child element `tag`; a faulty one is a DescriptionError."""
         return value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)
+
+    def deviation(self) -> float:
+        """Returns the plugin's `<gaussianNoise>`; an impossible one is a DescriptionError."""
+        return checked_deviation(self.number("gaussianNoise", 0.0), "<gaussianNoise>")
 
     def among(self, tag: str, names: Sequence[str]) -> str:
         """Returns which of its model's `names` the element `tag` means; "" for none.
