@@ -26,11 +26,10 @@ from bullet_gazebo.physics.description import (
     Sensor,
     library_of,
 )
-from bullet_gazebo.physics.files.sdf_parts import value
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.ros.common.publishing import Thinner
 from bullet_gazebo.sensors.schedule import SensorClock
-from bullet_gazebo.sensors.sensing import Sensing
+from bullet_gazebo.sensors.sensing import Mount, Sensing
 from bullet_gazebo.simulator import Simulator
 
 CONTROL = re.compile("plugin .*(control|drive|steer|planar_move|hw_sim)", re.IGNORECASE)
@@ -40,7 +39,7 @@ Update = Callable[[int], None]
 
 
 @dataclass(frozen=True)
-class PluginContext:
+class PluginContext(Mount):
     """What a plugin gets: its element in the file, its model, and the namespace to work in.
 
     Publish fast topics as a `ThinnedTopic` of `thinner`, measurements by a clock of `sensing`.
@@ -48,36 +47,15 @@ class PluginContext:
     Attributes:
         namespace: its `<robotNamespace>`, else that of the spawn request, else the model's name.
         given_namespace: the first two of these; None if there is neither.
-        sensor: the one that the plugin belongs to; None for a model's plugin.
     """
 
-    sim: Simulator
-    model: Model
-    plugin: Plugin
     namespace: str
     given_namespace: str | None
     thinner: Thinner
-    sensing: Sensing
-    sensor: Sensor | None = None
     _updates: list[Update] = field(default_factory=list, repr=False)
     _clocks: list[SensorClock] = field(default_factory=list, repr=False)
     _closers: list[Callable[[], None]] = field(default_factory=list, repr=False)
     _is_made: threading.Event = field(default_factory=threading.Event, repr=False)
-
-    @property
-    def key(self) -> str:
-        """What its random numbers are drawn by: the same for all plugins of a sensor."""
-        if self.sensor is not None:
-            return f"{self.sensor.link}::{self.sensor.name}"
-        return f"plugin {self.model.description.plugins.index(self.plugin)}"
-
-    def text(self, tag: str, default: str) -> str:
-        """Returns the text of the plugin's child element `tag`."""
-        return (self.plugin.element.findtext(tag) or "").strip() or default
-
-    def number(self, tag: str, default: float) -> float:
-        """Returns the number in the plugin's child element `tag`; a faulty one is a DescriptionError."""
-        return value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)
 
     def clock(
         self,
@@ -168,7 +146,7 @@ class PluginRegistry:
         """`seed` is that of the sensors' noise."""
         self._sim = sim
         self._thinner = thinner
-        self._sensing = Sensing(sim, seed)
+        self.sensing = Sensing(sim, seed)
         # Imported now, so that no spawn waits for it.
         self._built_in = _built_in()
         self._loaded: dict[Model, list[tuple[PluginContext, LoadedPlugin | None]]] = {}
@@ -196,8 +174,8 @@ class PluginRegistry:
             own = plugin.element.findtext("robotNamespace")
             given = own.strip() if own is not None else robot_namespace or None
             context = PluginContext(
-                self._sim, model, plugin, given or robot_namespace or model.name, given,
-                self._thinner, self._sensing, sensor,
+                self._sim, model, plugin, self.sensing, sensor,
+                given or robot_namespace or model.name, given, self._thinner,
             )  # fmt: skip
             try:
                 loaded.append((context, factory(context)))
