@@ -22,6 +22,7 @@ from robot_envs.variation.imperfections import Actuator, Noise, Sensor
 from robot_envs.variation.randomisation import UniformRandomisation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState, both, part_of
 
+MOST_SEED = 2**32  # of the sensors' noise
 RESET_OPTIONS = ("initial_state", "goal")
 
 
@@ -161,6 +162,7 @@ class RobotEnv(DrawnEnv):
         """Takes the task's spaces, and what checks actions and observations against them."""
         self.task = task
         self._hides = task.reward_query != StateQuery()  # from `apply` and `observe`
+        self._has_sensors = bool(task.query.sensors or task.reward_query.sensors)
         self.action_space = checks.made_space(task, "action_space")
         self.observation_space = space = checks.made_space(task, "observation_space")
         self._read_action = checks.action_reader(self.action_space)
@@ -234,7 +236,8 @@ class RobotEnv(DrawnEnv):
             self.np_random
         )  # even if it isn't used: streams stay the same
         self._initial = initial = options.get("initial_state", drawn)
-        state = self.backend.reset(initial)
+        seed = int(self.np_random.integers(1, MOST_SEED)) if self._has_sensors else 0
+        state = self.backend.reset(initial, seed)
         self._first = self.scene.commands(initial.commands)
         if self._first:
             state = state._replace(commands={**state.commands, **self._first})

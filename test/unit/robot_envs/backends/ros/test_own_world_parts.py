@@ -30,7 +30,7 @@ class Replayed:
     def vary(self, variation: Variation) -> None:
         self.asked.append(variation)
 
-    def reset(self, initial: InitialState) -> WorldState:
+    def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         self.asked.append(initial)
         return state(self._drift, 0.0, 0.0)
 
