@@ -99,7 +99,7 @@ run_tests() {  # [--fast] [ARG...]
         if [[ $argument == --fast ]]; then fast=yes; else arguments+=("$argument"); fi
     done
     # Three processes for two cores, because tests over ROS wait a quarter of their time. Each file stays
-    # in one process, which makes its fixtures once. Without reordering, the long tests over ROS start first.
+    # in one process, which makes its fixtures once. Without reordering, long files start first.
     [[ ${#arguments[@]} -gt 0 ]] ||
         arguments=(--numprocesses 3 --dist loadfile --no-loadscope-reorder)
     [[ -z $fast ]] || arguments=(-m "not ($NOT_FAST)" "${arguments[@]}")

@@ -131,7 +131,7 @@ class PolicyNode:
             self._step(now, now - began)
             before = now
             periods = math.floor((now - began) / self._period + 1e-6)
-            self._sleep_until(began + self._period * (periods + 1))
+            self._sleep_until(began + self._period * (periods + 1), now)
 
     def _begin(self) -> float:
         """Waits until all joints are known and all controllers listen; returns the time [s]."""
@@ -156,9 +156,9 @@ class PolicyNode:
         missing += [f"a subscriber of {each.resolved_name}" for each in deaf]
         return ", and ".join(missing)
 
-    def _sleep_until(self, due: float) -> None:
-        """Sleeps until a ROS time [s], or until time has gone back, or the run should end."""
-        clock, seen, since = rospy.rostime.get_rostime_cond(), rospy.get_time(), time.monotonic()
+    def _sleep_until(self, due: float, seen: float) -> None:
+        """Sleeps until a ROS time [s], or until time has gone back behind `seen`, or the run should end."""
+        clock, since = rospy.rostime.get_rostime_cond(), time.monotonic()
         while seen <= (now := rospy.get_time()) < due and not self._is_over():
             if rospy.rostime.is_wallclock():
                 rospy.rostime.wallsleep(min(due - now, POLL))

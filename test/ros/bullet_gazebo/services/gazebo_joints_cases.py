@@ -105,10 +105,12 @@ class JointsTest(GazeboTest):
             if first.setdefault(type(message), message) is message and len(first) == 2:
                 seen.set()
 
-        # rospy's own subscription to /clock keeps one message only, for all in this process.
         topics = [rospy.Subscriber("/clock", Clock, keep, queue_size=100),
                   rospy.Subscriber("/gazebo/link_states", LinkStates, keep, queue_size=100)]  # fmt: skip
         self.assertTrue(wait_until_heard("/clock", "/gazebo/link_states"))
+        # rospy made the connection for its own subscription, which keeps the newest message only.
+        for connection in topics[0].impl.connections:
+            connection.protocol.queue_size = 100
         call("unpause_physics")
         self.assertTrue(seen.wait(BOUND))
         call("pause_physics")
