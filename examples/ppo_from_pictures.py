@@ -3,8 +3,8 @@
 
     ./ws extras python3 examples/ppo_from_pictures.py --out runs/pictures
 
-The camera is a sensor of the robot's URDF; the task observes what it has measured. Four frames are stacked, so
-that the network sees motion. The folder gets the policy, and the curve in progress.csv.
+The camera is a sensor of the robot's URDF; the task observes what it has measured. Four frames are stacked,
+so that the network sees motion. The folder gets the policy, and the curve in progress.csv.
 """
 
 import argparse

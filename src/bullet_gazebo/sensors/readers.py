@@ -115,8 +115,8 @@ def find_sensor(sim: Simulator, sensing: Sensing, name: str) -> tuple[Mount, Mak
     if len(found) > 1:
         raise UnknownName(f"there are several sensors '{name}'; write model{SCOPE}sensor")
     if not found:
-        plain = [each for each in known if SCOPE not in each]
-        near = did_you_mean(name, known) or f"; there are: {', '.join(plain) or 'none'}"
+        there = [each for each in known if SCOPE not in each]
+        near = did_you_mean(name, known) or f"; there are: {', '.join(there) or 'none'}"
         raise UnknownName(f"there is no sensor '{name}' that can be read{near}")
     return found[0]
 

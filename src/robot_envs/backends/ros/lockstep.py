@@ -154,7 +154,7 @@ class LockstepWorld(RobotBackend):
             self._held,
             Links(zip(link_keys(self._query), motions[models:], strict=True)),
             Models(zip(answer.models, motions[:models], strict=True)),
-            [_contact_of(each) for each in answer.contacts],
+            [contact_of(each) for each in answer.contacts],
             Sensors(
                 (name, self._reading(each))
                 for name, each in zip(self._query.sensors, answer.sensors, strict=True)
@@ -165,7 +165,7 @@ class LockstepWorld(RobotBackend):
         values: dict[str, Any] = {
             each.name: np.frombuffer(each.data, each.type).reshape(each.shape)
             for each in found.values
-        } or {"contacts": [_contact_of(each) for each in found.contacts]}
+        } or {"contacts": [contact_of(each) for each in found.contacts]}
         return Reading((found.now - self._begun) / 1e9, values)
 
     def _send(self, names: StepNames, ticks: int, commands: Sequence[float]) -> None:
@@ -260,7 +260,7 @@ def _motions_of(numbers: Sequence[float]) -> Iterator[Motion]:
         yield Motion(Pose((x, y, z), (qx, qy, qz, qw)), Twist((vx, vy, vz), (wx, wy, wz)))
 
 
-def _contact_of(state: ContactState) -> ContactPair:
+def contact_of(state: ContactState) -> ContactPair:
     """Reads what touches."""
     return ContactPair(
         state.collision1_name,
