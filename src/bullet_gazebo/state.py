@@ -264,7 +264,7 @@ class StateQuery:
         contacts_of: names of models, links or collisions, plain or scoped, whose contacts are wanted.
         all_contacts: whether all contacts are wanted instead.
         sensors: names of sensors whose last measurements are wanted, plain or model::sensor; see
-            `bullet_gazebo.sensors.readers`, which reads them.
+            `bullet_gazebo.sensors.sensor_readers`, which reads them.
     """
 
     models: tuple[str, ...] = ()

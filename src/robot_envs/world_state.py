@@ -6,7 +6,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector
 from bullet_gazebo.physics.world import seen_from
-from bullet_gazebo.sensors.reading import Reading
+from bullet_gazebo.sensors.sensor_reading import Reading
 from bullet_gazebo.state import ContactPair, LinkQuery, StateQuery
 from file_access.text import did_you_mean
 

@@ -26,8 +26,8 @@ from bullet_gazebo.physics.properties import (
 )
 from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.robot import ControlledRobot, control_period_of
-from bullet_gazebo.sensors.readers import SensorReaders
 from bullet_gazebo.sensors.sensing import Sensing
+from bullet_gazebo.sensors.sensor_readers import SensorReaders
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 from bullet_gazebo.state import NOTHING, StateReader, UnknownName, find_link, find_model
 from robot_envs.backends.backend import PHYSICS_STEP, RobotBackend, ticks_per_action

@@ -79,7 +79,7 @@ def to_contact_state(pair: ContactPair) -> ContactState:
 
 
 def to_reading(now: int, values: Mapping[str, Any]) -> SensorReading:
-    """Converts what a sensor measured at a time [ns]; see `bullet_gazebo.sensors.reading.Reading`."""
+    """Converts what a sensor measured at a time [ns]; see `bullet_gazebo.sensors.sensor_reading.Reading`."""
     arrays = [
         SensorValue(name, each.dtype.str, each.shape, each.tobytes())
         for name, each in values.items()

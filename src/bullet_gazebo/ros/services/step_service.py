@@ -49,8 +49,8 @@ from bullet_gazebo.ros.services.step_requests import (
     StepPlan,
     query_of,
 )
-from bullet_gazebo.sensors.readers import SensorReaders, find_sensor
 from bullet_gazebo.sensors.sensing import Sensing
+from bullet_gazebo.sensors.sensor_readers import SensorReaders, find_sensor
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import NOTHING, StateReader, UnknownName
 
