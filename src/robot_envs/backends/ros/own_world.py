@@ -39,9 +39,9 @@ class Journal:
 
     variation: Variation = field(default_factory=Variation)  # all that were applied, merged
     initial: InitialState | None = None  # None: no episode has begun
-    seed: int = 0  # of its sensors' noise
     commands: list[Commands] = field(default_factory=list)  # of each step
     last: WorldState | None = None  # the state after them
+    seed: int = 0  # of the sensors' noise
 
     def forget_episode(self) -> None:
         """Forgets all but the variation."""
