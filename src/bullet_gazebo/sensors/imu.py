@@ -122,8 +122,8 @@ class ModelImu:
         name = mount.text("bodyName", "")
         if not name:
             raise DescriptionError("<bodyName> is missing")
-        if name in mount.model.link_names:
-            return mount.model, name, HERE
+        if own := mount.among("bodyName", mount.model.link_names):
+            return mount.model, own, HERE
         found = mount.sim.world.link(name)
         if found is None:
             raise DescriptionError(f"<bodyName>: there is no link '{name}'")

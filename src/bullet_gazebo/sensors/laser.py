@@ -139,11 +139,14 @@ class LaserSensor:
 
     def measure(self, now: int) -> tuple[Scan, np.random.Generator]:
         """Returns a scan at a time [ns], and what draws further noise of it."""
+        random = self._mount.random(now)
+        return self.scan(random), random
+
+    def scan(self, random: np.random.Generator) -> Scan:
+        """Returns a scan, whose noise is drawn from `random`."""
         mount, noise = self._mount, self.laser.noise
         bias = 0.0 if noise is None else noise.draw_bias(mount.biases())
-        random = mount.random(now)
-        pose = sensor_pose(mount.model, self._sensor)
-        return self.laser.measure(self._scene, pose, bias, random), random
+        return self.laser.measure(self._scene, sensor_pose(mount.model, self._sensor), bias, random)
 
     def values(self, now: int) -> dict[str, np.ndarray]:
         """Returns `ranges` and `intensities`, each (n,) of float32, the lowest row first."""

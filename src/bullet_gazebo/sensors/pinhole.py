@@ -35,6 +35,9 @@ class CameraView(NamedTuple):
 class PinholeCamera:
     """A camera.
 
+    Attributes:
+        across, down: (height, width) of a pixel's point, to the right and down, for each metre of depth.
+
     Args:
         element: a `<camera>`.
         pose: of what holds it, in its link.
@@ -66,7 +69,7 @@ class PinholeCamera:
         self.focal_length = self.width / (2.0 * math.tan(self.field_of_view / 2.0))  # [pixels]
         right = (np.arange(self.width) + 0.5 - self.width / 2.0) / self.focal_length
         down = (np.arange(self.height) + 0.5 - self.height / 2.0) / self.focal_length
-        x, y = np.meshgrid(right, down)
+        self.across, self.down = x, y = np.meshgrid(right, down)
         ahead = np.stack([np.ones_like(x), -x, -y], axis=-1).reshape(-1, 3)
         lengths = np.linalg.norm(ahead, axis=1)
         self._directions = ahead / lengths[:, None]

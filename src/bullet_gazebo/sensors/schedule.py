@@ -27,16 +27,20 @@ class SensorClock:
         now: int,
     ) -> None:
         self._schedule = schedule
-        self.period = round(NANOSECONDS / rate) if rate > 0.0 else 0  # [ns]
         self.measure = measure
         self.listens = listens
         self.at_once = at_once
-        self.begin = now  # [ns]
         self.last: int | None = (
             None  # time of the last measurement [ns], if nothing was moved since
         )
         self.heard = False
         self.has_newcomer = False
+        self.set_rate(rate, now, now)
+
+    def set_rate(self, rate: float, begin: int, now: int) -> None:
+        """Measures at whole periods of a rate [Hz] after `begin`, from `now` on [ns]; 0 is every step."""
+        self.period = round(NANOSECONDS / rate) if rate > 0.0 else 0  # [ns]
+        self.begin = begin
         self.plan(now)
 
     def look(self, somebody_came: bool = False) -> None:

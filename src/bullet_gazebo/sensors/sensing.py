@@ -82,6 +82,36 @@ class Mount:
         """Returns the number in the plugin's child element `tag`; a faulty one is a DescriptionError."""
         return value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)
 
+    def among(self, tag: str, names: Sequence[str]) -> str:
+        """Returns which of its model's `names` the element `tag` means; "" for none.
+
+        In a nested model's plugin a plain name is one of that model's.
+        """
+        given = self.text(tag, "")
+        scoped = f"{self.plugin.scope}::{given}"
+        return next((name for name in (scoped, given) if name in names), "")
+
+    def link(self, tag: str, required: bool = True) -> str:
+        """Returns the model's link that the element `tag` names.
+
+        Without the element it is the model's first one, unless it is `required`.
+
+        Raises:
+            DescriptionError: if there is none.
+        """
+        names = self.model.link_names
+        if not self.text(tag, "") and not required:
+            scope = self.plugin.scope
+            return next((name for name in names if name.startswith(f"{scope}::")), names[0])
+        found = self.among(tag, names)
+        if not found:
+            raise DescriptionError(
+                f"<{tag}>: the model has no link '{self.text(tag, '')}'"
+                if self.text(tag, "")
+                else f"<{tag}> is missing"
+            )
+        return found
+
     def random(self, now: int, part: str = "") -> np.random.Generator:
         """Returns what draws the noise of the measurement at `now` [ns]."""
         return self.sensing.noise(self.model, self.key + part, now)

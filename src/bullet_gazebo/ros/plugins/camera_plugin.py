@@ -12,7 +12,7 @@ import rospy
 from std_msgs.msg import Empty
 
 from bullet_gazebo.physics.description import DescriptionError, Sensor
-from bullet_gazebo.ros.plugins.camera_topics import CameraTopics, scope_of
+from bullet_gazebo.ros.plugins.camera_topics import CameraTopics, offer_rate, scope_of
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
     SensorPlugin,
@@ -36,6 +36,7 @@ class CameraPlugin(SensorPlugin):
         self._sensor = sensor = sensor_of(context, (self.kind,))
         topics = SensorTopics(context, rate_of(context, sensor), self._on_clock)
         self._scope = scope = scope_of(context)
+        offer_rate(context, topics, scope)
         baseline = context.number("hackBaseline", 0.0)
         names = (
             context.text("imageTopicName", "image_raw"),

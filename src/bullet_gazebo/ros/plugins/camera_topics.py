@@ -5,11 +5,13 @@ from contextlib import suppress
 
 import numpy as np
 import rospy
+from dynamic_reconfigure.encoding import Config
 from PIL import Image as Pillow
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from sensor_msgs.srv import SetCameraInfo, SetCameraInfoResponse
 from std_msgs.msg import Header
 
+from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
@@ -22,6 +24,7 @@ from bullet_gazebo.ros.plugins.sensor_topics import (
 from bullet_gazebo.sensors.pinhole import CameraView, PinholeCamera, with_noise
 
 QUEUE = 2
+IMAGER_RATE = Parameter("imager_rate", "double", 2.0, 1.0, 50.0)  # [Hz]
 MONO = {"L8": np.uint8, "L_INT8": np.uint8, "L16": np.uint16, "L_INT16": np.uint16}
 COLOUR = {
     "R8G8B8": "rgb8", "RGB_INT8": "rgb8", "B8G8R8": "bgr8", "BGR_INT8": "bgr8", "R16G16B16": "rgb16",
@@ -44,7 +47,8 @@ class CameraTopics:
         scope: full name that the topics are in.
         names: of the image and of its camera_info.
         baseline: [m] to the camera on the left.
-        own: prefix of its service, if the sensor has several cameras.
+        own: prefix of its service, if the plugin has several cameras.
+        frame: `<frameName>` if None.
     """
 
     def __init__(
@@ -56,10 +60,12 @@ class CameraTopics:
         names: tuple[str, str],
         baseline: float,
         own: str = "",
+        frame: str | None = None,
     ) -> None:
         self._context, self._camera = context, camera
-        self._frame = frame_of(scope, context.text("frameName", ""))
-        self.info = _camera_info(context, camera, baseline)
+        given = context.text("frameName", "") if frame is None else frame
+        self._frame = frame_of(scope, given)
+        self.info = camera_info(context, camera, baseline)
         image = topic_in(scope, names[0])
         self._image = topics.advertise(image, Image, QUEUE, latch=True)
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
@@ -110,6 +116,20 @@ def scope_of(context: PluginContext) -> str:
     )
 
 
+def offer_rate(context: PluginContext, topics: SensorTopics, scope: str) -> None:
+    """Offers dynamic_reconfigure of a camera with a `<cameraName>`: `imager_rate` counts once it is set."""
+
+    def apply(wanted: Config, level: int) -> Config:
+        if level != FIRST:
+            with context.sim.lock:
+                topics.set_rate(wanted["imager_rate"])
+        return wanted
+
+    if context.text("cameraName", ""):
+        with suppress(rospy.ServiceException):  # another camera below the same name offers it
+            context.closing(DynamicServer([IMAGER_RATE], apply, scope).shutdown)
+
+
 def to_image(seen: np.ndarray, pixel_format: str, header: Header) -> Image:
     """Returns the message of a picture (height, width, 3) of uint8 in one of SDF's pixel formats."""
     height, width = seen.shape[:2]
@@ -137,7 +157,8 @@ def _to_jpeg(seen: np.ndarray, header: Header) -> CompressedImage:
     return CompressedImage(header, "rgb8; jpeg compressed bgr8", memory.getvalue())
 
 
-def _camera_info(context: PluginContext, camera: PinholeCamera, baseline: float) -> CameraInfo:
+def camera_info(context: PluginContext, camera: PinholeCamera, baseline: float = 0.0) -> CameraInfo:
+    """Returns the calibration of a camera whose baseline is in metres, from the plugin's elements."""
     f = context.number("focalLength", 0.0) or camera.focal_length
     cx = context.number("Cx", 0.0) or (camera.width + 1.0) / 2.0
     cy = context.number("Cy", 0.0) or (camera.height + 1.0) / 2.0

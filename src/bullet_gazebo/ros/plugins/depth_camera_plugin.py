@@ -10,10 +10,10 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from bullet_gazebo.physics.files.elements import truth
-from bullet_gazebo.ros.plugins.camera_topics import QUEUE, CameraTopics, scope_of
+from bullet_gazebo.ros.plugins.camera_topics import QUEUE, CameraTopics, offer_rate, scope_of
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, SensorTopics, topic_in
-from bullet_gazebo.sensors.pinhole import KINECT, DepthSensor
+from bullet_gazebo.sensors.pinhole import KINECT, DepthSensor, PinholeCamera
 
 POINT_STEP = 32
 FIELDS = {"x": 0, "y": 4, "z": 8, "rgb": 16}
@@ -35,6 +35,7 @@ class DepthCameraPlugin(SensorPlugin):
         camera = sensor.camera
         scope = scope_of(context)
         topics = SensorTopics(context, sensor.rate, self._measure)
+        offer_rate(context, topics, scope)
         names = (
             context.text("imageTopicName", "ir/image_raw"),
             context.text("cameraInfoTopicName", "ir/camera_info"),
@@ -54,9 +55,6 @@ class DepthCameraPlugin(SensorPlugin):
             wakes=False,
         )
         self._in_millimetres = truth(context.text("useDepth16UC1Format", "false"))
-        rows, columns = np.indices((camera.height, camera.width))
-        self._across = (columns - (camera.width - 1) / 2.0) / camera.focal_length
-        self._down = (rows - (camera.height - 1) / 2.0) / camera.focal_length
 
     def _measure(self, now: int) -> None:
         picture = self._sensor.view(self._pictures.wants_colour or self._cloud.is_heard)
@@ -64,47 +62,55 @@ class DepthCameraPlugin(SensorPlugin):
         header = self._pictures.header(now)
         depths = self._sensor.depths(picture)
         if self._depth.is_heard:
-            self._depth.publish(self._to_image(depths, header))
+            self._depth.publish(to_depth_image(depths, self._in_millimetres, header))
         if self._depth_info.is_heard:
             info = self._pictures.info
             info.header = header
             self._depth_info.publish(info)
         if self._cloud.is_heard:
-            self._cloud.publish(self._to_cloud(depths, picture.colours, header))
-
-    def _to_image(self, depths: np.ndarray, header: Header) -> Image:
-        height, width = depths.shape
-        if self._in_millimetres:
-            whole = np.nan_to_num(np.rint(1000.0 * depths), nan=0.0)
-            data = np.where(whole <= np.iinfo(np.uint16).max, whole, 0.0).astype("<u2")
-            return Image(header, height, width, "16UC1", 0, 2 * width, data.tobytes())
-        data = depths.astype("<f4")
-        return Image(header, height, width, "32FC1", 0, 4 * width, data.tobytes())
-
-    def _to_cloud(self, depths: np.ndarray, colours: np.ndarray, header: Header) -> PointCloud2:
-        height, width = depths.shape
-        points = np.zeros((height, width), POINT)
-        points["x"], points["y"], points["z"] = depths * self._across, depths * self._down, depths
-        red, green, blue = np.moveaxis(colours.astype(np.uint32), 2, 0)
-        points["rgb"] = red << 16 | green << 8 | blue
-        if not self.is_organised:
-            height, width = 1, height * width
-        return PointCloud2(
-            header=header,
-            height=height,
-            width=width,
-            fields=[PointField(name, at, PointField.FLOAT32, 1) for name, at in FIELDS.items()],
-            point_step=POINT_STEP,
-            row_step=POINT_STEP * width,
-            data=points.tobytes(),
-            is_dense=not bool(np.isnan(depths).any()),
-        )
+            self._cloud.publish(
+                to_cloud(depths, picture.colours, self._sensor.camera, self.is_organised, header)
+            )
 
 
 class KinectPlugin(DepthCameraPlugin):
     """As the depth camera, with organised clouds that end at `pointCloudCutoffMax`."""
 
     is_organised = True
+
+
+def to_depth_image(depths: np.ndarray, in_millimetres: bool, header: Header) -> Image:
+    """Returns the message of depths (height, width) [m], NaN for no reading."""
+    height, width = depths.shape
+    if in_millimetres:
+        whole = np.nan_to_num(np.rint(1000.0 * depths), nan=0.0)
+        data = np.where(whole <= np.iinfo(np.uint16).max, whole, 0.0).astype("<u2")
+        return Image(header, height, width, "16UC1", 0, 2 * width, data.tobytes())
+    data = depths.astype("<f4")
+    return Image(header, height, width, "32FC1", 0, 4 * width, data.tobytes())
+
+
+def to_cloud(
+    depths: np.ndarray, colours: np.ndarray, camera: PinholeCamera, organised: bool, header: Header
+) -> PointCloud2:
+    """Returns the points of depths (height, width) [m] and colours (height, width, 3)."""
+    height, width = depths.shape
+    points = np.zeros((height, width), POINT)
+    points["x"], points["y"], points["z"] = depths * camera.across, depths * camera.down, depths
+    red, green, blue = np.moveaxis(colours.astype(np.uint32), 2, 0)
+    points["rgb"] = red << 16 | green << 8 | blue
+    if not organised:
+        height, width = 1, height * width
+    return PointCloud2(
+        header=header,
+        height=height,
+        width=width,
+        fields=[PointField(name, at, PointField.FLOAT32, 1) for name, at in FIELDS.items()],
+        point_step=POINT_STEP,
+        row_step=POINT_STEP * width,
+        data=points.tobytes(),
+        is_dense=not bool(np.isnan(depths).any()),
+    )
 
 
 LIBRARIES = {

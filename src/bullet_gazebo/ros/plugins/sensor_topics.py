@@ -125,6 +125,12 @@ class SensorTopics:
         self._waking: list[Topic] = []
         self._clock = context.clock(rate, measure, self._is_heard, at_once)
 
+    def set_rate(self, rate: float) -> None:
+        """Measures at another rate [Hz] from now on; the caller holds the simulator's lock."""
+        now = self._context.sim.now
+        self._clock.set_rate(rate, now, now)
+        self._clock.look()
+
     def advertise(
         self, name: str, kind: type, queue: int = 1, latch: bool = False, wakes: bool = True
     ) -> Topic:
@@ -155,6 +161,11 @@ class SensorTopic:
         self._measure = measure
         topics = SensorTopics(context, rate, self._send, at_once)
         self._topic = topics.advertise(name, kind)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether it has subscribers."""
+        return self._topic.is_heard
 
     def _send(self, now: int) -> None:
         message = self._measure(now)
