@@ -69,6 +69,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=150_000)
     parser.add_argument("--envs", type=int, default=8)
     parser.add_argument("--rollout", type=int, default=128, help="steps of each between updates")
+    parser.add_argument("--evaluations", type=int, default=20, help="episodes in the end")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", default="runs/pictures")
     args = parser.parse_args()
@@ -81,7 +82,9 @@ def main() -> None:
     model.set_logger(configure(args.out, ["stdout", "csv"]))
     model.learn(args.steps)
     model.save(f"{args.out}/policy")
-    returns, lengths = evaluate_policy(model, envs, n_eval_episodes=20, return_episode_rewards=True)
+    returns, lengths = evaluate_policy(
+        model, envs, n_eval_episodes=args.evaluations, return_episode_rewards=True
+    )
     print(f"steps of 200: {np.mean(lengths):.1f}, return {np.mean(returns):.1f}")
 
 

@@ -72,7 +72,7 @@ class RobotEnv(DrawnEnv):
         deadline: wall time that a simulator over ROS in lock-step may take for an answer, on top of 10 ms for
             each physics step [s]; None: 5 s, and 30 s for "ros-own", of which there may be many.
         max_steps: after how many steps an episode is truncated; None: the task's.
-        sensor_noise: standard deviation of noise on joints' positions and velocities; see `Sensor`.
+        sensor_noise: standard deviation of noise on what joints and sensors measure; see `Sensor`.
         sensor_delay: age of an observation [control steps].
         encoder_step: resolution of position sensors [rad, m]; see `Sensor`.
         action_delay: how many control steps pass before a command arrives.
@@ -123,7 +123,8 @@ class RobotEnv(DrawnEnv):
         self._adopt(task)
         self.control_period = period = _control_period(scene, control_period)
         nominal = period if period > 0.0 else scene.robots[0].control_period  # [s]
-        sensor = Sensor(scene.joints, nominal, sensor_noise, sensor_delay, encoder_step)
+        names = task.query.sensors
+        sensor = Sensor(scene.joints, nominal, sensor_noise, sensor_delay, encoder_step, names)
         self._sensor = None if sensor.is_exact else sensor
         holds = {name: port.holds for name, (_, port) in scene.ports.items()}
         actuator = Actuator(holds, nominal, action_delay, actuator_limit, actuator_lag)

@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 from support.scenes.seeing_rover import NAMES, SEEING, Look
 
-from robot_envs import RobotEnv, SimulatorError, StateQuery
+from robot_envs import RobotEnv, SimulatorError, StateQuery, WorldState
 from robot_envs.testing import differences, rollout
+
+WALLS = """<sdf version="1.6"><world name="walls"><model name="wall"><static>true</static><link name="wall">
+<collision name="c"><pose>2 0 0.5 0 0 0</pose><geometry><box><size>0.1 4 1</size></box></geometry></collision>
+</link></model></world></sdf>"""
 
 
 @pytest.fixture(params=["bullet", "mujoco"])
@@ -102,3 +106,43 @@ def observed(**options: Any) -> list[np.ndarray]:
 def test_a_delay_shows_older_readings() -> None:
     exact, late = observed(), observed(sensor_delay=3)
     assert np.array_equal(late[:4], [exact[0]] * 4) and np.array_equal(late[4:], exact[1:-3])
+
+
+def test_worlds_of_a_process_share_what_never_moves() -> None:
+    """Also after one of them is gone, and with the same bits."""
+    tasks = Look(), Look()
+    envs = [RobotEnv(replace(SEEING, world=WALLS), task) for task in tasks]
+    given = [env.reset(seed=5)[0] for env in envs]
+    assert np.array_equal(*given)
+    first, second = (env.backend._sensing.collisions._still_triangles for env in envs)
+    assert first is second
+    envs[0].close()
+    assert np.array_equal(envs[1].reset(seed=5)[0], given[0])
+    envs[1].close()
+
+
+def test_noise_is_added_once_to_each_measurement() -> None:
+    """To those of sensors that the option names, by number or by attribute."""
+    noise = {"sonar": 0.1, "camera": 20, "imu": {"angular_velocity": 0.5}}
+    kept: list[WorldState] = []
+
+    class Keep(Look):
+        def observe(self, state: WorldState) -> np.ndarray:
+            kept.append(state)
+            return super().observe(state)
+
+    env = RobotEnv(SEEING, Keep(), sensor_noise=noise)
+    env.reset(seed=5)
+    for _ in range(2):  # the sonar's measurement is that of the reset after the first
+        seen, true = kept[-1].sensors, env.state.sensors if env.state else {}
+        assert {name for name in NAMES if seen[name] != true[name]} == set(noise)
+        assert seen["imu"].linear_acceleration is true["imu"].linear_acceleration
+        assert seen["camera"].image.dtype == np.uint8
+        env.step(np.ones(2, np.float32))
+    assert kept[0].sensors["sonar"] == kept[1].sensors["sonar"]
+    assert kept[0].sensors["camera"] != kept[1].sensors["camera"]
+    env.close()
+    with pytest.raises(ValueError, match="no joint 'sonnar'"):
+        RobotEnv(SEEING, Look(), sensor_noise={"sonnar": 0.1})
+    with pytest.raises(ValueError, match="no attribute of a reading 'range'.*ranges"):
+        RobotEnv(SEEING, Look(), sensor_noise={"sonar": {"range": 0.1}})
