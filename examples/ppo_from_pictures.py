@@ -82,9 +82,8 @@ def main() -> None:
     model.set_logger(configure(args.out, ["stdout", "csv"]))
     model.learn(args.steps)
     model.save(f"{args.out}/policy")
-    returns, lengths = evaluate_policy(
-        model, envs, n_eval_episodes=args.evaluations, return_episode_rewards=True
-    )
+    count = args.evaluations
+    returns, lengths = evaluate_policy(model, envs, count, return_episode_rewards=True)
     print(f"steps of 200: {np.mean(lengths):.1f}, return {np.mean(returns):.1f}")
 
 

@@ -80,8 +80,8 @@ class Encoder(NamedTuple):
 
 
 class Sensor:
-    """Measures the joints, with noise, rounding and delay; what sensors have measured gets noise and delay. The
-    rest of a state is only delayed, except the commands, which are the present ones.
+    """Measures the joints, with noise, rounding and delay, and sensors with further noise and delay. The rest of
+    a state is only delayed, except the commands, which are the present ones.
 
     The velocity of a joint with an `encoder_step` is the difference of two measured positions over the
     control period, as drivers compute it: a multiple of step / period, without noise of its own.

@@ -11,11 +11,10 @@ import pytest
 ROOT = Path(__file__).resolve().parents[3]
 LIMIT = 300.0  # [s]
 
-pytestmark = pytest.mark.extras
+pytestmark = [pytest.mark.slow, pytest.mark.extras("stable_baselines3")]
 
 
 def test_it_trains_and_evaluates(tmp_path: Path) -> None:
-    pytest.importorskip("stable_baselines3")
     words = ["--steps", "32", "--envs", "2", "--rollout", "16", "--evaluations", "1"]
     ended = subprocess.run(
         [sys.executable, f"{ROOT}/examples/ppo_from_pictures.py", *words, "--out", str(tmp_path)],
