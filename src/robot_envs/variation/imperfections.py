@@ -80,7 +80,7 @@ class Encoder(NamedTuple):
 
 
 class Sensor:
-    """Measures the joints, with noise, rounding and delay, and sensors with further noise and delay. The rest of
+    """Measures joints with noise, rounding and delay, and sensors with further noise and delay. The rest of
     a state is only delayed, except the commands, which are the present ones.
 
     The velocity of a joint with an `encoder_step` is the difference of two measured positions over the
