@@ -112,7 +112,7 @@ class ModelImu:
 
     def __init__(self, mount: Mount) -> None:
         self._mount = mount
-        self.deviation = mount.number("gaussianNoise", 0.0)
+        self.deviation = mount.deviation()
         self._turn = from_rpy(*numbers(mount.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
         self._model, self._link, self._offset = self._place(mount)
         self.rate = self._rate(mount)

@@ -80,6 +80,7 @@ class RayScene:
         self._world = world
         self._visuals = visuals
         self.targets: list[Target] = []
+        self._targets_of: dict[Model, list[Target]] = {}
         self._key: object = None
         self._is_fresh = False
         self._apart_meshes: dict[int, Any] = {}
@@ -184,8 +185,8 @@ class RayScene:
         room = np.einsum("ij,ij->i", ways, ways) - radii**2
         # A ray meets a ball if it lies within the cone of tangents. All do that start in it.
         tangents = np.where(room > 0.0, np.sqrt(np.maximum(room, 0.0)), -np.inf)
-        tangents[tangents > far] = np.inf
         least = (tangents - MARGIN * (1.0 + np.abs(tangents))).astype(np.float32)
+        least[tangents > far] = np.inf
         (x, y, z), (dx, dy, dz) = (
             ways.astype(np.float32).T[..., None],
             directions.astype(np.float32).T,
@@ -217,12 +218,13 @@ class RayScene:
     # --- what there is --------------------------------------------------------------------------
 
     def _build(self) -> None:
-        self.targets = targets = [
-            target
+        read, known = _seen if self._visuals else _solid, self._targets_of
+        self._targets_of = {
+            model: known.get(model)
+            or [target for link in model.description.links.values() for target in read(model, link)]
             for model in self._world.models.values()
-            for link in model.description.links.values()
-            for target in (_seen if self._visuals else _solid)(model, link)
-        ]
+        }
+        self.targets = targets = [each for found in self._targets_of.values() for each in found]
         count = len(targets)
         self._kinds = np.array([*(target.shape.kind for target in targets), ""])  # of NONE, too
         self._sizes = np.zeros((count, 3))

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 
 Measure = Callable[[int], None]
+SLOWEST = 1e-9  # [Hz]
 LONG_AGO = -(10**18)  # [ns]
 
 
@@ -39,7 +40,7 @@ class SensorClock:
 
     def set_rate(self, rate: float, begin: int, now: int) -> None:
         """Measures at whole periods of a rate [Hz] after `begin`, from `now` on [ns]; 0 is every step."""
-        self.period = round(NANOSECONDS / rate) if rate > 0.0 else 0  # [ns]
+        self.period = round(NANOSECONDS / max(rate, SLOWEST)) if rate > 0.0 else 0  # [ns]
         self.begin = begin
         self.plan(now)
 
@@ -133,7 +134,10 @@ class Schedule:
             clock.has_newcomer = False
             if clock.heard and not was_heard:
                 clock.plan(now)
-            is_old = clock.last is None or now - clock.last >= max(clock.period, 1)
+            # Who was sent the last one may be gone, unnoticed: what there is now is measured anew.
+            is_old = clock.last in (None, now, self.moved_at) or now - clock.last >= max(
+                clock.period, 1
+            )
             if clock.heard and came and clock.at_once and is_old:
                 fresh.append(clock)
         self._take_part()

@@ -9,7 +9,7 @@ from bullet_gazebo.physics.description import DescriptionError, Plugin, Sensor
 from bullet_gazebo.physics.files.sdf_parts import value
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.sensors.noise import generator
+from bullet_gazebo.sensors.noise import checked_deviation, generator
 from bullet_gazebo.sensors.rays import RayScene
 from bullet_gazebo.sensors.schedule import Schedule
 from bullet_gazebo.simulator import Simulator
@@ -81,6 +81,10 @@ class Mount:
     def number(self, tag: str, default: float) -> float:
         """Returns the number in the plugin's child element `tag`; a faulty one is a DescriptionError."""
         return value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)
+
+    def deviation(self) -> float:
+        """Returns the plugin's `<gaussianNoise>`; an impossible one is a DescriptionError."""
+        return checked_deviation(self.number("gaussianNoise", 0.0), "<gaussianNoise>")
 
     def among(self, tag: str, names: Sequence[str]) -> str:
         """Returns which of its model's `names` the element `tag` means; "" for none.

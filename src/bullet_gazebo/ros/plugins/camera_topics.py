@@ -67,7 +67,8 @@ class CameraTopics:
         self._frame = frame_of(scope, given)
         self.info = camera_info(context, camera, baseline)
         image = topic_in(scope, names[0])
-        self._image = topics.advertise(image, Image, QUEUE, latch=True)
+        colours = 3 * camera.width * camera.height
+        self._image = topics.advertise(image, Image, QUEUE, latch=True, content=colours)
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
         self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)
         service = topic_in(scope, f"{own}set_camera_info")

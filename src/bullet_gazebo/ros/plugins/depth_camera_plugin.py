@@ -46,8 +46,12 @@ class DepthCameraPlugin(SensorPlugin):
         def named(tag: str, default: str) -> str:
             return topic_in(scope, context.text(tag, default))
 
-        self._depth = topics.advertise(named("depthImageTopicName", "depth/image_raw"), Image)
-        self._cloud = topics.advertise(named("pointCloudTopicName", "points"), PointCloud2)
+        pixels = camera.width * camera.height
+        depth, points = "depthImageTopicName", "pointCloudTopicName"
+        self._depth = topics.advertise(named(depth, "depth/image_raw"), Image, content=4 * pixels)
+        self._cloud = topics.advertise(
+            named(points, "points"), PointCloud2, content=POINT_STEP * pixels
+        )
         self._depth_info = topics.advertise(
             named("depthImageCameraInfoTopicName", "depth/camera_info"),
             CameraInfo,

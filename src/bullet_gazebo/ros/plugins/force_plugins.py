@@ -36,7 +36,7 @@ class ForcePlugin(SensorPlugin):
     ) -> None:
         self._context = context
         self._meter = meter
-        self._deviation = context.number("gaussianNoise", 0.0)
+        self._deviation = context.deviation()
         topic = context.text("topicName", "")
         if not topic:
             raise DescriptionError("<topicName> is missing")

@@ -74,8 +74,9 @@ class HectorTimer:
         period = context.number("updatePeriod", 0.0)
         self.rate = 1.0 / period if period > 0.0 else context.number("updateRate", default)
         clock = context.clock(self.rate, self._measure, at_once=False)
-        offset = round(context.number("updateOffset", 0.0) * NANOSECONDS)
-        clock.set_rate(self.rate, offset % max(clock.period, 1) - max(clock.period, 1), self._last)
+        ticks = max(clock.period, 1)
+        offset = math.fmod(context.number("updateOffset", 0.0), ticks / NANOSECONDS)
+        clock.set_rate(self.rate, round(offset * NANOSECONDS) - ticks, self._last)
 
     def random(self, now: int) -> np.random.Generator:
         """Returns what draws the errors of a measurement at a time [ns]."""

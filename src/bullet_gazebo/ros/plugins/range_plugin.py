@@ -20,7 +20,7 @@ class RangePlugin(SensorPlugin):
     def __init__(self, context: PluginContext) -> None:
         own = context.number("updateRate", 0.0)
         self._topic = LaserTopic(context, Range, self._message, "/range", empty="/", own_rate=own)
-        self._deviation = context.number("gaussianNoise", 0.0)
+        self._deviation = context.deviation()
         self._is_sound = context.text("radiation", "infrared") == "ultrasound"
         self._field_of_view = context.number("fov", 0.05)
 

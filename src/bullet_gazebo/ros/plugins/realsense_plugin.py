@@ -93,7 +93,8 @@ class _Depths(_Eye):
 
     def open(self) -> None:
         context, topics = self.context, self.topics
-        self._depth = topics.advertise(topic_in(self.scope, self.topic), Image, QUEUE)
+        pixels, depth = self.camera.width * self.camera.height, topic_in(self.scope, self.topic)
+        self._depth = topics.advertise(depth, Image, QUEUE, content=2 * pixels)
         info = topic_in(self.scope, self.info_topic)
         self._info_topic = topics.advertise(info, CameraInfo, QUEUE)
         self._info = _centred(context, self.camera)
@@ -101,7 +102,7 @@ class _Depths(_Eye):
         self._cloud = None
         if truth(context.text("pointCloud", "false")):
             cloud = topic_in(self.scope, context.text("pointCloudTopicName", "depth/points"))
-            self._cloud = topics.advertise(cloud, PointCloud2)
+            self._cloud = topics.advertise(cloud, PointCloud2, content=32 * pixels)
         self._low = context.number("rangeMinDepth", 0.2)
         self._high = context.number("rangeMaxDepth", 10.0)
         self._near = context.number("pointCloudCutoff", 0.5)

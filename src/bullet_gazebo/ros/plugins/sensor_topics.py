@@ -18,6 +18,7 @@ from bullet_gazebo.sensors.schedule import SensorClock
 from bullet_gazebo.sensors.sensing import slower
 
 LOCKSTEP_QUEUE = 100  # messages of a sensor
+MOST_QUEUED = 32_000_000  # [bytes] of a topic
 MODEL = "<model>"  # where a namespace is the model's name
 
 
@@ -47,9 +48,13 @@ def frame_of(namespace: str, frame: str) -> str:
     return "/".join(filter(None, [*prefix.split("/"), *frame.split("/")]))
 
 
-def queue_of(context: PluginContext, size: int) -> int:
-    """Returns a topic's queue size: a long step makes many messages before rospy's threads send one."""
-    return max(size, LOCKSTEP_QUEUE) if context.sim.lockstep else size
+def queue_of(context: PluginContext, size: int, content: int = 0) -> int:
+    """Returns a topic's queue size: a long step makes many messages before rospy's threads send one.
+
+    `content` is that of a message [bytes]: who stops reading must not cost more than MOST_QUEUED.
+    """
+    most = min(LOCKSTEP_QUEUE, MOST_QUEUED // max(content, 1))
+    return max(size, most) if context.sim.lockstep else size
 
 
 class SensorPlugin:
@@ -132,10 +137,19 @@ class SensorTopics:
         self._clock.look()
 
     def advertise(
-        self, name: str, kind: type, queue: int = 1, latch: bool = False, wakes: bool = True
+        self,
+        name: str,
+        kind: type,
+        queue: int = 1,
+        latch: bool = False,
+        wakes: bool = True,
+        content: int = 0,
     ) -> Topic:
-        """Returns a topic; its subscribers start the measurements if it `wakes` the sensor."""
-        size = queue_of(self._context, queue)
+        """Returns a topic; its subscribers start the measurements if it `wakes` the sensor.
+
+        `content` is that of a large message [bytes].
+        """
+        size = queue_of(self._context, queue, content)
         topic = Topic(name, kind, size, latch, Newcomers(self._clock))
         self._context.closing(topic.close)
         if wakes:
