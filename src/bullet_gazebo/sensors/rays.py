@@ -3,14 +3,16 @@
 All shapes that never move are one Embree scene, which is built when one comes, goes or is moved. What moves,
 and large meshes, are met in their own frames, into which rays are brought: meshes by Embree scenes that are
 kept, boxes, balls and cylinders analytically. So nothing is built while things move. A ray is only compared
-with shapes whose bounding ball it meets.
+with shapes whose bounding ball it meets. Worlds of one process share the Embree scenes that are equal.
 """
 
+import hashlib
 import importlib.util
 import logging
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -84,7 +86,7 @@ class RayScene:
         self._targets_of: dict[Model, list[Target]] = {}
         self._key: object = None
         self._is_fresh = False
-        self._meshes: dict[object, Any] = {}
+        self._apart_meshes: dict[int, Any] = {}
 
     def expire(self) -> None:
         """Says that things may have moved: the next cast looks where they are."""
@@ -227,8 +229,7 @@ class RayScene:
         self._centres, self._radii = np.zeros((count, 3)), np.zeros(count)
         self._place(np.arange(count))
         self._planes = [i for i in range(count) if self._kinds[i] == "plane"]
-        self._apart_meshes, kept = {}, self._meshes
-        self._meshes = {}
+        self._apart_meshes, kept = {}, self._apart_meshes  # noqa: F841 - those that stay are found
         still, triangles, apart = [], [], []
         for index, target in enumerate(targets):
             shape = target.shape
@@ -244,11 +245,9 @@ class RayScene:
             apart.append(index)
             self._surround(index, corners)
             if shape.kind == "mesh":
-                key = shape.solid or shape.mesh, shape.size, target.number
-                self._meshes[key] = kept.get(key) or self._meshes.get(key) or Triangles([corners])
-                self._apart_meshes[index] = self._meshes[key]
+                self._apart_meshes[index] = _built([corners])
         self._still, self._apart = np.array([*still, NONE]), np.array(apart, int)
-        self._still_triangles = Triangles(triangles)
+        self._still_triangles = _built(triangles)
         self._curved = [kind for kind in CURVED if kind in self._kinds[still]]
         self._analytic = [kind for kind in DISTANCES if kind in self._kinds[apart]]
         moves = [not targets[index].model.description.static for index in apart]
@@ -383,3 +382,17 @@ class _EachTriangle:
 
 
 Triangles = _Embree if importlib.util.find_spec("embreex") else _EachTriangle
+BUILT: WeakValueDictionary[bytes, Any] = WeakValueDictionary()  # by the corners of its parts
+
+
+def _built(parts: list[np.ndarray]) -> Any:
+    """Returns the triangles of some parts: for equal ones the same, so worlds of a process share them."""
+    digest = hashlib.blake2b(Triangles.__name__.encode(), digest_size=16)
+    for corners in parts:
+        digest.update(repr(corners.shape).encode())
+        digest.update(np.ascontiguousarray(corners).data)
+    key = digest.digest()
+    found = BUILT.get(key)
+    if found is None:
+        found = BUILT[key] = Triangles(parts)
+    return found

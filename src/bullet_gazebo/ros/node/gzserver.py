@@ -157,7 +157,7 @@ class GazeboNode:
         if self.sim.lockstep:
             one_at_a_time = threading.Lock()
             stepping = [
-                StepService(self.sim, self._watchdog, one_at_a_time),
+                StepService(self.sim, plugins.sensing, self._watchdog, one_at_a_time),
                 AdvanceService(self.sim, self._watchdog, thinner, one_at_a_time),
             ]
         spawning = threading.Lock()
