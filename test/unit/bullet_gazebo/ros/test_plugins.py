@@ -12,8 +12,8 @@ import rospy
 from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.ros.plugins.bumper_plugin import collision_named
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
+from bullet_gazebo.sensors.contact import collision_named
 from bullet_gazebo.simulator import Simulator
 
 BOX = """<robot name="box"><link name="body"><inertial><mass value="1"/>
