@@ -5,8 +5,6 @@ As the camera's plugin, with pictures at ir/image_raw, and `depthImageTopicName`
 (0.4 m), `useDepth16UC1Format` (false), and `pointCloudCutoffMax` (5 m), which only the second one reads.
 """
 
-import math
-
 import numpy as np
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header
@@ -16,14 +14,13 @@ from bullet_gazebo.ros.plugins.camera_topics import (
     QUEUE,
     CameraTopics,
     offer_rate,
-    rate_of,
     scope_of,
+    show_camera,
 )
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, SensorTopics, sensor_of, topic_in
-from bullet_gazebo.sensors.pinhole import PinholeCamera, camera_of
+from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, SensorTopics, topic_in
+from bullet_gazebo.sensors.pinhole import KINECT, DepthSensor, PinholeCamera
 
-KINDS = ("depth", "depth_camera", "rgbd_camera")
 POINT_STEP = 32
 FIELDS = {"x": 0, "y": 4, "z": 8, "rgb": 16}
 POINT = np.dtype(
@@ -40,11 +37,10 @@ class DepthCameraPlugin(SensorPlugin):
     is_organised = False  # whether a cloud has the picture's rows
 
     def __init__(self, context: PluginContext) -> None:
-        self._context = context
-        self._sensor = sensor = sensor_of(context, KINDS)
-        self._camera = camera = camera_of(sensor)
+        self._sensor = sensor = DepthSensor(context)
+        camera = sensor.camera
         scope = scope_of(context)
-        self._topics = topics = SensorTopics(context, rate_of(context, sensor), self._measure)
+        topics = SensorTopics(context, sensor.rate, self._measure)
         offer_rate(context, topics, scope)
         names = (
             context.text("imageTopicName", "ir/image_raw"),
@@ -56,26 +52,26 @@ class DepthCameraPlugin(SensorPlugin):
         def named(tag: str, default: str) -> str:
             return topic_in(scope, context.text(tag, default))
 
-        self._depth = topics.advertise(named("depthImageTopicName", "depth/image_raw"), Image)
-        self._cloud = topics.advertise(named("pointCloudTopicName", "points"), PointCloud2)
+        pixels = camera.width * camera.height
+        depth = named("depthImageTopicName", "depth/image_raw")
+        cloud = named("pointCloudTopicName", "points")
+        self._depth = topics.advertise(depth, Image, content=4 * pixels)
+        self._cloud = topics.advertise(cloud, PointCloud2, content=POINT_STEP * pixels)
+        for name, kind in ((depth, Image), (cloud, PointCloud2)):
+            show_camera(context, name, kind, camera)
         self._depth_info = topics.advertise(
             named("depthImageCameraInfoTopicName", "depth/camera_info"),
             CameraInfo,
             QUEUE,
             wakes=False,
         )
-        self._low = context.number("pointCloudCutoff", 0.4)
-        self._high = context.number("pointCloudCutoffMax", 5.0) if self.is_organised else math.inf
         self._in_millimetres = truth(context.text("useDepth16UC1Format", "false"))
 
     def _measure(self, now: int) -> None:
-        link = self._context.model.link_state(self._sensor.link)[0]
-        in_colour = self._pictures.wants_colour or self._cloud.is_heard
-        picture = self._camera.picture(self._context.sensing.visuals, link, in_colour)
+        picture = self._sensor.view(self._pictures.wants_colour or self._cloud.is_heard)
         self._pictures.send(picture, now)
         header = self._pictures.header(now)
-        depths = np.minimum(picture.depths, self._camera.far)
-        depths[(depths <= self._low) | (depths > self._high)] = np.nan
+        depths = self._sensor.depths(picture)
         if self._depth.is_heard:
             self._depth.publish(to_depth_image(depths, self._in_millimetres, header))
         if self._depth_info.is_heard:
@@ -84,7 +80,7 @@ class DepthCameraPlugin(SensorPlugin):
             self._depth_info.publish(info)
         if self._cloud.is_heard:
             self._cloud.publish(
-                to_cloud(depths, picture.colours, self._camera, self.is_organised, header)
+                to_cloud(depths, picture.colours, self._sensor.camera, self.is_organised, header)
             )
 
 
@@ -130,5 +126,5 @@ def to_cloud(
 
 LIBRARIES = {
     "libgazebo_ros_depth_camera.so": DepthCameraPlugin,
-    "libgazebo_ros_openni_kinect.so": KinectPlugin,
+    KINECT: KinectPlugin,
 }

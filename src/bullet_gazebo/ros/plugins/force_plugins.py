@@ -19,10 +19,10 @@ from bullet_gazebo.ros.plugins.sensor_topics import (
     SensorTopic,
     frame_of,
     namespace_of,
-    sensor_of,
     topic_in,
 )
 from bullet_gazebo.sensors.force_torque import JointForces, LinkForces
+from bullet_gazebo.sensors.sensing import sensor_of
 
 
 class ForcePlugin(SensorPlugin):
@@ -36,7 +36,7 @@ class ForcePlugin(SensorPlugin):
     ) -> None:
         self._context = context
         self._meter = meter
-        self._deviation = context.number("gaussianNoise", 0.0)
+        self._deviation = context.deviation()
         topic = context.text("topicName", "")
         if not topic:
             raise DescriptionError("<topicName> is missing")

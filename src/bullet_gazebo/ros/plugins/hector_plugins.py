@@ -25,18 +25,15 @@ from bullet_gazebo.physics.pose import conjugate, from_rpy, multiply, rotate
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import NANOSECONDS, to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.range_plugin import nearest
 from bullet_gazebo.ros.plugins.sensor_topics import (
     SensorPlugin,
     namespace_of,
     queue_of,
-    scan_of,
-    sensor_of,
     topic_in,
 )
 from bullet_gazebo.sensors.drift import DriftingError
 from bullet_gazebo.sensors.imu import Imu, LinkMotion, motion_of
-from bullet_gazebo.sensors.laser import KINDS, Laser
+from bullet_gazebo.sensors.laser import LaserSensor, nearest
 
 MOST = 1e6  # that dynamic_reconfigure sets
 EQUATOR = 6378137.0  # [m], radius of WGS84
@@ -77,8 +74,9 @@ class HectorTimer:
         period = context.number("updatePeriod", 0.0)
         self.rate = 1.0 / period if period > 0.0 else context.number("updateRate", default)
         clock = context.clock(self.rate, self._measure, at_once=False)
-        offset = round(context.number("updateOffset", 0.0) * NANOSECONDS)
-        clock.set_rate(self.rate, offset % max(clock.period, 1) - max(clock.period, 1), self._last)
+        ticks = max(clock.period, 1)
+        offset = math.fmod(context.number("updateOffset", 0.0), ticks / NANOSECONDS)
+        clock.set_rate(self.rate, round(offset * NANOSECONDS) - ticks, self._last)
 
     def random(self, now: int) -> np.random.Generator:
         """Returns what draws the errors of a measurement at a time [ns]."""
@@ -295,8 +293,7 @@ class HectorSonarPlugin(SensorPlugin):
     """The nearest range of a laser's rays."""
 
     def __init__(self, context: PluginContext) -> None:
-        self._context = context
-        self._laser = Laser(sensor_of(context, KINDS))
+        self._sensor = LaserSensor(context)
         self._error = DriftingError(_reader(context), "")
         self._timer = timer = HectorTimer(context, SONAR_RATE, (self._error,), self._publish)
         self._frame = context.text("frameId", "/sonar_link")
@@ -304,10 +301,11 @@ class HectorSonarPlugin(SensorPlugin):
         self._publisher = rospy.Publisher(
             topic, Range, queue_size=queue_of(context, 1), tcp_nodelay=True
         )
+        context.show(topic, Range, self._sensor.sensor.link, self._sensor.sensor.pose)
 
     def _publish(self, now: int, seconds: float) -> None:
-        laser, random = self._laser, self._timer.random(now)
-        exact = nearest(scan_of(self._context, laser, random), laser, 0.0, random)
+        laser, random = self._sensor.laser, self._timer.random(now)
+        exact = nearest(self._sensor.scan(random), laser, 0.0, random)
         found = float(self._error.applied(np.full(3, exact), seconds, random)[0])
         self._publisher.publish(
             Range(

@@ -47,7 +47,7 @@ class P3dPlugin(SensorPlugin):
         self._reference = None if frame in WORLDS else _link_of(context, frame)
         self._xyz = numbers(context.text("xyzOffset", "0 0 0"), "<xyzOffset>", 3)
         self._turn = from_rpy(*numbers(context.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
-        self._deviation = context.number("gaussianNoise", 0.0)
+        self._deviation = context.deviation()
         namespace = namespace_of(context, absent="", empty="/")
         self._frame = frame_of(namespace, frame)
         rate = context.number("updateRate", 0.0)

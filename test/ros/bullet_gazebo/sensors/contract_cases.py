@@ -2,8 +2,12 @@
 
 import itertools
 import math
+import signal
+import subprocess
+import xmlrpc.client
 
 import numpy as np
+import rosgraph
 import rospy
 from bullet_gazebo_msgs.srv import StepWorldRequest
 from gazebo_msgs.msg import ContactsState, LinkState, ModelState
@@ -13,6 +17,7 @@ from nav_msgs.msg import Odometry
 from sensor_case import MS, UPRIGHT, SensorCase
 from sensor_msgs.msg import CameraInfo, Image, Imu, LaserScan, PointCloud, PointCloud2, Range
 from std_srvs.srv import Empty
+from support.memory import resident
 from support.ros.calls import call, wait_until
 
 G = 9.8  # [m/s²]
@@ -51,6 +56,11 @@ TOP = """<sdf version="1.6"><model name="top"><link name="l"><sensor name="i" ty
 </pose><update_rate>100</update_rate><plugin name="p" filename="libgazebo_ros_imu_sensor.so">
 <frameName>f</frameName><topicName>outer_imu</topicName><updateRateHZ>100</updateRateHZ></plugin></sensor>
 </link></model></sdf>"""
+LARGE = """<sdf version="1.6"><model name="large"><static>1</static><link name="l">
+<sensor name="s" type="depth"><pose>0 0 0.3 0 0 0</pose>
+<update_rate>100</update_rate><camera><image><width>320</width><height>240</height>
+</image></camera><plugin name="p" filename="libgazebo_ros_openni_kinect.so"><cameraName>large</cameraName>
+</plugin></sensor></link></model></sdf>"""
 TOPICS = {  # of the bot: type, and period [ms]
     "/scan": (LaserScan, 100), "/cloud": (PointCloud2, 100), "/block": (PointCloud, 100),
     "/range": (Range, 100), "/sonar": (Range, 100), "/bumper_states": (ContactsState, 10),
@@ -205,6 +215,26 @@ class Contract(SensorCase):
             gaps = {later - earlier for earlier, later in itertools.pairwise(after)}
             self.assertLessEqual(max(gaps), 2 * period * MS, topic)
 
+    def test_a_subscriber_that_stops_reading_costs_no_memory(self):
+        """200 MB of clouds are sent to it."""
+        self.spawn("large", LARGE, x=-5.0)
+        heard = self.hear("/large/depth/image_raw", Image, read=stamp)
+        with subprocess.Popen(
+            ["rostopic", "echo", "--noarr", "/large/points/header"], stdout=subprocess.PIPE
+        ) as stopped:
+            try:
+                assert stopped.stdout.readline()  # a newcomer's
+                stopped.send_signal(signal.SIGSTOP)
+                before = resident(simulator())
+                for _ in range(8):
+                    now = self.step(100)
+                assert heard.wait_for(lambda stamps: stamps[-1] >= now)
+                self.assertLess(resident(simulator()) - before, 100e6)
+            finally:
+                stopped.kill()
+        now = self.step(20)
+        assert heard.wait_for(lambda stamps: stamps[-1] >= now)
+
     def test_whatever_moves_the_bot_brings_a_fresh_scan(self):
         heard = self.hear("/scan", LaserScan)
         self.step(150)
@@ -224,6 +254,12 @@ class Contract(SensorCase):
             message = heard.after(count + 1)[count]
             self.assertEqual(stamp(message), 150 * MS)
             self.assertAlmostEqual(message.ranges[0], expected, delta=0.05)
+
+
+def simulator():
+    """The process of the simulator."""
+    with xmlrpc.client.ServerProxy(rosgraph.Master("").lookupNode("/gazebo")) as node:
+        return node.getPid("/test")[2]
 
 
 def stamp(message):

@@ -64,8 +64,8 @@ class SensorCase(unittest.TestCase):
         state.twist = Twist(Vector3(), Vector3(0.0, 0.0, turning))
         self.assertTrue(call("/gazebo/set_model_state", SetModelState, state).success)
 
-    def hear(self, name, kind):
-        heard = Heard(name, kind)
+    def hear(self, name, kind, **options):
+        heard = Heard(name, kind, **options)
         self.addCleanup(heard.close)
         return heard
 

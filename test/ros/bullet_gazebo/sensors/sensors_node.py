@@ -190,11 +190,12 @@ class Sensors(SensorCase):
         config = DynamicClient("/eye", timeout=60.0)
         heard = self.hear("/eye/image_raw", Image)
         self.step(300)
-        self.assertEqual(heard.stamps(4), [0, 100 * MS, 200 * MS, 300 * MS])
+        heard.from_time(300 * MS)
         config.update_configuration({"imager_rate": 20.0})
         self.addCleanup(config.update_configuration, {"imager_rate": 10.0})
-        self.step(100)
-        self.assertEqual(heard.stamps(6)[4:], [350 * MS, 400 * MS])
+        heard.from_time(self.step(100))
+        stamps = sorted(set(heard.stamps(1)))
+        self.assertEqual(stamps[1:], [each * MS for each in (100, 200, 300, 350, 400)])
 
     def test_hectors_imu_has_biases_and_an_error_model(self):
         before = self.newest("/hector", Imu).linear_acceleration.z
