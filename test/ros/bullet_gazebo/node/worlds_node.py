@@ -24,7 +24,7 @@ from gazebo_msgs.srv import (
     SpawnModelRequest,
 )
 from geometry_msgs.msg import Point, Pose, Quaternion
-from support.ros.calls import BOUND, call
+from support.ros.calls import BOUND, call, executable
 
 from ros_utils import ros_gazebo
 
@@ -242,16 +242,18 @@ class OddFiles(unittest.TestCase):
     def test_spawn_model_reads_files_of_every_encoding(self):
         declaration = '\n<!-- mine -->\n<?xml version="1.0" encoding="{0}"?>\r\n<!-- Gelände -->'
         with tempfile.NamedTemporaryFile(suffix=".sdf") as file:
-            for encoding in ("utf-8-sig", "utf-16", "latin-1"):
+            for encoding, source in (
+                ("utf-8-sig", ["-file", file.name]), ("utf-16", ["-stdin"]),
+                ("latin-1", ["-file", file.name]),
+            ):  # fmt: skip
                 text = declaration.format(encoding.removesuffix("-sig")) + BOX.format(more="")
                 with open(file.name, "wb") as written:
                     written.write(text.encode(encoding))
-                command = ["rosrun", "gazebo_ros", "spawn_model", "-sdf", "-model", "from_file"]
-                for source in (["-file", file.name], ["-stdin"]):
-                    with open(file.name, "rb") as piped:
-                        code = subprocess.call([*command, *source, "-x", "60"], stdin=piped)
-                    self.assertEqual(code, 0, (encoding, source))
-                    self.assertTrue(delete("from_file").success)
+                command = [executable("gazebo_ros", "spawn_model"), "-sdf", "-model", "from_file"]
+                with open(file.name, "rb") as piped:
+                    code = subprocess.call([*command, *source, "-x", "60"], stdin=piped)
+                self.assertEqual(code, 0, (encoding, source))
+                self.assertTrue(delete("from_file").success)
                 self.assertTrue(ros_gazebo.gazebo_spawn_sdf_path(file.name, "from_file", pos_x=60))
                 self.assertTrue(delete("from_file").success)
 
@@ -266,7 +268,7 @@ class OddFiles(unittest.TestCase):
         text = URDF.replace('type="fixed"', 'type="continuous"').replace("</robot>", transmission)
         xml = f'\ufeff\r\n<!-- mine -->\r\n<?xml version="1.0" encoding="ISO-8859-1"?>\r\n{text}'
         rospy.set_param("/odd/robot_description", xml)
-        command = ["rosrun", "gazebo_ros", "spawn_model", "-urdf", "-model", "odd", "-x", "70",
+        command = [executable("gazebo_ros", "spawn_model"), "-urdf", "-model", "odd", "-x", "70",
                    "-param", "/odd/robot_description", "-robot_namespace", "/odd"]  # fmt: skip
         self.assertEqual(subprocess.call(command), 0)
         rospy.wait_for_service("/odd/controller_manager/list_controllers", BOUND)
