@@ -53,8 +53,8 @@ def _umask() -> int:
     return mask
 
 
-NAMES = [
-    "123", "yes", "~", "- a", "a: b", "{x}", '"""', 'a"b', "a<b>&", "a'b", "a\\b", "#", "${1 / 0}",
+NAMES = [  # each gives its controller another name
+    "123", "yes", "~", "- a", "a: b", "{x}", '"""', 'c"d', "e<f>&", "g'h", "i\\j", "#k", "${1 / 0}",
     "$(cwd)", "x\"] + [__import__('os').mkdir('owned')] + [\"",
 ]  # fmt: skip
 

@@ -28,6 +28,7 @@ from support.ros.calls import BOUND, call, executable
 
 from ros_utils import ros_gazebo
 
+STILL = 0.2  # [s of simulated time]
 UNKNOWN = (
     "GazeboRosApiPlugin SpawnModel Failure: input model_xml not SDF or URDF, or cannot be converted "
     "to Gazebo compatible format."
@@ -76,15 +77,16 @@ def models():
 
 
 def resting_height(name):
-    """Waits until `name` has come to rest; returns the height [m] of its origin."""
-    deadline = time.monotonic() + BOUND
-    last = None
+    """Waits until `name` has stood still for a time of the simulation's; returns its origin's height [m]."""
+    deadline, before = time.monotonic() + BOUND, None
     while time.monotonic() < deadline:
-        height = position(name).z
-        if last is not None and abs(height - last) < 1e-5:
-            return height
-        last = height
-        time.sleep(0.2)
+        found = call("/gazebo/get_model_state", GetModelState, name, "")
+        now, height = found.header.stamp.to_sec(), found.pose.position.z
+        if before is None or now - before[0] > STILL:
+            if before is not None and abs(height - before[1]) < 1e-5:
+                return height
+            before = now, height
+        time.sleep(0.05)
     raise AssertionError(f"{name} still moves")
 
 
