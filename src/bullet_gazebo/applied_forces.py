@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from bullet_gazebo.physics.model import Model
-from bullet_gazebo.physics.pose import Pose, Vector, add, cross, rotate
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, rotate
 
 Wrench = tuple[Vector, Vector]
 """Force [N] and torque [N m]."""
@@ -66,6 +66,23 @@ class AppliedForces:
         names = set(model.all_joints)
         self.wrenches = [each for each in self.wrenches if each.model is not model]
         self.efforts = [each for each in self.efforts if each.joint not in names]
+
+    def wrench_on(self, model: Model, link: str, now: int) -> Wrench:
+        """Returns what acts on a link in the step that ends at `now` [ns]."""
+        acting = [
+            each.wrench
+            for each in self.wrenches
+            if each.model is model and each.link == link and each.interval.covers(now)
+        ]
+        return acting[-1] if acting else (ZERO, ZERO)
+
+    def effort_on(self, model: Model, joint: str, now: int) -> float:
+        """Returns the effort [N m, N] on a movable joint in the step that ends at `now` [ns]."""
+        return sum(
+            _truncated(each)
+            for each in self.efforts
+            if each.model is model and each.joint == joint and each.interval.covers(now)
+        )
 
     def apply(self, now: int) -> None:
         """Applies what acts in the step that ends at `now` [ns], and drops what is over."""

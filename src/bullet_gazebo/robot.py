@@ -189,6 +189,10 @@ class ControlledRobot:
             self._drive(dt)
         self.model.body.apply_efforts(efforts)
 
+    def effort_on(self, joint: str) -> float:
+        """Returns the effort [N m, N] that it has applied to a movable joint in the last step."""
+        return self._efforts[self.model.joint_index(joint)]
+
     def _halt(self) -> None:
         """Replaces the commands in an emergency stop (docs/contract/gazebo_ros_control.md 6.7)."""
         for joint, _, index in self._effort_joints:

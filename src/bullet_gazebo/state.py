@@ -263,6 +263,8 @@ class StateQuery:
         links: links whose states are wanted.
         contacts_of: names of models, links or collisions, plain or scoped, whose contacts are wanted.
         all_contacts: whether all contacts are wanted instead.
+        sensors: names of sensors whose last measurements are wanted, plain or model::sensor; see
+            `bullet_gazebo.sensors.sensor_readers`, which reads them.
     """
 
     models: tuple[str, ...] = ()
@@ -270,6 +272,7 @@ class StateQuery:
     links: tuple[LinkQuery, ...] = ()
     contacts_of: tuple[str, ...] = ()
     all_contacts: bool = False
+    sensors: tuple[str, ...] = ()
 
 
 NOTHING = StateQuery()

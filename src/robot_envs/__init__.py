@@ -40,6 +40,7 @@ __all__ = [
     "Motion",
     "Object",
     "Pose",
+    "Reading",
     "Robot",
     "RobotEnv",
     "RobotEnvError",

@@ -132,7 +132,7 @@ def _check_query(where: str, query: Any) -> None:
     for each in query.links:
         if not isinstance(each, LinkQuery):
             raise TaskError(f'{where}: links lists LinkQuery("NAME"), not {each!r}')
-    for what in ("models", "contacts_of"):
+    for what in ("models", "contacts_of", "sensors"):
         names = getattr(query, what)
         if isinstance(names, str):
             raise TaskError(f"{where}: {what} lists names: ({names!r},), and not {names!r}")

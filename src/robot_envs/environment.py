@@ -22,6 +22,7 @@ from robot_envs.variation.imperfections import Actuator, Noise, Sensor
 from robot_envs.variation.randomisation import UniformRandomisation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState, both, part_of
 
+MOST_SEED = 2**32  # of the sensors' noise
 RESET_OPTIONS = ("initial_state", "goal")
 
 
@@ -71,7 +72,7 @@ class RobotEnv(DrawnEnv):
         deadline: wall time that a simulator over ROS in lock-step may take for an answer, on top of 10 ms for
             each physics step [s]; None: 5 s, and 30 s for "ros-own", of which there may be many.
         max_steps: after how many steps an episode is truncated; None: the task's.
-        sensor_noise: standard deviation of noise on joints' positions and velocities; see `Sensor`.
+        sensor_noise: standard deviation of noise on what joints and sensors measure; see `Sensor`.
         sensor_delay: age of an observation [control steps].
         encoder_step: resolution of position sensors [rad, m]; see `Sensor`.
         action_delay: how many control steps pass before a command arrives.
@@ -122,7 +123,8 @@ class RobotEnv(DrawnEnv):
         self._adopt(task)
         self.control_period = period = _control_period(scene, control_period)
         nominal = period if period > 0.0 else scene.robots[0].control_period  # [s]
-        sensor = Sensor(scene.joints, nominal, sensor_noise, sensor_delay, encoder_step)
+        names = task.query.sensors
+        sensor = Sensor(scene.joints, nominal, sensor_noise, sensor_delay, encoder_step, names)
         self._sensor = None if sensor.is_exact else sensor
         holds = {name: port.holds for name, (_, port) in scene.ports.items()}
         actuator = Actuator(holds, nominal, action_delay, actuator_limit, actuator_lag)
@@ -161,6 +163,7 @@ class RobotEnv(DrawnEnv):
         """Takes the task's spaces, and what checks actions and observations against them."""
         self.task = task
         self._hides = task.reward_query != StateQuery()  # from `apply` and `observe`
+        self._has_sensors = bool(task.query.sensors or task.reward_query.sensors)
         self.action_space = checks.made_space(task, "action_space")
         self.observation_space = space = checks.made_space(task, "observation_space")
         self._read_action = checks.action_reader(self.action_space)
@@ -234,7 +237,8 @@ class RobotEnv(DrawnEnv):
             self.np_random
         )  # even if it isn't used: streams stay the same
         self._initial = initial = options.get("initial_state", drawn)
-        state = self.backend.reset(initial)
+        seed = int(self.np_random.integers(1, MOST_SEED)) if self._has_sensors else 0
+        state = self.backend.reset(initial, seed)
         self._first = self.scene.commands(initial.commands)
         if self._first:
             state = state._replace(commands={**state.commands, **self._first})

@@ -59,6 +59,7 @@ class Robot:
         description: the parameter that holds the URDF over ROS, in the namespace.
         publisher: the controller that publishes its joint states over ROS.
         rviz: package and name of a launch file that shows it in RViz; None: there is none.
+        sensor_topics: topics of sensors in real time, by the sensor's name, where plugins name others.
     """
 
     urdf: Source | Callable[[], Source]
@@ -76,6 +77,7 @@ class Robot:
     description: str = "robot_description"
     publisher: str = "joint_state_controller"
     rviz: tuple[str, str] | None = None
+    sensor_topics: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def xml(self) -> str:

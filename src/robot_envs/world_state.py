@@ -6,6 +6,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector
 from bullet_gazebo.physics.world import seen_from
+from bullet_gazebo.sensors.sensor_reading import Reading
 from bullet_gazebo.state import ContactPair, LinkQuery, StateQuery
 from file_access.text import did_you_mean
 
@@ -18,6 +19,7 @@ __all__ = [
     "LinkQuery",
     "Motion",
     "Pose",
+    "Reading",
     "StateQuery",
     "Twist",
     "WorldState",
@@ -104,6 +106,13 @@ class Models(_Entries[Motion]):
     what, hint = "model", "; the task's query names those that a state has"
 
 
+class Sensors(_Entries[Reading]):
+    """Sensors by their names in the query."""
+
+    __slots__ = ()
+    what, hint = "sensor", "; the task's query names those that a state has"
+
+
 class WorldState(NamedTuple):
     """The world after a reset or a control period: bit-identical in-process and over ROS in lock-step.
 
@@ -115,6 +124,7 @@ class WorldState(NamedTuple):
     | `links` | links that the task's query names, by that name, each in the frame asked for |
     | `models` | models that the query names, in the world frame |
     | `contacts` | contacts of the last physics step that the query asks for; none right after a reset |
+    | `sensors` | the last `Reading` of each sensor that the query names, by that name |
     """
 
     time: float
@@ -123,6 +133,7 @@ class WorldState(NamedTuple):
     links: Mapping[str, Motion] = Links()
     models: Mapping[str, Motion] = Models()
     contacts: Sequence[ContactPair] = ()
+    sensors: Mapping[str, Reading] = Sensors()
 
 
 @dataclass(frozen=True)
@@ -156,12 +167,13 @@ def both(first: StateQuery, second: StateQuery) -> StateQuery:
 
 
 def part_of(state: WorldState, query: StateQuery) -> WorldState:
-    """Returns a state without the links and models that a query doesn't name; contacts stay all, or none."""
+    """Returns a state with what a query names alone; contacts stay all, or none."""
     links = Links((name, state.links[name]) for name in link_keys(query))
     named = Models((name, state.models[name]) for name in query.models)
     contacts = state.contacts if query.all_contacts or query.contacts_of else ()
     models = state.models if query.all_models else named
-    return state._replace(links=links, models=models, contacts=contacts)
+    sensors = Sensors((name, state.sensors[name]) for name in query.sensors)
+    return state._replace(links=links, models=models, contacts=contacts, sensors=sensors)
 
 
 def link_keys(query: StateQuery) -> list[str]:

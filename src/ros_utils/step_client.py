@@ -11,6 +11,7 @@ from numbers import Integral
 from typing import Any, NamedTuple
 
 import genpy
+from bullet_gazebo_msgs.msg import SensorReading
 from bullet_gazebo_msgs.srv import (
     PreparedStep,
     PreparedStepRequest,
@@ -54,6 +55,7 @@ class StepNames(NamedTuple):
     frames: tuple[str, ...] = ()
     all_contacts: bool = False
     contacts_of: tuple[str, ...] = ()
+    sensors: tuple[str, ...] = ()
 
 
 class StepAnswer(NamedTuple):
@@ -64,6 +66,7 @@ class StepAnswer(NamedTuple):
     models: Sequence[str]
     numbers: Sequence[float]  # see PreparedStep.srv
     contacts: Sequence[ContactState]
+    sensors: Sequence[SensorReading]
 
 
 class PreparedSteps:
@@ -142,8 +145,9 @@ class PreparedSteps:
             raise StepRefused(answer.status_message)
         prepared = self._prepared[names]
         return StepAnswer(
-            answer.now, prepared.joints, prepared.models, answer.numbers, answer.contacts
-        )
+            answer.now, prepared.joints, prepared.models, answer.numbers, answer.contacts,
+            answer.sensors,
+        )  # fmt: skip
 
     def close(self) -> None:
         """Closes the connections; the next call opens new ones."""

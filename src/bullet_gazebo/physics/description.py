@@ -139,11 +139,15 @@ class Joint:
 
 @dataclass(frozen=True)
 class Plugin:
-    """A `<plugin>` element of a model. The library's file name selects the code."""
+    """A `<plugin>` element of a model. The library's file name selects the code.
+
+    `scope` is the nested model that it belongs to, if it is a model's plugin.
+    """
 
     filename: str
     name: str
     element: Element
+    scope: str = ""
 
 
 def library_of(filename: str) -> str:
@@ -161,7 +165,8 @@ def is_control_plugin(filename: str) -> bool:
 class Sensor:
     """A `<sensor>` element: at `pose` in its link, which it measures from.
 
-    `rate` is in Hz of simulated time; 0 is every step. What each kind measures: `bullet_gazebo.sensors`.
+    `rate` is in Hz of simulated time; 0 is every step. `joint` is the one that has it, whose child the link
+    is. What each kind measures: `bullet_gazebo.sensors`.
     """
 
     name: str
@@ -171,6 +176,7 @@ class Sensor:
     rate: float
     plugins: tuple[Plugin, ...]
     element: Element
+    joint: str = ""
 
 
 @dataclass

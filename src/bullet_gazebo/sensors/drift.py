@@ -1,6 +1,6 @@
 """The error model of hector's sensors: scale, offset, drift and noise (docs/contract/sensors.md 12.1)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -22,22 +22,22 @@ class DriftingError:
 
         self.offset = read(named("Offset"), 0.0)
         self.drift = read(named("Drift"), 0.0)
-        self._frequency = read(named("DriftFrequency"), 1.0 / HOUR)  # [Hz]
+        self.frequency = read(named("DriftFrequency"), 1.0 / HOUR)  # [Hz]
         noise = read("gaussianNoise", 0.0) if prefix in ("accel", "rate") else np.zeros(AXES)
         own = read(named("GaussianNoise"), 0.0)
         self.noise = np.where(own != 0.0, own, noise)
-        self._scale = read(named("ScaleError"), 1.0)
+        self.scale = read(named("ScaleError"), 1.0)
         self.bias = np.zeros(AXES)  # the drift at present
 
     def applied(
         self, values: np.ndarray, seconds: float, random: np.random.Generator
     ) -> np.ndarray:
         """Returns `values` (3,) with the error after another time [s]."""
-        walk = random.normal(0.0, 1.0, AXES) * np.sqrt(2.0 * self._frequency) * self.drift
-        self.bias = np.exp(-seconds * self._frequency) * self.bias + seconds * walk
+        walk = random.normal(0.0, 1.0, AXES) * np.sqrt(2.0 * self.frequency) * self.drift
+        self.bias = np.exp(-seconds * self.frequency) * self.bias + seconds * walk
         noise = random.normal(0.0, 1.0, AXES) * self.noise
-        return np.asarray(self._scale * values + self.offset + self.bias + noise)
+        return np.asarray(self.scale * values + self.offset + self.bias + noise)
 
-    def restart(self) -> None:
-        """Begins with no drift."""
-        self.bias = np.zeros(AXES)
+    def restart(self, bias: Sequence[float] = (0.0,) * AXES) -> None:
+        """Begins with a drift of `bias`."""
+        self.bias = np.array(bias, float)

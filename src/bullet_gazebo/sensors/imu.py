@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.files.elements import numbers, truth
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import (
     Pose,
@@ -12,10 +14,14 @@ from bullet_gazebo.physics.pose import (
     add,
     conjugate,
     cross,
+    from_rpy,
+    multiply,
     rotate,
     scale,
     subtract,
 )
+from bullet_gazebo.sensors.noise import read_noise
+from bullet_gazebo.sensors.sensing import Mount, sensor_of, slower
 
 NANOSECONDS = 1_000_000_000
 HERE = Pose()
@@ -59,6 +65,10 @@ class Imu:
         self._longest = 1.5 * NANOSECONDS * max(1.0 / rate if rate else 0.0, LONGEST_STEP)  # [ns]
         self._last: tuple[int, int, Vector] | None = None  # time [ns], moves, velocity [m/s]
 
+    def start(self) -> None:
+        """Begins at rest, if it hasn't begun: so the next measurement has something to compare with."""
+        self._last = self._last or (0, -1, (0.0, 0.0, 0.0))
+
     def measure(
         self, now: int, moves: int, motion: LinkMotion, gravity: Vector
     ) -> InertialSample | None:
@@ -83,6 +93,107 @@ class Imu:
         return InertialSample(
             motion.pose.orientation, rotate(back, motion.angular), rotate(back, acceleration)
         )
+
+
+class ModelImu:
+    """The IMU of a model, which feels no gravity (docs/contract/sensors.md 3b).
+
+    Of its plugin, `bodyName`, which is required, `updateRate` (0 Hz), `gaussianNoise` (0) and `rpyOffset` are
+    read.
+
+    Args:
+        mount: its place.
+
+    Raises:
+        DescriptionError: if an element is missing or wrong.
+    """
+
+    feels_gravity = False
+
+    def __init__(self, mount: Mount) -> None:
+        self._mount = mount
+        self.deviation = mount.deviation()
+        self._turn = from_rpy(*numbers(mount.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
+        self._model, self._link, self._offset = self._place(mount)
+        self.rate = self._rate(mount)
+        self._imu = Imu(self.feels_gravity, self.rate)
+
+    def _place(self, mount: Mount) -> tuple[Model, str, Pose]:
+        name = mount.text("bodyName", "")
+        if not name:
+            raise DescriptionError("<bodyName> is missing")
+        if own := mount.among("bodyName", mount.model.link_names):
+            return mount.model, own, HERE
+        found = mount.sim.world.link(name)
+        if found is None:
+            raise DescriptionError(f"<bodyName>: there is no link '{name}'")
+        return (*found, HERE)
+
+    def _rate(self, mount: Mount) -> float:
+        return mount.number("updateRate", 0.0)
+
+    def start(self) -> None:
+        """Lets the next measurement be one, without acceleration, if it is the first."""
+        self._imu.start()
+
+    def measure(self, now: int) -> InertialSample | None:
+        """Returns a measurement at a time [ns]; None for the first one."""
+        mount = self._mount
+        motion = motion_of(self._model, self._link, self._offset)
+        gravity, moves = mount.sim.world.gravity, mount.sensing.schedule.moves
+        sample = self._imu.measure(now, moves, motion, gravity)
+        if sample is None:
+            return None
+        sample = sample._replace(orientation=multiply(self._turn, sample.orientation))
+        random = mount.random(now)
+        return with_noise(self._distorted(sample, random), self.deviation, random)
+
+    def _distorted(self, sample: InertialSample, random: np.random.Generator) -> InertialSample:
+        return sample
+
+    def values(self, now: int) -> dict[str, np.ndarray] | None:
+        """Returns what an `InertialSample` has, as arrays."""
+        sample = self.measure(now)
+        return sample and {name: np.array(each) for name, each in sample._asdict().items()}
+
+
+class ImuSensor(ModelImu):
+    """A sensor of type imu, which feels gravity (docs/contract/sensors.md 3a).
+
+    Of its plugin, `updateRateHZ` (1), `gaussianNoise` (0), `rpyOffset` and `initialOrientationAsReference`
+    (false) are read.
+    """
+
+    feels_gravity = True
+
+    def _place(self, mount: Mount) -> tuple[Model, str, Pose]:
+        sensor = sensor_of(mount, ("imu",))
+        if truth(mount.text("initialOrientationAsReference", "false")):
+            start = motion_of(mount.model, sensor.link, sensor.pose).pose.orientation
+            self._turn = multiply(self._turn, conjugate(start))
+        self._noise = [
+            (part, axis, noise)
+            for part in ("angular_velocity", "linear_acceleration")
+            for axis, letter in enumerate("xyz")
+            if (
+                noise := read_noise(sensor.element.find(f"imu/{part}/{letter}"), f"<imu>, <{part}>")
+            )
+        ]
+        return mount.model, sensor.link, sensor.pose
+
+    def _rate(self, mount: Mount) -> float:
+        assert mount.sensor is not None
+        return slower(
+            mount.number("updateRateHZ", 1.0 if mount.plugin.filename else 0.0), mount.sensor.rate
+        )
+
+    def _distorted(self, sample: InertialSample, random: np.random.Generator) -> InertialSample:
+        biases = self._mount.biases() if self._noise else random
+        for part, axis, noise in self._noise:
+            values = list(getattr(sample, part))
+            values[axis] = float(noise.applied(values[axis], noise.draw_bias(biases), random))
+            sample = sample._replace(**{part: tuple(values)})
+        return sample
 
 
 def with_noise(

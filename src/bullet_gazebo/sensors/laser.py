@@ -11,6 +11,7 @@ from bullet_gazebo.physics.files.sdf_parts import value
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.sensors.noise import Noise, read_noise
 from bullet_gazebo.sensors.rays import RayScene, frames
+from bullet_gazebo.sensors.sensing import Mount, sensor_of, sensor_pose, slower
 
 KINDS = ("ray", "gpu_ray", "lidar", "gpu_lidar")
 RENDERED = ("gpu_ray", "gpu_lidar")  # they see visuals, the others collisions
@@ -106,7 +107,7 @@ class Laser:
         shape = self.vertical.samples, self.horizontal.samples
         ranges, intensities = (
             hits.distances.reshape(shape),
-            self._retro(scene, hits.targets).reshape(shape),
+            scene.retro[hits.targets].reshape(shape),
         )
         for axis, fan in enumerate((self.vertical, self.horizontal)):
             ranges, intensities = (_resampled(each, fan, axis) for each in (ranges, intensities))
@@ -117,9 +118,60 @@ class Laser:
         ranges = np.where(beyond, np.inf, np.where(before, -np.inf, ranges))
         return Scan(ranges, intensities)
 
-    def _retro(self, scene: RayScene, targets: np.ndarray) -> np.ndarray:
-        retro = np.array([*(target.shape.retro for target in scene.targets), 0.0])
-        return retro[targets]  # that of NONE is the last
+
+class LaserSensor:
+    """A laser on a model; raises as `Laser`.
+
+    Args:
+        mount: its place.
+    """
+
+    def __init__(self, mount: Mount) -> None:
+        self._mount, self.sensor = mount, sensor_of(mount, KINDS)
+        self.laser = Laser(self.sensor)
+        self.rate = self.sensor.rate
+        sensing = mount.sensing
+        self._scene = sensing.visuals if self.laser.sees_visuals else sensing.collisions
+
+    def measure(self, now: int) -> tuple[Scan, np.random.Generator]:
+        """Returns a scan at a time [ns], and what draws further noise of it."""
+        random = self._mount.random(now)
+        return self.scan(random), random
+
+    def scan(self, random: np.random.Generator) -> Scan:
+        """Returns a scan, whose noise is drawn from `random`."""
+        mount, noise = self._mount, self.laser.noise
+        bias = 0.0 if noise is None else noise.draw_bias(mount.biases())
+        return self.laser.measure(self._scene, sensor_pose(mount.model, self.sensor), bias, random)
+
+    def values(self, now: int) -> dict[str, np.ndarray]:
+        """Returns `ranges` and `intensities`, each (n,) of float32, the lowest row first."""
+        scan, _ = self.measure(now)
+        return {name: each.astype(np.float32).ravel() for name, each in scan._asdict().items()}
+
+
+class RangeSensor(LaserSensor):
+    """The nearest ray of a laser. Of its plugin, `gaussianNoise` (0 m) and `updateRate` (0 Hz) are read."""
+
+    def __init__(self, mount: Mount) -> None:
+        super().__init__(mount)
+        self.rate = slower(mount.number("updateRate", 0.0), self.rate)
+        self._deviation = mount.deviation()
+
+    def values(self, now: int) -> dict[str, np.ndarray]:
+        """Returns `ranges` (1,) of float32."""
+        scan, random = self.measure(now)
+        return {
+            "ranges": np.array([nearest(scan, self.laser, self._deviation, random)], np.float32)
+        }
+
+
+def nearest(scan: Scan, laser: Laser, deviation: float, random: np.random.Generator) -> float:
+    """Returns the smallest range of a scan [m], with noise if it is below the largest."""
+    found = float(np.clip(scan.ranges.min(), laser.low, laser.high))
+    if found < laser.high and deviation:
+        found += float(random.normal(0.0, deviation))
+    return min(found, laser.high)
 
 
 def _directions(yaws: np.ndarray, pitches: np.ndarray) -> np.ndarray:

@@ -10,9 +10,12 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.sdf_parts import value
 
 GAUSSIAN = ("gaussian", "gaussian_quantized")
+LARGEST = 1e9
+DEVIATIONS = ("stddev", "bias_stddev")
 
 
 def generator(seed: int, *key: object) -> np.random.Generator:
@@ -50,7 +53,7 @@ def read_noise(parent: Element | None, where: str) -> Noise | None:
     Its type is an attribute, or a child as in `<ray>` and `<camera>`.
 
     Raises:
-        DescriptionError: if a number can't be read.
+        DescriptionError: if a number can't be read, or a deviation is impossible.
     """
     element = None if parent is None else parent.find("noise")
     if element is None:
@@ -61,4 +64,14 @@ def read_noise(parent: Element | None, where: str) -> Noise | None:
     names = ["mean", "stddev", "bias_mean", "bias_stddev"]
     if kind == GAUSSIAN[1]:
         names.append("precision")
-    return Noise(**{name: value(element, name, f"{where}, <noise>", 0.0) for name in names})
+    found = {name: value(element, name, f"{where}, <noise>", 0.0) for name in names}
+    for name in DEVIATIONS:
+        checked_deviation(found[name], f"{where}, <noise>: <{name}>")
+    return Noise(**found)
+
+
+def checked_deviation(deviation: float, what: str) -> float:
+    """Returns a deviation; a negative or absurd one is a DescriptionError."""
+    if not 0.0 <= deviation <= LARGEST:
+        raise DescriptionError(f"{what} is {deviation:g}; it must be between 0 and {LARGEST:g}")
+    return deviation

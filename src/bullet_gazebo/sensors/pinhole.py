@@ -1,18 +1,22 @@
 """Cameras: colours and depths of what lies before a pinhole (docs/contract/sensors.md 4)."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from bullet_gazebo.physics.description import DescriptionError, Sensor
+from bullet_gazebo.physics.description import DescriptionError, Sensor, library_of
 from bullet_gazebo.physics.files.sdf_parts import read_pose, value
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.sensors.noise import Noise, read_noise
 from bullet_gazebo.sensors.rays import RayScene, frames
+from bullet_gazebo.sensors.sensing import Mount, sensor_of, slower
 from bullet_gazebo.sensors.shading import colours
 
+KINECT = "libgazebo_ros_openni_kinect.so"
+DEPTH_KINDS = ("depth", "depth_camera", "rgbd_camera")
 MOST_PIXELS = 4_000_000
 
 
@@ -31,16 +35,21 @@ class CameraView(NamedTuple):
 class PinholeCamera:
     """A camera.
 
+    Attributes:
+        across, down: (height, width) of a pixel's point, to the right and down, for each metre of depth.
+
     Args:
         element: a `<camera>`.
         pose: of what holds it, in its link.
         where: names it in errors.
+        link: what it is in.
 
     Raises:
         DescriptionError: if it can't be simulated.
     """
 
-    def __init__(self, element: Element, pose: Pose, where: str) -> None:
+    def __init__(self, element: Element, pose: Pose, where: str, link: str) -> None:
+        self.link = link
         self.pose = pose.compose(read_pose(element, f"{where}, <camera>")[0])
         self.width, self.height = (
             _pixels(element, f"image/{tag}", where, default)
@@ -62,7 +71,7 @@ class PinholeCamera:
         self.focal_length = self.width / (2.0 * math.tan(self.field_of_view / 2.0))  # [pixels]
         right = (np.arange(self.width) + 0.5 - self.width / 2.0) / self.focal_length
         down = (np.arange(self.height) + 0.5 - self.height / 2.0) / self.focal_length
-        x, y = np.meshgrid(right, down)
+        self.across, self.down = x, y = np.meshgrid(right, down)
         ahead = np.stack([np.ones_like(x), -x, -y], axis=-1).reshape(-1, 3)
         lengths = np.linalg.norm(ahead, axis=1)
         self._directions = ahead / lengths[:, None]
@@ -106,7 +115,74 @@ def camera_of(sensor: Sensor) -> PinholeCamera:
     element = sensor.element.find("camera")
     if element is None:
         raise DescriptionError(f"{where} has no <camera>")
-    return PinholeCamera(element, sensor.pose, where)
+    return PinholeCamera(element, sensor.pose, where, sensor.link)
+
+
+def with_noise(
+    mount: Mount, camera: PinholeCamera, picture: np.ndarray, now: int, own: str = ""
+) -> np.ndarray:
+    """Returns a camera's picture at a time [ns] with its noise; `own` names one of several cameras."""
+    noise, part = camera.noise, f"/{own}"
+    if noise is None:
+        return picture
+    return noisy(picture, noise, noise.draw_bias(mount.biases(part)), mount.random(now, part))
+
+
+def rate_of(mount: Mount, sensor: Sensor) -> float:
+    """Returns the slower one of a plugin's `<updateRate>` and the sensor's rate [Hz]; 0 is every step."""
+    own = mount.number("updateRate", 0.0)
+    if own < 0.0:
+        raise DescriptionError(f"<updateRate> is {own:g}")
+    return slower(own, sensor.rate)
+
+
+class CameraSensor:
+    """A camera on a model; raises as `PinholeCamera`.
+
+    Args:
+        mount: its place.
+    """
+
+    kinds: Sequence[str] = ("camera",)
+
+    def __init__(self, mount: Mount) -> None:
+        self._mount, self._sensor = mount, sensor_of(mount, self.kinds)
+        self.camera = camera_of(self._sensor)
+        self.rate = rate_of(mount, self._sensor)
+
+    def view(self, in_colour: bool = True) -> CameraView:
+        """Returns what it sees now, without noise."""
+        link = self._mount.model.link_state(self._sensor.link)[0]
+        return self.camera.picture(self._mount.sensing.visuals, link, in_colour)
+
+    def values(self, now: int) -> dict[str, np.ndarray]:
+        """Returns `image` (height, width, 3) of uint8."""
+        return {"image": with_noise(self._mount, self.camera, self.view().colours, now)}
+
+
+class DepthSensor(CameraSensor):
+    """A depth camera. Of its plugin, `pointCloudCutoff` (0.4 m) is read, and a kinect's `pointCloudCutoffMax`
+    (5 m)."""
+
+    kinds = DEPTH_KINDS
+
+    def __init__(self, mount: Mount) -> None:
+        super().__init__(mount)
+        has_end = library_of(mount.plugin.filename) == KINECT
+        self._low = mount.number("pointCloudCutoff", 0.4 if mount.plugin.filename else 0.0)
+        self._high = mount.number("pointCloudCutoffMax", 5.0) if has_end else math.inf
+
+    def depths(self, view: CameraView) -> np.ndarray:
+        """Returns depths (height, width) within the cutoffs [m]; NaN for others."""
+        depths = np.minimum(view.depths, self.camera.far)
+        depths[(depths <= self._low) | (depths > self._high)] = np.nan
+        return depths
+
+    def values(self, now: int) -> dict[str, np.ndarray]:
+        """Returns `depth` (height, width) of float32, and `image` (height, width, 3) of uint8."""
+        view = self.view()
+        image = with_noise(self._mount, self.camera, view.colours, now)
+        return {"depth": self.depths(view).astype(np.float32), "image": image}
 
 
 def _pixels(element: Element, path: str, where: str, default: int) -> int:

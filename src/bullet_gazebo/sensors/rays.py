@@ -3,14 +3,16 @@
 All shapes that never move are one Embree scene, which is built when one comes, goes or is moved. What moves,
 and large meshes, are met in their own frames, into which rays are brought: meshes by Embree scenes that are
 kept, boxes, balls and cylinders analytically. So nothing is built while things move. A ray is only compared
-with shapes whose bounding ball it meets.
+with shapes whose bounding ball it meets. Worlds of one process share the Embree scenes that are equal.
 """
 
+import hashlib
 import importlib.util
 import logging
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -59,7 +61,9 @@ class Hits(NamedTuple):
 
     def improve(self, rays: np.ndarray, targets: Any, distances: np.ndarray) -> np.ndarray:
         """Takes over nearer hits, of several of a ray the nearest one; returns which are taken."""
-        nearer = np.flatnonzero(distances < self.distances[rays])
+        nearer = (distances < self.distances[rays]).nonzero()[0]
+        if not len(nearer):
+            return nearer
         order = nearer[np.argsort(-distances[nearer], kind="stable")]  # the last one assigned holds
         self.distances[rays[order]] = distances[order]
         self.targets[rays[order]] = np.broadcast_to(targets, distances.shape)[order]
@@ -78,9 +82,11 @@ class RayScene:
         self._world = world
         self._visuals = visuals
         self.targets: list[Target] = []
+        self.retro = np.zeros(1)  # reflectivity of each target
+        self._targets_of: dict[Model, list[Target]] = {}
         self._key: object = None
         self._is_fresh = False
-        self._meshes: dict[object, Any] = {}
+        self._apart_meshes: dict[int, Any] = {}
 
     def expire(self) -> None:
         """Says that things may have moved: the next cast looks where they are."""
@@ -92,7 +98,9 @@ class RayScene:
         if key != self._key:
             self._build()
             self._key = key
-        self._place(self._apart)
+        if len(self._moving):
+            self._place(self._moving)
+            self._find_centres()
         self._is_fresh = True
 
     def cast(
@@ -110,17 +118,13 @@ class RayScene:
         """
         if not self._is_fresh:
             self._refresh()
-        count = len(directions)
         starts = origin + np.reshape(near, (-1, 1)) * directions
-        found = Hits(
-            np.full(count, np.inf), np.full(count, NONE), np.zeros(count, int), np.zeros((count, 2))
-        )
-        self._meet_still(found, starts, directions)
-        rays = np.arange(count)
+        found = self._meet_still(starts, directions)
+        rays = np.arange(len(directions))
         for target in self._planes:
             found.improve(rays, target, self._plane_distances(target, starts, directions))
         targets, rays = self._pairs(origin, directions, np.max(far))
-        for kind in DISTANCES:
+        for kind in self._analytic:
             some = self._kinds[targets] == kind
             distances = self._distances(
                 kind, targets[some], starts[rays[some]], directions[rays[some]]
@@ -145,17 +149,15 @@ class RayScene:
             own = NORMALS[kind]((points - self._places[target]) @ turn, self._sizes[target])
         return np.asarray(own @ turn.T)
 
-    def _meet_still(self, found: Hits, starts: np.ndarray, directions: np.ndarray) -> None:
-        if not len(self._still):
-            return
+    def _meet_still(self, starts: np.ndarray, directions: np.ndarray) -> Hits:
         met = self._still_triangles.first(starts, directions)
-        hit = np.flatnonzero(met.parts != NONE)
-        found.distances[hit], found.targets[hit] = met.distances[hit], self._still[met.parts[hit]]
-        found.triangles[hit], found.weights[hit] = met.triangles[hit], met.weights[hit]
-        for kind in CURVED:
-            some = hit[self._kinds[found.targets[hit]] == kind]
-            exact = self._distances(kind, found.targets[some], starts[some], directions[some])
+        targets = self._still[met.parts]  # the last one is NONE
+        found = Hits(met.distances, targets, met.triangles, met.weights)
+        for kind in self._curved:
+            some = np.flatnonzero(self._kinds[targets] == kind)
+            exact = self._distances(kind, targets[some], starts[some], directions[some])
             found.distances[some] = np.where(exact < np.inf, exact, found.distances[some])
+        return found
 
     def _meet_mesh(
         self, found: Hits, target: int, triangles: Any, rays: np.ndarray,
@@ -174,16 +176,12 @@ class RayScene:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns which targets' bounding balls are met by which rays: two arrays of indices."""
         apart = self._apart
-        centres = self._places[apart] + np.einsum(
-            "kij,kj->ki", self._turns[apart], self._centres[apart]
-        )
-        ways = centres - origin
-        radii = self._radii[apart]
-        room = np.einsum("ij,ij->i", ways, ways) - radii**2
+        ways = self._apart_centres - origin
+        room = np.einsum("ij,ij->i", ways, ways) - self._radii[apart] ** 2
         # A ray meets a ball if it lies within the cone of tangents. All do that start in it.
         tangents = np.where(room > 0.0, np.sqrt(np.maximum(room, 0.0)), -np.inf)
-        tangents[tangents > far] = np.inf
         least = (tangents - MARGIN * (1.0 + np.abs(tangents))).astype(np.float32)
+        least[tangents > far] = np.inf
         (x, y, z), (dx, dy, dz) = (
             ways.astype(np.float32).T[..., None],
             directions.astype(np.float32).T,
@@ -191,7 +189,7 @@ class RayScene:
         along = x * dx
         along += y * dy
         along += z * dz
-        which, rays = np.divmod(np.flatnonzero(along >= least[:, None]), len(directions))
+        which, rays = (along >= least[:, None]).nonzero()
         return apart[which], rays
 
     def _distances(
@@ -215,22 +213,23 @@ class RayScene:
     # --- what there is --------------------------------------------------------------------------
 
     def _build(self) -> None:
-        self.targets = targets = [
-            target
+        read, known = _seen if self._visuals else _solid, self._targets_of
+        self._targets_of = {
+            model: known.get(model)
+            or [target for link in model.description.links.values() for target in read(model, link)]
             for model in self._world.models.values()
-            for link in model.description.links.values()
-            for target in (_seen if self._visuals else _solid)(model, link)
-        ]
+        }
+        self.targets = targets = [each for found in self._targets_of.values() for each in found]
         count = len(targets)
-        self._kinds = np.array([*(target.shape.kind for target in targets), ""])  # of NONE, too
+        self.retro = np.array([*(target.shape.retro for target in targets), 0.0])  # of NONE, too
+        self._kinds = np.array([*(target.shape.kind for target in targets), ""])
         self._sizes = np.zeros((count, 3))
         self._own_turns, self._own_places = frames([target.shape.pose for target in targets])
         self._turns, self._places = np.zeros((count, 3, 3)), np.zeros((count, 3))
         self._centres, self._radii = np.zeros((count, 3)), np.zeros(count)
         self._place(np.arange(count))
         self._planes = [i for i in range(count) if self._kinds[i] == "plane"]
-        self._apart_meshes, kept = {}, self._meshes
-        self._meshes = {}
+        self._apart_meshes, kept = {}, self._apart_meshes  # noqa: F841 - those that stay are found
         still, triangles, apart = [], [], []
         for index, target in enumerate(targets):
             shape = target.shape
@@ -246,11 +245,21 @@ class RayScene:
             apart.append(index)
             self._surround(index, corners)
             if shape.kind == "mesh":
-                key = shape.solid or shape.mesh, shape.size, target.number
-                self._meshes[key] = kept.get(key) or self._meshes.get(key) or Triangles([corners])
-                self._apart_meshes[index] = self._meshes[key]
-        self._still, self._apart = np.array(still, int), np.array(apart, int)
-        self._still_triangles = Triangles(triangles)
+                self._apart_meshes[index] = _built([corners])
+        self._still, self._apart = np.array([*still, NONE]), np.array(apart, int)
+        self._still_triangles = _built(triangles)
+        self._curved = [kind for kind in CURVED if kind in self._kinds[still]]
+        self._analytic = [kind for kind in DISTANCES if kind in self._kinds[apart]]
+        moves = [not targets[index].model.description.static for index in apart]
+        self._moving = self._apart[np.array(moves, bool)]
+        self._find_centres()
+
+    def _find_centres(self) -> None:
+        """Finds where the balls are around what isn't part of the still scene."""
+        turns, apart = self._turns[self._apart], self._apart
+        self._apart_centres = self._places[apart] + np.einsum(
+            "kij,kj->ki", turns, self._centres[apart]
+        )
 
     def _surround(self, index: int, corners: np.ndarray) -> None:
         """Sets the ball around a target, in the target's frame."""
@@ -332,8 +341,9 @@ class _Embree:
             query="INTERSECT", output=True,
         )  # fmt: skip
         parts = found["geomID"]
-        distances = np.where(parts == NONE, np.inf, found["tfar"]).astype(float)
-        return _Met(distances, parts, found["primID"], np.stack([found["u"], found["v"]], axis=1))
+        distances = found["tfar"].astype(float)
+        distances[parts == NONE] = np.inf
+        return _Met(distances, parts, found["primID"], np.column_stack([found["u"], found["v"]]))
 
 
 class _EachTriangle:
@@ -372,3 +382,17 @@ class _EachTriangle:
 
 
 Triangles = _Embree if importlib.util.find_spec("embreex") else _EachTriangle
+BUILT: WeakValueDictionary[bytes, Any] = WeakValueDictionary()  # by the corners of its parts
+
+
+def _built(parts: list[np.ndarray]) -> Any:
+    """Returns the triangles of some parts: for equal ones the same, so worlds of a process share them."""
+    digest = hashlib.blake2b(Triangles.__name__.encode(), digest_size=16)
+    for corners in parts:
+        digest.update(repr(corners.shape).encode())
+        digest.update(np.ascontiguousarray(corners).data)
+    key = digest.digest()
+    found = BUILT.get(key)
+    if found is None:
+        found = BUILT[key] = Triangles(parts)
+    return found

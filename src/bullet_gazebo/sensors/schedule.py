@@ -1,8 +1,8 @@
 """When sensors measure: at the first tick that is due, in the file's order, if somebody listens.
 
 Due times are whole multiples of a sensor's period after it was made or time was reset (in ns, without
-drift), whoever listens: a late or second listener changes no measurement. After a service has moved bodies,
-all that is heard measures at once. See docs/contract/sensors.md 0.4.
+drift), whoever listens: a late or second listener changes no measurement. A reset with a seed begins them
+anew. After a service has moved bodies, all that is heard measures at once. See docs/contract/sensors.md 0.4.
 """
 
 import threading
@@ -11,6 +11,7 @@ from collections.abc import Callable
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 
 Measure = Callable[[int], None]
+SLOWEST = 1e-9  # [Hz]
 LONG_AGO = -(10**18)  # [ns]
 
 
@@ -27,16 +28,20 @@ class SensorClock:
         now: int,
     ) -> None:
         self._schedule = schedule
-        self.period = round(NANOSECONDS / rate) if rate > 0.0 else 0  # [ns]
         self.measure = measure
         self.listens = listens
         self.at_once = at_once
-        self.begin = now  # [ns]
         self.last: int | None = (
             None  # time of the last measurement [ns], if nothing was moved since
         )
         self.heard = False
         self.has_newcomer = False
+        self.set_rate(rate, now, now)
+
+    def set_rate(self, rate: float, begin: int, now: int) -> None:
+        """Measures at whole periods of a rate [Hz] after `begin`, from `now` on [ns]; 0 is every step."""
+        self.period = round(NANOSECONDS / max(rate, SLOWEST)) if rate > 0.0 else 0  # [ns]
+        self.begin = begin
         self.plan(now)
 
     def look(self, somebody_came: bool = False) -> None:
@@ -64,9 +69,12 @@ class Schedule:
         self._is_looking = False
         self.moves = 0  # how often something other than time has moved bodies
         self.moved_at = LONG_AGO  # when it did so last [ns]
+        self.moves_before_seed = 0
+        self._begins_anew = False  # with the next move
         self.prepare: list[Callable[[], None]] = []  # called before the measurements of one time
         sim.moved.append(self._moved)
         sim.before_advance.append(self._catch_up)
+        sim.reseeded.append(self._reseeded)
 
     def add(
         self, rate: float, measure: Measure, listens: Callable[[], bool], at_once: bool = True
@@ -81,8 +89,14 @@ class Schedule:
                 measurement or something was moved.
         """
         with self._sim.lock:
-            clock = SensorClock(self, rate, measure, listens, at_once, self._sim.now)
-            self._clocks.append(clock)
+            return self.begin(rate, measure, listens, at_once)
+
+    def begin(
+        self, rate: float, measure: Measure, listens: Callable[[], bool], at_once: bool = True
+    ) -> SensorClock:
+        """As `add`; the caller holds the simulator's lock."""
+        clock = SensorClock(self, rate, measure, listens, at_once, self._sim.now)
+        self._clocks.append(clock)
         return clock
 
     def end(self, clock: SensorClock) -> None:
@@ -120,7 +134,10 @@ class Schedule:
             clock.has_newcomer = False
             if clock.heard and not was_heard:
                 clock.plan(now)
-            is_old = clock.last is None or now - clock.last >= max(clock.period, 1)
+            # Who was sent the last one may be gone, unnoticed: what there is now is measured anew.
+            is_old = clock.last in (None, now, self.moved_at) or now - clock.last >= max(
+                clock.period, 1
+            )
             if clock.heard and came and clock.at_once and is_old:
                 fresh.append(clock)
         self._take_part()
@@ -152,12 +169,16 @@ class Schedule:
         for clock in clocks:
             clock.measure(now)
 
+    def _reseeded(self, seed: int) -> None:
+        self.moves_before_seed, self._begins_anew = self.moves, True
+
     def _moved(self) -> None:
         """Measures afresh all that is heard, after a service has moved bodies or reset time."""
         self.moves += 1
         now = self.moved_at = self._sim.now
+        anew, self._begins_anew = self._begins_anew, False
         for clock in self._clocks:
-            if now < clock.begin or (clock.last is not None and now < clock.last):
+            if anew or now < clock.begin or (clock.last is not None and now < clock.last):
                 clock.begin = now
             clock.last = None
             clock.plan(now)

@@ -30,8 +30,10 @@ class RobotBackend(Protocol):
         """Adds what a query names to all later states, which otherwise have only joints."""
         ...
 
-    def reset(self, initial: InitialState) -> WorldState:
+    def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         """Begins an episode; returns the state reached.
+
+        `seed` is that of the sensors' noise; 0 goes on with what there is.
 
         A backend that can't set velocities puts joints at rest, and its state says so. The environment sends
         `initial.commands`.

@@ -26,6 +26,8 @@ from bullet_gazebo.physics.properties import (
 )
 from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.robot import ControlledRobot, control_period_of
+from bullet_gazebo.sensors.sensing import Sensing
+from bullet_gazebo.sensors.sensor_readers import SensorReaders
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 from bullet_gazebo.state import NOTHING, StateReader, UnknownName, find_link, find_model
 from robot_envs.backends.backend import PHYSICS_STEP, RobotBackend, ticks_per_action
@@ -46,6 +48,8 @@ from robot_envs.world_state import (
     Links,
     Models,
     Motion,
+    Reading,
+    Sensors,
     StateQuery,
     WorldState,
     link_keys,
@@ -101,6 +105,8 @@ class InProcessWorld(RobotBackend):
         self._apply = Applier(scene, InProcessChanges(self._sim))
         self._reader = StateReader(world, NOTHING)
         self._links: list[str] = []
+        self._sensing: Sensing | None = None
+        self._readers: SensorReaders | None = None
         self._reads_more = False  # than the joints
         self._held: dict[str, Any] = {}
         self._begin = 0  # [ns] of the episode
@@ -129,12 +135,22 @@ class InProcessWorld(RobotBackend):
     def look(self, query: StateQuery) -> None:
         links = link_keys(query)
         try:
-            self._reader = StateReader(self._sim.world, query)
+            reader = StateReader(self._sim.world, query)
+            if query.sensors or self._readers:
+                self._sense(query.sensors)
         except UnknownName as error:
             raise SimulatorError(str(error)) from error
+        self._reader = reader
         self._links, self._reads_more = links, query != NOTHING
 
-    def reset(self, initial: InitialState) -> WorldState:
+    def _sense(self, names: Sequence[str]) -> None:
+        sensing = self._sensing = self._sensing or Sensing(self._sim)
+        readers = SensorReaders(self._sim, sensing, names)
+        if self._readers is not None:
+            self._readers.end()
+        self._readers = readers
+
+    def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         """See `RobotBackend.reset`; the state reached is the one asked for, within the joints' stops."""
         joints, world = self.scene.placed_joints(initial), self._sim.world
         placed = self.scene.placed_models(initial)
@@ -142,20 +158,25 @@ class InProcessWorld(RobotBackend):
             models = [(find_model(world, name), at) for name, at in placed.items()]
         except UnknownName as error:
             raise SimulatorError(str(error)) from error
-        self._sim.reset(everything=False)
-        self._begin = self._sim.now
-        for model, (pose, twist) in models:
-            upright = Pose(pose.position, normalized(pose.orientation))
-            self._sim.place_model(model, upright, twist)
-        for robot in self.scene.robots:
-            own = [
-                (name, joints[key]) for key, (of, name) in self.scene.moved.items() if of is robot
-            ]
-            self._sim.set_joint_states(
-                self._robots[robot.model][0],
-                {name: position for name, (position, _) in own},
-                {name: velocity for name, (_, velocity) in own},
-            )
+        with self._sim.one_move():
+            if seed:
+                self._sim.reseed(seed)
+            self._sim.reset(everything=False)
+            self._begin = self._sim.now
+            for model, (pose, twist) in models:
+                upright = Pose(pose.position, normalized(pose.orientation))
+                self._sim.place_model(model, upright, twist)
+            for robot in self.scene.robots:
+                own = [
+                    (name, joints[key])
+                    for key, (of, name) in self.scene.moved.items()
+                    if of is robot
+                ]
+                self._sim.set_joint_states(
+                    self._robots[robot.model][0],
+                    {name: position for name, (position, _) in own},
+                    {name: velocity for name, (_, velocity) in own},
+                )
         state = self._state()
         self._held = self.scene.starting_commands(state.joints)
         return state._replace(commands=self._held)
@@ -190,6 +211,15 @@ class InProcessWorld(RobotBackend):
             Links(zip(self._links, starmap(Motion.of, answer.links), strict=True)),
             Models((name, Motion.of(*state)) for name, state in answer.models.items()),
             answer.contacts,
+            self._sensed(),
+        )
+
+    def _sensed(self) -> Sensors:
+        if self._readers is None:
+            return Sensors()
+        return Sensors(
+            (name, Reading((taken.now - self._begin) / NANOSECONDS, taken.values))
+            for name, taken in zip(self._readers.names, self._readers.read(), strict=True)
         )
 
     def vary(self, variation: Variation) -> None:

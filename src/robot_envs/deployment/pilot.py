@@ -14,7 +14,7 @@ from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.task import GoalTask, Task, Unjudged
-from robot_envs.world_state import Command, JointState, StateQuery, WorldState
+from robot_envs.world_state import Command, JointState, Sensors, StateQuery, WorldState
 
 
 class CommandLimits:
@@ -102,10 +102,11 @@ def impossible(limits: JointLimits, position: float, velocity: float) -> str:
 
 Joints = Mapping[str, JointState]
 Say = Callable[[str], None]
+NO_SENSORS = Sensors()
 
 
 class Pilot:
-    """Runs a policy on a task, as in an environment, from the robot's joint states.
+    """Runs a policy on a task, as in an environment, from the robot's joint states and sensors.
 
     Calls all methods of the task as an environment does, even its reward, so that the task stores the same
     data as in training; of one with a `reward_query` it calls neither `reward` nor `is_terminal`. Joints
@@ -153,14 +154,14 @@ class Pilot:
         if goal is not None:
             self.aim(goal)
 
-    def begin(self, joints: Joints) -> None:
+    def begin(self, joints: Joints, sensors: Sensors = NO_SENSORS) -> None:
         """Begins an episode; commands start from the joints' positions."""
         self._task.initial_state(self._generator)
         self._action = None
         self.go_on(joints)
         task = self._task
         if isinstance(task, GoalTask):
-            set_goal(task, self._state(0.0, joints), self._generator, self._goal)
+            set_goal(task, self._state(0.0, joints, sensors), self._generator, self._goal)
 
     def aim(self, goal: Any) -> None:
         """Gives a `GoalTask` a goal for all episodes; raises ValueError if it isn't one of its goals."""
@@ -173,15 +174,18 @@ class Pilot:
         """Continues from the joints' positions, after they were stopped."""
         self._held = {name: limits.stop(joints) for name, limits in self._limits.items()}
 
-    def _state(self, time: float, joints: Joints) -> WorldState:
-        return WorldState(time, joints, dict(self._held), self._links(joints))
+    def _state(self, time: float, joints: Joints, sensors: Sensors) -> WorldState:
+        return WorldState(time, joints, dict(self._held), self._links(joints), sensors=sensors)
 
-    def step(self, time: float, joints: Joints) -> dict[str, Command] | None:
+    def step(
+        self, time: float, joints: Joints, sensors: Sensors = NO_SENSORS
+    ) -> dict[str, Command] | None:
         """One step.
 
         Args:
             time: since the beginning [s].
             joints: their states.
+            sensors: readings of those that the task's query names.
 
         Returns:
             Commands to send, by controller; None if the task's episode would have ended.
@@ -189,7 +193,7 @@ class Pilot:
         Raises:
             ValueError: if the policy or the task returns something impossible.
         """
-        task, state = self._task, self._state(time, joints)
+        task, state = self._task, self._state(time, joints, sensors)
         over = self._judge.is_terminal(state)
         if self._action is not None:
             self._judge.reward(state, self._action)

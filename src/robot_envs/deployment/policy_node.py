@@ -1,4 +1,4 @@
-"""A policy that moves a robot over ROS, simulated or real: joint states in, commands out."""
+"""A policy that moves a robot over ROS, simulated or real: joint states and sensors in, commands out."""
 
 import math
 import os
@@ -14,6 +14,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from robot_envs.backends.ros import node
 from robot_envs.backends.ros.bringup import full_name
 from robot_envs.backends.ros.running import lockstep_hint
+from robot_envs.backends.ros.sensor_listener import SensorListener
 from robot_envs.deployment.pilot import Pilot
 from robot_envs.deployment.reports import ControllerWatch, JointListener
 from robot_envs.errors import RobotEnvError
@@ -30,10 +31,10 @@ SENDING = 1.0  # [s] of wall time, for each of the last commands to be sent
 class PolicyNode:
     """Runs a policy on a robot, as soon as its joint states come and its controllers listen.
 
-    Each control period of ROS time it passes the newest joint states to task and policy, and publishes their
-    commands. While joint states are late, or the task's episode would have ended, it commands a stop instead
-    (see `CommandLimits.stop`). At the end it stops the robot, also after `rosnode kill`, or an error of
-    policy or task.
+    Each control period of ROS time it passes the newest joint states and readings of sensors to task and
+    policy, and publishes their commands. While one of them is late, or the task's episode would have ended,
+    it commands a stop instead (see `CommandLimits.stop`). At the end it stops the robot, also after
+    `rosnode kill`, or an error of policy or task.
 
     The topic `~goal` (std_msgs/Float64MultiArray) changes the goal of a task with goals.
 
@@ -42,8 +43,8 @@ class PolicyNode:
         task: what the policy has learned.
         act: the policy: the action for an observation.
         period: of control [s].
-        late: how long the robot may be without a joint state before it is stopped [s]; None: 5 control
-            periods, and at least 0.1 s.
+        late: how long the robot may be without a joint state before it is stopped [s], or without a reading,
+            but at least three of its sensor's periods; None: 5 control periods, and at least 0.1 s.
         seed: see `Pilot`.
         goal: see `Pilot`.
         way: see `CommandLimits`.
@@ -77,6 +78,7 @@ class PolicyNode:
         self._joints = JointListener(
             full_name(robot, "joint_states"), robot.model, robot.joints, robot.limits
         )
+        self._sensors = SensorListener(robot, task.query.sensors, rospy.get_time)
         self._controllers = ControllerWatch(robot, self._ended)
         self._topics = {
             port.name: rospy.Publisher(
@@ -126,6 +128,7 @@ class PolicyNode:
             now = rospy.get_time()
             if now < before:  # a simulation was reset
                 self._joints.forget()
+                self._sensors.forget()
                 began = before = self._begin()
                 continue
             self._step(now, now - began)
@@ -143,7 +146,7 @@ class PolicyNode:
         if not missing:
             self._report("")
             self._last = self._joints.look()[0]
-            self._pilot.begin(self._last)
+            self._pilot.begin(self._last, self._sensors.read(rospy.get_time()))
             rospy.loginfo("the policy moves the robot")
         return rospy.get_time()
 
@@ -153,6 +156,7 @@ class PolicyNode:
             return f"a possible state: {fault}"
         missing = [f"the state of {', '.join(joints)} on {self._joints.topic}"] if joints else []
         deaf = [each for each in self._topics.values() if each.get_num_connections() == 0]
+        missing += [f"a message on {topic}" for topic in self._sensors.missing()]
         missing += [f"a subscriber of {each.resolved_name}" for each in deaf]
         return ", and ".join(missing)
 
@@ -177,7 +181,7 @@ class PolicyNode:
             self._publish(self._pilot.stop(self._last))
             return
         self._aim_if_told()
-        commands = self._pilot.step(passed, self._last)
+        commands = self._pilot.step(passed, self._last, self._sensors.read(now - passed))
         if commands is None:
             self._report("an episode would be over here: the robot is stopped")
             commands = self._pilot.stop(self._last)
@@ -191,6 +195,8 @@ class PolicyNode:
             return fault
         if age > self._late:
             return f"no joint state on {self._joints.topic} for {self._late:g} s"
+        if trouble := self._sensors.trouble(self._late):
+            return trouble
         return self._controllers.trouble
 
     def _aim_if_told(self) -> None:

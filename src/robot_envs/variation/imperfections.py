@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from file_access.text import did_you_mean
-from robot_envs.world_state import Joints, JointState, WorldState
+from robot_envs.world_state import Joints, JointState, Reading, Sensors, WorldState
 
 
 def is_number(value: Any) -> bool:
@@ -63,6 +63,7 @@ def steps(option: str, given: Any, most: int) -> int:
 
 Noise = float | tuple[float, float] | Mapping[str, Any]
 MOST_DELAY: Final = 1000  # [control steps]
+NOISY: Final = ("ranges", "depth", "image", "angular_velocity", "linear_acceleration")
 LEAST_STEP: Final = 1e-9  # [rad, m]; of an encoder
 
 
@@ -79,8 +80,8 @@ class Encoder(NamedTuple):
 
 
 class Sensor:
-    """Measures the joints, with noise, rounding and delay. The rest of a state is only delayed, except the
-    commands, which are the present ones.
+    """Measures joints with noise, rounding and delay, and sensors with further noise and delay. The rest of
+    a state is only delayed, except the commands, which are the present ones.
 
     The velocity of a joint with an `encoder_step` is the difference of two measured positions over the
     control period, as drivers compute it: a multiple of step / period, without noise of its own.
@@ -90,10 +91,12 @@ class Sensor:
         period: of control [s].
         noise: standard deviation of the normal noise on positions and velocities [m, m/s, rad, rad/s]: a
             number, or a pair (position, velocity), for all joints, or by joint. It is drawn for all joints,
-            those of a mapping first, in its order, and added before an encoder rounds.
+            those of a mapping first, in its order, and added before an encoder rounds. A mapping may name
+            sensors, too: a number for all that one measures, or by attribute of its `Reading`.
         delay: age of a measurement [control steps]; until there are any so old, the episode's first is
             repeated.
         encoder_step: resolution of positions [rad, m]: one for all joints, or by joint; 0: exact.
+        sensors: names of the sensors of a state.
 
     Raises:
         ValueError: for an impossible number, or an unknown joint.
@@ -106,8 +109,14 @@ class Sensor:
         noise: Noise = 0.0,
         delay: int = 0,
         encoder_step: float | Mapping[str, float] = 0.0,
+        sensors: Sequence[str] = (),
     ) -> None:
         self._period = period
+        self._sensors: dict[str, dict[str, float]] = {}
+        if isinstance(noise, Mapping):
+            self._sensors = {name: _by_part(noise[name]) for name in noise if name in sensors}
+            noise = {name: each for name, each in noise.items() if name not in sensors}
+        self._readings: dict[str, tuple[float, Reading]] = {}  # noisy ones, with their times [s]
         found = by_name("sensor_noise", noise, joints, "joint")
         sizes = {name: _pair("sensor_noise", size) for name, size in found.items()}
         found = by_name("encoder_step", encoder_step, joints, "joint")
@@ -120,7 +129,7 @@ class Sensor:
             for name in dict.fromkeys([*sizes, *joints])
         }
         self._is_noisy = any(map(any, sizes.values()))
-        self._distorts = self._is_noisy or any(notches.values())
+        self._distorts = self._is_noisy or any(notches.values()) or bool(self._sensors)
         self._seen: deque[WorldState] = deque(maxlen=steps("sensor_delay", delay, MOST_DELAY) + 1)
         self._before: dict[str, float] = {}  # measured positions of joints with encoder steps
 
@@ -133,6 +142,7 @@ class Sensor:
         """Returns the first measurement of an episode that starts in `state`."""
         self._seen.clear()
         self._before.clear()
+        self._readings.clear()
         return self.measure(state, rng)
 
     def measure(self, state: WorldState, rng: np.random.Generator) -> WorldState:
@@ -153,7 +163,26 @@ class Sensor:
             else:
                 velocity += encoder.rate_noise * rate_error
             joints[name] = JointState(position, velocity, effort)
-        return state._replace(joints=joints)
+        if not self._sensors:
+            return state._replace(joints=joints)
+        sensors = Sensors(state.sensors)
+        for name, sizes in self._sensors.items():
+            sensors[name] = self._with_noise(name, sensors[name], sizes, rng)
+        return state._replace(joints=joints, sensors=sensors)
+
+    def _with_noise(
+        self, name: str, reading: Reading, sizes: Mapping[str, float], rng: np.random.Generator
+    ) -> Reading:
+        """Returns a reading with noise, which is drawn once for each measurement."""
+        time, noisy = self._readings.get(name, (-1.0, reading))
+        if time == reading.time:
+            return noisy
+        values = dict(reading.values)
+        for part in [each for each in values if each in sizes]:
+            values[part] = _noisy(values[part], sizes[part], rng)
+        noisy = Reading(reading.time, values)
+        self._readings[name] = (reading.time, noisy)
+        return noisy
 
     def _measured(
         self, name: str, encoder: Encoder, position: float, velocity: float
@@ -165,6 +194,19 @@ class Sensor:
             before = encoder.rounded(position - velocity * self._period)
         self._before[name] = measured
         return measured, (measured - before) / self._period
+
+
+def _by_part(given: Any) -> dict[str, float]:
+    """Returns the standard deviations of what a sensor measures, by attribute of its `Reading`."""
+    sizes = by_name("sensor_noise", given, NOISY, "attribute of a reading")
+    return {name: at_least_zero("sensor_noise", size) for name, size in sizes.items()}
+
+
+def _noisy(values: np.ndarray, size: float, rng: np.random.Generator) -> np.ndarray:
+    noisy = values + rng.normal(0.0, size, values.shape)
+    if values.dtype == np.uint8:
+        noisy = np.rint(np.clip(noisy, 0.0, 255.0))
+    return noisy.astype(values.dtype)
 
 
 def _pair(option: str, given: Any) -> tuple[float, float]:

@@ -5,8 +5,9 @@ import rostest
 from free_robot_cases import FreeRobot
 from robots_cases import Robots
 from scenes_cases import Arms, Rover
+from sensors_cases import Seeing
 
-__all__ = ["Arms", "FreeRobot", "Robots", "Rover"]
+__all__ = ["Arms", "FreeRobot", "Robots", "Rover", "Seeing"]
 
 if __name__ == "__main__":
     rostest.rosrun("cartpole", "robots", "__main__")

@@ -37,7 +37,7 @@ class FakePlant:
     def look(self, query: StateQuery) -> None:
         assert query == StateQuery()
 
-    def reset(self, initial: InitialState) -> WorldState:
+    def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         places = self.scene.placed_joints(initial)
         self._state = CartPoleState(places[CART_JOINT][0], 0.0, places[POLE_JOINT][0], 0.0)
         return cartpole_world(self._state)

@@ -276,7 +276,10 @@ def _read_parts(model: Element, context: FileContext, static: bool, depth: int) 
         _take_over(parts, inner, name)
     parts.poses = {link.name: frames.resolve(link.name) for link in parts.links}
     joints = JointReader(frames, context.version, parts.warnings)
-    parts.joints += [joints.read(element) for element in model.findall("joint")]
+    for element in model.findall("joint"):
+        joint = joints.read(element)
+        parts.joints.append(joint)
+        parts.sensors += read_sensors(element, joint.child, parts.warnings, joint=joint.name)
     parts.plugins += [read_plugin(element) for element in model.findall("plugin")]
     return parts
 
@@ -311,8 +314,18 @@ def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
             )
     parts.links += inner.links
     parts.joints += inner.joints
-    parts.plugins += inner.plugins
-    parts.sensors += [replace(each, link=f"{prefix}::{each.link}") for each in inner.sensors]
+    parts.plugins += [
+        replace(each, scope=f"{prefix}::{each.scope}" if each.scope else prefix)
+        for each in inner.plugins
+    ]
+    parts.sensors += [
+        replace(
+            each,
+            link=f"{prefix}::{each.link}",
+            joint=f"{prefix}::{each.joint}" if each.joint else "",
+        )
+        for each in inner.sensors
+    ]
     parts.warnings += inner.warnings
     parts.stand_ins += inner.stand_ins
 

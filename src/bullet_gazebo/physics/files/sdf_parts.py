@@ -104,15 +104,20 @@ def read_inertia(link: Element, where: str, static: bool) -> Inertia:
 
 
 def read_sensors(
-    parent: Element, link: str, warnings: list[str], frames: Frames | None = None
+    parent: Element,
+    link: str,
+    warnings: list[str],
+    frames: Frames | None = None,
+    joint: str = "",
 ) -> Iterator[Sensor]:
     """Yields the sensors of `link` that `parent` has; a faulty one is a warning.
 
     Args:
-        parent: a `<link>`, or URDF's `<gazebo reference=LINK>`.
+        parent: a `<link>` or `<joint>`, or URDF's `<gazebo reference=…>` of one.
         link: its name.
         warnings: receives a line for each sensor that is left out.
         frames: those of the model, for poses that are relative to another one than the link.
+        joint: the one whose sensors they are, if `link` is its child.
     """
     for element in parent.findall("sensor"):
         where = f"link '{shown(link)}', sensor '{shown(element.get('name', ''))}'"
@@ -125,7 +130,7 @@ def read_sensors(
                 raise DescriptionError(f"{where}: <update_rate> is {rate:g}; 0 is every step")
             plugins = tuple(map(read_plugin, element.findall("plugin")))
             kind = element.get("type", "")
-            yield Sensor(named(element, "sensor"), kind, link, pose, rate, plugins, element)
+            yield Sensor(named(element, "sensor"), kind, link, pose, rate, plugins, element, joint)
         except DescriptionError as error:
             warnings.append(f"{error}; it is left out")
 

@@ -280,7 +280,7 @@ def apply_extensions(model: ModelDescription, robot: Element) -> None:
         elif reference in model.links:
             _apply_to_link(model, model.links[reference], block)
         elif reference in model.joints:
-            _apply_to_joint(model.joints[reference], block)
+            _apply_to_joint(model, model.joints[reference], block)
         else:
             model.warnings.append(
                 f"<gazebo reference='{shown(reference)}'> refers to no link or joint"
@@ -322,8 +322,9 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
             model.left_out.append(f"plugin {name} of link '{shown(link.name)}'")
 
 
-def _apply_to_joint(joint: Joint, block: Element) -> None:
-    """Keeps a fixed joint as it is, or as a hinge that can't turn."""
+def _apply_to_joint(model: ModelDescription, joint: Joint, block: Element) -> None:
+    """Reads a joint's sensors; keeps a fixed joint as it is, or as a hinge that can't turn."""
+    model.sensors += read_sensors(block, joint.child, model.warnings, joint=joint.name)
     if joint.kind != "fixed":
         return
     if _value(block.find("preserveFixedJoint")) in YES:

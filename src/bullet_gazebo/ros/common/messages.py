@@ -1,9 +1,12 @@
 """Conversions between our records and ROS messages, and the check of numbers in requests."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import genpy
+import numpy as np
+from bullet_gazebo_msgs.msg import SensorReading, SensorValue
 from control_msgs.msg import JointControllerState
 from gazebo_msgs.msg import ContactState
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3, Wrench
@@ -72,6 +75,18 @@ def to_contact_state(pair: ContactPair) -> ContactState:
         contact_positions=[Vector3(*point) for point in pair.points],
         contact_normals=[Vector3(*normal) for normal in pair.normals],
         depths=pair.depths,
+    )
+
+
+def to_reading(now: int, values: Mapping[str, Any]) -> SensorReading:
+    """Converts what a sensor measured at a time [ns]; see `bullet_gazebo.sensors.sensor_reading.Reading`."""
+    arrays = [
+        SensorValue(name, each.dtype.str, each.shape, each.tobytes())
+        for name, each in values.items()
+        if isinstance(each, np.ndarray)
+    ]
+    return SensorReading(
+        now, arrays, [to_contact_state(each) for each in values.get("contacts", ())]
     )
 
 

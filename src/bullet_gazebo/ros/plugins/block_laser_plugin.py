@@ -19,7 +19,7 @@ class BlockLaserPlugin(SensorPlugin):
 
     def __init__(self, context: PluginContext) -> None:
         self._topic = LaserTopic(context, PointCloud, self._message, "/world", empty="/")
-        self._deviation = context.number("gaussianNoise", 0.0)
+        self._deviation = context.deviation()
         self._directions = self._topic.laser.directions().reshape(-1, 3)
 
     def _message(self, scan: Scan, now: int, random: np.random.Generator) -> PointCloud:

@@ -12,15 +12,15 @@ import rospy
 from std_msgs.msg import Empty
 
 from bullet_gazebo.physics.description import DescriptionError, Sensor
-from bullet_gazebo.ros.plugins.camera_topics import CameraTopics, rate_of, scope_of
+from bullet_gazebo.ros.plugins.camera_topics import CameraTopics, offer_rate, scope_of
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
     SensorPlugin,
     SensorTopics,
-    sensor_of,
     topic_in,
 )
-from bullet_gazebo.sensors.pinhole import PinholeCamera, camera_of
+from bullet_gazebo.sensors.pinhole import PinholeCamera, camera_of, rate_of
+from bullet_gazebo.sensors.sensing import sensor_of
 
 MULTICAMERA = "multicamera"
 SIDES = ("left/", "right/")
@@ -36,6 +36,7 @@ class CameraPlugin(SensorPlugin):
         self._sensor = sensor = sensor_of(context, (self.kind,))
         topics = SensorTopics(context, rate_of(context, sensor), self._on_clock)
         self._scope = scope = scope_of(context)
+        offer_rate(context, topics, scope)
         baseline = context.number("hackBaseline", 0.0)
         names = (
             context.text("imageTopicName", "image_raw"),
@@ -107,7 +108,7 @@ def _cameras(sensor: Sensor) -> Iterator[tuple[str, PinholeCamera]]:
         raise DescriptionError("no <camera> has left or right in its name")
     for side, element, name in sides:
         where = f"sensor '{sensor.name}', camera '{name}'"
-        yield side, PinholeCamera(element, sensor.pose, where)
+        yield side, PinholeCamera(element, sensor.pose, where, sensor.link)
 
 
 LIBRARIES = {

@@ -5,12 +5,14 @@ from contextlib import suppress
 
 import numpy as np
 import rospy
+from dynamic_reconfigure.encoding import Config
 from PIL import Image as Pillow
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from sensor_msgs.srv import SetCameraInfo, SetCameraInfoResponse
 from std_msgs.msg import Header
 
-from bullet_gazebo.physics.description import DescriptionError, Sensor
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
@@ -20,9 +22,10 @@ from bullet_gazebo.ros.plugins.sensor_topics import (
     namespace_of,
     topic_in,
 )
-from bullet_gazebo.sensors.pinhole import CameraView, PinholeCamera, noisy
+from bullet_gazebo.sensors.pinhole import CameraView, PinholeCamera, with_noise
 
 QUEUE = 2
+IMAGER_RATE = Parameter("imager_rate", "double", 2.0, 1.0, 50.0)  # [Hz]
 MONO = {"L8": np.uint8, "L_INT8": np.uint8, "L16": np.uint16, "L_INT16": np.uint16}
 COLOUR = {
     "R8G8B8": "rgb8", "RGB_INT8": "rgb8", "B8G8R8": "bgr8", "BGR_INT8": "bgr8", "R16G16B16": "rgb16",
@@ -33,6 +36,7 @@ BAYER = {  # the channel of each pixel of a two-by-two tile
     "BAYER_GRBG8": (1, 0, 2, 1),
 }  # fmt: skip
 LUMINANCE = (0.299, 0.587, 0.114)
+OPTICAL = Pose(orientation=(-0.5, 0.5, -0.5, 0.5))  # x right, y down, z ahead
 
 
 class CameraTopics:
@@ -45,7 +49,8 @@ class CameraTopics:
         scope: full name that the topics are in.
         names: of the image and of its camera_info.
         baseline: [m] to the camera on the left.
-        own: prefix of its service, if the sensor has several cameras.
+        own: prefix of its service, if the plugin has several cameras.
+        frame: `<frameName>` if None.
     """
 
     def __init__(
@@ -57,16 +62,20 @@ class CameraTopics:
         names: tuple[str, str],
         baseline: float,
         own: str = "",
+        frame: str | None = None,
     ) -> None:
         self._context, self._camera = context, camera
-        self._frame = frame_of(scope, context.text("frameName", ""))
-        self.info = _camera_info(context, camera, baseline)
+        given = context.text("frameName", "") if frame is None else frame
+        self._frame = frame_of(scope, given)
+        self.info = camera_info(context, camera, baseline)
         image = topic_in(scope, names[0])
-        self._image = topics.advertise(image, Image, QUEUE, latch=True)
+        colours = 3 * camera.width * camera.height
+        self._image = topics.advertise(image, Image, QUEUE, latch=True, content=colours)
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
+        show_camera(context, f"{image}/compressed", CompressedImage, camera)
         self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)
         service = topic_in(scope, f"{own}set_camera_info")
-        self._key = f"{context.key}/{own}"
+        self._own = own
         with suppress(rospy.ServiceException):  # another camera below the same name offers it
             offered = rospy.Service(service, SetCameraInfo, self._set)
             context.closing(offered.shutdown)
@@ -83,7 +92,7 @@ class CameraTopics:
         """Publishes what is heard of a picture at a time [ns]."""
         header = self.header(now)
         if self.wants_colour:
-            seen = self._with_noise(picture.colours, now)
+            seen = with_noise(self._context, self._camera, picture.colours, now, self._own)
             if self._image.is_heard:
                 self._image.publish(to_image(seen, self._camera.format, header))
             if self._jpeg.is_heard:
@@ -91,13 +100,6 @@ class CameraTopics:
         if self._info.is_heard:
             self.info.header = header
             self._info.publish(self.info)
-
-    def _with_noise(self, seen: np.ndarray, now: int) -> np.ndarray:
-        noise, sensing, model = self._camera.noise, self._context.sensing, self._context.model
-        if noise is None:
-            return seen
-        bias = noise.draw_bias(sensing.bias(model, self._key))
-        return noisy(seen, noise, bias, sensing.noise(model, self._key, now))
 
     def _set(self, request: object) -> SetCameraInfoResponse:
         """Takes over a calibration."""
@@ -108,6 +110,12 @@ class CameraTopics:
         return SetCameraInfoResponse(True, "")
 
 
+def show_camera(context: PluginContext, topic: str, kind: type, camera: PinholeCamera) -> None:
+    """Has windows offer a topic in the optical axes of a camera."""
+    view = camera.field_of_view, camera.width / camera.height
+    context.show(topic, kind, camera.link, camera.pose.compose(OPTICAL), view)
+
+
 def scope_of(context: PluginContext) -> str:
     """Returns the full name that a camera's topics are in: its namespace and `<cameraName>`."""
     namespace = namespace_of(context, absent="", empty=MODEL)
@@ -116,6 +124,20 @@ def scope_of(context: PluginContext) -> str:
         if context.text("cameraName", "")
         else namespace
     )
+
+
+def offer_rate(context: PluginContext, topics: SensorTopics, scope: str) -> None:
+    """Offers dynamic_reconfigure of a camera with a `<cameraName>`: `imager_rate` counts once it is set."""
+
+    def apply(wanted: Config, level: int) -> Config:
+        if level != FIRST:
+            with context.sim.lock:
+                topics.set_rate(wanted["imager_rate"])
+        return wanted
+
+    if context.text("cameraName", ""):
+        with suppress(rospy.ServiceException):  # another camera below the same name offers it
+            context.closing(DynamicServer([IMAGER_RATE], apply, scope).shutdown)
 
 
 def to_image(seen: np.ndarray, pixel_format: str, header: Header) -> Image:
@@ -145,7 +167,8 @@ def _to_jpeg(seen: np.ndarray, header: Header) -> CompressedImage:
     return CompressedImage(header, "rgb8; jpeg compressed bgr8", memory.getvalue())
 
 
-def _camera_info(context: PluginContext, camera: PinholeCamera, baseline: float) -> CameraInfo:
+def camera_info(context: PluginContext, camera: PinholeCamera, baseline: float = 0.0) -> CameraInfo:
+    """Returns the calibration of a camera whose baseline is in metres, from the plugin's elements."""
     f = context.number("focalLength", 0.0) or camera.focal_length
     cx = context.number("Cx", 0.0) or (camera.width + 1.0) / 2.0
     cy = context.number("Cy", 0.0) or (camera.height + 1.0) / 2.0
@@ -161,11 +184,3 @@ def _camera_info(context: PluginContext, camera: PinholeCamera, baseline: float)
         R=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         P=[f, 0.0, cx, -f * baseline, 0.0, f, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
     )
-
-
-def rate_of(context: PluginContext, sensor: Sensor) -> float:
-    """Returns the slower one of a plugin's `<updateRate>` and the sensor's rate [Hz]; 0 is every step."""
-    own = context.number("updateRate", 0.0)
-    if own < 0.0:
-        raise DescriptionError(f"<updateRate> is {own:g}")
-    return min((each for each in (own, sensor.rate) if each > 0.0), default=0.0)

@@ -5,19 +5,22 @@ As the camera's plugin, with pictures at ir/image_raw, and `depthImageTopicName`
 (0.4 m), `useDepth16UC1Format` (false), and `pointCloudCutoffMax` (5 m), which only the second one reads.
 """
 
-import math
-
 import numpy as np
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from bullet_gazebo.physics.files.elements import truth
-from bullet_gazebo.ros.plugins.camera_topics import QUEUE, CameraTopics, rate_of, scope_of
+from bullet_gazebo.ros.plugins.camera_topics import (
+    QUEUE,
+    CameraTopics,
+    offer_rate,
+    scope_of,
+    show_camera,
+)
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, SensorTopics, sensor_of, topic_in
-from bullet_gazebo.sensors.pinhole import camera_of
+from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, SensorTopics, topic_in
+from bullet_gazebo.sensors.pinhole import KINECT, DepthSensor, PinholeCamera
 
-KINDS = ("depth", "depth_camera", "rgbd_camera")
 POINT_STEP = 32
 FIELDS = {"x": 0, "y": 4, "z": 8, "rgb": 16}
 POINT = np.dtype(
@@ -34,11 +37,11 @@ class DepthCameraPlugin(SensorPlugin):
     is_organised = False  # whether a cloud has the picture's rows
 
     def __init__(self, context: PluginContext) -> None:
-        self._context = context
-        self._sensor = sensor = sensor_of(context, KINDS)
-        self._camera = camera = camera_of(sensor)
+        self._sensor = sensor = DepthSensor(context)
+        camera = sensor.camera
         scope = scope_of(context)
-        self._topics = topics = SensorTopics(context, rate_of(context, sensor), self._measure)
+        topics = SensorTopics(context, sensor.rate, self._measure)
+        offer_rate(context, topics, scope)
         names = (
             context.text("imageTopicName", "ir/image_raw"),
             context.text("cameraInfoTopicName", "ir/camera_info"),
@@ -49,65 +52,36 @@ class DepthCameraPlugin(SensorPlugin):
         def named(tag: str, default: str) -> str:
             return topic_in(scope, context.text(tag, default))
 
-        self._depth = topics.advertise(named("depthImageTopicName", "depth/image_raw"), Image)
-        self._cloud = topics.advertise(named("pointCloudTopicName", "points"), PointCloud2)
+        pixels = camera.width * camera.height
+        depth = named("depthImageTopicName", "depth/image_raw")
+        cloud = named("pointCloudTopicName", "points")
+        self._depth = topics.advertise(depth, Image, content=4 * pixels)
+        self._cloud = topics.advertise(cloud, PointCloud2, content=POINT_STEP * pixels)
+        for name, kind in ((depth, Image), (cloud, PointCloud2)):
+            show_camera(context, name, kind, camera)
         self._depth_info = topics.advertise(
             named("depthImageCameraInfoTopicName", "depth/camera_info"),
             CameraInfo,
             QUEUE,
             wakes=False,
         )
-        self._low = context.number("pointCloudCutoff", 0.4)
-        self._high = context.number("pointCloudCutoffMax", 5.0) if self.is_organised else math.inf
         self._in_millimetres = truth(context.text("useDepth16UC1Format", "false"))
-        rows, columns = np.indices((camera.height, camera.width))
-        self._across = (columns - (camera.width - 1) / 2.0) / camera.focal_length
-        self._down = (rows - (camera.height - 1) / 2.0) / camera.focal_length
 
     def _measure(self, now: int) -> None:
-        link = self._context.model.link_state(self._sensor.link)[0]
-        in_colour = self._pictures.wants_colour or self._cloud.is_heard
-        picture = self._camera.picture(self._context.sensing.visuals, link, in_colour)
+        picture = self._sensor.view(self._pictures.wants_colour or self._cloud.is_heard)
         self._pictures.send(picture, now)
         header = self._pictures.header(now)
-        depths = np.minimum(picture.depths, self._camera.far)
-        depths[(depths <= self._low) | (depths > self._high)] = np.nan
+        depths = self._sensor.depths(picture)
         if self._depth.is_heard:
-            self._depth.publish(self._to_image(depths, header))
+            self._depth.publish(to_depth_image(depths, self._in_millimetres, header))
         if self._depth_info.is_heard:
             info = self._pictures.info
             info.header = header
             self._depth_info.publish(info)
         if self._cloud.is_heard:
-            self._cloud.publish(self._to_cloud(depths, picture.colours, header))
-
-    def _to_image(self, depths: np.ndarray, header: Header) -> Image:
-        height, width = depths.shape
-        if self._in_millimetres:
-            whole = np.nan_to_num(np.rint(1000.0 * depths), nan=0.0)
-            data = np.where(whole <= np.iinfo(np.uint16).max, whole, 0.0).astype("<u2")
-            return Image(header, height, width, "16UC1", 0, 2 * width, data.tobytes())
-        data = depths.astype("<f4")
-        return Image(header, height, width, "32FC1", 0, 4 * width, data.tobytes())
-
-    def _to_cloud(self, depths: np.ndarray, colours: np.ndarray, header: Header) -> PointCloud2:
-        height, width = depths.shape
-        points = np.zeros((height, width), POINT)
-        points["x"], points["y"], points["z"] = depths * self._across, depths * self._down, depths
-        red, green, blue = np.moveaxis(colours.astype(np.uint32), 2, 0)
-        points["rgb"] = red << 16 | green << 8 | blue
-        if not self.is_organised:
-            height, width = 1, height * width
-        return PointCloud2(
-            header=header,
-            height=height,
-            width=width,
-            fields=[PointField(name, at, PointField.FLOAT32, 1) for name, at in FIELDS.items()],
-            point_step=POINT_STEP,
-            row_step=POINT_STEP * width,
-            data=points.tobytes(),
-            is_dense=not bool(np.isnan(depths).any()),
-        )
+            self._cloud.publish(
+                to_cloud(depths, picture.colours, self._sensor.camera, self.is_organised, header)
+            )
 
 
 class KinectPlugin(DepthCameraPlugin):
@@ -116,7 +90,41 @@ class KinectPlugin(DepthCameraPlugin):
     is_organised = True
 
 
+def to_depth_image(depths: np.ndarray, in_millimetres: bool, header: Header) -> Image:
+    """Returns the message of depths (height, width) [m], NaN for no reading."""
+    height, width = depths.shape
+    if in_millimetres:
+        whole = np.nan_to_num(np.rint(1000.0 * depths), nan=0.0)
+        data = np.where(whole <= np.iinfo(np.uint16).max, whole, 0.0).astype("<u2")
+        return Image(header, height, width, "16UC1", 0, 2 * width, data.tobytes())
+    data = depths.astype("<f4")
+    return Image(header, height, width, "32FC1", 0, 4 * width, data.tobytes())
+
+
+def to_cloud(
+    depths: np.ndarray, colours: np.ndarray, camera: PinholeCamera, organised: bool, header: Header
+) -> PointCloud2:
+    """Returns the points of depths (height, width) [m] and colours (height, width, 3)."""
+    height, width = depths.shape
+    points = np.zeros((height, width), POINT)
+    points["x"], points["y"], points["z"] = depths * camera.across, depths * camera.down, depths
+    red, green, blue = np.moveaxis(colours.astype(np.uint32), 2, 0)
+    points["rgb"] = red << 16 | green << 8 | blue
+    if not organised:
+        height, width = 1, height * width
+    return PointCloud2(
+        header=header,
+        height=height,
+        width=width,
+        fields=[PointField(name, at, PointField.FLOAT32, 1) for name, at in FIELDS.items()],
+        point_step=POINT_STEP,
+        row_step=POINT_STEP * width,
+        data=points.tobytes(),
+        is_dense=not bool(np.isnan(depths).any()),
+    )
+
+
 LIBRARIES = {
     "libgazebo_ros_depth_camera.so": DepthCameraPlugin,
-    "libgazebo_ros_openni_kinect.so": KinectPlugin,
+    KINECT: KinectPlugin,
 }

@@ -1,43 +1,61 @@
-"""hector_gazebo_plugins' IMU, GPS and magnetometer (docs/contract/sensors.md 12.1).
+"""hector_gazebo_plugins' IMU, GPS, magnetometer and sonar (docs/contract/sensors.md 12.1).
 
-They publish without subscribers, at `updateRate` (absent: every step), and have errors that drift.
+They publish without subscribers, at multiples of `updatePeriod` [s] or of that of `updateRate` (absent: every
+step) after `updateOffset` [s], and have errors that drift.
 """
 
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
+from typing import Any
 
 import numpy as np
 import rospy
+from dynamic_reconfigure.encoding import Config
 from geometry_msgs.msg import Quaternion, Vector3, Vector3Stamped
+from hector_gazebo_plugins.srv import SetBias
 from sensor_msgs.msg import Imu as ImuMsg
-from sensor_msgs.msg import MagneticField, NavSatFix, NavSatStatus
+from sensor_msgs.msg import MagneticField, NavSatFix, NavSatStatus, Range
 from std_msgs.msg import Header
-from std_srvs.srv import Empty, EmptyResponse
+from std_srvs.srv import Empty
 
-from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.elements import numbers, truth
 from bullet_gazebo.physics.pose import conjugate, from_rpy, multiply, rotate
+from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import NANOSECONDS, to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, namespace_of, queue_of, topic_in
+from bullet_gazebo.ros.plugins.sensor_topics import (
+    SensorPlugin,
+    namespace_of,
+    queue_of,
+    topic_in,
+)
 from bullet_gazebo.sensors.drift import DriftingError
 from bullet_gazebo.sensors.imu import Imu, LinkMotion, motion_of
+from bullet_gazebo.sensors.laser import LaserSensor, nearest
 
+MOST = 1e6  # that dynamic_reconfigure sets
 EQUATOR = 6378137.0  # [m], radius of WGS84
 FLATTENING = 1.0 / 298.257223563
 GPS_RATE = 4.0  # [Hz]
+SONAR_RATE = 10.0  # [Hz]
 GRAVITY = 9.8065  # [m/s²]
+ATTRIBUTES = {
+    "gaussian_noise": "noise", "offset": "offset", "drift": "drift", "drift_frequency": "frequency",
+    "scale_error": "scale",
+}  # fmt: skip
+MODEL = [Parameter(name, "double", 0.0, -MOST, MOST) for name in ATTRIBUTES]
 
 
-class HectorSensor:
-    """What the three have in common: a link, a clock that is always heard, a topic.
+class HectorTimer:
+    """What they have in common: a clock that is always heard.
 
     Args:
         context: the plugin's.
         default: rate [Hz] without `<updateRate>`; 0 is every step.
         errors: whose drift begins again when time does, and with a new seed.
-        send: publishes the measurement of a motion at a time [ns], some time [s] after the last one.
+        send: publishes the measurement at a time [ns], some time [s] after the last one.
     """
 
     def __init__(
@@ -45,18 +63,20 @@ class HectorSensor:
         context: PluginContext,
         default: float,
         errors: Sequence[DriftingError],
-        send: Callable[[LinkMotion, int, float], None],
+        send: Callable[[int, float], None],
     ) -> None:
         self._context = context
         self._send = send
-        self.link = context.text("bodyName", context.model.link_names[0])
-        if self.link not in context.model.link_names:
-            raise DescriptionError(f"<bodyName>: the model has no link '{self.link}'")
         self.namespace = namespace_of(context, absent="", empty="")
         self._errors = errors
         self._seeds = context.sensing.seeds
         self._last = context.sim.now
-        context.clock(context.number("updateRate", default), self._measure)
+        period = context.number("updatePeriod", 0.0)
+        self.rate = 1.0 / period if period > 0.0 else context.number("updateRate", default)
+        clock = context.clock(self.rate, self._measure, at_once=False)
+        ticks = max(clock.period, 1)
+        offset = math.fmod(context.number("updateOffset", 0.0), ticks / NANOSECONDS)
+        clock.set_rate(self.rate, round(offset * NANOSECONDS) - ticks, self._last)
 
     def random(self, now: int) -> np.random.Generator:
         """Returns what draws the errors of a measurement at a time [ns]."""
@@ -70,7 +90,27 @@ class HectorSensor:
                 error.restart()
         seconds = max(now - self._last, 0) / NANOSECONDS
         self._last = now
-        self._send(motion_of(self._context.model, self.link), now, seconds)
+        self._send(now, seconds)
+
+
+class HectorSensor(HectorTimer):
+    """One that measures the motion of a link."""
+
+    def __init__(
+        self,
+        context: PluginContext,
+        default: float,
+        errors: Sequence[DriftingError],
+        send: Callable[[LinkMotion, int, float], None],
+    ) -> None:
+        self.link = context.link("bodyName", required=False)
+        self.frame = context.text("frameId", context.text("bodyName", self.link))
+        super().__init__(
+            context,
+            default,
+            errors,
+            lambda now, seconds: send(motion_of(context.model, self.link), now, seconds),
+        )
 
 
 class HectorImuPlugin(SensorPlugin):
@@ -82,24 +122,47 @@ class HectorImuPlugin(SensorPlugin):
             DriftingError(_reader(context), prefix) for prefix in ("accel", "rate", "yaw")
         )
         self._turn = from_rpy(*numbers(context.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
-        self._imu = Imu(True, context.number("updateRate", 0.0))
         self._sensor = sensor = HectorSensor(
             context, 0.0, (self._accel, self._rate, self._yaw), self._publish
         )
-        self._frame = context.text("frameId", sensor.link).lstrip("/")
+        self._imu = Imu(True, sensor.rate)
+        self._frame = sensor.frame.lstrip("/")
         topic = topic_in(sensor.namespace, context.text("topicName", "imu"))
-        self._publisher = rospy.Publisher(
-            topic, ImuMsg, queue_size=queue_of(context, 10), tcp_nodelay=True
+        bias = topic_in(sensor.namespace, context.text("biasTopicName", f"{topic}/bias"))
+        self._publisher, self._bias = (
+            rospy.Publisher(name, ImuMsg, queue_size=queue_of(context, 10), tcp_nodelay=True)
+            for name in (topic, bias)
         )
-        service = context.text("serviceName", f"{topic}/calibrate")
-        with suppress(rospy.ServiceException):  # another robot's has the name
-            offered = rospy.Service(topic_in(sensor.namespace, service), Empty, self._calibrate)
-            context.closing(offered.shutdown)
+        calibrate = context.text("serviceName", f"{topic}/calibrate")
+        self._offer(topic_in(sensor.namespace, calibrate), Empty, self._rate)
+        self._offer(f"{topic}/set_accel_bias", SetBias, self._accel)
+        self._offer(f"{topic}/set_rate_bias", SetBias, self._rate)
+        for name, error in (("accel", self._accel), ("rate", self._rate), ("yaw", self._yaw)):
+            server = DynamicServer(MODEL, partial(self._configure, error), f"{topic}/{name}")
+            context.closing(server.shutdown)
 
-    def _calibrate(self, _: object) -> EmptyResponse:
+    def _offer(self, name: str, kind: Any, error: DriftingError) -> None:
+        """Offers a service that sets the drift of `error`: to zero if the request has no bias."""
+
+        def answer(request: Any) -> Any:
+            bias = getattr(request, "bias", Vector3())
+            with self._context.sim.lock:
+                error.restart((bias.x, bias.y, bias.z))
+            return kind._response_class()
+
+        with suppress(rospy.ServiceException):  # another robot's has the name
+            offered = rospy.Service(name, kind, answer)
+            self._context.closing(offered.shutdown)
+
+    def _configure(self, error: DriftingError, wanted: Config, level: int) -> Config:
+        """Sets an error model; the first call asks for the file's."""
         with self._context.sim.lock:
-            self._rate.restart()
-        return EmptyResponse()
+            for parameter in MODEL:
+                if level == FIRST:
+                    wanted[parameter.name] = float(getattr(error, ATTRIBUTES[parameter.name])[0])
+                else:
+                    setattr(error, ATTRIBUTES[parameter.name], np.full(3, wanted[parameter.name]))
+        return wanted
 
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
         sim, moves = self._context.sim, self._context.sensing.schedule.moves
@@ -113,9 +176,15 @@ class HectorImuPlugin(SensorPlugin):
         turned = multiply(self._turn, sample.orientation)
         turned = multiply(from_rpy(0.0, 0.0, yaw), turned)
         tilt = self._accel.noise[:2] ** 2 / GRAVITY**2
+        header = Header(stamp=to_time(now), frame_id=self._frame)
+        if self._bias.get_num_connections():
+            drifts = (Vector3(*error.bias) for error in (self._rate, self._accel))
+            bias = ImuMsg(header=header, orientation=Quaternion(w=1.0))
+            bias.angular_velocity, bias.linear_acceleration = drifts
+            self._bias.publish(bias)
         self._publisher.publish(
             ImuMsg(
-                header=Header(stamp=to_time(now), frame_id=self._frame),
+                header=header,
                 orientation=Quaternion(*turned),
                 orientation_covariance=_diagonal([*tilt, self._yaw.noise[2] ** 2]),
                 angular_velocity=Vector3(*rate),
@@ -200,7 +269,7 @@ class HectorMagneticPlugin(SensorPlugin):
         self._field = (across * math.cos(turn), across * math.sin(turn), down)
         self._error = DriftingError(_reader(context), "")
         self._sensor = sensor = HectorSensor(context, 0.0, (self._error,), self._publish)
-        self._frame = context.text("frameId", sensor.link).lstrip("/")
+        self._frame = sensor.frame.lstrip("/")
         self._is_field = truth(context.text("useMagneticFieldMsgs", "false"))
         topic = topic_in(sensor.namespace, context.text("topicName", "magnetic"))
         kind = MagneticField if self._is_field else Vector3Stamped
@@ -218,6 +287,36 @@ class HectorMagneticPlugin(SensorPlugin):
             else Vector3Stamped(header, seen)
         )
         self._publisher.publish(message)
+
+
+class HectorSonarPlugin(SensorPlugin):
+    """The nearest range of a laser's rays."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self._sensor = LaserSensor(context)
+        self._error = DriftingError(_reader(context), "")
+        self._timer = timer = HectorTimer(context, SONAR_RATE, (self._error,), self._publish)
+        self._frame = context.text("frameId", "/sonar_link")
+        topic = topic_in(timer.namespace, context.text("topicName", "sonar"))
+        self._publisher = rospy.Publisher(
+            topic, Range, queue_size=queue_of(context, 1), tcp_nodelay=True
+        )
+        context.show(topic, Range, self._sensor.sensor.link, self._sensor.sensor.pose)
+
+    def _publish(self, now: int, seconds: float) -> None:
+        laser, random = self._sensor.laser, self._timer.random(now)
+        exact = nearest(self._sensor.scan(random), laser, 0.0, random)
+        found = float(self._error.applied(np.full(3, exact), seconds, random)[0])
+        self._publisher.publish(
+            Range(
+                header=Header(stamp=to_time(now), frame_id=self._frame),
+                radiation_type=Range.ULTRASOUND,
+                field_of_view=min(fan.high - fan.low for fan in (laser.horizontal, laser.vertical)),
+                min_range=laser.low,
+                max_range=laser.high,
+                range=min(max(found, laser.low), laser.high),
+            )
+        )
 
 
 def _reader(context: PluginContext) -> Callable[[str, float], np.ndarray]:
@@ -239,4 +338,5 @@ LIBRARIES = {
     "libhector_gazebo_ros_imu.so": HectorImuPlugin,
     "libhector_gazebo_ros_gps.so": HectorGpsPlugin,
     "libhector_gazebo_ros_magnetic.so": HectorMagneticPlugin,
+    "libhector_gazebo_ros_sonar.so": HectorSonarPlugin,
 }

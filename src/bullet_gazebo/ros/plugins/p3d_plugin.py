@@ -11,6 +11,7 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.elements import numbers
+from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import (
     add,
     conjugate,
@@ -38,19 +39,15 @@ class P3dPlugin(SensorPlugin):
 
     def __init__(self, context: PluginContext) -> None:
         self._context = context
-        self._link = context.text("bodyName", "")
+        self._link, self._child = context.link("bodyName"), context.text("bodyName", "")
         topic = context.text("topicName", "")
-        if self._link not in context.model.link_names:
-            raise DescriptionError(f"<bodyName>: the model has no link '{self._link}'")
         if not topic:
             raise DescriptionError("<topicName> is missing")
         frame = context.text("frameName", "world")
-        self._reference = None if frame in WORLDS else context.sim.world.link(frame)
-        if frame not in WORLDS and self._reference is None:
-            raise DescriptionError(f"<frameName>: there is no link '{frame}'")
+        self._reference = None if frame in WORLDS else _link_of(context, frame)
         self._xyz = numbers(context.text("xyzOffset", "0 0 0"), "<xyzOffset>", 3)
         self._turn = from_rpy(*numbers(context.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
-        self._deviation = context.number("gaussianNoise", 0.0)
+        self._deviation = context.deviation()
         namespace = namespace_of(context, absent="", empty="/")
         self._frame = frame_of(namespace, frame)
         rate = context.number("updateRate", 0.0)
@@ -69,7 +66,7 @@ class P3dPlugin(SensorPlugin):
         covariance[::7] = [self._deviation**2] * 6
         return Odometry(
             Header(stamp=to_time(now), frame_id=self._frame),
-            self._link,
+            self._child,
             PoseWithCovariance(PoseMsg(Point(*place), Quaternion(*turn)), covariance),
             TwistWithCovariance(to_twist_msg((linear, angular)), covariance),
         )
@@ -87,6 +84,15 @@ class P3dPlugin(SensorPlugin):
         turn = frame.pose.orientation
         linear = rotate(turn, subtract(motion.linear, frame.linear))
         return LinkMotion(pose, linear, rotate(turn, subtract(motion.angular, frame.angular)))
+
+
+def _link_of(context: PluginContext, frame: str) -> tuple[Model, str]:
+    """Returns the link `frameName`: of its own model, or else of the world."""
+    own = context.among("frameName", context.model.link_names)
+    found = (context.model, own) if own else context.sim.world.link(frame)
+    if found is None:
+        raise DescriptionError(f"<frameName>: there is no link '{frame}'")
+    return found
 
 
 LIBRARIES = {"libgazebo_ros_p3d.so": P3dPlugin}

@@ -18,6 +18,7 @@ from functools import partial
 from typing import Protocol
 
 import rospy
+from bullet_gazebo_msgs.msg import SceneSensor
 
 from bullet_gazebo.physics.description import (
     CONTROL_PLUGIN,
@@ -26,11 +27,12 @@ from bullet_gazebo.physics.description import (
     Sensor,
     library_of,
 )
-from bullet_gazebo.physics.files.sdf_parts import value
 from bullet_gazebo.physics.model import Model
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.ros.common.messages import to_pose_msg
 from bullet_gazebo.ros.common.publishing import Thinner
 from bullet_gazebo.sensors.schedule import SensorClock
-from bullet_gazebo.sensors.sensing import Sensing
+from bullet_gazebo.sensors.sensing import Mount, Sensing
 from bullet_gazebo.simulator import Simulator
 
 CONTROL = re.compile("plugin .*(control|drive|steer|planar_move|hw_sim)", re.IGNORECASE)
@@ -40,7 +42,7 @@ Update = Callable[[int], None]
 
 
 @dataclass(frozen=True)
-class PluginContext:
+class PluginContext(Mount):
     """What a plugin gets: its element in the file, its model, and the namespace to work in.
 
     Publish fast topics as a `ThinnedTopic` of `thinner`, measurements by a clock of `sensing`.
@@ -48,36 +50,16 @@ class PluginContext:
     Attributes:
         namespace: its `<robotNamespace>`, else that of the spawn request, else the model's name.
         given_namespace: the first two of these; None if there is neither.
-        sensor: the one that the plugin belongs to; None for a model's plugin.
     """
 
-    sim: Simulator
-    model: Model
-    plugin: Plugin
     namespace: str
     given_namespace: str | None
     thinner: Thinner
-    sensing: Sensing
-    sensor: Sensor | None = None
+    _shown: list[SceneSensor] = field(default_factory=list, repr=False)
     _updates: list[Update] = field(default_factory=list, repr=False)
     _clocks: list[SensorClock] = field(default_factory=list, repr=False)
     _closers: list[Callable[[], None]] = field(default_factory=list, repr=False)
     _is_made: threading.Event = field(default_factory=threading.Event, repr=False)
-
-    @property
-    def key(self) -> str:
-        """What its random numbers are drawn by: the same for all plugins of a sensor."""
-        if self.sensor is not None:
-            return f"{self.sensor.link}::{self.sensor.name}"
-        return f"plugin {self.model.description.plugins.index(self.plugin)}"
-
-    def text(self, tag: str, default: str) -> str:
-        """Returns the text of the plugin's child element `tag`."""
-        return (self.plugin.element.findtext(tag) or "").strip() or default
-
-    def number(self, tag: str, default: float) -> float:
-        """Returns the number in the plugin's child element `tag`; a faulty one is a DescriptionError."""
-        return value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)
 
     def clock(
         self,
@@ -107,6 +89,37 @@ class PluginContext:
     def closing(self, close: Callable[[], None]) -> None:
         """Calls `close` when the plugin ends, or can't be made; the last one first."""
         self._closers.append(close)
+
+    def show(
+        self, topic: str, kind: type, link: str, pose: Pose, view: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
+        """Has windows offer to draw measurements.
+
+        Args:
+            topic: full name of theirs.
+            kind: type of its messages.
+            link: which they are taken from.
+            pose: of the axes that they are in, in the link.
+            view: of a camera, its horizontal field of view [rad] and its picture's width by height.
+        """
+        shown = SceneSensor(
+            topic,
+            kind._type,
+            self.model.name,
+            link,
+            to_pose_msg(pose),
+            *view,  # type: ignore[attr-defined]
+        )
+
+        def close() -> None:
+            with self.sim.lock:
+                self._shown.remove(shown)
+                self.sim.world.version += 1
+
+        with self.sim.lock:
+            self._shown.append(shown)
+            self.sim.world.version += 1
+        self.closing(close)
 
     def made(self) -> None:
         """Lets the clocks begin: the plugin can measure now."""
@@ -164,11 +177,18 @@ Factory = Callable[[PluginContext], LoadedPlugin | None]
 class PluginRegistry:
     """Starts and ends plugins by the file names of their libraries: built-in ones, then users'."""
 
-    def __init__(self, sim: Simulator, thinner: Thinner, seed: int = 0) -> None:
-        """`seed` is that of the sensors' noise."""
+    def __init__(
+        self,
+        sim: Simulator,
+        thinner: Thinner,
+        seed: int = 0,
+        shown: list[SceneSensor] | None = None,
+    ) -> None:
+        """`seed` is that of the sensors' noise; to `shown` come the topics that windows can draw."""
         self._sim = sim
+        self._shown = [] if shown is None else shown
         self._thinner = thinner
-        self._sensing = Sensing(sim, seed)
+        self.sensing = Sensing(sim, seed)
         # Imported now, so that no spawn waits for it.
         self._built_in = _built_in()
         self._loaded: dict[Model, list[tuple[PluginContext, LoadedPlugin | None]]] = {}
@@ -196,8 +216,8 @@ class PluginRegistry:
             own = plugin.element.findtext("robotNamespace")
             given = own.strip() if own is not None else robot_namespace or None
             context = PluginContext(
-                self._sim, model, plugin, given or robot_namespace or model.name, given,
-                self._thinner, self._sensing, sensor,
+                self._sim, model, plugin, self.sensing, sensor,
+                given or robot_namespace or model.name, given, self._thinner, self._shown,
             )  # fmt: skip
             try:
                 loaded.append((context, factory(context)))

@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import LaserTopic, SensorPlugin
-from bullet_gazebo.sensors.laser import Laser, Scan
+from bullet_gazebo.sensors.laser import Scan, nearest
 
 
 class RangePlugin(SensorPlugin):
@@ -20,7 +20,7 @@ class RangePlugin(SensorPlugin):
     def __init__(self, context: PluginContext) -> None:
         own = context.number("updateRate", 0.0)
         self._topic = LaserTopic(context, Range, self._message, "/range", empty="/", own_rate=own)
-        self._deviation = context.number("gaussianNoise", 0.0)
+        self._deviation = context.deviation()
         self._is_sound = context.text("radiation", "infrared") == "ultrasound"
         self._field_of_view = context.number("fov", 0.05)
 
@@ -34,14 +34,6 @@ class RangePlugin(SensorPlugin):
             max_range=laser.high,
             range=nearest(scan, laser, self._deviation, random),
         )
-
-
-def nearest(scan: Scan, laser: Laser, deviation: float, random: np.random.Generator) -> float:
-    """Returns the smallest range of a scan [m], with noise if it is below the largest."""
-    found = float(np.clip(scan.ranges.min(), laser.low, laser.high))
-    if found < laser.high and deviation:
-        found += float(random.normal(0.0, deviation))
-    return min(found, laser.high)
 
 
 LIBRARIES = {"libgazebo_ros_range.so": RangePlugin}

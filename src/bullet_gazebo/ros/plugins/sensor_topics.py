@@ -1,6 +1,6 @@
 """Names, frames and topics of sensors' plugins (docs/contract/sensors.md 0.2 to 0.4)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,32 +9,17 @@ from geometry_msgs.msg import Quaternion, Vector3
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
 
-from bullet_gazebo.physics.description import DescriptionError, Sensor
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.control_plugin import find_param
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.sensors.imu import InertialSample
-from bullet_gazebo.sensors.laser import KINDS, Laser, Scan
+from bullet_gazebo.sensors.laser import LaserSensor, Scan
 from bullet_gazebo.sensors.schedule import SensorClock
-from bullet_gazebo.sensors.sensing import sensor_pose
+from bullet_gazebo.sensors.sensing import slower
 
 LOCKSTEP_QUEUE = 100  # messages of a sensor
+MOST_QUEUED = 32_000_000  # [bytes] of a topic
 MODEL = "<model>"  # where a namespace is the model's name
-
-
-def sensor_of(context: PluginContext, kinds: Sequence[str]) -> Sensor:
-    """Returns the sensor that a plugin belongs to.
-
-    Raises:
-        DescriptionError: if it has none, or one of another kind.
-    """
-    sensor = context.sensor
-    if sensor is None or sensor.kind not in kinds:
-        found = "a model" if sensor is None else f"the {sensor.kind} sensor '{sensor.name}'"
-        raise DescriptionError(
-            f"it belongs to {found}, not to a sensor of type {' or '.join(kinds)}"
-        )
-    return sensor
 
 
 def namespace_of(context: PluginContext, absent: str, empty: str) -> str:
@@ -63,9 +48,13 @@ def frame_of(namespace: str, frame: str) -> str:
     return "/".join(filter(None, [*prefix.split("/"), *frame.split("/")]))
 
 
-def queue_of(context: PluginContext, size: int) -> int:
-    """Returns a topic's queue size: a long step makes many messages before rospy's threads send one."""
-    return max(size, LOCKSTEP_QUEUE) if context.sim.lockstep else size
+def queue_of(context: PluginContext, size: int, content: int = 0) -> int:
+    """Returns a topic's queue size: a long step makes many messages before rospy's threads send one.
+
+    `content` is that of a message [bytes]: who stops reading must not cost more than MOST_QUEUED.
+    """
+    most = min(LOCKSTEP_QUEUE, MOST_QUEUED // max(content, 1))
+    return max(size, most) if context.sim.lockstep else size
 
 
 class SensorPlugin:
@@ -141,11 +130,26 @@ class SensorTopics:
         self._waking: list[Topic] = []
         self._clock = context.clock(rate, measure, self._is_heard, at_once)
 
+    def set_rate(self, rate: float) -> None:
+        """Measures at another rate [Hz] from now on; the caller holds the simulator's lock."""
+        now = self._context.sim.now
+        self._clock.set_rate(rate, now, now)
+        self._clock.look()
+
     def advertise(
-        self, name: str, kind: type, queue: int = 1, latch: bool = False, wakes: bool = True
+        self,
+        name: str,
+        kind: type,
+        queue: int = 1,
+        latch: bool = False,
+        wakes: bool = True,
+        content: int = 0,
     ) -> Topic:
-        """Returns a topic; its subscribers start the measurements if it `wakes` the sensor."""
-        size = queue_of(self._context, queue)
+        """Returns a topic; its subscribers start the measurements if it `wakes` the sensor.
+
+        `content` is that of a large message [bytes].
+        """
+        size = queue_of(self._context, queue, content)
         topic = Topic(name, kind, size, latch, Newcomers(self._clock))
         self._context.closing(topic.close)
         if wakes:
@@ -171,6 +175,11 @@ class SensorTopic:
         self._measure = measure
         topics = SensorTopics(context, rate, self._send, at_once)
         self._topic = topics.advertise(name, kind)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether it has subscribers."""
+        return self._topic.is_heard
 
     def _send(self, now: int) -> None:
         message = self._measure(now)
@@ -199,29 +208,21 @@ class LaserTopic:
         empty: str,
         own_rate: float = 0.0,
     ) -> None:
-        self._context = context
         self._message = message
-        self._sensor = sensor = sensor_of(context, KINDS)
-        self.laser = Laser(sensor)
-        sensing = context.sensing
-        self._scene = sensing.visuals if self.laser.sees_visuals else sensing.collisions
+        self._sensor = sensor = LaserSensor(context)
+        self.laser = sensor.laser
         namespace = namespace_of(context, absent="", empty=empty)
         self.frame = frame_of(namespace, context.text("frameName", "/world"))
         topic = context.plugin.element.findtext("topicName", name).strip()
         if topic:
-            rate = min((each for each in (own_rate, sensor.rate) if each > 0.0), default=0.0)
-            full = topic_in(namespace, topic)
-            SensorTopic(context, full, kind, rate, self._measure)
+            full, own = topic_in(namespace, topic), sensor.sensor
+            SensorTopic(context, full, kind, slower(own_rate, sensor.rate), self._measure)
+            context.show(full, kind, own.link, own.pose)
         else:
-            rospy.logwarn("Sensor '%s': its <topicName> is empty", sensor.name)
+            rospy.logwarn("Sensor '%s': its <topicName> is empty", context.key)
 
     def _measure(self, now: int) -> Any:
-        model = self._context.model
-        random = self._context.sensing.noise(model, self._context.key, now)
-        noise, bias = self.laser.noise, 0.0
-        if noise is not None:
-            bias = noise.draw_bias(self._context.sensing.bias(model, self._context.key))
-        scan = self.laser.measure(self._scene, sensor_pose(model, self._sensor), bias, random)
+        scan, random = self._sensor.measure(now)
         return self._message(scan, now, random)
 
 

@@ -44,7 +44,7 @@ class VelodynePlugin(SensorPlugin):
         self._low = max(context.number("min_range", 0.0), laser.low)
         self._high = min(context.number("max_range", math.inf), laser.high)
         self._least = context.number("min_intensity", -math.inf)
-        self._deviation = context.number("gaussianNoise", 0.0)
+        self._deviation = context.deviation()
         self._directions = laser.directions().transpose(1, 0, 2)
         self._rings = np.broadcast_to(
             np.arange(laser.vertical.readings), self._directions.shape[:2]

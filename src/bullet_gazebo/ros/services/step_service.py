@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 
 import rospy
+from bullet_gazebo_msgs.msg import SensorReading
 from bullet_gazebo_msgs.srv import (
     PreparedStep,
     PreparedStepRequest,
@@ -34,6 +35,7 @@ from bullet_gazebo.ros.common.messages import (
     check_numbers,
     to_contact_state,
     to_pose_msg,
+    to_reading,
     to_time,
     to_twist_msg,
 )
@@ -47,6 +49,8 @@ from bullet_gazebo.ros.services.step_requests import (
     StepPlan,
     query_of,
 )
+from bullet_gazebo.sensors.sensing import Sensing
+from bullet_gazebo.sensors.sensor_readers import SensorReaders, find_sensor
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import NOTHING, StateReader, UnknownName
 
@@ -56,11 +60,16 @@ MOST_HANDLES = 256  # a client whose handle was dropped prepares its step again
 class _Prepared:
     """What a handle stands for."""
 
-    def __init__(self, sim: Simulator, addresses: Addresses, request: PrepareStepRequest) -> None:
+    def __init__(
+        self, sim: Simulator, sensing: Sensing, addresses: Addresses, request: PrepareStepRequest
+    ) -> None:
+        for name in request.sensors:
+            find_sensor(sim, sensing, name)
         self.addresses = addresses
         self.commanded = addresses.commanded(request.controllers, request.commanded_joints)
         self.reader = StateReader(sim.world, query_of(request))
         self.models = list(self.reader.read(stepped=False).models)
+        self.sensors = tuple(request.sensors)
 
     def check(self, request: PreparedStepRequest) -> None:
         """Raises ControlError if the request doesn't fit the prepared names."""
@@ -94,21 +103,25 @@ class StepService:
     def __init__(
         self,
         sim: Simulator,
+        sensing: Sensing,
         watchdog: AbstractContextManager[object],
         one_at_a_time: threading.Lock,
     ) -> None:
         """
         Args:
             sim: the simulator, in lock-step.
+            sensing: its sensors.
             watchdog: a fault in its block ends the node.
             one_at_a_time: keeps the ticks of other requests out of a request's ticks.
         """
-        self._sim = sim
+        self._sim, self._sensing = sim, sensing
         self._watchdog = watchdog
         self._one_at_a_time = one_at_a_time
         self._reader = StateReader(sim.world, NOTHING)
         self._current = Addresses(sim)
         self._prepared: dict[int, _Prepared] = {}  # by handle
+        self._readers: SensorReaders | None = None  # that the last step asked for
+        self._readers_version = sim.world.version
         # Contacts are those of the last tick, until a reset or a placing makes them void.
         self._knows_contacts = False
         self._services = [
@@ -121,7 +134,7 @@ class StepService:
     def _prepare(self, request: PrepareStepRequest) -> PrepareStepResponse:
         with self._sim.lock:
             try:
-                prepared = _Prepared(self._sim, self._addresses(), request)
+                prepared = _Prepared(self._sim, self._sensing, self._addresses(), request)
             except (ControlError, UnknownName) as error:
                 return PrepareStepResponse(status_message=f"PrepareStep: {error}")
             if len(self._prepared) >= MOST_HANDLES:
@@ -146,12 +159,14 @@ class StepService:
                 del self._prepared[request.handle]  # it would keep deleted models
                 prepared = None
             if prepared is None or not prepared.commanded.is_ready:
-                return PreparedStepResponse(False, True, sim.now, "PreparedStep: stale", [], [])
+                return PreparedStepResponse(False, True, sim.now, "PreparedStep: stale", [], [], [])
             commanded = prepared.commanded
             try:
                 prepared.check(request)
+                if prepared.sensors or (self._readers and request.ticks):
+                    self._sense(prepared.sensors)
                 commanded.send(list(request.commands[: commanded.size]))
-            except ControlError as error:
+            except (ControlError, UnknownName) as error:
                 return self._refused(str(error))
             self._advance(request.ticks, commanded, request.commands[commanded.size :])
             try:
@@ -160,7 +175,24 @@ class StepService:
                 numbers, contacts = prepared.read(self._knows_contacts)
             except UnknownName as error:
                 return self._refused(f"the ticks are done, but meanwhile {error}")
-            return PreparedStepResponse(True, False, sim.now, "", numbers, contacts)
+            sensors = self._sensed() if prepared.sensors else []
+            return PreparedStepResponse(True, False, sim.now, "", numbers, contacts, sensors)
+
+    def _sense(self, names: tuple[str, ...]) -> None:
+        """Lets these sensors measure from now on, and no others."""
+        version = self._sim.world.version
+        before = self._readers
+        if before and (before.names, self._readers_version) == (names, version):
+            return
+        self._readers, self._readers_version = None, version
+        if before:
+            before.end()
+        if names:
+            self._readers = SensorReaders(self._sim, self._sensing, names)
+
+    def _sensed(self) -> list[SensorReading]:
+        assert self._readers is not None  # the step has asked for them
+        return [to_reading(now, values) for now, values in self._readers.read()]
 
     def _check_layout(self, prepared: _Prepared) -> None:
         """Raises UnknownName if the numbers would belong to other names now."""
@@ -172,7 +204,9 @@ class StepService:
             raise UnknownName("robots or models have come or gone")
 
     def _refused(self, fault: str) -> PreparedStepResponse:
-        return PreparedStepResponse(False, False, self._sim.now, f"PreparedStep: {fault}", [], [])
+        return PreparedStepResponse(
+            False, False, self._sim.now, f"PreparedStep: {fault}", [], [], []
+        )
 
     def _step(self, request: StepWorldRequest) -> StepWorldResponse:
         with self._one_at_a_time, self._sim.lock:

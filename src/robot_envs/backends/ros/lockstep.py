@@ -4,6 +4,8 @@ import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+import numpy as np
+from bullet_gazebo_msgs.msg import SensorReading
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from gazebo_msgs.msg import ContactState
 from geometry_msgs.msg import Point, Quaternion, Vector3
@@ -32,6 +34,8 @@ from robot_envs.world_state import (
     Links,
     Models,
     Motion,
+    Reading,
+    Sensors,
     StateQuery,
     Twist,
     WorldState,
@@ -88,11 +92,11 @@ class LockstepWorld(RobotBackend):
             self._look(names)
         self._query, self._names = query, names
 
-    def reset(self, initial: InitialState) -> WorldState:
+    def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         """See `RobotBackend.reset`; the state asked for is the state reached, exactly."""
         joints = self.scene.placed_joints(initial).values()
         self._drop()
-        request = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=self._moved)
+        request = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=self._moved, seed=seed)
         request.positions = [position for position, _ in joints]
         request.velocities = [velocity for _, velocity in joints]
         placed = self.scene.placed_models(initial)
@@ -140,7 +144,7 @@ class LockstepWorld(RobotBackend):
             numbers[2 * count : 3 * count],
         )
         time = (answer.now - self._begun) / 1e9  # [s]
-        if len(numbers) == 3 * count and not answer.contacts:
+        if len(numbers) == 3 * count and not answer.contacts and not answer.sensors:
             return WorldState(time, joints, self._held)
         motions = list(_motions_of(numbers[3 * count :]))
         models = len(answer.models)
@@ -150,8 +154,19 @@ class LockstepWorld(RobotBackend):
             self._held,
             Links(zip(link_keys(self._query), motions[models:], strict=True)),
             Models(zip(answer.models, motions[:models], strict=True)),
-            [_contact_of(each) for each in answer.contacts],
+            [contact_of(each) for each in answer.contacts],
+            Sensors(
+                (name, self._reading(each))
+                for name, each in zip(self._query.sensors, answer.sensors, strict=True)
+            ),
         )
+
+    def _reading(self, found: SensorReading) -> Reading:
+        values: dict[str, Any] = {
+            each.name: np.frombuffer(each.data, each.type).reshape(each.shape)
+            for each in found.values
+        } or {"contacts": [contact_of(each) for each in found.contacts]}
+        return Reading((found.now - self._begun) / 1e9, values)
 
     def _send(self, names: StepNames, ticks: int, commands: Sequence[float]) -> None:
         self._call(self._steps.begin, names, ticks, commands)
@@ -234,6 +249,7 @@ def _names(query: StateQuery) -> StepNames:
         frames=tuple([each.frame for each in query.links]),
         all_contacts=query.all_contacts,
         contacts_of=tuple(query.contacts_of),
+        sensors=tuple(query.sensors),
     )
 
 
@@ -244,7 +260,7 @@ def _motions_of(numbers: Sequence[float]) -> Iterator[Motion]:
         yield Motion(Pose((x, y, z), (qx, qy, qz, qw)), Twist((vx, vy, vz), (wx, wy, wz)))
 
 
-def _contact_of(state: ContactState) -> ContactPair:
+def contact_of(state: ContactState) -> ContactPair:
     """Reads what touches."""
     return ContactPair(
         state.collision1_name,

@@ -41,6 +41,7 @@ class Journal:
     initial: InitialState | None = None  # None: no episode has begun
     commands: list[Commands] = field(default_factory=list)  # of each step
     last: WorldState | None = None  # the state after them
+    seed: int = 0  # of the sensors' noise
 
     def forget_episode(self) -> None:
         """Forgets all but the variation."""
@@ -60,7 +61,7 @@ class Journal:
             world.vary(self.variation)
         if self.initial is None or self.last is None:
             return
-        state = checked(world.reset(self.initial), 0)
+        state = checked(world.reset(self.initial, self.seed), 0)
         for count, commands in enumerate(self.commands, 1):
             state = checked(world.act(commands), count * step)
         if repr(state) == repr(self.last):  # shows all bits of a number, and tells -0.0 from 0.0
@@ -170,11 +171,12 @@ class OwnWorld(RobotBackend):
         self._perform(lambda world: world.vary(variation))
         self._journal.variation = self._journal.variation.merged(variation)
 
-    def reset(self, initial: InitialState) -> WorldState:
+    def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         """See `RobotBackend.reset`; the state reached is exactly the one asked for."""
         self._journal.forget_episode()
-        state = self._perform(lambda world: checked(world.reset(initial), 0))
-        self._journal.initial, self._journal.last = initial, state
+        state = self._perform(lambda world: checked(world.reset(initial, seed), 0))
+        journal = self._journal
+        journal.initial, journal.seed, journal.last = initial, seed, state
         return state
 
     def begin(self, commands: Commands) -> None:

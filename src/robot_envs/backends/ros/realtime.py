@@ -4,6 +4,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import rospy
@@ -26,6 +27,7 @@ from robot_envs.backends.ros.running import (
     SimulatorService,
     check_success,
 )
+from robot_envs.backends.ros.sensor_listener import SensorListener
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
@@ -44,7 +46,7 @@ STATE_TIMEOUT = 5.0  # [s] of wall time without a joint state
 RESET_WAIT = 0.5  # [s] of wall time for the joint state that a reset publishes
 _SAME = 1e-6  # [m], [rad]
 _EARLY = 1e-6  # [s] of rounding error
-_ONLY_JOINTS = "a world in real time gives the joints alone (backend 'ros-realtime')"
+_ONLY_JOINTS = "a world in real time gives joints and sensors alone (backend 'ros-realtime')"
 
 
 class JointStates:
@@ -206,8 +208,9 @@ class RealtimeWorld(RobotBackend):
         }
         world.join(self)
         self._states = JointStates(scene)
+        self._sensors = SensorListener(scene.robots[0], (), time.monotonic)
 
-    def reset(self, initial: InitialState) -> WorldState:
+    def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         """See `RobotBackend.reset`; leaves the world paused, and joints at rest.
 
         Waits for the joint state that the reset publishes. If the simulator publishes none while it is
@@ -222,12 +225,25 @@ class RealtimeWorld(RobotBackend):
             self._reset_world()
             for name, motion in self.scene.placed_models(initial).items():
                 self._place_model(name, motion)
+            self._sensors.forget()
             self._place_joints(positions)
+            self._await_sensors()
         self._states.forget_unless_at(positions)
         joints = {name: JointState(positions[name], 0.0, 0.0) for name in self.scene.joints}
         self._held = self.scene.starting_commands(joints)
         self._begin = self._states.time or 0.0
-        return WorldState(0.0, joints, self._held)
+        return WorldState(0.0, joints, self._held, sensors=self._sensors.read(self._begin))
+
+    def _await_sensors(self) -> None:
+        """Waits for measurements of the placed robot; if none come while time stands still, lets it run."""
+        if self._sensors.wait(RESET_WAIT):
+            return
+        self._unpause()
+        came = self._sensors.wait(STATE_TIMEOUT)
+        self._pause()
+        if not came:
+            missing = ", ".join(self._sensors.missing())
+            raise SimulatorError(f"no message on {missing} for {STATE_TIMEOUT:g} s since the reset")
 
     def _place_model(self, name: str, motion: Motion) -> None:
         pose, (linear, angular) = motion
@@ -257,13 +273,18 @@ class RealtimeWorld(RobotBackend):
                 self._topics[name].publish(command)
             self._held = {**self._held, **commands}
             now, joints = self._states.wait_until(due)
-        return WorldState(max(0.0, now - self._begin), joints, self._held)
+        if trouble := self._sensors.trouble(STATE_TIMEOUT):
+            raise SimulatorError(trouble)
+        passed = max(0.0, now - self._begin)
+        return WorldState(passed, joints, self._held, sensors=self._sensors.read(self._begin))
 
     def look(self, query: StateQuery) -> None:
-        if query != StateQuery():
+        if replace(query, sensors=()) != StateQuery():
             raise RobotEnvError(
                 f"{_ONLY_JOINTS}: it has no links, models and contacts{ONLY_REWARDED}"
             )
+        self._sensors.close()
+        self._sensors = SensorListener(self.scene.robots[0], query.sensors, time.monotonic)
 
     def vary(self, variation: Variation) -> None:
         with self._simulator:
@@ -289,6 +310,7 @@ class RealtimeWorld(RobotBackend):
     def close(self) -> None:
         """Leaves the topics, and restores robot and objects; the world stays paused or running."""
         self._states.close()
+        self._sensors.close()
         for topic in self._topics.values():
             topic.close()
         self._variation.undo()

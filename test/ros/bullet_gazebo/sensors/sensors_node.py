@@ -2,16 +2,18 @@
 """Sensors over ROS: each kind's message, its times, resets, and equal bits (docs/contract/sensors.md)."""
 
 import math
-import unittest
 
 import numpy as np
 import rospy
 import rostest
-from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
-from gazebo_msgs.msg import ContactsState, ModelState
-from gazebo_msgs.srv import DeleteModel, SetModelState, SpawnModel, SpawnModelRequest
-from geometry_msgs.msg import Point, Pose, Quaternion, Vector3Stamped
+from bullet_gazebo_msgs.srv import StepWorldRequest
+from contract_cases import Contract
+from dynamic_reconfigure.client import Client as DynamicClient
+from gazebo_msgs.msg import ContactsState
+from geometry_msgs.msg import Vector3, Vector3Stamped
+from hector_gazebo_plugins.srv import SetBias
 from nav_msgs.msg import Odometry
+from sensor_case import MS, SensorCase
 from sensor_msgs.msg import (
     CameraInfo,
     CompressedImage,
@@ -26,64 +28,11 @@ from sensor_msgs.msg import (
 from std_msgs.msg import Empty as EmptyMsg
 from std_srvs.srv import Empty
 from support.ros.calls import call, wait_until
-from support.ros.subscribed import Listener
 
-SHAPE = "<geometry><box><size>1 1 1</size></box></geometry>"
-RED = "<material><ambient>1 0 0 1</ambient><diffuse>1 0 0 1</diffuse></material>"
-WALL = (
-    f'<sdf version="1.6"><model name="w"><static>1</static><link name="l"><collision name="c">{SHAPE}'
-    f'<laser_retro>5</laser_retro></collision><visual name="v">{SHAPE}{RED}</visual></link></model></sdf>'
-)
-MS = 1_000_000
+__all__ = ["Contract", "Sensors"]
 
 
-class Heard(Listener):
-    """The messages of a topic."""
-
-    def after(self, count):
-        """Returns the messages when there are as many."""
-        assert self.wait_for(lambda messages: len(messages) >= count), self.messages
-        return self.messages
-
-    def stamps(self, count):
-        return [message.header.stamp.to_nsec() for message in self.after(count)]
-
-    def from_time(self, time):
-        """Returns the newest message when one isn't older than `time` [ns]."""
-        assert self.wait_for(lambda messages: messages[-1].header.stamp.to_nsec() >= time), time
-        return self.messages[-1]
-
-
-class Sensors(unittest.TestCase):
-    def setUp(self):
-        self.spawn("wall", WALL, x=2.0, z=0.5)
-        self.spawn("bot", rospy.get_param("~model"))
-        call("/gazebo/reset_simulation", Empty)
-
-    def tearDown(self):
-        for name in ("bot", "wall"):
-            self.assertTrue(call("/gazebo/delete_model", DeleteModel, name).success)
-
-    def spawn(self, name, xml, x=0.0, z=0.0):
-        pose = Pose(Point(x, 0.0, z), Quaternion(0.0, 0.0, 0.0, 1.0))
-        request = SpawnModelRequest(model_name=name, model_xml=xml, initial_pose=pose)
-        request.robot_namespace = "/"
-        self.assertTrue(call("/gazebo/spawn_sdf_model", SpawnModel, request).success)
-
-    def hear(self, name, kind):
-        heard = Heard(name, kind)
-        self.addCleanup(heard.close)
-        return heard
-
-    def step(self, ticks, **more):
-        answer = call("/gazebo/step_world", StepWorld, StepWorldRequest(ticks=ticks, **more))
-        self.assertTrue(answer.success, answer.status_message)
-        return round(1000 * answer.sim_time) * MS
-
-    def newest(self, name, kind, ticks=300):
-        heard = self.hear(name, kind)
-        return heard.from_time(self.step(ticks) - 250 * MS)  # the slowest one has 4 Hz
-
+class Sensors(SensorCase):
     def test_a_scan_comes_every_hundred_ticks(self):
         heard = self.hear("/scan", LaserScan)
         self.step(250)
@@ -118,9 +67,7 @@ class Sensors(unittest.TestCase):
         heard = self.hear("/scan", LaserScan)
         self.step(150)
         heard.after(2)
-        state = ModelState(model_name="bot", reference_frame="world")
-        state.pose = Pose(Point(0.5, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
-        self.assertTrue(call("/gazebo/set_model_state", SetModelState, state).success)
+        self.put(x=0.5)
         self.assertEqual(heard.stamps(3)[2], 150 * MS)
         self.assertAlmostEqual(heard.messages[2].ranges[0], 1.0, delta=0.05)
         call("/gazebo/reset_simulation", Empty)
@@ -216,11 +163,61 @@ class Sensors(unittest.TestCase):
         info = self.newest("/pair/right/camera_info", CameraInfo)
         self.assertAlmostEqual(info.P[3], -0.2 * f, places=9)
 
+    def test_a_sonar_hears_the_wall(self):
+        heard = self.hear("/sonar", Range)
+        echo = heard.from_time(self.step(300))
+        self.assertAlmostEqual(echo.range, 1.5, delta=0.05)
+        self.assertEqual((echo.radiation_type, echo.header.frame_id), (0, "/sonar_link"))
+        self.assertTrue(all(stamp % (100 * MS) == 0 for stamp in heard.stamps(3)))
+
+    def test_a_realsense_has_colours_depths_and_a_cloud(self):
+        self.put(x=0.5)
+        colour = self.newest("/d435/color/image_raw", Image)
+        self.assertEqual((colour.encoding, colour.header.frame_id), ("rgb8", "d435_color"))
+        self.assertEqual(self.newest("/d435/infra1/image_raw", Image).encoding, "mono8")
+        depth = self.newest("/d435/depth/image_raw", Image)
+        self.assertEqual(depth.encoding, "16UC1")
+        depths = np.frombuffer(depth.data, "<u2").reshape(24, 32)
+        self.assertEqual((depths[12, 16], depths[0, 0]), (1000, 0))
+        info = self.newest("/d435/depth/camera_info", CameraInfo)
+        self.assertEqual((info.K[2], info.K[5], info.P[2], info.P[6]), (16.0, 12.0, 16.0, 12.0))
+        cloud = self.newest("/d435/depth/points", PointCloud2)
+        self.assertEqual((cloud.height, cloud.width, cloud.point_step), (24, 32, 32))
+        points = np.frombuffer(cloud.data, np.uint8).reshape(24, 32, 32)
+        self.assertTrue(points[12, 16, 18] > 50 and points[12, 16, 16] == 0)  # red, not blue
+
+    def test_a_cameras_rate_can_be_changed(self):
+        config = DynamicClient("/eye", timeout=60.0)
+        heard = self.hear("/eye/image_raw", Image)
+        self.step(300)
+        heard.from_time(300 * MS)
+        config.update_configuration({"imager_rate": 20.0})
+        self.addCleanup(config.update_configuration, {"imager_rate": 10.0})
+        heard.from_time(self.step(100))
+        stamps = sorted(set(heard.stamps(1)))
+        self.assertEqual(stamps[1:], [each * MS for each in (100, 200, 300, 350, 400)])
+
+    def test_hectors_imu_has_biases_and_an_error_model(self):
+        before = self.newest("/hector", Imu).linear_acceleration.z
+        call("/hector/set_accel_bias", SetBias, Vector3(0.0, 0.0, 0.5))
+        call("/hector/set_rate_bias", SetBias, Vector3(0.25, 0.0, 0.0))
+        biased = self.newest("/hector", Imu)
+        self.assertAlmostEqual(biased.linear_acceleration.z - before, 0.5, delta=0.01)
+        self.assertAlmostEqual(biased.angular_velocity.x, 0.25, delta=0.01)
+        bias = self.newest("/hector/bias", Imu)
+        self.assertAlmostEqual(bias.linear_acceleration.z, 0.5, delta=0.01)
+        call("/hector/calibrate", Empty)
+        self.assertAlmostEqual(self.newest("/hector", Imu).angular_velocity.x, 0.0, delta=0.01)
+        config = DynamicClient("/hector/accel", timeout=60.0)
+        self.assertEqual(config.get_configuration()["scale_error"], 1.0)
+        config.update_configuration({"scale_error": 2.0})
+        self.addCleanup(config.update_configuration, {"scale_error": 1.0})
+        doubled = self.newest("/hector", Imu).linear_acceleration.z
+        self.assertAlmostEqual(doubled, 2.0 * before + 0.5, delta=0.02)
+
     def test_hectors_sensors(self):
         self.assertAlmostEqual(self.newest("/hector", Imu).linear_acceleration.z, 9.8, delta=0.01)
-        state = ModelState(model_name="bot", reference_frame="world")
-        state.pose = Pose(Point(0.0, 0.5, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
-        self.assertTrue(call("/gazebo/set_model_state", SetModelState, state).success)
+        self.put(y=0.5)
         fix = self.newest("/fix", NavSatFix)
         # x points east, so y points north.
         self.assertAlmostEqual((fix.latitude - 49.9) * 111_229.0, 0.5, delta=0.01)
@@ -237,4 +234,4 @@ class Sensors(unittest.TestCase):
 
 if __name__ == "__main__":
     rospy.init_node("sensors_test")
-    rostest.rosrun("cartpole", "sensors", Sensors)
+    rostest.rosrun("cartpole", "sensors", "__main__")

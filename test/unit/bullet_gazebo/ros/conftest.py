@@ -15,6 +15,7 @@ from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import ground_plane
 from bullet_gazebo.ros.services import step_service
 from bullet_gazebo.ros.services.step_service import StepService
+from bullet_gazebo.sensors.sensing import Sensing
 
 BOX = """<robot name="crate"><link name="crate">
 <inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
@@ -33,7 +34,7 @@ class Slides:
         self.sim = sim
         self._urdf = slides(root)
         self._params = yaml.safe_load((root / "test/data/robots/slides.yaml").read_text())
-        self.service = StepService(self.sim, contextlib.nullcontext(), threading.Lock())
+        self.service = StepService(sim, Sensing(sim), contextlib.nullcontext(), threading.Lock())
 
     def add(self, name, *controllers):
         robot = add_robot(self.sim, name, self._urdf, namespace=f"/{name}")

@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 import rospy
 
+from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.ros.plugins.bumper_plugin import collision_named
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
+from bullet_gazebo.sensors.contact import collision_named
 from bullet_gazebo.simulator import Simulator
 
 BOX = """<robot name="box"><link name="body"><inertial><mass value="1"/>
@@ -45,6 +46,12 @@ seen = []
 class Good:
     def __init__(self, context): context.on_update(seen.append)
     def shutdown(self): seen.append("shutdown")
+"""
+ASKING = """
+seen = []
+class Asking:
+    def __init__(self, context): seen.append(context.link("bodyName"))
+    def shutdown(self): pass
 """
 
 
@@ -109,6 +116,22 @@ def test_whatever_a_plugin_raises_the_others_and_the_world_go_on(setting, place,
     assert setting.sim.listeners == [] and not setting.sim.world.models
     if place == "update":
         assert sys.modules[rude].seen == ["update", "shutdown"]
+
+
+def test_a_nested_models_plugin_means_its_own_links(setting):
+    setting.write("asking", ASKING)
+    setting.places = {"libasking.so": "asking:Asking"}
+    plugin = '<plugin name="p" filename="libasking.so"><bodyName>{}</bodyName></plugin>'
+    inner = f'<model name="arm"><link name="l"/>{plugin.format("l")}</model>'
+    text = (
+        f'<sdf version="1.6"><model name="m"><link name="l"/><link name="k"/>{inner}'
+        f"{plugin.format('k')}{plugin.format('x')}"
+        '<joint name="j" type="fixed"><parent>l</parent><child>k</child></joint>'
+        '<joint name="i" type="fixed"><parent>l</parent><child>arm::l</child></joint></model></sdf>'
+    )
+    setting.plugins.load(setting.sim.world.spawn("m", parse_sdf(text), Pose()), "")
+    assert sys.modules["asking"].seen == ["arm::l", "k"]
+    assert "no link 'x'" in setting.errors[0]
 
 
 @pytest.mark.parametrize(

@@ -255,7 +255,9 @@ class StuckController(Controller):
 
 def add_plugin(sim: Simulator, code: Stuck) -> str:
     plugin = Plugin("librude.so", "rude", ElementTree.Element("plugin"))
-    context = PluginContext(sim, SimpleNamespace(name="robot"), plugin, "robot", None, None, None)
+    context = PluginContext(
+        sim, SimpleNamespace(name="robot"), plugin, None, None, "robot", None, None
+    )
     context.on_update(code.update)
     return "plugin librude.so of model 'robot'"
 

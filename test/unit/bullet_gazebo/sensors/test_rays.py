@@ -107,6 +107,17 @@ def test_equal_rays_give_equal_bits(world, put):
         assert hits.targets.tobytes() == first.targets.tobytes()
 
 
+def test_what_a_model_looks_like_is_read_once_though_others_come(world, put, monkeypatch):
+    read, seen = [], rays._seen
+    monkeypatch.setattr(rays, "_seen", lambda model, link: read.append(link) or seen(model, link))
+    scene = RayScene(world, visuals=True)
+    for index in range(3):
+        put(f"thing{index}", "box", SIZES["box"], tag="visual")
+        scene.expire()
+        scene.cast(np.array([0.0, 0.0, 0.4]), fan(4))
+    assert len(read) == 4  # with the ground
+
+
 def test_without_embree_rays_meet_the_same(world, put, monkeypatch):
     for index, kind in enumerate(SIZES):
         put(

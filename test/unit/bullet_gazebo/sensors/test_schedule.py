@@ -149,6 +149,28 @@ def test_who_comes_after_a_reset_gets_what_there_is_now(sim, make):
     assert sensor.times == [0, 0]
 
 
+def test_who_comes_instead_of_one_who_has_left_unnoticed_gets_what_the_other_was_sent(sim, make):
+    """rospy learns that a subscriber has gone when it sends the next time."""
+    sensor = make(10.0)
+    sensor.come()
+    sim.reset_simulation()
+    sensor.come()
+    assert sensor.times == [0, 0, 0]
+    advance(sim, 100)
+    sensor.come()
+    assert sensor.times[3:] == [100 * MS, 100 * MS]
+    advance(sim, 5)
+    sensor.come()  # this one waits for a measurement that is new
+    assert len(sensor.times) == 5
+
+
+def test_the_slowest_of_rates_is_one(sim, make):
+    sensor = make(1e-320)
+    sensor.come()
+    advance(sim, 2)
+    assert sensor.times == [0]
+
+
 def test_a_clock_that_has_ended_measures_no_more(sim, make):
     sensor = make(100.0, lambda now: pytest.fail("measured"), at_once=False)
     sensor.come()

@@ -14,7 +14,7 @@ class Reset(PolicyNode):
 
     def __init__(self) -> None:
         self._period, self.time, self.begun = 0.02, 70.0, 0
-        self._joints = SimpleNamespace(forget=lambda: None)
+        self._joints = self._sensors = SimpleNamespace(forget=lambda: None)
         self._is_killed = threading.Event()
         self._should_end = lambda: self.begun == 2 or 1.0 < self.time < 70.0
 

@@ -30,8 +30,9 @@ class Replayed:
     def vary(self, variation: Variation) -> None:
         self.asked.append(variation)
 
-    def reset(self, initial: InitialState) -> WorldState:
+    def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         self.asked.append(initial)
+        self.seed = seed
         return state(self._drift, 0.0, 0.0)
 
     def act(self, commands: dict) -> WorldState:
@@ -44,10 +45,10 @@ class Replayed:
 def test_a_journal_brings_another_simulator_to_the_same_state_or_says_where_it_differs() -> None:
     varied, begun = Variation(gravity=0.5), InitialState()
     commands = [{"a": 0.1}, {"a": -0.0}, {}, {"b": (1e-300, 2.0), "a": 3.0}]
-    journal = Journal(varied, begun, commands, state(4.0, 0.0, 0.0, time=0.032))
+    journal = Journal(varied, begun, commands, state(4.0, 0.0, 0.0, time=0.032), seed=7)
     world = Replayed()
     journal.replay(world, 8_000_000)
-    assert world.asked == [varied, begun, *commands]
+    assert world.asked == [varied, begun, *commands] and world.seed == 7
     with pytest.raises(
         SimulatorFault,
         match="4 steps lead to another state.*: joints '[a-z]+': .*position=4.5.*, not ",

@@ -1,0 +1,66 @@
+"""Contact sensors: what the collisions of a link touch (docs/contract/sensors.md 5)."""
+
+import logging
+
+from bullet_gazebo.physics.lumping import LUMPED
+from bullet_gazebo.sensors.sensing import Mount, sensor_of
+from bullet_gazebo.simulator import NANOSECONDS
+from bullet_gazebo.state import ContactPair, contact_pairs
+
+logger = logging.getLogger(__name__)
+
+
+class ContactSensor:
+    """A sensor of the contacts of `<contact>`'s collisions.
+
+    Args:
+        mount: its place.
+
+    Raises:
+        DescriptionError: if the sensor is of another kind.
+    """
+
+    def __init__(self, mount: Mount) -> None:
+        self._mount = mount
+        sensor = sensor_of(mount, ("contact",))
+        self.rate = sensor.rate
+        names = [(each.text or "").strip() for each in sensor.element.findall("contact/collision")]
+        model, link = mount.model, sensor.link
+        found = [collision_named(name, link, list(model.collisions(link))) for name in names]
+        for name, taken in zip(names, found, strict=True):
+            if taken is None:
+                logger.warning(
+                    "Sensor '%s': link '%s' has no collision '%s'", sensor.name, link, name
+                )
+            elif taken != name:
+                logger.info("Sensor '%s': collision '%s' is '%s' here", sensor.name, name, taken)
+        self._collisions = {(model.name, link, each) for each in found if each is not None}
+
+    def measure(self, now: int) -> list[ContactPair]:
+        """Returns what they touched in the last step."""
+        # Contacts are those of the last step, which may have been before a service moved something.
+        world = self._mount.sim.world
+        step = round(world.time_step * NANOSECONDS)
+        is_stale = now - self._mount.sensing.schedule.moved_at <= step
+        if is_stale or not self._collisions:
+            return []
+        return contact_pairs(world, self._collisions)
+
+    def values(self, now: int) -> dict[str, list[ContactPair]]:
+        """Returns `contacts`."""
+        return {"contacts": self.measure(now)}
+
+
+def collision_named(name: str, link: str, collisions: list[str]) -> str | None:
+    """Returns the collision that is meant, whichever way a lumped link's is written."""
+    child = name.removeprefix(f"{link}_collision_")
+    spellings = (name, f"{link}{LUMPED}{name}", f"{link}{LUMPED}{child}_collision")
+    exact = [each for each in spellings if each in collisions]
+    # Lumping numbers all but the first collision of a link.
+    numbered = [
+        each
+        for spelling in spellings
+        for each in collisions
+        if each.startswith(f"{spelling}_") and each.removeprefix(f"{spelling}_").isdigit()
+    ]
+    return next(iter([*exact, *numbered]), None)

@@ -1,0 +1,136 @@
+"""Measures sensors for those who ask for them by name: over ROS with a step, and in-process."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from bullet_gazebo.physics.description import DescriptionError, Plugin, library_of
+from bullet_gazebo.physics.world import World
+from bullet_gazebo.sensors.contact import ContactSensor
+from bullet_gazebo.sensors.imu import ImuSensor, ModelImu
+from bullet_gazebo.sensors.laser import KINDS, LaserSensor, RangeSensor
+from bullet_gazebo.sensors.pinhole import DEPTH_KINDS, CameraSensor, DepthSensor
+from bullet_gazebo.sensors.sensing import Mount, Sensing
+from bullet_gazebo.simulator import Simulator
+from bullet_gazebo.state import SCOPE, UnknownName
+from file_access.text import did_you_mean
+
+
+class Measuring(Protocol):
+    """A sensor on a model."""
+
+    rate: float  # [Hz] of simulated time; 0 is every step
+
+    def values(self, now: int) -> Mapping[str, Any] | None:
+        """Returns a measurement at a time [ns], by the attributes of a `Reading`; None for nothing yet."""
+
+
+Maker = Callable[[Mount], Measuring]
+BY_KIND: dict[str, Maker] = {
+    **dict.fromkeys(KINDS, LaserSensor),
+    **dict.fromkeys(DEPTH_KINDS, DepthSensor),
+    "camera": CameraSensor,
+    "contact": ContactSensor,
+    "imu": ImuSensor,
+}
+BY_LIBRARY: dict[str, Maker] = {  # of a sensor's plugin, or a model's
+    "libgazebo_ros_range.so": RangeSensor,
+    "libgazebo_ros_imu.so": ModelImu,
+}
+WITHOUT = Plugin("", "", Element("plugin"))
+
+
+class Taken(NamedTuple):
+    """A measurement: its time [ns], and values by the attributes of a `Reading`."""
+
+    now: int
+    values: Mapping[str, Any]
+
+
+class SensorReaders:
+    """Sensors that measure by their own clocks, whether or not their topics are heard.
+
+    The caller holds the simulator's lock.
+
+    Args:
+        sim: the simulator.
+        sensing: its sensors.
+        names: of sensors, plain or model::sensor; of a model's IMU, the plugin's.
+
+    Raises:
+        UnknownName: if a name refers to none, or several, or to one that can't be read.
+    """
+
+    def __init__(self, sim: Simulator, sensing: Sensing, names: Sequence[str]) -> None:
+        self.names = tuple(names)
+        self._schedule = sensing.schedule
+        self._taken: dict[str, Taken] = {}
+        made = [(name, *find_sensor(sim, sensing, name)) for name in self.names]
+        self._clocks = []
+        for name, mount, maker in made:
+            try:
+                sensor = maker(mount)
+            except DescriptionError as error:
+                self.end()
+                raise UnknownName(f"the sensor '{name}' can't be simulated: {error}") from error
+            take = self._taker(name, mount, sensor)
+            self._clocks.append(self._schedule.begin(sensor.rate, take, lambda: True))
+        self._schedule.review()
+
+    def _taker(self, name: str, mount: Mount, sensor: Measuring) -> Callable[[int], None]:
+        if isinstance(sensor, ModelImu):
+            sensor.start()
+
+        def take(now: int) -> None:
+            if mount.sim.world.models.get(mount.model.name) is not mount.model:
+                return  # it was deleted
+            values = sensor.values(now)
+            for array in (values or {}).values():
+                if isinstance(array, np.ndarray):
+                    array.flags.writeable = False
+            if values is not None:
+                self._taken[name] = Taken(now, values)
+
+        return take
+
+    def read(self) -> list[Taken]:
+        """Returns what each has measured last, in the order of the names."""
+        return [self._taken[name] for name in self.names]
+
+    def end(self) -> None:
+        """Ends the measurements."""
+        for clock in self._clocks:
+            self._schedule.fail(clock)
+
+
+def find_sensor(sim: Simulator, sensing: Sensing, name: str) -> tuple[Mount, Maker]:
+    """Returns the sensor of a name, and what makes it; raises UnknownName."""
+    known: dict[str, list[tuple[Mount, Maker]]] = {}
+    for plain, mount, maker in _sensors(sim, sensing):
+        for each in (plain, f"{mount.model.name}{SCOPE}{plain}"):
+            known.setdefault(each, []).append((mount, maker))
+    found = known.get(name, [])
+    if len(found) > 1:
+        raise UnknownName(f"there are several sensors '{name}'; write model{SCOPE}sensor")
+    if not found:
+        there = [each for each in known if SCOPE not in each]
+        near = did_you_mean(name, known) or f"; there are: {', '.join(there) or 'none'}"
+        raise UnknownName(f"there is no sensor '{name}' that can be read{near}")
+    return found[0]
+
+
+def _sensors(sim: Simulator, sensing: Sensing) -> Iterator[tuple[str, Mount, Maker]]:
+    """Yields all sensors that can be read, with their plain names."""
+    world: World = sim.world
+    for model in world.models.values():
+        for sensor in model.description.sensors:
+            plugin = next(iter(sensor.plugins), WITHOUT)
+            maker = BY_LIBRARY.get(library_of(plugin.filename), BY_KIND.get(sensor.kind))
+            if maker is not None:
+                yield sensor.name, Mount(sim, model, plugin, sensing, sensor), maker
+        for plugin in model.description.plugins:
+            maker = BY_LIBRARY.get(library_of(plugin.filename))
+            if maker is not None:
+                yield plugin.name, Mount(sim, model, plugin, sensing, None), maker

@@ -1,0 +1,237 @@
+"""Readings of a robot's sensors from their topics, in real time."""
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import rospy
+from gazebo_msgs.msg import ContactsState
+from sensor_msgs.msg import Image, Imu, LaserScan, Range
+
+from bullet_gazebo.physics.description import Plugin, library_of
+from bullet_gazebo.sensors.laser import KINDS as LASERS
+from bullet_gazebo.sensors.pinhole import DEPTH_KINDS
+from file_access.text import did_you_mean
+from robot_envs.backends.ros.lockstep import contact_of
+from robot_envs.errors import RobotEnvError
+from robot_envs.robot import Robot
+from robot_envs.world_state import Reading, Sensors
+
+Values = Mapping[str, Any]
+COLOURS = {  # by encoding: the type of a channel, and where red, green and blue are
+    "rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2)), "bgra8": (4, (2, 1, 0)),
+    "mono8": (1, (0, 0, 0)),
+}  # fmt: skip
+LATE_PERIODS = 3  # of a sensor
+
+
+def _scan(message: LaserScan) -> Values:
+    names = ("ranges", "intensities")
+    return {name: np.array(getattr(message, name), np.float32) for name in names}
+
+
+def _range(message: Range) -> Values:
+    return {"ranges": np.array([message.range], np.float32)}
+
+
+def _imu(message: Imu) -> Values:
+    turn, spin, push = message.orientation, message.angular_velocity, message.linear_acceleration
+    return {
+        "orientation": np.array([turn.x, turn.y, turn.z, turn.w]),
+        "angular_velocity": np.array([spin.x, spin.y, spin.z]),
+        "linear_acceleration": np.array([push.x, push.y, push.z]),
+    }
+
+
+def _image(message: Image) -> Values:
+    if message.encoding not in COLOURS:
+        raise ValueError(f"pictures are {message.encoding}; {', '.join(COLOURS)} can be read")
+    count, order = COLOURS[message.encoding]
+    pixels = _rows(message, np.dtype(np.uint8), count)
+    return {"image": np.ascontiguousarray(pixels[..., order])}
+
+
+def _depth(message: Image) -> Values:
+    if message.encoding == "32FC1":
+        return {"depth": _rows(message, np.dtype("<f4"), 1)[..., 0]}
+    if message.encoding != "16UC1":
+        raise ValueError(f"depths are {message.encoding}; 32FC1 and 16UC1 can be read")
+    depth = _rows(message, np.dtype("<u2"), 1)[..., 0] / np.float32(1000.0)
+    return {"depth": np.where(depth > 0.0, depth, np.float32(np.nan))}
+
+
+def _rows(message: Image, kind: np.dtype[Any], channels: int) -> np.ndarray:
+    rows = np.frombuffer(message.data, np.uint8).reshape(message.height, message.step)
+    used = np.ascontiguousarray(rows[:, : message.width * channels * kind.itemsize])
+    return used.view(kind).reshape(message.height, message.width, channels)
+
+
+def _contacts(message: ContactsState) -> Values:
+    return {"contacts": [contact_of(each) for each in message.states]}
+
+
+class _Driver(NamedTuple):
+    """Where a library publishes (docs/contract/sensors.md 0.2), and how its messages are read."""
+
+    tag: str
+    topic: str  # without that element
+    empty: str | None  # namespace of an empty <robotNamespace>; None: the model's name
+    message: type
+    read: Callable[[Any], Values]
+
+
+_LASER = _Driver("topicName", "/world", None, LaserScan, _scan)
+_CAMERA = _Driver("imageTopicName", "image_raw", None, Image, _image)
+_DEPTH = _Driver("depthImageTopicName", "depth/image_raw", None, Image, _depth)
+_DRIVERS = {
+    "libgazebo_ros_laser.so": _LASER,
+    "libgazebo_ros_gpu_laser.so": _LASER,
+    "libgazebo_ros_range.so": _Driver("topicName", "/range", "/", Range, _range),
+    "libgazebo_ros_imu_sensor.so": _Driver("topicName", "imu_data", "/", Imu, _imu),
+    "libgazebo_ros_imu.so": _Driver("topicName", "/default_imu", "/", Imu, _imu),
+    "libgazebo_ros_camera.so": _CAMERA,
+    "libgazebo_ros_depth_camera.so": _DEPTH,
+    "libgazebo_ros_openni_kinect.so": _DEPTH,
+    "libgazebo_ros_bumper.so": _Driver(
+        "bumperTopicName", "bumper_states", "/", ContactsState, _contacts
+    ),
+}
+_OF_KIND = {  # of a sensor whose plugin is another one, and whose topic the robot names
+    **dict.fromkeys(LASERS, _LASER),
+    **dict.fromkeys(DEPTH_KINDS, _DEPTH),
+    "camera": _CAMERA,
+    "imu": _DRIVERS["libgazebo_ros_imu_sensor.so"],
+    "contact": _DRIVERS["libgazebo_ros_bumper.so"],
+}
+
+
+class _Heard(NamedTuple):
+    """A message of a sensor."""
+
+    stamp: float  # [s]
+    arrival: float  # [s] of the listener's clock
+    values: Values
+
+
+class SensorListener:
+    """Keeps the newest reading of each sensor, and when it has come.
+
+    Args:
+        robot: whose plugins, or `sensor_topics`, name the topics.
+        names: of its sensors.
+        clock: tells the time of arrival [s].
+
+    Raises:
+        RobotEnvError: if the robot has no such sensor, or none whose topic is known.
+    """
+
+    def __init__(self, robot: Robot, names: Sequence[str], clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._arrived = threading.Condition()
+        self._heard: dict[str, _Heard] = {}
+        self._faults: dict[str, str] = {}
+        self._periods: dict[str, float] = {}  # [s]
+        self._subscribers = {name: self._subscribed(robot, name) for name in names}
+
+    def _subscribed(self, robot: Robot, name: str) -> rospy.Subscriber:
+        topic, driver, rate = _source(robot, name)
+        self._periods[name] = 1.0 / rate if rate else 0.0
+
+        def receive(message: Any) -> None:
+            with self._arrived:
+                try:
+                    stamp = message.header.stamp.to_sec()
+                    self._heard[name] = _Heard(stamp, self._clock(), driver.read(message))
+                    self._faults.pop(name, None)
+                except ValueError as error:
+                    self._faults[name] = f"the sensor '{name}': {error}"
+                self._arrived.notify_all()
+
+        return rospy.Subscriber(topic, driver.message, receive, queue_size=1, tcp_nodelay=True)
+
+    def missing(self) -> list[str]:
+        """Returns the topics that nothing has come on."""
+        with self._arrived:
+            return [
+                str(each.resolved_name)
+                for name, each in self._subscribers.items()
+                if name not in self._heard
+            ]
+
+    def wait(self, timeout: float) -> bool:
+        """Returns whether something has come of all, at the latest after so long [s of wall time]."""
+        with self._arrived:
+            return self._arrived.wait_for(
+                lambda: len(self._heard) == len(self._subscribers), timeout
+            )
+
+    def trouble(self, late: float) -> str:
+        """Returns what can't be read, or is older than `late` [s] and three periods; empty if all is well."""
+        now = self._clock()
+        with self._arrived:
+            for name, heard in self._heard.items():
+                most = max(late, LATE_PERIODS * self._periods[name])
+                if now - heard.arrival > most and name not in self._faults:
+                    return f"no message on {self._subscribers[name].resolved_name} for {most:g} s"
+            return next(iter(self._faults.values()), "")
+
+    def read(self, begin: float) -> Sensors:
+        """Returns the newest readings, whose times are counted from `begin` [s]."""
+        with self._arrived:
+            return Sensors(
+                (name, Reading(self._heard[name].stamp - begin, self._heard[name].values))
+                for name in self._subscribers
+            )
+
+    def forget(self) -> None:
+        """Forgets all that has come."""
+        with self._arrived:
+            self._heard.clear()
+            self._faults.clear()
+
+    def close(self) -> None:
+        """Unsubscribes."""
+        for each in self._subscribers.values():
+            each.unregister()
+
+
+def _source(robot: Robot, name: str) -> tuple[str, _Driver, float]:
+    """Returns the topic of a sensor, how it is read, and the sensor's rate [Hz]."""
+    known = {
+        each.name: (each.kind, next(iter(each.plugins), None), each.rate)
+        for each in robot.links.sensors
+    }
+    for plugin in robot.links.plugins:
+        if library_of(plugin.filename) in _DRIVERS:
+            known[plugin.name] = ("", plugin, 0.0)
+    plain = name.removeprefix(f"{robot.model}::")
+    if plain not in known:
+        near = did_you_mean(plain, known) or f"; there are: {', '.join(known) or 'none'}"
+        raise RobotEnvError(f"the robot '{robot.model}' has no sensor '{plain}'{near}")
+    kind, of_sensor, rate = known[plain]
+    own = None if of_sensor is None else _DRIVERS.get(library_of(of_sensor.filename))
+    driver, given = own or _OF_KIND.get(kind), robot.sensor_topics.get(plain)
+    if driver is None or not (given or own):
+        raise RobotEnvError(
+            f"the topic of the sensor '{plain}' isn't known: name it in the robot's sensor_topics"
+        )
+    if given:
+        return given, driver, rate
+    assert of_sensor is not None
+    return _topic_of(robot, of_sensor, driver), driver, rate
+
+
+def _topic_of(robot: Robot, plugin: Plugin, driver: _Driver) -> str:
+    def text(tag: str, default: str) -> str:
+        return (plugin.element.findtext(tag) or "").strip() or default
+
+    own = plugin.element.findtext("robotNamespace")
+    given = f"/{robot.namespace.strip('/')}" if own is None else own.strip()
+    namespace = given or (robot.model if driver.empty is None else driver.empty)
+    scope = text("cameraName", "")
+    parts = [text(driver.tag, driver.topic)]
+    for outer in (scope if driver.message is Image else "", namespace):
+        if outer and not parts[0].startswith("/"):
+            parts.insert(0, outer)
+    return "/" + "/".join(filter(None, "/".join(parts).split("/")))

@@ -1,0 +1,68 @@
+"""A rover's sensors over ROS: the bits of those in this process."""
+
+import unittest
+
+import numpy as np
+import rospy
+from gazebo_msgs.srv import GetWorldProperties
+from sensor_msgs.msg import Image, LaserScan
+from support.scenes.seeing_rover import NAMES, SEEING, Look
+
+from robot_envs import RobotEnv, SimulatorError, StateQuery
+from robot_envs.testing import differences, rollout
+from ros_calls.waiting import wait_until
+
+MEASUREMENTS = 1000  # of each sensor at 50 Hz
+
+
+class Seeing(unittest.TestCase):
+    def make(self, backend="ros", task=None):
+        made = RobotEnv([SEEING], task or Look(), backend=backend)
+        self.addCleanup(made.close)
+        return made
+
+    def test_a_thousand_measurements_have_the_bits_of_those_in_process(self):
+        """Episode after episode; in the middle others come who listen to the topics, and ask for services."""
+        over_ros, here = self.make(), self.make("bullet")
+        scans, images = [], []
+        busy = rospy.ServiceProxy("/gazebo/get_world_properties", GetWorldProperties)
+        for seed in (3, 4):
+            wanted = rollout(here, MEASUREMENTS // 2, seed)
+            self.assertEqual(list(wanted[0][1]["sensors"]), list(NAMES))
+            self.assertEqual(differences(rollout(over_ros, MEASUREMENTS // 2, seed), wanted), "")
+            if not scans:
+                for topic, kind, found in (
+                    ("scan", LaserScan, scans),
+                    ("eye/image_raw", Image, images),
+                ):
+                    listener = rospy.Subscriber(topic, kind, found.append)
+                    self.addCleanup(listener.unregister)
+                timer = rospy.Timer(rospy.Duration(0.01), lambda _: busy())
+                self.addCleanup(timer.shutdown)
+                over_ros.reset(seed=9)  # the newcomers get the present measurement
+        self.assertTrue(scans and images)
+
+    def test_the_topic_says_the_same(self):
+        env = self.make()
+        scans = []
+        env.reset(seed=1)
+        listener = rospy.Subscriber("scan", LaserScan, scans.append)
+        self.addCleanup(listener.unregister)
+        self.assertTrue(wait_until(lambda: scans, 10.0, "a scan"))
+        for _ in range(10):
+            env.step(np.ones(2, np.float32))
+        last = env.state.sensors["front_laser"].ranges
+        said = wait_until(
+            lambda: any(np.array_equal(np.float32(each.ranges), last) for each in list(scans)),
+            10.0,
+            "the last scan",
+        )
+        self.assertTrue(said)
+
+    def test_unknown_sensors_are_told_with_those_there_are(self):
+        task = Look()
+        task.query = StateQuery(sensors=("lidar",))
+        with self.assertRaisesRegex(
+            SimulatorError, "no sensor 'lidar' .*there are: front_laser, sonar"
+        ):
+            self.make(task=task)
