@@ -233,13 +233,16 @@ class RayScene:
         self._centres, self._radii = np.zeros((count, 3)), np.zeros(count)
         self._place(np.arange(count))
         self._planes = [i for i in range(count) if self._kinds[i] == "plane"]
-        self._apart_meshes, kept = {}, self._apart_meshes  # noqa: F841 - those that stay are found
-        still, triangles, apart = [], [], []
+        still, triangles, apart, meshes = [], [], [], {}
         for index, target in enumerate(targets):
             shape = target.shape
             if shape.kind == "plane":
                 continue
             self._sizes[index, : len(shape.size)] = shape.size
+            if shape.kind != "mesh" and not target.model.description.static:
+                apart.append(index)
+                self._radii[index] = _reach(shape)
+                continue
             corners = target.corners()
             is_large = shape.kind == "mesh" and len(corners) > 3 * LARGE
             if target.model.description.static and not is_large:
@@ -248,10 +251,9 @@ class RayScene:
                 continue
             apart.append(index)
             self._surround(index, corners)
-            if shape.kind == "mesh":
-                self._apart_meshes[index] = _built([corners])
+            meshes[index] = _built([corners])
         self._still, self._apart = np.array(still, int), np.array(apart, int)
-        self._still_triangles = _built(triangles)
+        self._apart_meshes, self._still_triangles = meshes, _built(triangles)
 
     def _surround(self, index: int, corners: np.ndarray) -> None:
         """Sets the ball around a target, in the target's frame."""
@@ -284,6 +286,15 @@ def frames(poses: Sequence[Pose]) -> tuple[np.ndarray, np.ndarray]:
     ]
     places = np.array([pose.position for pose in poses]).reshape(-1, 3)
     return np.array(rows).transpose(2, 0, 1), places
+
+
+def _reach(shape: Shape) -> float:
+    """Returns how far from its middle a box, ball or cylinder reaches [m]."""
+    if shape.kind == "box":
+        return math.hypot(*shape.size) / 2.0
+    return (
+        shape.size[0] if shape.kind == "sphere" else math.hypot(shape.size[0], shape.size[1] / 2.0)
+    )
 
 
 def _solid(model: Model, link: Link) -> list[Target]:
