@@ -301,6 +301,7 @@ class HectorSonarPlugin(SensorPlugin):
         self._publisher = rospy.Publisher(
             topic, Range, queue_size=queue_of(context, 1), tcp_nodelay=True
         )
+        context.show(topic, Range, self._sensor.sensor.link, self._sensor.sensor.pose)
 
     def _publish(self, now: int, seconds: float) -> None:
         laser, random = self._sensor.laser, self._timer.random(now)

@@ -215,8 +215,9 @@ class LaserTopic:
         self.frame = frame_of(namespace, context.text("frameName", "/world"))
         topic = context.plugin.element.findtext("topicName", name).strip()
         if topic:
-            rate = slower(own_rate, sensor.rate)
-            SensorTopic(context, topic_in(namespace, topic), kind, rate, self._measure)
+            full, own = topic_in(namespace, topic), sensor.sensor
+            SensorTopic(context, full, kind, slower(own_rate, sensor.rate), self._measure)
+            context.show(full, kind, own.link, own.pose)
         else:
             rospy.logwarn("Sensor '%s': its <topicName> is empty", context.key)
 
