@@ -104,11 +104,11 @@ class PluginContext(Mount):
         """
         shown = SceneSensor(
             topic,
-            kind._type,
+            kind._type,  # type: ignore[attr-defined]
             self.model.name,
             link,
             to_pose_msg(pose),
-            *view,  # type: ignore[attr-defined]
+            *view,
         )
 
         def close() -> None:

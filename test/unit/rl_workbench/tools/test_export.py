@@ -40,7 +40,7 @@ KINDS = {
     "document": ("reinforce-document", {}),
 }  # fmt: skip
 CONTINUOUS = {"env_id": "Pendulum-v1", "eval_frequency": 0, "eval_episodes": 1}
-OFF_POLICY = {"total_timesteps": 200, "learning_starts": 50, "buffer_size": 500, "n_steps": None,
+OFF_POLICY = {"total_timesteps": 90, "learning_starts": 50, "buffer_size": 500, "n_steps": None,
               "batch_size": 16, "eval_frequency": 0, "eval_episodes": 1}  # fmt: skip
 SB3 = {
     "ppo": ("ppo", {}),
