@@ -49,6 +49,7 @@ class CameraTopics:
         baseline: [m] to the camera on the left.
         own: prefix of its service, if the plugin has several cameras.
         frame: `<frameName>` if None.
+        latch: whether a new subscriber gets the last picture.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class CameraTopics:
         baseline: float,
         own: str = "",
         frame: str | None = None,
+        latch: bool = False,
     ) -> None:
         self._context, self._camera = context, camera
         given = context.text("frameName", "") if frame is None else frame
@@ -68,7 +70,7 @@ class CameraTopics:
         self.info = camera_info(context, camera, baseline)
         image = topic_in(scope, names[0])
         colours = 3 * camera.width * camera.height
-        self._image = topics.advertise(image, Image, QUEUE, latch=True, content=colours)
+        self._image = topics.advertise(image, Image, QUEUE, latch, content=colours)
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
         self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)
         service = topic_in(scope, f"{own}set_camera_info")
