@@ -21,7 +21,7 @@ from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.pictures.visuals import Piece, pieces_of, solid_of
-from bullet_gazebo.sensors.intersection import DISTANCES, NORMALS
+from bullet_gazebo.sensors.intersection import DISTANCES, NORMALS, reach
 
 logger = logging.getLogger(__name__)
 LARGE = 2000  # triangles of a mesh that isn't built anew with its neighbours
@@ -229,13 +229,16 @@ class RayScene:
         self._centres, self._radii = np.zeros((count, 3)), np.zeros(count)
         self._place(np.arange(count))
         self._planes = [i for i in range(count) if self._kinds[i] == "plane"]
-        self._apart_meshes, kept = {}, self._apart_meshes  # noqa: F841 - those that stay are found
-        still, triangles, apart = [], [], []
+        still, triangles, apart, meshes = [], [], [], {}
         for index, target in enumerate(targets):
             shape = target.shape
             if shape.kind == "plane":
                 continue
             self._sizes[index, : len(shape.size)] = shape.size
+            if shape.kind != "mesh" and not target.model.description.static:
+                apart.append(index)
+                self._radii[index] = reach(shape.kind, shape.size)
+                continue
             corners = target.corners()
             is_large = shape.kind == "mesh" and len(corners) > 3 * LARGE
             if target.model.description.static and not is_large:
@@ -244,10 +247,9 @@ class RayScene:
                 continue
             apart.append(index)
             self._surround(index, corners)
-            if shape.kind == "mesh":
-                self._apart_meshes[index] = _built([corners])
+            meshes[index] = _built([corners])
         self._still, self._apart = np.array([*still, NONE]), np.array(apart, int)
-        self._still_triangles = _built(triangles)
+        self._apart_meshes, self._still_triangles = meshes, _built(triangles)
         self._curved = [kind for kind in CURVED if kind in self._kinds[still]]
         self._analytic = [kind for kind in DISTANCES if kind in self._kinds[apart]]
         moves = [not targets[index].model.description.static for index in apart]

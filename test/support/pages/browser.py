@@ -3,7 +3,6 @@
 import base64
 import itertools
 import json
-import math
 import shutil
 import subprocess
 import tempfile
@@ -16,7 +15,6 @@ from websockets.sync.client import connect
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 BOUND = 180.0  # [s] for anything of the browser's
 POLL = 0.05  # [s]
-WHEEL = 120.0  # [pixels] of a turn of the mouse's wheel
 # Software draws slowly on a busy machine: a GPU process that is taken for hung is started anew, without the
 # picture.
 OPTIONS = (
@@ -174,29 +172,6 @@ class Browser:
           while (e && !e.querySelector("[role=slider]")) e = e.parentElement;
           return e && e.querySelector("[role=slider]");
         }})()"""
-
-    def scroll(self, x, y, turns):
-        """Turns the mouse's wheel at a place [pixels]: away from what is seen if `turns` is above 0."""
-        for _ in range(abs(turns)):
-            way = math.copysign(WHEEL, turns)
-            self._do(
-                "Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0.0, deltaY=way
-            )
-
-    def drag(self, start, end):
-        """Moves the mouse from one place to another [pixels], with its left button pressed."""
-        for kind, (x, y) in (
-            ("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)
-        ):  # fmt: skip
-            self._do(
-                "Input.dispatchMouseEvent",
-                type=kind,
-                button="left",
-                buttons=1,
-                clickCount=1,
-                x=x,
-                y=y,
-            )
 
     def _press(self, place):
         for kind in ("mousePressed", "mouseReleased"):

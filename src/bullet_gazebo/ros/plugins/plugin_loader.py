@@ -102,14 +102,8 @@ class PluginContext(Mount):
             pose: of the axes that they are in, in the link.
             view: of a camera, its horizontal field of view [rad] and its picture's width by height.
         """
-        shown = SceneSensor(
-            topic,
-            kind._type,
-            self.model.name,
-            link,
-            to_pose_msg(pose),
-            *view,  # type: ignore[attr-defined]
-        )
+        name = kind._type  # type: ignore[attr-defined]
+        shown = SceneSensor(topic, name, self.model.name, link, to_pose_msg(pose), *view)
 
         def close() -> None:
             with self.sim.lock:

@@ -57,6 +57,14 @@ def queue_of(context: PluginContext, size: int, content: int = 0) -> int:
     return max(size, most) if context.sim.lockstep else size
 
 
+def always_heard(context: PluginContext, name: str, kind: type, queue: int = 1) -> rospy.Publisher:
+    """Returns the topic of a sensor that measures without subscribers; the context closes it."""
+    size = queue_of(context, queue)
+    publisher = rospy.Publisher(name, kind, queue_size=size, tcp_nodelay=True)
+    context.closing(publisher.unregister)
+    return publisher
+
+
 class SensorPlugin:
     """A plugin whose topics, services and clocks are the context's, which closes them."""
 

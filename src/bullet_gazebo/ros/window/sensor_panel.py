@@ -177,6 +177,8 @@ class SensorPanel:
 
     def show(self, scene: Picture) -> None:
         """Draws what is new, where the links of the scene are."""
+        if not any(view.is_on for view in self._views):
+            return
         links = scene.links
         models = {each.name: each for each in scene.models.values() if each.name in links}
         for view in self._views:
@@ -212,6 +214,11 @@ class SensorView:
         self._newest: Any = None
         self._due = 0.0  # [s of wall time]
 
+    @property
+    def is_on(self) -> bool:
+        """Whether it is subscribed to."""
+        return self._subscriber is not None
+
     def listen(self, watched: bool) -> None:
         """Subscribes if a page is open and it is switched on; removes what is drawn if it isn't."""
         wanted = watched and self._box.value
@@ -231,7 +238,7 @@ class SensorView:
 
     def show(self, link: np.ndarray) -> None:
         """Draws the newest message where its link (7,) is now, and moves the frustum with the link."""
-        if self._subscriber is None:
+        if not self.is_on:
             return
         place = compose(link[None], self._inner)[0]
         if self._frustum is not None:
