@@ -83,7 +83,9 @@ def _check_names(env_id: str, options: Mapping[str, Any]) -> None:
     spec = spec_of(env_id)
     for name, value in (spec.kwargs if spec else {}).items():
         if name in options and isinstance(value, str) and _CODE.fullmatch(value):
-            raise WorkbenchError(f"can't make {env_id}: its {name} is {value}; no option changes it")
+            raise WorkbenchError(
+                f"can't make {env_id}: its {name} is {value}; no option changes it"
+            )
 
 
 def _wrapper(name: str) -> Any:

@@ -93,7 +93,7 @@ def test_nothing_but_tasks_and_robots_is_called(tmp_path):
     made = tmp_path / "made"
     solo = "support.scenes.solo_arm:SOLO"
     with pytest.raises(RobotEnvError, match="is not a subclass of robot_envs.Task"):
-        make_environment(solo, "subprocess:Popen", args=f"touch {made}", shell=True)
+        make_environment(solo, "subprocess:Popen", args=["touch", str(made)])
     with pytest.raises(RobotEnvError, match="threading.Thread.* is not a robot_envs.Robot"):
         make_environment("threading:Thread", "support.scenes.solo_arm:Hold")
     assert not made.exists()
