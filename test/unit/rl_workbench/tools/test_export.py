@@ -26,7 +26,7 @@ from rl_workbench.training.algorithms import ALGORITHMS
 KINDS = {
     "plain": ("dqn", {"normalize_observations": "false"}),
     "dueling": ("dqn", {"dueling": "true"}),
-    "robot": ("dqn", {"env_id": "cartpole/Classic-v0"}),
+    "robot": ("dqn", {"env_id": "cartpole:cartpole/Classic-v0"}),
     "pair": ("reinforce", {"observation_scale": "0.4,1,0.2,3"}),
     "hidden": ("reinforce", {"policy_hidden": 8, "normalize_observations": "true",
                              "observation_scale": "0.4,1,0.2,3"}),
