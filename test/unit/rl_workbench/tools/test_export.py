@@ -26,7 +26,7 @@ from rl_workbench.training.algorithms import ALGORITHMS
 KINDS = {
     "plain": ("dqn", {"normalize_observations": "false"}),
     "dueling": ("dqn", {"dueling": "true"}),
-    "robot": ("dqn", {"env_id": "cartpole/Classic-v0"}),
+    "robot": ("dqn", {"env_id": "cartpole:cartpole/Classic-v0"}),
     "pair": ("reinforce", {"observation_scale": "0.4,1,0.2,3"}),
     "hidden": ("reinforce", {"policy_hidden": 8, "normalize_observations": "true",
                              "observation_scale": "0.4,1,0.2,3"}),
@@ -40,7 +40,7 @@ KINDS = {
     "document": ("reinforce-document", {}),
 }  # fmt: skip
 CONTINUOUS = {"env_id": "Pendulum-v1", "eval_frequency": 0, "eval_episodes": 1}
-OFF_POLICY = {"total_timesteps": 200, "learning_starts": 50, "buffer_size": 500, "n_steps": None,
+OFF_POLICY = {"total_timesteps": 90, "learning_starts": 50, "buffer_size": 500, "n_steps": None,
               "batch_size": 16, "eval_frequency": 0, "eval_episodes": 1}  # fmt: skip
 SB3 = {
     "ppo": ("ppo", {}),
@@ -154,16 +154,17 @@ def test_how_far_scores_are_from_another_choice(kind, scores: list, margins: lis
 def test_what_rounds_otherwise_is_told_by_its_size(
     run: Path, tmp_path: Path, capsys, monkeypatch
 ) -> None:
-    agreements = (torchscript.Agreement(1000, 0, 2.4e-7), torchscript.Agreement(1000, 1000, 0.0))
-    for agreement in agreements:
+    for numbers in ((1000, 0, 2.4e-7), (1000, 1000, 0.0), (1000, 998, 0.0)):
+        agreement = torchscript.Agreement(*numbers)
         monkeypatch.setattr(torchscript, "export", lambda *_, found=agreement: (b"", found))
         monkeypatch.setattr(torchscript, "open_exported", lambda path: None)
         assert work("export", run, "--out", tmp_path / "policy.pt") == 0
-    first, second = capsys.readouterr().out.splitlines()
+    first, second, third = capsys.readouterr().out.splitlines()
     assert first.endswith(
         "over 1000 observations its actions differ by at most 2e-07 of their range"
     )
     assert second.endswith("over 1000 observations its actions are the same")
+    assert third.endswith("its actions are the same, but for 2 where scores tie")
 
 
 @pytest.mark.slow
