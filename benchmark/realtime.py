@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 import xmlrpc.client
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,14 +35,14 @@ TARGETS = {"unlimited": ">= 40", "limited": "1 +- 0.002", "share of a core": "< 
 
 
 @contextlib.contextmanager
-def listening(simulation: Simulation) -> Iterator[None]:
-    """Processes that hear the topics."""
+def listening(simulation: Simulation, topics: Mapping[str, str] = TOPICS) -> Iterator[None]:
+    """Processes that hear the topics, which are given with their types."""
     listeners = [
         subprocess.Popen(
             [sys.executable, "-c", LISTENER, *topic],
             env=simulation.environment(), stdout=subprocess.PIPE,
         )
-        for topic in TOPICS.items()
+        for topic in topics.items()
     ]  # fmt: skip
     try:
         for listener in listeners:

@@ -21,6 +21,7 @@ from bullet_gazebo_msgs.msg import (
     SceneLink,
     SceneModel,
     ScenePoses,
+    SceneSensor,
     SceneShape,
 )
 from bullet_gazebo_msgs.srv import GetScene, GetSceneRequest, GetSceneResponse
@@ -43,8 +44,9 @@ NO_STOP = (1.0, 0.0)  # limits of a joint without any: the lower one above the u
 class SceneOffer:
     """Opens the scene's service and topics once."""
 
-    def __init__(self, sim: Simulator) -> None:
-        self._sim = sim
+    def __init__(self, sim: Simulator, sensors: Sequence[SceneSensor]) -> None:
+        """`sensors` changes under the simulator's lock, and the world's version with it."""
+        self._sim, self._sensors = sim, sensors
         self._one_at_a_time = threading.Lock()
         self._opened: SceneServer | None = None
 
@@ -52,7 +54,7 @@ class SceneOffer:
         """Offers the scene, if it isn't offered yet."""
         with self._one_at_a_time:
             if self._opened is None:
-                self._opened = SceneServer(self._sim)
+                self._opened = SceneServer(self._sim, self._sensors)
 
 
 class SceneServer:
@@ -63,8 +65,8 @@ class SceneServer:
     publishes the copies.
     """
 
-    def __init__(self, sim: Simulator) -> None:
-        self._sim = sim
+    def __init__(self, sim: Simulator, sensors: Sequence[SceneSensor]) -> None:
+        self._sim, self._sensors = sim, sensors
         # A window may outlive its simulator: the next one counts from another number.
         self._first = secrets.randbits(31)
         self._news = threading.Event()  # a subscriber comes or goes, or the end
@@ -82,6 +84,7 @@ class SceneServer:
             version = self._number(world.version)
             models = list(world.models.values())
             lights = [copy(light) for light in world.lights.values()]
+            sensors = list(self._sensors)
         found = []
         for model in models:
             number = self._number(model.number)
@@ -89,7 +92,7 @@ class SceneServer:
                 found.append(SceneModel(number=number, name=model.name, known=True))
             else:
                 found.append(to_model(model, number, request.collisions))
-        return GetSceneResponse(version, found, [to_light(light) for light in lights])
+        return GetSceneResponse(version, found, [to_light(light) for light in lights], sensors)
 
     def _advertise(self, name: str, kind: type) -> tuple[rospy.Publisher, SubscriberCount]:
         count = SubscriberCount(self._news.set)

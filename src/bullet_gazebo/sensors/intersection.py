@@ -4,6 +4,7 @@ Shapes are centred in their own frames, and rays are given there: origins (k, 3)
 length 1. A ray that starts inside a shape meets it where it leaves. A ray that misses has distance inf.
 """
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -89,6 +90,13 @@ def cylinder_normals(points: Numbers, sizes: Numbers) -> Numbers:
 def plane_normals(points: Numbers, sizes: Numbers) -> Numbers:
     """Returns the normals (k, 3) of a plane through its x and y axes."""
     return np.broadcast_to((0.0, 0.0, 1.0), points.shape)
+
+
+def reach(kind: str, size: tuple[float, ...]) -> float:
+    """Returns how far from its middle a box, ball or cylinder reaches [m]."""
+    if kind == "box":
+        return math.hypot(*size) / 2.0
+    return size[0] if kind == "sphere" else math.hypot(size[0], size[1] / 2.0)
 
 
 DISTANCES: dict[str, Distances] = {

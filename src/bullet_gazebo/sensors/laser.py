@@ -107,7 +107,7 @@ class Laser:
         shape = self.vertical.samples, self.horizontal.samples
         ranges, intensities = (
             hits.distances.reshape(shape),
-            self._retro(scene, hits.targets).reshape(shape),
+            scene.retro[hits.targets].reshape(shape),
         )
         for axis, fan in enumerate((self.vertical, self.horizontal)):
             ranges, intensities = (_resampled(each, fan, axis) for each in (ranges, intensities))
@@ -118,10 +118,6 @@ class Laser:
         ranges = np.where(beyond, np.inf, np.where(before, -np.inf, ranges))
         return Scan(ranges, intensities)
 
-    def _retro(self, scene: RayScene, targets: np.ndarray) -> np.ndarray:
-        retro = np.array([*(target.shape.retro for target in scene.targets), 0.0])
-        return retro[targets]  # that of NONE is the last
-
 
 class LaserSensor:
     """A laser on a model; raises as `Laser`.
@@ -131,9 +127,9 @@ class LaserSensor:
     """
 
     def __init__(self, mount: Mount) -> None:
-        self._mount, self._sensor = mount, sensor_of(mount, KINDS)
-        self.laser = Laser(self._sensor)
-        self.rate = self._sensor.rate
+        self._mount, self.sensor = mount, sensor_of(mount, KINDS)
+        self.laser = Laser(self.sensor)
+        self.rate = self.sensor.rate
         sensing = mount.sensing
         self._scene = sensing.visuals if self.laser.sees_visuals else sensing.collisions
 
@@ -146,7 +142,7 @@ class LaserSensor:
         """Returns a scan, whose noise is drawn from `random`."""
         mount, noise = self._mount, self.laser.noise
         bias = 0.0 if noise is None else noise.draw_bias(mount.biases())
-        return self.laser.measure(self._scene, sensor_pose(mount.model, self._sensor), bias, random)
+        return self.laser.measure(self._scene, sensor_pose(mount.model, self.sensor), bias, random)
 
     def values(self, now: int) -> dict[str, np.ndarray]:
         """Returns `ranges` and `intensities`, each (n,) of float32, the lowest row first."""

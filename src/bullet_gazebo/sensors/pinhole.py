@@ -42,12 +42,14 @@ class PinholeCamera:
         element: a `<camera>`.
         pose: of what holds it, in its link.
         where: names it in errors.
+        link: what it is in.
 
     Raises:
         DescriptionError: if it can't be simulated.
     """
 
-    def __init__(self, element: Element, pose: Pose, where: str) -> None:
+    def __init__(self, element: Element, pose: Pose, where: str, link: str) -> None:
+        self.link = link
         self.pose = pose.compose(read_pose(element, f"{where}, <camera>")[0])
         self.width, self.height = (
             _pixels(element, f"image/{tag}", where, default)
@@ -113,7 +115,7 @@ def camera_of(sensor: Sensor) -> PinholeCamera:
     element = sensor.element.find("camera")
     if element is None:
         raise DescriptionError(f"{where} has no <camera>")
-    return PinholeCamera(element, sensor.pose, where)
+    return PinholeCamera(element, sensor.pose, where, sensor.link)
 
 
 def with_noise(

@@ -21,7 +21,7 @@ from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.pictures.visuals import Piece, pieces_of, solid_of
-from bullet_gazebo.sensors.intersection import DISTANCES, NORMALS
+from bullet_gazebo.sensors.intersection import DISTANCES, NORMALS, reach
 
 logger = logging.getLogger(__name__)
 LARGE = 2000  # triangles of a mesh that isn't built anew with its neighbours
@@ -61,7 +61,9 @@ class Hits(NamedTuple):
 
     def improve(self, rays: np.ndarray, targets: Any, distances: np.ndarray) -> np.ndarray:
         """Takes over nearer hits, of several of a ray the nearest one; returns which are taken."""
-        nearer = np.flatnonzero(distances < self.distances[rays])
+        nearer = (distances < self.distances[rays]).nonzero()[0]
+        if not len(nearer):
+            return nearer
         order = nearer[np.argsort(-distances[nearer], kind="stable")]  # the last one assigned holds
         self.distances[rays[order]] = distances[order]
         self.targets[rays[order]] = np.broadcast_to(targets, distances.shape)[order]
@@ -80,6 +82,7 @@ class RayScene:
         self._world = world
         self._visuals = visuals
         self.targets: list[Target] = []
+        self.retro = np.zeros(1)  # reflectivity of each target
         self._targets_of: dict[Model, list[Target]] = {}
         self._key: object = None
         self._is_fresh = False
@@ -95,7 +98,9 @@ class RayScene:
         if key != self._key:
             self._build()
             self._key = key
-        self._place(self._apart)
+        if len(self._moving):
+            self._place(self._moving)
+            self._find_centres()
         self._is_fresh = True
 
     def cast(
@@ -113,17 +118,13 @@ class RayScene:
         """
         if not self._is_fresh:
             self._refresh()
-        count = len(directions)
         starts = origin + np.reshape(near, (-1, 1)) * directions
-        found = Hits(
-            np.full(count, np.inf), np.full(count, NONE), np.zeros(count, int), np.zeros((count, 2))
-        )
-        self._meet_still(found, starts, directions)
-        rays = np.arange(count)
+        found = self._meet_still(starts, directions)
+        rays = np.arange(len(directions))
         for target in self._planes:
             found.improve(rays, target, self._plane_distances(target, starts, directions))
         targets, rays = self._pairs(origin, directions, np.max(far))
-        for kind in DISTANCES:
+        for kind in self._analytic:
             some = self._kinds[targets] == kind
             distances = self._distances(
                 kind, targets[some], starts[rays[some]], directions[rays[some]]
@@ -148,17 +149,15 @@ class RayScene:
             own = NORMALS[kind]((points - self._places[target]) @ turn, self._sizes[target])
         return np.asarray(own @ turn.T)
 
-    def _meet_still(self, found: Hits, starts: np.ndarray, directions: np.ndarray) -> None:
-        if not len(self._still):
-            return
+    def _meet_still(self, starts: np.ndarray, directions: np.ndarray) -> Hits:
         met = self._still_triangles.first(starts, directions)
-        hit = np.flatnonzero(met.parts != NONE)
-        found.distances[hit], found.targets[hit] = met.distances[hit], self._still[met.parts[hit]]
-        found.triangles[hit], found.weights[hit] = met.triangles[hit], met.weights[hit]
-        for kind in CURVED:
-            some = hit[self._kinds[found.targets[hit]] == kind]
-            exact = self._distances(kind, found.targets[some], starts[some], directions[some])
+        targets = self._still[met.parts]  # the last one is NONE
+        found = Hits(met.distances, targets, met.triangles, met.weights)
+        for kind in self._curved:
+            some = np.flatnonzero(self._kinds[targets] == kind)
+            exact = self._distances(kind, targets[some], starts[some], directions[some])
             found.distances[some] = np.where(exact < np.inf, exact, found.distances[some])
+        return found
 
     def _meet_mesh(
         self, found: Hits, target: int, triangles: Any, rays: np.ndarray,
@@ -177,12 +176,8 @@ class RayScene:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns which targets' bounding balls are met by which rays: two arrays of indices."""
         apart = self._apart
-        centres = self._places[apart] + np.einsum(
-            "kij,kj->ki", self._turns[apart], self._centres[apart]
-        )
-        ways = centres - origin
-        radii = self._radii[apart]
-        room = np.einsum("ij,ij->i", ways, ways) - radii**2
+        ways = self._apart_centres - origin
+        room = np.einsum("ij,ij->i", ways, ways) - self._radii[apart] ** 2
         # A ray meets a ball if it lies within the cone of tangents. All do that start in it.
         tangents = np.where(room > 0.0, np.sqrt(np.maximum(room, 0.0)), -np.inf)
         least = (tangents - MARGIN * (1.0 + np.abs(tangents))).astype(np.float32)
@@ -194,7 +189,7 @@ class RayScene:
         along = x * dx
         along += y * dy
         along += z * dz
-        which, rays = np.divmod(np.flatnonzero(along >= least[:, None]), len(directions))
+        which, rays = (along >= least[:, None]).nonzero()
         return apart[which], rays
 
     def _distances(
@@ -226,20 +221,24 @@ class RayScene:
         }
         self.targets = targets = [each for found in self._targets_of.values() for each in found]
         count = len(targets)
-        self._kinds = np.array([*(target.shape.kind for target in targets), ""])  # of NONE, too
+        self.retro = np.array([*(target.shape.retro for target in targets), 0.0])  # of NONE, too
+        self._kinds = np.array([*(target.shape.kind for target in targets), ""])
         self._sizes = np.zeros((count, 3))
         self._own_turns, self._own_places = frames([target.shape.pose for target in targets])
         self._turns, self._places = np.zeros((count, 3, 3)), np.zeros((count, 3))
         self._centres, self._radii = np.zeros((count, 3)), np.zeros(count)
         self._place(np.arange(count))
         self._planes = [i for i in range(count) if self._kinds[i] == "plane"]
-        self._apart_meshes, kept = {}, self._apart_meshes  # noqa: F841 - those that stay are found
-        still, triangles, apart = [], [], []
+        still, triangles, apart, meshes = [], [], [], {}
         for index, target in enumerate(targets):
             shape = target.shape
             if shape.kind == "plane":
                 continue
             self._sizes[index, : len(shape.size)] = shape.size
+            if shape.kind != "mesh" and not target.model.description.static:
+                apart.append(index)
+                self._radii[index] = reach(shape.kind, shape.size)
+                continue
             corners = target.corners()
             is_large = shape.kind == "mesh" and len(corners) > 3 * LARGE
             if target.model.description.static and not is_large:
@@ -248,10 +247,21 @@ class RayScene:
                 continue
             apart.append(index)
             self._surround(index, corners)
-            if shape.kind == "mesh":
-                self._apart_meshes[index] = _built([corners])
-        self._still, self._apart = np.array(still, int), np.array(apart, int)
-        self._still_triangles = _built(triangles)
+            meshes[index] = _built([corners])
+        self._still, self._apart = np.array([*still, NONE]), np.array(apart, int)
+        self._apart_meshes, self._still_triangles = meshes, _built(triangles)
+        self._curved = [kind for kind in CURVED if kind in self._kinds[still]]
+        self._analytic = [kind for kind in DISTANCES if kind in self._kinds[apart]]
+        moves = [not targets[index].model.description.static for index in apart]
+        self._moving = self._apart[np.array(moves, bool)]
+        self._find_centres()
+
+    def _find_centres(self) -> None:
+        """Finds where the balls are around what isn't part of the still scene."""
+        turns, apart = self._turns[self._apart], self._apart
+        self._apart_centres = self._places[apart] + np.einsum(
+            "kij,kj->ki", turns, self._centres[apart]
+        )
 
     def _surround(self, index: int, corners: np.ndarray) -> None:
         """Sets the ball around a target, in the target's frame."""
@@ -333,8 +343,9 @@ class _Embree:
             query="INTERSECT", output=True,
         )  # fmt: skip
         parts = found["geomID"]
-        distances = np.where(parts == NONE, np.inf, found["tfar"]).astype(float)
-        return _Met(distances, parts, found["primID"], np.stack([found["u"], found["v"]], axis=1))
+        distances = found["tfar"].astype(float)
+        distances[parts == NONE] = np.inf
+        return _Met(distances, parts, found["primID"], np.column_stack([found["u"], found["v"]]))
 
 
 class _EachTriangle:

@@ -60,12 +60,6 @@ class PgTrainFaults(unittest.TestCase):
         self.assertEqual(place.left_after(), {})
         self.assertFalse(place.run.exists())
 
-    def test_a_simulator_that_dies(self):
-        place = self.place()
-        training = self.training(place)
-        place.send_to_simulator(signal.SIGKILL)
-        self.assert_failed(place, training)
-
     def test_a_simulator_that_dies_in_real_time(self):
         place = self.place()
         training = self.training(place, "--realtime")

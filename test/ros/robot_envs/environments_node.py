@@ -36,10 +36,7 @@ class Balance(OverRos, unittest.TestCase):
     identifier = "cartpole/Balance-v0"
 
 
-class Classic(OverRos, unittest.TestCase):
-    identifier = "cartpole/Classic-v0"
-
-
+@unittest.skipIf(REALTIME, "one kind of action is enough, as each test starts a simulator")
 class SwingUp(OverRos, unittest.TestCase):
     identifier = "cartpole/SwingUp-v0"
 
@@ -77,12 +74,10 @@ class Lockstep(unittest.TestCase):
     def test_the_bits_are_those_of_the_environment_in_process(self):
         for identifier in IDS:
             with self.subTest(identifier):
-                self.compare(identifier, 2000, max_steps=300)
+                self.compare(identifier, 700, max_steps=300)
 
     def test_also_with_all_options(self):
-        for identifier in IDS:
-            with self.subTest(identifier):
-                self.compare(identifier, 500, max_steps=100, control_period=0.005, **RICH)
+        self.compare(IDS[-1], 500, max_steps=100, control_period=0.005, **RICH)
 
     def test_a_step_that_was_begun_is_over_before_another_environments_reset(self):
         first, second = (gymnasium.make("cartpole/Classic-v0", backend="ros") for _ in range(2))

@@ -27,4 +27,6 @@ class Robots(unittest.TestCase):
                     self.assertEqual(differences(given, rollout(here, 30, seed)), "")
                 over_ros.close()
                 here.close()
-                check_robot_env(identifier, ("ros",), steps=30)
+
+    def test_one_with_goals_keeps_what_environments_of_robots_promise(self):
+        check_robot_env(IDS[0], ("ros",), steps=30)

@@ -5,9 +5,9 @@ import rostest
 from free_robot_cases import FreeRobot
 from robots_cases import Robots
 from scenes_cases import Arms, Rover
-from sensors_cases import Seeing
+from sensors_cases import Seeing, SeeingInRealTime
 
-__all__ = ["Arms", "FreeRobot", "Robots", "Rover", "Seeing"]
+__all__ = ["Arms", "FreeRobot", "Robots", "Rover", "Seeing", "SeeingInRealTime"]
 
 if __name__ == "__main__":
     rostest.rosrun("cartpole", "robots", "__main__")

@@ -34,6 +34,14 @@ class Scenes:
                 differences(rollout(over_ros, 130, seed), rollout(here, 130, seed)), ""
             )
 
+
+class Arms(Scenes, unittest.TestCase):
+    robots = (LEFT, RIGHT)
+
+    def task(self):
+        folder = self.enterContext(tempfile.TemporaryDirectory())
+        return Volley(Path(folder))
+
     def test_it_keeps_what_environments_of_robots_promise(self):
         check_robot_env(lambda **options: RobotEnv(self.robots, self.task(), **options), ("ros",))
 
@@ -92,14 +100,6 @@ class Scenes:
         near = next(iter(env.scene.joints))
         with self.assertRaisesRegex(ValueError, f"to place; did you mean '{near}'"):
             env.reset(options={"initial_state": InitialState(joints={near[:-1]: 0.0})})
-
-
-class Arms(Scenes, unittest.TestCase):
-    robots = (LEFT, RIGHT)
-
-    def task(self):
-        folder = self.enterContext(tempfile.TemporaryDirectory())
-        return Volley(Path(folder))
 
 
 class Rover(Scenes, unittest.TestCase):

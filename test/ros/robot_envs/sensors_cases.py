@@ -1,6 +1,8 @@
 """A rover's sensors over ROS: the bits of those in this process."""
 
 import unittest
+from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import rospy
@@ -9,6 +11,7 @@ from sensor_msgs.msg import Image, LaserScan
 from support.scenes.seeing_rover import NAMES, SEEING, Look
 
 from robot_envs import RobotEnv, SimulatorError, StateQuery
+from robot_envs.backends.ros import realtime
 from robot_envs.testing import differences, rollout
 from ros_calls.waiting import wait_until
 
@@ -66,3 +69,34 @@ class Seeing(unittest.TestCase):
             SimulatorError, "no sensor 'lidar' .*there are: front_laser, sonar"
         ):
             self.make(task=task)
+
+
+class SeeingInRealTime(unittest.TestCase):
+    """After the others: the simulator in lock-step has ended."""
+
+    def test_readings_come_from_the_topics(self):
+        env = RobotEnv(SEEING, Look(), "ros-realtime")
+        self.addCleanup(env.close)
+        for seed in (1, 2):
+            env.reset(seed=seed)
+            sensors = env.state.sensors
+            self.assertEqual(list(sensors), list(NAMES))
+            self.assertAlmostEqual(float(sensors["sonar"].ranges[0]), 0.18, delta=0.05)
+            self.assertEqual(sensors["camera"].image.shape, (12, 16, 3))
+            self.assertEqual(sensors["deep"].depth.shape, (12, 16))
+            for _ in range(10):
+                env.step(np.ones(2, np.float32))
+            self.assertGreater(env.state.sensors["front_laser"].time, 0.1)
+            self.assertGreater(env.state.sensors["imu"].time, 0.1)
+
+    def test_a_robot_names_topics(self):
+        robot = replace(SEEING, sensor_topics={"front_laser": "/elsewhere"})
+        env = RobotEnv(robot, Look(), "ros-realtime")
+        self.addCleanup(env.close)
+        with (
+            mock.patch.object(realtime, "STATE_TIMEOUT", 0.5),
+            self.assertRaisesRegex(
+                SimulatorError, "no message on /elsewhere for 0.5 s since the reset"
+            ),
+        ):
+            env.reset(seed=1)

@@ -189,7 +189,7 @@ class Browser:
                 a => a.playState === "running" && a.effect.target.contains(found[0]));
               if (!found.length || moving.length) return null;
               found[0].scrollIntoView({{block: "center"}});
-              const box = found[0].getBoundingClientRect();
+              const box = found[0].getClientRects()[0];  // of a text in lines, the first one
               return {{x: box.x + box.width / 2, y: box.y + box.height / 2}};
             }})()"""
         )

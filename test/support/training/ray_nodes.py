@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 STORE = 80 * 2**20  # [bytes], hardly more than Ray's least
-PATIENCE = 180.0  # [s], on a busy machine
+PATIENCE = 600.0  # [s], on a busy machine
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",
     "RAY_AUTH_MODE": "disabled",

@@ -7,6 +7,7 @@ import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 import torch
@@ -136,8 +137,10 @@ def small(name: str, **changed: Any) -> TrainingOptions:
 
 
 def run(options: TrainingOptions, folder: Path, interrupt: Interrupt | None = None) -> Path:
+    """With an empty picture of the curves: to draw it takes longer than to train."""
     folder.mkdir(parents=True, exist_ok=True)
-    Training(options, folder, interrupt or Interrupt()).run()
+    with mock.patch("rl_workbench.plotting.as_png", lambda figure: lambda file: file.write(b"")):
+        Training(options, folder, interrupt or Interrupt()).run()
     return folder
 
 

@@ -36,29 +36,17 @@ def test_it_resumes_exactly(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "length"),
-    [
-        ("reinforce", {"episodes": 8, "eval_frequency": 0}),
-        pytest.param(
-            "ppo",
-            {"total_timesteps": 256, "eval_frequency": 0},
-            marks=pytest.mark.extras("stable_baselines3"),
-        ),
-    ],
-)
-def test_in_two_simulators_it_comes_to_the_bits_of_two_worlds_here(
-    tmp_path: Path, name: str, length: dict[str, int]
-) -> None:
+@pytest.mark.extras("stable_baselines3")
+def test_in_two_simulators_it_comes_to_the_bits_of_two_worlds_here(tmp_path: Path) -> None:
     """Both are at work at the same time; policies are evaluated in this process. Those over ROS are ended in
     their midst, and gone on with in new ones."""
-    given = {"env_id": "cartpole/Balance-v0", "env_kwargs": {"noise": 0.02}, "num_envs": 2, **length,
-             "eval_env_kwargs": {"backend": "bullet"}}  # fmt: skip
+    given = {"env_id": "cartpole/Balance-v0", "env_kwargs": {"noise": 0.02}, "total_timesteps": 256,
+             "num_envs": 2, "eval_frequency": 0, "eval_env_kwargs": {"backend": "bullet"}}  # fmt: skip
     counting = InterruptAfter()
     here, there = tmp_path / "here", tmp_path / "there"
-    train(here, name, counting, **given)
+    train(here, "ppo", counting, **given)
     simulators = {"train_env_kwargs": {"backend": "ros-own"}}
-    train(there, name, InterruptAfter(counting.times * 2 // 3), **given, **simulators)
+    train(there, "ppo", InterruptAfter(counting.times * 2 // 3), **given, **simulators)
     assert summary(there)["interrupted"]
     resume(there)
     for name in ("agent", "policy", "optimizers", "history", "environment"):

@@ -26,15 +26,10 @@ def printed(*words: str) -> str:
     return ended.stdout
 
 
-def test_episodes_over_services_balance_and_repeat_in_lockstep() -> None:
-    words = [f"{ROOT}/scripts/lockstep.py", f"{ROOT}/examples/episode_over_services.py"]
-    once, again = (
-        [line for line in printed(*words).splitlines() if "ends at" in line] for _ in "12"
-    )
-    assert once == again
-    assert [line.partition(", ")[0] for line in once] == [
-        f"episode {n}: 200 steps" for n in range(3)
-    ]
+def test_episodes_over_services_balance_in_lockstep() -> None:
+    text = printed(f"{ROOT}/scripts/lockstep.py", f"{ROOT}/examples/episode_over_services.py")
+    told = [line.partition(", ")[0] for line in text.splitlines() if "ends at" in line]
+    assert told == [f"episode {n}: 200 steps" for n in range(3)]
 
 
 def test_the_tests_of_a_robot_pass() -> None:

@@ -1,7 +1,7 @@
 """examples/own_task.py is short, a regular environment, and known to the workbench."""
 
 import importlib
-import subprocess
+import runpy
 import sys
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,6 @@ from support.robots.fake_plant import cartpole_world
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 LONGEST = 40  # [lines]
-LIMIT = 300.0  # [s] for a process
 
 
 @pytest.fixture
@@ -46,19 +45,21 @@ def test_the_reward_draws_towards_the_place(own_task: Any) -> None:
     env.close()
 
 
-def run(folder: Path, *words: str) -> str:
-    ended = subprocess.run(
-        [sys.executable, str(EXAMPLES / "own_task.py"), *words], cwd=folder, timeout=LIMIT,
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert ended.returncode == 0, ended.stderr
-    return ended.stdout
-
-
 @pytest.mark.slow
-def test_it_is_a_workbench_that_knows_the_task(tmp_path: Path) -> None:
-    run(tmp_path, "train", "--algo", "reinforce", "--env-id", "StandAt-v0", "--episodes", "5",
+def test_it_is_a_workbench_that_knows_the_task(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str) -> str:
+        monkeypatch.setattr(sys, "argv", ["own_task.py", *words])
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_path(str(EXAMPLES / "own_task.py"), run_name="__main__")
+        assert ended.value.code == 0
+        return capsys.readouterr().out
+
+    run("train", "--algo", "reinforce", "--env-id", "StandAt-v0", "--episodes", "5",
         "--env-kwargs", "place=-0.1", "--run-dir", "mine")  # fmt: skip
     agent = torch.load(tmp_path / "mine" / "last.pt", weights_only=True)["agent"]
     assert any(weights.any() for weights in agent["policy"].values())  # they start at zero
-    assert "over 2 greedy episodes" in run(tmp_path, "eval", "mine", "--episodes", "2")
+    assert "over 2 greedy episodes" in run("eval", "mine", "--episodes", "2")

@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from xml.sax import saxutils as xml_text
+from xml.sax.saxutils import quoteattr
 
 import pytest
 import yaml
@@ -53,27 +53,29 @@ def _umask() -> int:
     return mask
 
 
+NAMES = [  # each gives its controller another name
+    "123", "yes", "~", "- a", "a: b", "{x}", '"""', 'c"d', "e<f>&", "g'h", "i\\j", "#k", "${1 / 0}",
+    "$(cwd)", "x\"] + [__import__('os').mkdir('owned')] + [\"",
+]  # fmt: skip
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "joint",
-    [
-        "123", "yes", "~", "- a", "a: b", "{x}", '"""', 'a"b', "a<b>&", "a'b", "a\\b", "#", "${1 / 0}",
-        "$(cwd)", "x\"] + [__import__('os').mkdir('owned')] + [\"",
-    ],
-)  # fmt: skip
-def test_names_of_a_file_are_data_in_what_is_written(new, joint, tmp_path, monkeypatch):
+def test_names_of_a_file_are_data_in_what_is_written(new, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    text = robot(*BARE, FIXED).replace('"swing"', xml_text.quoteattr(joint))
-    text = text.replace("${", "$${").replace("$(", "$$(")  # as xacro writes them
-    folder, made, task, _ = new("my_arm", text)
-    assert made.joints == (joint,)
+    parts = [BARE[0], FIXED]
+    for number, name in enumerate(NAMES):
+        swing = SWING.replace('"rod"', f'"rod{number}"')
+        parts += [LINK.format(f"rod{number}", ""), swing.replace('"swing"', quoteattr(name))]
+    text = robot(*parts).replace("${", "$${").replace("$(", "$$(")  # as xacro writes them
+    folder, made, *_ = new("my_arm", text)
+    assert sorted(made.joints) == sorted(NAMES)
     described = yaml.safe_load((folder / "config/controllers.yaml").read_text())
-    assert joint in [each.get("joint") for each in described.values()]
+    assert set(NAMES) <= {each.get("joint") for each in described.values()}
     assert not (tmp_path / "owned").exists()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["arm", "light_hand", "pendulum", "slides", "two_link_arm"])
+@pytest.mark.parametrize("name", ["arm", "light_hand", "slides"])
 def test_robots_of_many_kinds_reach_with_the_gains_that_they_get(new, name):
     """Six joints of 17 kg, fingers of grams, slides with all three interfaces."""
     _, made, task, _ = new(f"my_{name}", ROBOTS / f"{name}.urdf")

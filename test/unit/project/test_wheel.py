@@ -126,11 +126,10 @@ def test_a_package_of_ones_own_is_written(python: Path, tmp_path: Path) -> None:
 def test_rl_workbench_trains(python: Path, tmp_path: Path) -> None:
     command = python.with_name("rl-workbench")
     robot = ["--env-id", "cartpole/Classic-v0"]
-    flags = ["--total-timesteps", "600", "--run-dir", "run"]
+    flags = ["--total-timesteps", "200", "--eval-episodes", "1", "--run-dir", "run"]
     run(command, "train", "--algo", "dqn", *robot, *flags, cwd=tmp_path)
     summary = json.loads((tmp_path / "run/summary.json").read_text())
-    assert summary["steps"] == 600
-    assert "mean" in run(command, "eval", "run", "--episodes", "2", cwd=tmp_path)
+    assert summary["steps"] == 200
 
 
 def test_what_needs_ros_says_so_in_one_line(python: Path, tmp_path: Path) -> None:
@@ -143,8 +142,7 @@ def test_what_needs_ros_says_so_in_one_line(python: Path, tmp_path: Path) -> Non
 
 def test_cartpole_pg_trains(python: Path, tmp_path: Path) -> None:
     command = python.with_name("cartpole-pg")
-    run(command, "--episodes", "20", "--run-dir", "run", cwd=tmp_path)
+    run(command, "--episodes", "5", "--eval-episodes", "1", "--run-dir", "run", cwd=tmp_path)
     summary = json.loads((tmp_path / "run/summary.json").read_text())
-    assert len(summary["lengths"]) == 20
-    assert summary["steps"] >= 200
+    assert len(summary["lengths"]) == 5
     assert (tmp_path / "run/policy_network.pth").is_file()

@@ -82,7 +82,7 @@ def test_ready_workspace_is_quiet(ws):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["python", "python3"])
 def test_interpreter_is_the_workspaces(ws, root, name):
-    code = "import bullet_gazebo_msgs.srv, rospy, torch, cartpole, sys; print(sys.prefix)"
+    code = "import bullet_gazebo_msgs.srv, rospy, scipy, cartpole, sys; print(sys.prefix)"
     result = ws(name, "-c", code)
     assert Path(result.stdout.strip()).resolve() == root / ".ws/venv", result.stderr
 

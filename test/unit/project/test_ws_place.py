@@ -111,7 +111,7 @@ def test_a_workspace_that_is_ready_serves_who_cannot_write_it(root):
     """As on a read-only disk; what commands write goes to the user's own folders."""
     with tempfile.TemporaryDirectory() as home:
         os.chown(home, NOBODY, NOBODY)
-        code = "import os, rospy, torch, bullet_gazebo_msgs.srv; print(os.environ['ROS_LOG_DIR'])"
+        code = "import os, rospy, scipy, bullet_gazebo_msgs.srv; print(os.environ['ROS_LOG_DIR'])"
         result = as_nobody(root / "ws", "python3", "-c", code, HOME=home)
         if "Permission denied" in result.stderr and not os.stat(root).st_mode & 0o001:
             pytest.skip("this checkout is closed to others")

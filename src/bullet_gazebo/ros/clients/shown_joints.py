@@ -77,7 +77,7 @@ class ShownJoints:
         return positions if len(positions) == len(names) else []
 
     def _publish(self, names: Sequence[str], positions: Sequence[float]) -> None:
-        """Stamps with wall time, as tf and RViz use here: simulated time may stand still or go back."""
+        """Stamps with the time that tf and RViz use here."""
         self._publisher.publish(JointState(header=_now(), name=names, position=positions))
 
 
@@ -87,6 +87,7 @@ class ShownBase:
     def __init__(self, root: str) -> None:
         self._root = root
         self._model = ""  # with that link; empty while unknown
+        self._last = rospy.Time()  # of what is published: tf refuses a second one of the same
         self._publisher = rospy.Publisher("~tf", TFMessage, queue_size=1)
         self._models = ServiceClient("/gazebo/get_world_properties", GetWorldProperties)
         self._state = ServiceClient("/gazebo/get_link_state", GetLinkState, persistent=True)
@@ -114,11 +115,17 @@ class ShownBase:
     def _publish(self, pose: Pose) -> None:
         place, turn = pose.position, pose.orientation
         there = Transform(Vector3(place.x, place.y, place.z), turn)
-        self._publisher.publish(TFMessage([TransformStamped(_now(WORLD), self._root, there)]))
+        header = _now(WORLD)
+        if header.stamp != self._last:
+            self._last = header.stamp
+            self._publisher.publish(TFMessage([TransformStamped(header, self._root, there)]))
 
 
 def _now(frame: str = "") -> Header:
-    return Header(stamp=rospy.Time.from_sec(time.time()), frame_id=frame)
+    """Stamps with wall time, where simulated time may stand still, or as measurements are stamped."""
+    simulated = rospy.get_param_cached("~use_sim_time", False)
+    now = rospy.Time.now() if simulated else rospy.Time.from_sec(time.time())
+    return Header(stamp=now, frame_id=frame)
 
 
 def _described() -> ModelDescription | None:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import rospy
+from bullet_gazebo_msgs.msg import SceneSensor
 
 from bullet_gazebo.heap import use_one_arena
 from bullet_gazebo.physics.engine import Engine
@@ -136,7 +137,8 @@ class GazeboNode:
         MasterWatch().start()
 
     def _advertise(self, network: bool, seed: int) -> None:
-        scene = SceneOffer(self.sim)
+        sensors: list[SceneSensor] = []
+        scene = SceneOffer(self.sim, sensors)
         control = WorldControl(self.sim, self._watchdog, scene.show if network else None)
         answer_xmlrpc(METHOD, control.answer)
         free_polls_at_once()
@@ -146,7 +148,7 @@ class GazeboNode:
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
-        plugins = PluginRegistry(self.sim, thinner, seed)
+        plugins = PluginRegistry(self.sim, thinner, seed, sensors)
         load_plugins(self.sim, plugins)
         if not network:
             return

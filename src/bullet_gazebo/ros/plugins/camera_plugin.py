@@ -73,9 +73,9 @@ class TriggeredCameraPlugin(CameraPlugin):
         super().__init__(context)
         self._waiting = 0
         topic = topic_in(self._scope, context.text("triggerTopicName", "image_trigger"))
+        self._clock = context.clock(0.0, self._update, lambda: self._waiting > 0, at_once=False)
         trigger = rospy.Subscriber(topic, Empty, self._on_trigger, tcp_nodelay=True)
         context.closing(trigger.unregister)
-        context.on_update(self._update)
 
     def _on_clock(self, now: int) -> None:
         """Triggers take pictures, not the clock."""
@@ -83,12 +83,14 @@ class TriggeredCameraPlugin(CameraPlugin):
     def _on_trigger(self, _: Empty) -> None:
         with self._context.sim.lock:
             self._waiting += 1
+        self._clock.look()
 
     def _update(self, now: int) -> None:
         if self._waiting:
             self._waiting -= 1
-            self._context.sensing.visuals.expire()
             self._take(now)
+        if not self._waiting:
+            self._clock.look()
 
 
 class TriggeredMulticameraPlugin(TriggeredCameraPlugin):
@@ -108,7 +110,7 @@ def _cameras(sensor: Sensor) -> Iterator[tuple[str, PinholeCamera]]:
         raise DescriptionError("no <camera> has left or right in its name")
     for side, element, name in sides:
         where = f"sensor '{sensor.name}', camera '{name}'"
-        yield side, PinholeCamera(element, sensor.pose, where)
+        yield side, PinholeCamera(element, sensor.pose, where, sensor.link)
 
 
 LIBRARIES = {

@@ -11,6 +11,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from sensor_msgs.srv import SetCameraInfo, SetCameraInfoResponse
 from std_msgs.msg import Header
 
+from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
@@ -35,6 +36,7 @@ BAYER = {  # the channel of each pixel of a two-by-two tile
     "BAYER_GRBG8": (1, 0, 2, 1),
 }  # fmt: skip
 LUMINANCE = (0.299, 0.587, 0.114)
+OPTICAL = Pose(orientation=(-0.5, 0.5, -0.5, 0.5))  # x right, y down, z ahead
 
 
 class CameraTopics:
@@ -70,6 +72,7 @@ class CameraTopics:
         colours = 3 * camera.width * camera.height
         self._image = topics.advertise(image, Image, QUEUE, latch=True, content=colours)
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
+        show_camera(context, f"{image}/compressed", CompressedImage, camera)
         self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)
         service = topic_in(scope, f"{own}set_camera_info")
         self._own = own
@@ -105,6 +108,12 @@ class CameraTopics:
             return SetCameraInfoResponse(False, "the size isn't that of the camera's pictures")
         self.info = given
         return SetCameraInfoResponse(True, "")
+
+
+def show_camera(context: PluginContext, topic: str, kind: type, camera: PinholeCamera) -> None:
+    """Has windows offer a topic in the optical axes of a camera."""
+    view = camera.field_of_view, camera.width / camera.height
+    context.show(topic, kind, camera.link, camera.pose.compose(OPTICAL), view)
 
 
 def scope_of(context: PluginContext) -> str:

@@ -10,7 +10,13 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from bullet_gazebo.physics.files.elements import truth
-from bullet_gazebo.ros.plugins.camera_topics import QUEUE, CameraTopics, offer_rate, scope_of
+from bullet_gazebo.ros.plugins.camera_topics import (
+    QUEUE,
+    CameraTopics,
+    offer_rate,
+    scope_of,
+    show_camera,
+)
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, SensorTopics, topic_in
 from bullet_gazebo.sensors.pinhole import KINECT, DepthSensor, PinholeCamera
@@ -47,11 +53,12 @@ class DepthCameraPlugin(SensorPlugin):
             return topic_in(scope, context.text(tag, default))
 
         pixels = camera.width * camera.height
-        depth, points = "depthImageTopicName", "pointCloudTopicName"
-        self._depth = topics.advertise(named(depth, "depth/image_raw"), Image, content=4 * pixels)
-        self._cloud = topics.advertise(
-            named(points, "points"), PointCloud2, content=POINT_STEP * pixels
-        )
+        depth = named("depthImageTopicName", "depth/image_raw")
+        cloud = named("pointCloudTopicName", "points")
+        self._depth = topics.advertise(depth, Image, content=4 * pixels)
+        self._cloud = topics.advertise(cloud, PointCloud2, content=POINT_STEP * pixels)
+        for name, kind in ((depth, Image), (cloud, PointCloud2)):
+            show_camera(context, name, kind, camera)
         self._depth_info = topics.advertise(
             named("depthImageCameraInfoTopicName", "depth/camera_info"),
             CameraInfo,

@@ -27,8 +27,8 @@ from bullet_gazebo.ros.common.messages import NANOSECONDS, to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
     SensorPlugin,
+    always_heard,
     namespace_of,
-    queue_of,
     topic_in,
 )
 from bullet_gazebo.sensors.drift import DriftingError
@@ -130,16 +130,16 @@ class HectorImuPlugin(SensorPlugin):
         topic = topic_in(sensor.namespace, context.text("topicName", "imu"))
         bias = topic_in(sensor.namespace, context.text("biasTopicName", f"{topic}/bias"))
         self._publisher, self._bias = (
-            rospy.Publisher(name, ImuMsg, queue_size=queue_of(context, 10), tcp_nodelay=True)
-            for name in (topic, bias)
+            always_heard(context, name, ImuMsg, 10) for name in (topic, bias)
         )
         calibrate = context.text("serviceName", f"{topic}/calibrate")
         self._offer(topic_in(sensor.namespace, calibrate), Empty, self._rate)
         self._offer(f"{topic}/set_accel_bias", SetBias, self._accel)
         self._offer(f"{topic}/set_rate_bias", SetBias, self._rate)
         for name, error in (("accel", self._accel), ("rate", self._rate), ("yaw", self._yaw)):
-            server = DynamicServer(MODEL, partial(self._configure, error), f"{topic}/{name}")
-            context.closing(server.shutdown)
+            with suppress(rospy.ServiceException):
+                server = DynamicServer(MODEL, partial(self._configure, error), f"{topic}/{name}")
+                context.closing(server.shutdown)
 
     def _offer(self, name: str, kind: Any, error: DriftingError) -> None:
         """Offers a service that sets the drift of `error`: to zero if the request has no bias."""
@@ -218,13 +218,9 @@ class HectorGpsPlugin(SensorPlugin):
         )
         self._frame = context.text("frameId", "/world")
         fix = topic_in(sensor.namespace, context.text("topicName", "fix"))
-        self._fix = rospy.Publisher(
-            fix, NavSatFix, queue_size=queue_of(context, 10), tcp_nodelay=True
-        )
+        self._fix = always_heard(context, fix, NavSatFix, 10)
         velocity = topic_in(sensor.namespace, context.text("velocityTopicName", "fix_velocity"))
-        self._velocity = rospy.Publisher(
-            velocity, Vector3Stamped, queue_size=queue_of(context, 10), tcp_nodelay=True
-        )
+        self._velocity = always_heard(context, velocity, Vector3Stamped, 10)
 
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
         random = self._sensor.random(now)
@@ -273,9 +269,7 @@ class HectorMagneticPlugin(SensorPlugin):
         self._is_field = truth(context.text("useMagneticFieldMsgs", "false"))
         topic = topic_in(sensor.namespace, context.text("topicName", "magnetic"))
         kind = MagneticField if self._is_field else Vector3Stamped
-        self._publisher = rospy.Publisher(
-            topic, kind, queue_size=queue_of(context, 1), tcp_nodelay=True
-        )
+        self._publisher = always_heard(context, topic, kind, 1)
 
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
         field = rotate(conjugate(motion.pose.orientation), self._field)
@@ -298,9 +292,8 @@ class HectorSonarPlugin(SensorPlugin):
         self._timer = timer = HectorTimer(context, SONAR_RATE, (self._error,), self._publish)
         self._frame = context.text("frameId", "/sonar_link")
         topic = topic_in(timer.namespace, context.text("topicName", "sonar"))
-        self._publisher = rospy.Publisher(
-            topic, Range, queue_size=queue_of(context, 1), tcp_nodelay=True
-        )
+        self._publisher = always_heard(context, topic, Range, 1)
+        context.show(topic, Range, self._sensor.sensor.link, self._sensor.sensor.pose)
 
     def _publish(self, now: int, seconds: float) -> None:
         laser, random = self._sensor.laser, self._timer.random(now)

@@ -18,6 +18,7 @@ from functools import partial
 from typing import Protocol
 
 import rospy
+from bullet_gazebo_msgs.msg import SceneSensor
 
 from bullet_gazebo.physics.description import (
     CONTROL_PLUGIN,
@@ -27,6 +28,8 @@ from bullet_gazebo.physics.description import (
     library_of,
 )
 from bullet_gazebo.physics.model import Model
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.ros.common.messages import to_pose_msg
 from bullet_gazebo.ros.common.publishing import Thinner
 from bullet_gazebo.sensors.schedule import SensorClock
 from bullet_gazebo.sensors.sensing import Mount, Sensing
@@ -52,6 +55,7 @@ class PluginContext(Mount):
     namespace: str
     given_namespace: str | None
     thinner: Thinner
+    _shown: list[SceneSensor] = field(default_factory=list, repr=False)
     _updates: list[Update] = field(default_factory=list, repr=False)
     _clocks: list[SensorClock] = field(default_factory=list, repr=False)
     _closers: list[Callable[[], None]] = field(default_factory=list, repr=False)
@@ -85,6 +89,31 @@ class PluginContext(Mount):
     def closing(self, close: Callable[[], None]) -> None:
         """Calls `close` when the plugin ends, or can't be made; the last one first."""
         self._closers.append(close)
+
+    def show(
+        self, topic: str, kind: type, link: str, pose: Pose, view: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
+        """Has windows offer to draw measurements.
+
+        Args:
+            topic: full name of theirs.
+            kind: type of its messages.
+            link: which they are taken from.
+            pose: of the axes that they are in, in the link.
+            view: of a camera, its horizontal field of view [rad] and its picture's width by height.
+        """
+        name = kind._type  # type: ignore[attr-defined]
+        shown = SceneSensor(topic, name, self.model.name, link, to_pose_msg(pose), *view)
+
+        def close() -> None:
+            with self.sim.lock:
+                self._shown.remove(shown)
+                self.sim.world.version += 1
+
+        with self.sim.lock:
+            self._shown.append(shown)
+            self.sim.world.version += 1
+        self.closing(close)
 
     def made(self) -> None:
         """Lets the clocks begin: the plugin can measure now."""
@@ -142,9 +171,16 @@ Factory = Callable[[PluginContext], LoadedPlugin | None]
 class PluginRegistry:
     """Starts and ends plugins by the file names of their libraries: built-in ones, then users'."""
 
-    def __init__(self, sim: Simulator, thinner: Thinner, seed: int = 0) -> None:
-        """`seed` is that of the sensors' noise."""
+    def __init__(
+        self,
+        sim: Simulator,
+        thinner: Thinner,
+        seed: int = 0,
+        shown: list[SceneSensor] | None = None,
+    ) -> None:
+        """`seed` is that of the sensors' noise; to `shown` come the topics that windows can draw."""
         self._sim = sim
+        self._shown = [] if shown is None else shown
         self._thinner = thinner
         self.sensing = Sensing(sim, seed)
         # Imported now, so that no spawn waits for it.
@@ -175,7 +211,7 @@ class PluginRegistry:
             given = own.strip() if own is not None else robot_namespace or None
             context = PluginContext(
                 self._sim, model, plugin, self.sensing, sensor,
-                given or robot_namespace or model.name, given, self._thinner,
+                given or robot_namespace or model.name, given, self._thinner, self._shown,
             )  # fmt: skip
             try:
                 loaded.append((context, factory(context)))

@@ -15,7 +15,7 @@ from bullet_gazebo.physics.description import DescriptionError, Sensor
 from bullet_gazebo.physics.files.elements import truth
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.ros.common.messages import to_time
-from bullet_gazebo.ros.plugins.camera_topics import QUEUE, CameraTopics, camera_info
+from bullet_gazebo.ros.plugins.camera_topics import QUEUE, CameraTopics, camera_info, show_camera
 from bullet_gazebo.ros.plugins.depth_camera_plugin import to_cloud, to_depth_image
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
@@ -95,6 +95,7 @@ class _Depths(_Eye):
         context, topics = self.context, self.topics
         pixels, depth = self.camera.width * self.camera.height, topic_in(self.scope, self.topic)
         self._depth = topics.advertise(depth, Image, QUEUE, content=2 * pixels)
+        show_camera(context, depth, Image, self.camera)
         info = topic_in(self.scope, self.info_topic)
         self._info_topic = topics.advertise(info, CameraInfo, QUEUE)
         self._info = _centred(context, self.camera)
@@ -103,6 +104,7 @@ class _Depths(_Eye):
         if truth(context.text("pointCloud", "false")):
             cloud = topic_in(self.scope, context.text("pointCloudTopicName", "depth/points"))
             self._cloud = topics.advertise(cloud, PointCloud2, content=32 * pixels)
+            show_camera(context, cloud, PointCloud2, self.camera)
         self._low = context.number("rangeMinDepth", 0.2)
         self._high = context.number("rangeMaxDepth", 10.0)
         self._near = context.number("pointCloudCutoff", 0.5)

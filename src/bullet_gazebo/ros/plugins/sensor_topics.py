@@ -57,6 +57,14 @@ def queue_of(context: PluginContext, size: int, content: int = 0) -> int:
     return max(size, most) if context.sim.lockstep else size
 
 
+def always_heard(context: PluginContext, name: str, kind: type, queue: int = 1) -> rospy.Publisher:
+    """Returns the topic of a sensor that measures without subscribers; the context closes it."""
+    size = queue_of(context, queue)
+    publisher = rospy.Publisher(name, kind, queue_size=size, tcp_nodelay=True)
+    context.closing(publisher.unregister)
+    return publisher
+
+
 class SensorPlugin:
     """A plugin whose topics, services and clocks are the context's, which closes them."""
 
@@ -215,8 +223,9 @@ class LaserTopic:
         self.frame = frame_of(namespace, context.text("frameName", "/world"))
         topic = context.plugin.element.findtext("topicName", name).strip()
         if topic:
-            rate = slower(own_rate, sensor.rate)
-            SensorTopic(context, topic_in(namespace, topic), kind, rate, self._measure)
+            full, own = topic_in(namespace, topic), sensor.sensor
+            SensorTopic(context, full, kind, slower(own_rate, sensor.rate), self._measure)
+            context.show(full, kind, own.link, own.pose)
         else:
             rospy.logwarn("Sensor '%s': its <topicName> is empty", context.key)
 

@@ -23,6 +23,7 @@ from bullet_gazebo.ros.scene import from_light, from_model
 from bullet_gazebo.ros.window.model_panel import ModelPanel
 from bullet_gazebo.ros.window.panels import Controllers, TimePanel
 from bullet_gazebo.ros.window.remote_scene import Commands, RemoteScene
+from bullet_gazebo.ros.window.sensor_panel import SensorPanel
 from ros_calls.service import ServiceFailed
 from web_viewer.address import Address
 from web_viewer.curves import Curves
@@ -75,6 +76,8 @@ class Window:
             )
         with tabs.add_tab("Controllers"):
             self._tree = gui.add_html("")
+        with tabs.add_tab("Sensors"):
+            self._sensors = SensorPanel(server, WORLD)
         TrainingTab(server, tabs).start()
         for box in (self._collisions, self._joint_frames):
             box.on_update(lambda _: self._redraw.set())
@@ -96,6 +99,7 @@ class Window:
         while not rospy.is_shutdown():
             watched = bool(self._server.get_clients())
             self._scene.look(watched, watched and self._contacts.value)
+            self._sensors.listen(watched)
             poses, contacts = self._scene.wait(WAIT)
             if not watched:
                 continue
@@ -121,12 +125,14 @@ class Window:
                 self._joint_frames.value,
             )
             self._models.set_models(list(self._picture.models.values()))
+            self._sensors.set_sensors(scene.sensors)
             self._version = scene.version
         if poses.version == self._version:
             self._newest = poses
             with self._server.atomic():
                 self._picture.move(np.array(poses.poses, dtype=float).reshape(-1, NUMBERS))
                 self._models.follow(self._picture.links)
+                self._sensors.show(self._picture)
                 self._aim()
 
     def _aim(self) -> None:

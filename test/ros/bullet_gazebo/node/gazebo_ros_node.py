@@ -211,8 +211,6 @@ class GazeboRos(unittest.TestCase):
         self.assertIn("not set", self.spawn("-urdf", "-param", "nix", "-model", "c", code=1))
         self.assertIn("can't be read", self.spawn("-urdf", "-file", "/nix", "-model", "c", code=1))
         self.spawn("-urdf", "-stdin", "-model", "c", text="<robot", code=1)
-        self.spawn("-urdf", "-stdin", "-model", "c", text="", code=1)
-        self.spawn("-urdf", "-model", "c", code=2)
         call("/gazebo/pause_physics", Empty)
         self.spawn("-urdf", "-file", path, "-model", "d", "-robot_namespace", "/d", "-wait", "a",
                    "-unpause", "-package_to_model")  # fmt: skip

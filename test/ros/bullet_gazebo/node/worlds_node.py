@@ -24,10 +24,11 @@ from gazebo_msgs.srv import (
     SpawnModelRequest,
 )
 from geometry_msgs.msg import Point, Pose, Quaternion
-from support.ros.calls import BOUND, call
+from support.ros.calls import BOUND, call, executable
 
 from ros_utils import ros_gazebo
 
+STILL = 0.2  # [s of simulated time]
 UNKNOWN = (
     "GazeboRosApiPlugin SpawnModel Failure: input model_xml not SDF or URDF, or cannot be converted "
     "to Gazebo compatible format."
@@ -76,15 +77,16 @@ def models():
 
 
 def resting_height(name):
-    """Waits until `name` has come to rest; returns the height [m] of its origin."""
-    deadline = time.monotonic() + BOUND
-    last = None
+    """Waits until `name` has stood still for a time of the simulation's; returns its origin's height [m]."""
+    deadline, before = time.monotonic() + BOUND, None
     while time.monotonic() < deadline:
-        height = position(name).z
-        if last is not None and abs(height - last) < 1e-5:
-            return height
-        last = height
-        time.sleep(0.2)
+        found = call("/gazebo/get_model_state", GetModelState, name, "")
+        now, height = found.header.stamp.to_sec(), found.pose.position.z
+        if before is None or now - before[0] > STILL:
+            if before is not None and abs(height - before[1]) < 1e-5:
+                return height
+            before = now, height
+        time.sleep(0.05)
     raise AssertionError(f"{name} still moves")
 
 
@@ -242,16 +244,18 @@ class OddFiles(unittest.TestCase):
     def test_spawn_model_reads_files_of_every_encoding(self):
         declaration = '\n<!-- mine -->\n<?xml version="1.0" encoding="{0}"?>\r\n<!-- Gelände -->'
         with tempfile.NamedTemporaryFile(suffix=".sdf") as file:
-            for encoding in ("utf-8-sig", "utf-16", "latin-1"):
+            for encoding, source in (
+                ("utf-8-sig", ["-file", file.name]), ("utf-16", ["-stdin"]),
+                ("latin-1", ["-file", file.name]),
+            ):  # fmt: skip
                 text = declaration.format(encoding.removesuffix("-sig")) + BOX.format(more="")
                 with open(file.name, "wb") as written:
                     written.write(text.encode(encoding))
-                command = ["rosrun", "gazebo_ros", "spawn_model", "-sdf", "-model", "from_file"]
-                for source in (["-file", file.name], ["-stdin"]):
-                    with open(file.name, "rb") as piped:
-                        code = subprocess.call([*command, *source, "-x", "60"], stdin=piped)
-                    self.assertEqual(code, 0, (encoding, source))
-                    self.assertTrue(delete("from_file").success)
+                command = [executable("gazebo_ros", "spawn_model"), "-sdf", "-model", "from_file"]
+                with open(file.name, "rb") as piped:
+                    code = subprocess.call([*command, *source, "-x", "60"], stdin=piped)
+                self.assertEqual(code, 0, (encoding, source))
+                self.assertTrue(delete("from_file").success)
                 self.assertTrue(ros_gazebo.gazebo_spawn_sdf_path(file.name, "from_file", pos_x=60))
                 self.assertTrue(delete("from_file").success)
 
@@ -266,7 +270,7 @@ class OddFiles(unittest.TestCase):
         text = URDF.replace('type="fixed"', 'type="continuous"').replace("</robot>", transmission)
         xml = f'\ufeff\r\n<!-- mine -->\r\n<?xml version="1.0" encoding="ISO-8859-1"?>\r\n{text}'
         rospy.set_param("/odd/robot_description", xml)
-        command = ["rosrun", "gazebo_ros", "spawn_model", "-urdf", "-model", "odd", "-x", "70",
+        command = [executable("gazebo_ros", "spawn_model"), "-urdf", "-model", "odd", "-x", "70",
                    "-param", "/odd/robot_description", "-robot_namespace", "/odd"]  # fmt: skip
         self.assertEqual(subprocess.call(command), 0)
         rospy.wait_for_service("/odd/controller_manager/list_controllers", BOUND)

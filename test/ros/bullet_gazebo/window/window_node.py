@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import rosgraph
 import rospy
 import rostest
 from gazebo_msgs.msg import ModelState
@@ -38,6 +39,20 @@ DOOR = f"""<robot name="door"><link name="world"/><link name="frame">{INERTIAL}
 </robot>"""
 CRATE = f"""<robot name="crate"><link name="crate">{INERTIAL}
 <collision><geometry><box size="0.4 0.4 0.2"/></geometry></collision></link></robot>"""
+WALL = """<robot name="wall"><link name="wall">
+<collision><geometry><box size="2 0.1 1"/></geometry></collision>
+<visual><geometry><box size="2 0.1 1"/></geometry></visual></link>
+<gazebo><static>true</static></gazebo></robot>"""
+SEEING = f"""<robot name="seeing"><link name="body">{INERTIAL}</link>
+<gazebo reference="body">
+<sensor name="scanner" type="ray"><pose>0 0 0 0 0 1.57</pose><ray>
+  <scan><horizontal><samples>61</samples><min_angle>-1</min_angle><max_angle>1</max_angle></horizontal></scan>
+  <range><min>0.1</min><max>5</max></range></ray>
+  <plugin name="laser" filename="libgazebo_ros_laser.so"><topicName>/scan</topicName></plugin></sensor>
+<sensor name="eye" type="camera"><camera/>
+  <plugin name="eye" filename="libgazebo_ros_camera.so"><cameraName>/eye</cameraName></plugin></sensor>
+</gazebo><gazebo><static>true</static></gazebo></robot>"""
+PICTURES = "[...document.querySelectorAll('img')].filter(e => e.naturalWidth === 320).length"
 ODD = "<b>ö\t\"&'/x"
 # The lengths of all charts' data, as viser's page offers them to tests.
 CHARTS = """Object.values((window.__viserTestpoints || {}).uplots || {})
@@ -147,6 +162,32 @@ class WindowTest(WindowCase):
         self.wait_until_seen(RED, 1000)  # the camera stays with it
         self.place("ball", (0.0, 0.0, 0.6))
         self.wait_until_gone(RED)
+
+    def test_a_scan_and_a_picture_on_demand(self):
+        self.spawn("wall", WALL, y=1.0, z=0.5)
+        self.spawn("seeing", SEEING, z=0.3)
+        self.page.click("Sensors")
+        self.page.wait_for_text("/eye/image_raw")
+        self.wait_until_gone(RED)
+        self.assertEqual(self.watchers("/scan"), [])
+        self.page.click("/scan")
+        self.wait_until_seen(RED, 40)
+        self.assertEqual(self.page.run(PICTURES), 0)
+        self.page.click("/scan")
+        self.wait_until_gone(RED)
+        self.assertEqual(self.watchers("/scan"), [])
+        self.wait_until_gone(BLUE)
+        self.page.click("/eye/image_raw")
+        wait_for(lambda: self.page.run(PICTURES) == 1, "picture")
+        self.wait_until_seen(BLUE, 40)  # the frustum
+        self.delete("seeing")
+        wait_for(lambda: "/eye" not in self.page.text, "end of its sensors")
+        self.wait_until_gone(BLUE)
+
+    def watchers(self, topic):
+        """The nodes that subscribe to a topic."""
+        found = rosgraph.Master("window_test").getSystemState()[1]
+        return dict(found).get(topic, [])
 
     def screenshot(self):
         """What the page's button saves."""

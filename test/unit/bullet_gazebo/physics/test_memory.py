@@ -23,8 +23,8 @@ from bullet_gazebo.physics.world import World, ground_plane
 
 pytestmark = pytest.mark.slow
 
-CYCLES, WARM_UP = 120, 60
-MOST_GROWTH = 1_000_000  # [bytes] in CYCLES; a cylinder left 52 KB each time
+CYCLES, WARM_UP = 40, 30
+MOST_GROWTH = 1_000_000  # [bytes] in CYCLES; a cylinder left 34 KB each time
 BOX = """<robot name="m"><link name="a"><inertial><origin xyz="0.01 0.02 0.03" rpy="0.1 0.2 0.3"/>
   <mass value="1"/><inertia ixx="1" iyy="2" izz="2.5" ixy="0.1" ixz="0" iyz="0"/></inertial>
   <collision><geometry>{}</geometry></collision><visual><geometry>{}</geometry></visual></link></robot>"""

@@ -206,3 +206,15 @@ def test_a_callback_that_looks_under_the_worlds_lock_does_not_wait_for_it(sim, m
         if thread.name == "sensors' listeners":
             thread.join(60.0)
     assert sensor.times == [0, 10 * MS]
+
+
+def test_a_reset_with_a_seed_begins_the_clocks_anew(sim, make):
+    """So that an episode measures at the same of its times, whenever it begins."""
+    sensor = make(100.0)
+    sensor.come()
+    advance(sim, 13)
+    with sim.lock, sim.one_move():
+        sim.reseed(5)
+        sim.reset(everything=False)
+    advance(sim, 20)
+    assert sensor.times == [0, 10 * MS, 13 * MS, 23 * MS, 33 * MS]

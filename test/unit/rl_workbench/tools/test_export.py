@@ -26,7 +26,7 @@ from rl_workbench.training.algorithms import ALGORITHMS
 KINDS = {
     "plain": ("dqn", {"normalize_observations": "false"}),
     "dueling": ("dqn", {"dueling": "true"}),
-    "robot": ("dqn", {"env_id": "cartpole/Classic-v0"}),
+    "robot": ("dqn", {"env_id": "cartpole:cartpole/Classic-v0"}),
     "pair": ("reinforce", {"observation_scale": "0.4,1,0.2,3"}),
     "hidden": ("reinforce", {"policy_hidden": 8, "normalize_observations": "true",
                              "observation_scale": "0.4,1,0.2,3"}),
@@ -40,7 +40,7 @@ KINDS = {
     "document": ("reinforce-document", {}),
 }  # fmt: skip
 CONTINUOUS = {"env_id": "Pendulum-v1", "eval_frequency": 0, "eval_episodes": 1}
-OFF_POLICY = {"total_timesteps": 200, "learning_starts": 50, "buffer_size": 500, "n_steps": None,
+OFF_POLICY = {"total_timesteps": 90, "learning_starts": 50, "buffer_size": 500, "n_steps": None,
               "batch_size": 16, "eval_frequency": 0, "eval_episodes": 1}  # fmt: skip
 SB3 = {
     "ppo": ("ppo", {}),

@@ -83,7 +83,7 @@ def test_a_training_that_is_killed_goes_on_bit_identically(tmp_path: Path, capsy
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(job_module, "_start", started)
         assert pool(tmp_path, [killed]).run(killed, is_needed) == ""
-    assert pool(tmp_path, [other]).run(other) == ""
+    assert cli.main(["train", f"--run-dir={other.folder}", *other.flags]) == 0
     assert "lost, and tried again: its process was killed" in capsys.readouterr().out
     assert len(cost_of(killed.folder)["spans"]) == 2
     assert_same_run(killed.folder, other.folder)

@@ -46,9 +46,7 @@ def module(tmp_path_factory: pytest.TempPathFactory):
 @pytest.fixture(scope="module")
 def trained(module: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("runs") / "run"
-    command = [*PROGRAM, "train", "--algo", "dqn", *SMALL, "--run-dir", str(folder)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    assert cli.main(["train", "--algo", "dqn", *SMALL, "--run-dir", str(folder)]) == 0
     return folder
 
 
@@ -139,27 +137,20 @@ def test_a_name_that_leads_nowhere_is_one_line(
 
 
 def test_a_run_whose_module_is_gone_is_plotted_all_the_same(
-    trained: Path, tmp_path: Path, capsys
+    module: Path, trained: Path, tmp_path: Path, capsys, monkeypatch
 ) -> None:
-    """In a process that doesn't find the module."""
-    found = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    found["PYTHONPATH"] = str(Path(rl_workbench.__file__).parents[1])
-    out = str(tmp_path / "curve.png")
-    command = [sys.executable, "-m", "rl_workbench"]
-    done = subprocess.run(
-        [*command, "plot", str(trained), "--out", out], env=found, capture_output=True, text=True,
-        check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    monkeypatch.setattr(sys, "path", [each for each in sys.path if each != str(module)])
+    for name in ("own_arm", "own_arm.tasks"):
+        monkeypatch.delitem(sys.modules, name)
+    assert cli.main(["plot", str(trained), "--out", str(tmp_path / "curve.png")]) == 0
     for needs_it in (
         ["eval"],
         ["eval", "--checkpoint=random"],
         ["view", "--no-browser"],
         ["enjoy", "--gui"],
     ):
-        done = subprocess.run(
-            [*command, *needs_it, str(trained)], env=found, capture_output=True, text=True, check=False,
-            timeout=300,
-        )  # fmt: skip
-        assert done.returncode == 1 and done.stdout == ""
-        assert "there is no module 'own_arm'" in done.stderr and done.stderr.count("\n") == 1
+        capsys.readouterr()
+        assert cli.main([*needs_it, str(trained)]) == 1
+        told = capsys.readouterr()
+        assert told.out == "" and told.err.count("\n") == 1
+        assert "there is no module 'own_arm'" in told.err

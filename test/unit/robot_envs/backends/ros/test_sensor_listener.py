@@ -1,0 +1,120 @@
+"""What a robot's sensors send, in real time: topics and messages, without ROS's servers."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import rospy
+from sensor_msgs.msg import Image, Imu, LaserScan, Range
+from std_msgs.msg import Header
+from support.scenes.seeing_rover import NAMES, SEEING
+
+from robot_envs import RobotEnvError
+from robot_envs.backends.ros.sensor_listener import SensorListener
+
+HEADER = Header(stamp=rospy.Time(7, 500_000_000))
+
+
+class Heard:
+    """In the place of subscribers: what they subscribe to, and a clock."""
+
+    def __init__(self) -> None:
+        self.topics: dict[str, tuple[type, Callable[[Any], None]]] = {}
+        self.now = 0.0  # [s]
+
+    def subscribe(self, topic: str, kind: type, receive: Callable, **_: object) -> SimpleNamespace:
+        self.topics[topic] = (kind, receive)
+        return SimpleNamespace(resolved_name=topic, unregister=lambda: self.topics.pop(topic))
+
+    def send(self, topic: str, message: Any) -> None:
+        kind, receive = self.topics[topic]
+        assert isinstance(message, kind)
+        receive(message)
+
+
+@pytest.fixture
+def heard(monkeypatch: pytest.MonkeyPatch) -> Iterator[Heard]:
+    made = Heard()
+    monkeypatch.setattr(rospy, "Subscriber", made.subscribe)
+    yield made
+
+
+def listener(heard: Heard, *names: str, robot: Any = SEEING) -> SensorListener:
+    return SensorListener(robot, names, lambda: heard.now)
+
+
+def picture(encoding: str, data: np.ndarray) -> Image:
+    height, width = data.shape[:2]
+    return Image(HEADER, height, width, encoding, 0, data.nbytes // height, data.tobytes())
+
+
+def test_topics_are_those_that_the_plugins_name(heard: Heard) -> None:
+    found = listener(heard, *NAMES)
+    wanted = "/scan /sonar /imu /eye/image_raw /deep/depth/image_raw /bumper_states /old_imu"
+    assert list(heard.topics) == wanted.split() == found.missing()
+    found.close()
+    assert not heard.topics
+    text = str(SEEING.urdf).replace(
+        "<topicName>scan", "<robotNamespace>own</robotNamespace><topicName>scan"
+    )
+    robot = replace(SEEING, urdf=text, namespace="left", sensor_topics={"imu": "/phone/imu"})
+    listener(heard, "front_laser", "sonar", "seeing::imu", robot=robot)
+    assert list(heard.topics) == ["/own/scan", "/left/sonar", "/phone/imu"]
+
+
+def test_unknown_sensors_and_topics_are_told(heard: Heard) -> None:
+    with pytest.raises(RobotEnvError, match="no sensor 'sonarr'; did you mean 'sonar'"):
+        listener(heard, "sonarr")
+    velodyne = str(SEEING.urdf).replace("libgazebo_ros_laser", "libgazebo_ros_velodyne_laser")
+    robot = replace(SEEING, urdf=velodyne)
+    with pytest.raises(RobotEnvError, match="topic of the sensor 'front_laser' isn't known"):
+        listener(heard, "front_laser", robot=robot)
+    listener(heard, "front_laser", robot=replace(robot, sensor_topics={"front_laser": "/scan"}))
+    assert list(heard.topics) == ["/scan"]
+
+
+def test_messages_become_readings(heard: Heard) -> None:
+    found = listener(heard, "front_laser", "sonar", "imu", "camera", "deep")
+    colours = np.arange(18, dtype=np.uint8).reshape(2, 3, 3)
+    depths = np.array([[0.5, np.nan]], np.float32)
+    imu = Imu(header=HEADER)
+    imu.linear_acceleration.z, imu.orientation.w = 9.8, 1.0
+    heard.send("/scan", LaserScan(header=HEADER, ranges=[0.1, float("inf")]))
+    heard.send("/sonar", Range(header=HEADER, range=0.3))
+    heard.send("/imu", imu)
+    heard.send("/eye/image_raw", picture("bgr8", colours))
+    assert found.missing() == ["/deep/depth/image_raw"] and not found.wait(0.0)
+    heard.send("/deep/depth/image_raw", picture("32FC1", depths))
+    assert found.wait(0.0)
+    sensors = found.read(begin=5.0)
+    assert sensors["front_laser"].ranges.tolist() == [pytest.approx(0.1), np.inf]
+    assert sensors["front_laser"].time == 2.5
+    assert sensors["sonar"].ranges.dtype == np.float32
+    assert sensors["imu"].linear_acceleration.tolist() == [0.0, 0.0, 9.8]
+    assert sensors["imu"].orientation.tolist() == [0.0, 0.0, 0.0, 1.0]
+    assert np.array_equal(sensors["camera"].image, colours[..., ::-1])
+    assert np.array_equal(sensors["deep"].depth, depths, equal_nan=True)
+    heard.send("/deep/depth/image_raw", picture("16UC1", np.array([[500, 0]], np.uint16)))
+    assert np.array_equal(found.read(0.0)["deep"].depth, depths, equal_nan=True)
+    heard.send("/eye/image_raw", picture("mono8", colours[..., 0]))
+    assert np.array_equal(found.read(0.0)["camera"].image, colours[..., [0, 0, 0]])
+
+
+def test_late_and_unreadable_messages_are_told(heard: Heard) -> None:
+    found = listener(heard, "front_laser", "camera")
+    heard.send("/scan", LaserScan(header=HEADER, ranges=[0.1]))
+    heard.send("/eye/image_raw", picture("rgb8", np.zeros((2, 2, 3), np.uint8)))
+    heard.now = 0.05
+    assert found.trouble(late=0.01) == ""  # three periods of 50 Hz haven't passed
+    heard.now = 0.07
+    assert found.trouble(late=0.01) == "no message on /scan for 0.06 s"
+    assert found.trouble(late=0.1) == ""
+    heard.send("/eye/image_raw", picture("yuv422", np.zeros((2, 2, 2), np.uint8)))
+    assert found.trouble(late=0.1).startswith("the sensor 'camera': pictures are yuv422; rgb8, ")
+    heard.send("/eye/image_raw", picture("rgb8", np.zeros((2, 2, 3), np.uint8)))
+    assert found.trouble(late=0.1) == ""
+    found.forget()
+    assert found.missing() == ["/scan", "/eye/image_raw"]
