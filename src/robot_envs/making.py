@@ -30,7 +30,8 @@ def make_environment(robot: str, task: str, backend: str | None = None, **option
         ValueError: if an option makes no sense.
     """
     make_task = named(task)
-    if not callable(make_task):
+    is_class = isinstance(make_task, type)
+    if not callable(make_task) or (is_class and not issubclass(make_task, Task)):
         raise RobotEnvError(
             f"{task} is {short(make_task)}, which is not a subclass of robot_envs.Task"
         )
@@ -56,7 +57,7 @@ def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
 
 def _robots(name: str) -> Any:
     found = named(name)
-    robots = found() if _takes_nothing(found) else found
+    robots = found() if _takes_nothing(found) and not isinstance(found, type) else found
     listed = [robots] if isinstance(robots, Robot) else robots
     if not isinstance(listed, (list, tuple)) or not all(isinstance(each, Robot) for each in listed):
         raise RobotEnvError(
@@ -117,7 +118,7 @@ def named(name: str) -> Any:
         if error.name is None or not f"{module}.".startswith(f"{error.name}."):
             raise  # the module exists, and imports one that doesn't
         raise RobotEnvError(
-            f"there is no module '{module}' (of '{name}'); ./ws --with FOLDER finds those of a folder"
+            f"there is no module '{module}' (of '{name}'); ./ws --with FOLDER ... finds those in FOLDER"
         ) from error
     if not hasattr(found, attribute):
         raise RobotEnvError(

@@ -6,8 +6,12 @@ same robot), `own_robot_options` (the options by which a copy has a robot of its
 `side_by_side(count)` (a context manager within which that many start, or close, at the same time).
 """
 
+import hashlib
+import re
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
+from pathlib import Path
 from typing import Any, TypeGuard
 
 import gymnasium
@@ -15,12 +19,13 @@ import numpy as np
 from gymnasium import spaces
 
 from rl_workbench import errors
-from rl_workbench.env_ids import FORM, import_module_of, module_of
+from rl_workbench.env_ids import FORM, import_module_of, module_of, spec_of
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
 from rl_workbench.option import imported
 from rl_workbench.training.checked import CheckedEnvironment
 from rl_workbench.training.options import TrainingOptions
 
+_CODE = re.compile(r"[\w.]+:[\w.]+")  # module:name
 # What constructors raise for options that they reject.
 _REFUSED = (gymnasium.error.Error, ImportError, TypeError, ValueError, LookupError, AssertionError)
 
@@ -48,7 +53,8 @@ def make_environment(
             make no sense, or it observes images that can't be learned from.
     """
     import_module_of(env_id)
-    wrap = imported(wrapper, "--wrapper") if wrapper else lambda env: env
+    _check_names(env_id, options or {})
+    wrap = _wrapper(wrapper) if wrapper else lambda env: env
     with ExitStack() as refused:
         try:
             env: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **(options or {}))
@@ -73,6 +79,24 @@ def make_environment(
         suited = _suited(env, env_id, keep_dict)
         refused.pop_all()
     return CheckedEnvironment(suited, env_id, which)
+
+
+def _check_names(env_id: str, options: Mapping[str, Any]) -> None:
+    """Refuses other code than the registration names: options may come from the record of a foreign run."""
+    spec = spec_of(env_id)
+    for name, value in (spec.kwargs if spec else {}).items():
+        if name in options and isinstance(value, str) and _CODE.fullmatch(value):
+            raise WorkbenchError(
+                f"can't make {env_id}: its {name} is {value}; no option changes it"
+            )
+
+
+def _wrapper(name: str) -> Any:
+    """Returns what wraps environments: a function, or a class of environments."""
+    found = imported(name, "--wrapper")
+    if isinstance(found, type) and not issubclass(found, gymnasium.Env):
+        raise WorkbenchError(f"--wrapper {name}: it is no gymnasium.Wrapper")
+    return found
 
 
 def _suited(env: gymnasium.Env[Any, Any], env_id: str, keep_dict: bool) -> gymnasium.Env[Any, Any]:
@@ -170,6 +194,15 @@ def robot_options(
         return None
     named = _attribute(env, "same_robot_options") or {}
     return {name: [given.get(name), *values] for name, values in named.items()}
+
+
+def source_digest(env: gymnasium.Env[Any, Any]) -> str:
+    """Returns the digest of the files that the environment's task is written in, or else its class."""
+    kinds = type(_attribute(env, "task") or env.unwrapped).__mro__
+    modules = [sys.modules.get(kind.__module__) for kind in kinds]
+    paths = [Path(path) for each in modules if (path := getattr(each, "__file__", None))]
+    content = b"".join(path.read_bytes() for path in sorted(set(paths)) if path.is_file())
+    return hashlib.sha256(content).hexdigest()
 
 
 def _attribute(env: gymnasium.Env[Any, Any], name: str) -> Any:

@@ -89,6 +89,16 @@ def test_names_of_what_an_id_is_made_of(robot, task, text):
     assert is_a_line(error.value)
 
 
+def test_nothing_but_tasks_and_robots_is_called(tmp_path):
+    made = tmp_path / "made"
+    solo = "support.scenes.solo_arm:SOLO"
+    with pytest.raises(RobotEnvError, match="is not a subclass of robot_envs.Task"):
+        make_environment(solo, "subprocess:Popen", args=["touch", str(made)])
+    with pytest.raises(RobotEnvError, match="threading.Thread.* is not a robot_envs.Robot"):
+        make_environment("threading:Thread", "support.scenes.solo_arm:Hold")
+    assert not made.exists()
+
+
 def test_an_option_that_nobody_knows():
     with pytest.raises(
         RobotEnvError, match="no option 'sensor_noize'; did you mean 'sensor_noise'"

@@ -44,6 +44,19 @@ def test_an_environment_that_fails_as_gymnasiums_do_is_one_line(monkeypatch) -> 
         env.reset()
 
 
+def test_options_change_no_code_of_a_registration(monkeypatch) -> None:
+    spec = gymnasium.registry[POLE]
+    monkeypatch.setitem(spec.kwargs, "task", "my_robot.tasks:Reach")
+    words = f"can't make {POLE}: its task is my_robot.tasks:Reach; no option changes it"
+    with pytest.raises(WorkbenchError, match=words):
+        make_environment(POLE, {"task": "os:getcwd"})
+
+
+def test_a_wrapper_of_another_kind_is_not_called() -> None:
+    with pytest.raises(WorkbenchError, match="--wrapper subprocess:Popen: it is no gymnasium.Wrap"):
+        make_environment(POLE, wrapper="subprocess:Popen")
+
+
 @pytest.mark.extras("Box2D")
 @pytest.mark.parametrize(
     ("env_id", "options", "words"),
