@@ -39,7 +39,7 @@ setup(
     package_dir={"": "src"},
     package_data={
         "bullet_gazebo.physics.files": ["models.sdf"],
-        "package_writing": ["parts/*", "template/**/*"],
+        "package_writing": ["parts/*", "template/**/*", "template/.gitignore.in"],
         "rl_workbench.tools": ["page.html"],
     },
     cmdclass={"build_py": BuildWithData},

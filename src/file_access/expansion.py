@@ -4,12 +4,14 @@ A xacro file is a program: it may include itself, compute without end or ask for
 a child process, with the xacro that the caller would import.
 """
 
+import io
 import json
 import os
+import re
 import signal
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stderr, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -34,6 +36,8 @@ MAX_REASON = 500  # characters
 MAX_FILES = 3  # that an error names
 
 BROKEN = 2  # exit code, xacro's own
+
+_told: set[str] = set()  # xacro's warnings that this process has printed
 
 
 class CannotExpand(Exception):
@@ -75,7 +79,12 @@ def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: Lim
     # A process for each file: xacro keeps its state in module variables.
     process = LimitedProcess("file_access.expansion:answer", limits)
     try:
-        return process.ask(json.dumps(request).encode()).decode(errors="surrogateescape")
+        answered = json.loads(process.ask(json.dumps(request).encode()))
+        for line, more in answered["warnings"].items():
+            if line not in _told:
+                _told.add(line)
+                print(line, *more, sep="\n", file=sys.stderr)
+        return str(answered["text"])
     except ProcessDied as fault:
         raise CannotExpand(f"{path}: xacro: {fault}") from fault
     except RequestRefused as fault:
@@ -86,7 +95,11 @@ def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: Lim
 
 
 def answer(data: bytes) -> bytes:
-    """Answers a request of this module in the child process: the XML, or a line for each included file."""
+    """Answers a request of this module in the child process.
+
+    Returns:
+        JSON: "text", the XML or a line for each included file; "warnings", as `_heard` gives them.
+    """
     request = json.loads(data)
     path = request["path"]
     try:
@@ -102,13 +115,13 @@ def answer(data: bytes) -> bytes:
         return xacro_parse(given, name)
 
     xacro_parse, xacro.parse = xacro.parse, parse
-    with _in_one_line(xacro, path):
+    with _heard() as told, _in_one_line(xacro, path):
         document = xacro.process_file(path, mappings=request["mappings"])
         if request["wanted"] == "files":
             text = "\n".join(sorted(set(xacro.all_includes)))
         else:
             text = document.toprettyxml(indent="  ")
-    return text.encode(errors="surrogateescape")
+    return json.dumps({"text": text, "warnings": told}).encode()
 
 
 def main() -> int:
@@ -139,8 +152,11 @@ def _run_program() -> NoReturn:
     if options.root_dir:
         xacro.root_dir = options.root_dir
     try:
-        with _in_one_line(xacro, path):
+        with _heard() as told, _in_one_line(xacro, path):
             document = xacro.process_file(path, **vars(options))
+        for line, more in told.items():
+            print(line, *more, sep="\n", file=sys.stderr)
+        with _in_one_line(xacro, path):
             if options.just_deps:
                 text = " ".join(sorted(set(xacro.all_includes)))
             else:
@@ -153,6 +169,25 @@ def _run_program() -> NoReturn:
         print(f"xacro: {fault}", file=sys.stderr)
         sys.exit(BROKEN)
     sys.exit(0)
+
+
+@contextmanager
+def _heard() -> Iterator[dict[str, list[str]]]:
+    """Collects xacro's warnings, each distinct one once, with the lines on its first place.
+
+    Whatever else it writes to stderr is passed on.
+    """
+    found: dict[str, list[str]] = {}
+    heard = io.StringIO()
+    try:
+        with redirect_stderr(heard):
+            yield found
+    finally:
+        said, *warnings = re.split(r"^(?=warning: )", heard.getvalue(), flags=re.MULTILINE)
+        sys.stderr.write(said)
+        for each in warnings:
+            line, *more = each.rstrip("\n").split("\n")
+            found.setdefault(line, more)
 
 
 @contextmanager

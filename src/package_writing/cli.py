@@ -119,7 +119,7 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
 def _write(args: argparse.Namespace, parent: Path) -> list[str]:
     """Writes the package next to its destination, then moves it there; returns lines to print."""
     check_name(args.name)
-    folder = parent.absolute() / args.name
+    folder = Path(os.path.abspath(parent)) / args.name
     if os.path.lexists(folder):
         raise CannotWrite(
             f"{folder} is there already; choose another name, or another place with --to FOLDER"

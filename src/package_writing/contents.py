@@ -3,8 +3,9 @@
 import json
 import math
 import re
+import shlex
 import string
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -218,14 +219,27 @@ def _units(motor: Motor) -> str:
 def ranges_text(survey: Survey) -> str:
     """Returns the ranges of the postures to reach, as the inside of a Python dict."""
     return "".join(
-        f"    {literal(each.joint)}: ({_inwards(each.low, math.ceil)}, {_inwards(each.high, math.floor)}),\n"
-        for each in survey.motors
+        f"    {literal(each.joint)}: ({each.low}, {each.high}),\n" for each in survey.motors
     )
 
 
-def _inwards(bound: float, rounded: Callable[[float], int]) -> float:
-    """Rounds a bound to three decimals, inwards."""
-    return rounded(bound * 1000.0) / 1000.0
+def stance_text(package: str, survey: Survey, starts: Mapping[str, float]) -> dict[str, str]:
+    """Returns the template's values about where joints start, and a test that what has feet stands."""
+    options = "".join(f" -J {shlex.quote(name)} {start}" for name, start in starts.items())
+    stands = bool(feet(survey.model))
+    return {
+        "stance": "".join(f"    {literal(name)}: {start},\n" for name, start in starts.items()),
+        "joints": escape(options, QUOTE),
+        "stands": (PARTS / "stands.py.in").read_text(encoding="utf-8") if stands else "",
+        "stands_checked": ", check_stands" if stands else "",
+        "stands_imported": f"\nfrom {package}.robot import ROBOT, STANCE" if stands else "",
+    }
+
+
+def folder_text(needed: Sequence[str]) -> str:
+    """Returns the README's line on the packages that a robot needs; "" for none."""
+    names = ", ".join(f"`{each}`" for each in needed)
+    return f"`FOLDER` has what the robot needs of other packages: {names}.\n\n" if needed else ""
 
 
 def wheels_text(survey: Survey) -> dict[str, str]:

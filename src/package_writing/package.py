@@ -17,7 +17,15 @@ import yaml
 
 from bullet_gazebo.physics.files.reading import Resources
 from package_writing import CannotWrite, contents
-from package_writing.survey import Survey, feet, height_note, look_at, root_link, standing_height
+from package_writing.survey import (
+    Survey,
+    feet,
+    height_note,
+    look_at,
+    root_link,
+    stance,
+    standing_height,
+)
 from package_writing.urdf_files import Copied, copy_urdf, expanded
 from robot_envs import Robot, RobotEnvError, controllers, files
 
@@ -102,10 +110,11 @@ def write(request: PackageRequest, made: Path) -> list[str]:
     loose = _loose_link(request, root_link(copied.xml), request.urdf or ARM)
     urdf, xml, survey, lacks = _completed(request, copied, made, loose)
     contents.check_controllers(survey.motors)
-    stands = None if survey.model.fixed_base else standing_height(survey.model)
+    starts = stance(survey)
+    stands = None if survey.model.fixed_base else standing_height(survey.model, starts)
     if request.height is None:
         request = replace(request, height=stands or 0.0)
-    contents.fill(made, request.name, _values(request, survey, urdf, copied))
+    contents.fill(made, request.name, _values(request, survey, urdf, copied, starts))
     parameters = yaml.safe_load((made / "config/controllers.yaml").read_text(encoding="utf-8"))
     run = tuple(map(contents.controller, survey.motors))
     robot = Robot(urdf=xml, controllers=parameters, run=run)
@@ -159,6 +168,10 @@ def _completed(
     interface = f"{request.interface.capitalize()}JointInterface" if request.interface else None
     free = request.base == "free"
     control = f"{request.name}_control.urdf.xacro"
+    if (made / "urdf" / control).exists():
+        raise CannotWrite(
+            f"the package has a urdf/{control} of its own: rename that file, or the package"
+        )
 
     def with_more(survey: Survey | None) -> str:
         text = contents.control_text(request.name, copied.place, survey, loose)
@@ -204,7 +217,9 @@ def _package(name: str) -> Path | None:
         return None
 
 
-def _values(request: PackageRequest, survey: Survey, urdf: str, copied: Copied) -> dict[str, str]:
+def _values(
+    request: PackageRequest, survey: Survey, urdf: str, copied: Copied, starts: Mapping[str, float]
+) -> dict[str, str]:
     needed = [each for each in copied.packages if each not in OURS]
     pairs = [f"{name}:={value}" for name, value in request.arguments.items()]
     units = {"rad/s" if each.wheel else "m" if each.linear else "rad" for each in survey.motors}
@@ -222,6 +237,7 @@ def _values(request: PackageRequest, survey: Survey, urdf: str, copied: Copied) 
         ),
         "controllers_yaml": contents.controllers_text(survey),
         "ranges": contents.ranges_text(survey),
+        **contents.stance_text(request.name, survey, starts),
         "units": ", ".join(each for each in ("rad", "m", "rad/s") if each in units),
         **contents.wheels_text(survey),
         "run": " ".join(map(contents.controller, survey.motors)),
@@ -233,7 +249,10 @@ def _values(request: PackageRequest, survey: Survey, urdf: str, copied: Copied) 
         "ns": survey.namespace,
         "height": str(request.height),
         "period": str(contents.PERIOD),
-        "commands": "\n".join(_commands(request, copied)),
+        "commands": "\n".join(
+            _commands(request.name, f"../{request.name}", ["FOLDER"] * bool(needed))
+        ),
+        "folder": contents.folder_text(needed),
     }
 
 
@@ -267,6 +286,8 @@ def _report(
             yield f"gains are for a robot that stands on its feet: {', '.join(on)}"
     if survey.passive:
         yield f"joints that move without a motor, and that tasks don't see: {', '.join(survey.passive)}"
+    if survey.followers:
+        yield f"note: <mimic> isn't followed yet, so that these swing freely: {', '.join(survey.followers)}"
     held = [each.joint for each in survey.motors if not each.limited]
     if held:
         yield (
@@ -284,27 +305,26 @@ def _report(
     if len(warnings) > NOTES:
         yield f"note: {len(warnings) - NOTES} more of such"
     yield f"in {TREE}, next:" if IS_CHECKOUT else "next:"
-    yield from (f"  {each}" for each in _commands(request, copied))
+    near = request.folder.parent == PARENT
+    here = os.path.relpath(request.folder, TREE) if near else str(request.folder)
+    commands = _commands(request.name, shlex.quote(here), list(_others(copied)))
+    yield from (f"  {each}" for each in commands)
 
 
-def _commands(request: PackageRequest, copied: Copied) -> list[str]:
-    """Returns commands for the next steps, to run in the checkout."""
-    place = (
-        os.path.relpath(request.folder, TREE) if request.folder.parent == PARENT else request.folder
-    )
-    here = shlex.quote(str(place))
-    ws = f"./ws {''.join(f'--with {each} ' for each in _others(copied))}--with {here}"
+def _commands(name: str, here: str, others: Sequence[str]) -> list[str]:
+    """Returns commands for the next steps, to run in the checkout; `here` and `others` are for ws."""
+    ws = f"./ws {''.join(f'--with {each} ' for each in others)}--with {here}"
     run = f"{ws} rosrun cartpole workbench.py"
-    runs = f"runs/{request.name}"
+    runs = f"runs/{name}"
     return [
-        f"{ws} roslaunch {request.name} simulation.launch    # look at it; Ctrl-C ends it",
+        f"{ws} roslaunch {name} simulation.launch    # look at it; Ctrl-C ends it",
         f"{ws} test {here}",
-        f"{ws} rostest {request.name} simulation.test",
+        f"{ws} rostest {name} simulation.test",
         "./ws extras true    # once: Stable-Baselines3",
-        f"{run} train --algo ppo --env-id {request.name}.environment:{request.name}/Reach-v0 "
+        f"{run} train --algo ppo --env-id {name}.environment:{name}/Reach-v0 "
         f"--config {here}/config/ppo.yaml --run-dir {runs}",
         f"{run} eval {runs} --episodes 20",
-        f"{run} record {runs} --out {request.name}.gif",
+        f"{run} record {runs} --out {name}.gif",
         f"{run} eval {runs} --episodes 5 --env-kwargs backend=ros    # the same over ROS",
     ]
 

@@ -2,11 +2,12 @@
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 import numpy as np
+import yaml
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.joint import JointHandle
@@ -17,7 +18,7 @@ from bullet_gazebo.physics.description import (
     Shape,
     is_control_plugin,
 )
-from bullet_gazebo.physics.dynamics import poses_at_zero
+from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, conjugate, rotate
@@ -31,9 +32,13 @@ EFFORT, POSITION, VELOCITY = (
 )
 SHARE = 0.6  # of a joint's range, about its middle, from which postures to reach are drawn
 WIDEST = 1.8  # [rad, m], largest half-width of that range
+FARTHEST = 1e6  # [rad, m], of the range's middle
 FASTEST = 5.0  # [rad/s], of wheels
 # Of the height at which a robot stands: how much higher than its lowest link feet may be.
 FOOT = 0.05
+NEAR = 1e-6  # [m], how exactly a foot is put below its leg
+TURNS = 50  # of a search for a leg's posture
+SMALL = 1e-4  # [rad, m], for slopes
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,7 @@ class Survey:
     model: ModelDescription
     motors: tuple[Motor, ...]
     passive: tuple[str, ...]  # movable joints without a motor
+    followers: tuple[str, ...]  # those of them that follow another joint by <mimic>
     added: bool  # whether the URDF lacks transmissions, so that they must be added
     has_plugin: bool
     namespace: str  # of the plugin
@@ -87,13 +93,16 @@ def look_at(
     except (ControlError, DescriptionError, FileError) as error:
         raise CannotWrite(str(error)) from error
     movable = [joint.name for joint in model.movable_joints]
+    for name in movable:
+        if yaml.reader.Reader.NON_PRINTABLE.search(name):
+            raise CannotWrite(f"rename the joint {name!r}: YAML can't hold its control characters")
     driven = {each.joint: each.interface for each in control.transmissions}
     added = not driven
     _check_passive(passive, movable, driven)
     endless = {each.name for each in model.movable_joints if each.kind == "continuous"}
     wheels = endless if free and not model.fixed_base else set()
+    mimics = {e.get("name") for e in robot.findall("joint") if e.find("mimic") is not None}
     if added:
-        mimics = {e.get("name") for e in robot.findall("joint") if e.find("mimic") is not None}
         names = [name for name in movable if name not in mimics and name not in passive]
         driven = {name: interface or (VELOCITY if name in wheels else EFFORT) for name in names}
     motors = tuple(_motors(control, driven, movable, wheels))
@@ -107,7 +116,8 @@ def look_at(
     namespace = namespace.strip().strip("/")
     if namespace and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*", namespace):
         raise CannotWrite(f"the plugin's <robotNamespace> is no name of ROS: {namespace!r}")
-    return Survey(model, motors, without, added, plugin is not None, namespace)
+    followers = tuple(name for name in without if name in mimics)
+    return Survey(model, motors, without, followers, added, plugin is not None, namespace)
 
 
 def root_link(xml: str) -> str:
@@ -159,7 +169,7 @@ def _motors(
 
 def _speeds(joint: JointHandle) -> tuple[float, float]:
     fastest = min(SHARE * (joint.limits.velocity or math.inf), FASTEST)
-    return -fastest, fastest
+    return _inwards(-fastest, math.ceil), _inwards(fastest, math.floor)
 
 
 def _range(joint: JointHandle) -> tuple[float, float]:
@@ -172,7 +182,16 @@ def _range(joint: JointHandle) -> tuple[float, float]:
             "range there, or make it continuous"
         )
     middle, half = (lower + upper) / 2.0, min(SHARE * (upper - lower) / 2.0, WIDEST)
-    return middle - half, middle + half
+    if not abs(middle) <= FARTHEST:
+        raise CannotWrite(
+            f"joint '{joint.name}' can't move from {lower:g} to {upper:g}: mend its <limit>"
+        )
+    return _inwards(middle - half, math.ceil), _inwards(middle + half, math.floor)
+
+
+def _inwards(bound: float, rounded: Callable[[float], int]) -> float:
+    """Rounds a bound to three decimals, inwards."""
+    return rounded(bound * 1000.0) / 1000.0
 
 
 def _plugins(robot: Element) -> Iterator[Element]:
@@ -182,12 +201,65 @@ def _plugins(robot: Element) -> Iterator[Element]:
                 yield plugin
 
 
-def standing_height(model: ModelDescription) -> float | None:
-    """Returns the least height at which no collision is below the ground, joints at zero [m, three decimals].
+def stance(survey: Survey) -> dict[str, float]:
+    """Returns where joints start that don't start at 0 [rad, m, three decimals].
 
-    None if there are no collisions.
+    A joint whose range excludes 0 starts in its middle. The other joints of its leg then put the foot below
+    where it is with all joints at 0.
     """
-    lows = _lows(model)
+    own = {each.joint: (each.low, each.high) for each in survey.motors if not each.wheel}
+    ranges, found = {}, {}
+    for joint in survey.model.movable_joints:
+        stops = (joint.lower, joint.upper) if joint.bounded else (-math.inf, math.inf)
+        low, high = ranges[joint.name] = own.get(joint.name, stops)
+        start = 0.0 if stops[0] <= 0.0 <= stops[1] else sum(stops) / 2.0
+        found[joint.name] = min(max(start, low), high)
+    bent = {name for name, start in found.items() if start}
+    for foot in feet(survey.model) if bent else ():
+        leg = [each.name for each in survey.model.carriers(foot) if each.movable]
+        if bent.intersection(leg):
+            _put_below(
+                survey.model, foot, [each for each in leg if each not in bent], found, ranges
+            )
+    return {name: round(start, 3) for name, start in found.items() if round(start, 3)}
+
+
+def _put_below(
+    model: ModelDescription,
+    foot: str,
+    joints: Sequence[str],
+    positions: dict[str, float],
+    ranges: Mapping[str, tuple[float, float]],
+) -> None:
+    """Moves `joints`, within their ranges, so that a foot is below where it is with all joints at 0."""
+    sole = min(
+        (each.pose for each in model.links[foot].collisions), key=lambda each: each.position[2]
+    )
+
+    def place(changed: Mapping[str, float]) -> np.ndarray:
+        poses = link_poses(model, Pose(), changed)
+        return np.array(poses[foot].compose(sole).position[:2])
+
+    wanted = place({})
+    for _ in range(TURNS if joints else 0):
+        here = place(positions)
+        if np.linalg.norm(wanted - here) < NEAR:
+            return
+        slopes = [
+            (place({**positions, name: positions[name] + SMALL}) - here) / SMALL for name in joints
+        ]
+        steps = np.linalg.pinv(np.array(slopes).T, rcond=0.05) @ (wanted - here)
+        for name, step in zip(joints, np.clip(steps, -0.2, 0.2).tolist(), strict=True):
+            low, high = ranges[name]
+            positions[name] = min(max(positions[name] + step, low), high)
+
+
+def standing_height(model: ModelDescription, positions: Mapping[str, float]) -> float | None:
+    """Returns the least height at which no collision is below the ground [m, three decimals].
+
+    `positions` are those of the joints; others are at 0. None if there are no collisions.
+    """
+    lows = _lows(model, positions)
     if not lows:
         return None
     return max(0.0, math.ceil(round(-min(lows.values()) * 1000.0, 6)) / 1000.0)  # 0.1 stays 0.1
@@ -195,18 +267,18 @@ def standing_height(model: ModelDescription) -> float | None:
 
 def feet(model: ModelDescription) -> list[str]:
     """Returns the links on which a robot stands, joints at zero; none on wheels, or on its base."""
-    lows = {} if model.fixed_base else _lows(model)
+    lows = {} if model.fixed_base else _lows(model, {})
     ground = min(lows.values(), default=0.0)
     found = [name for name, low in lows.items() if low <= (1.0 - FOOT) * ground]
     kinds = {joint.kind for name in found for joint in model.carriers(name)}
     return [] if model.root in found or "continuous" in kinds else found
 
 
-def _lows(model: ModelDescription) -> dict[str, float]:
-    """Returns how low each link with a collision reaches, joints at zero, seen from the root [m]."""
+def _lows(model: ModelDescription, positions: Mapping[str, float]) -> dict[str, float]:
+    """Returns how low each link with a collision reaches, seen from the root [m]."""
     return {
         name: min(_low(shape, pose.compose(shape.pose)) for shape in model.links[name].collisions)
-        for name, pose in poses_at_zero(model).items()
+        for name, pose in link_poses(model, Pose(), positions).items()
         if model.links[name].collisions
     }
 

@@ -85,8 +85,8 @@ def locate(source: Source) -> Path:
     with contextlib.suppress(RobotEnvError):
         return own_file(package, place)
     raise RobotEnvError(
-        f"{text}: there is no package '{package}' on ROS_PACKAGE_PATH; ./ws --with FOLDER puts those of a "
-        "folder there, and sourcing a workspace does"
+        f"{text}: there is no package '{package}' on ROS_PACKAGE_PATH; ./ws --with FOLDER ... finds "
+        "those in FOLDER, and sourcing a workspace does"
     )
 
 

@@ -118,7 +118,7 @@ def named(name: str) -> Any:
         if error.name is None or not f"{module}.".startswith(f"{error.name}."):
             raise  # the module exists, and imports one that doesn't
         raise RobotEnvError(
-            f"there is no module '{module}' (of '{name}'); ./ws --with FOLDER finds those of a folder"
+            f"there is no module '{module}' (of '{name}'); ./ws --with FOLDER ... finds those in FOLDER"
         ) from error
     if not hasattr(found, attribute):
         raise RobotEnvError(

@@ -15,6 +15,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+import msgspec
 import viser
 import websockets.asyncio.server
 from viser import _messages as messages
@@ -61,16 +62,15 @@ class Gate:
         """Wraps `answer` in the check; the answer sets the cookie that the page's websocket sends."""
 
         def guarded(connection: Any, request: Request) -> Response | None:
-            refusal = self.refusal(request)
-            if refusal:
-                return Response(
-                    http.HTTPStatus.FORBIDDEN, "Forbidden", Headers(), f"{refusal}\n".encode()
-                )
-            if len(request.path) > LONGEST_PATH:  # longer than a file's name may be
-                return Response(
-                    http.HTTPStatus.NOT_FOUND, "Not Found", Headers(), b"no such page\n"
-                )
-            response = answer(connection, request)
+            try:
+                refusal = self.refusal(request)
+                if refusal:
+                    return _said(http.HTTPStatus.FORBIDDEN, refusal)
+                if len(request.path) > LONGEST_PATH:  # longer than a file's name may be
+                    return _said(http.HTTPStatus.NOT_FOUND, "no such page")
+                response = answer(connection, request)
+            except (LookupError, ValueError, OSError):  # two hosts, a path that is no text, ...
+                return _said(http.HTTPStatus.BAD_REQUEST, "it is no browser's request")
             if self._token and response is not None:
                 response.headers["Set-Cookie"] = (
                     f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
@@ -78,6 +78,10 @@ class Gate:
             return response
 
         return guarded
+
+
+def _said(status: http.HTTPStatus, text: str) -> Response:
+    return Response(status, status.phrase, Headers(), f"{text}\n".encode())
 
 
 def _place(origin: str) -> str:
@@ -147,15 +151,35 @@ def _is_camera(message: messages.ViewerCameraMessage) -> bool:
     )
 
 
-async def _check_camera(page: Any) -> None:
-    """Passes on only cameras: viser takes anything, and whoever reads it later would fail."""
-    (take,) = page._incoming_handlers.pop(messages.ViewerCameraMessage)
+USED = {  # what pages of ours send, and its check, by type; a field's value is checked by `_check_fields`
+    "GuiUpdateMessage": lambda each: True,
+    "ViewerCameraMessage": _is_camera,
+    "GetRenderResponseMessage": lambda each: isinstance(each.payload, bytes),
+}
 
-    async def checked(client: Any, message: messages.ViewerCameraMessage) -> None:
-        if _is_camera(message):
-            await take(client, message)
 
-    page.register_handler(messages.ViewerCameraMessage, checked)
+def is_used(raw: Any) -> bool:
+    """Returns whether a page's message is one that pages of ours send, and can be read.
+
+    Args:
+        raw: from the websocket. viser also takes files, forms, clicks, ..., and trusts them.
+    """
+    try:
+        content = msgspec.msgpack.decode(raw)
+        kind = content.pop("type")
+        return kind in USED and USED[kind](getattr(messages, kind)(**content))
+    except (LookupError, TypeError, ValueError, AttributeError, RecursionError):
+        return False
+
+
+class Door(websockets.asyncio.server.ServerConnection):
+    """A page's connection that drops all but the messages that are used here."""
+
+    async def recv(self, decode: bool | None = None) -> Any:
+        """Waits for the next message that is used; see the base class."""
+        while not is_used(raw := await super().recv(decode)):
+            pass
+        return raw
 
 
 def _start(address: Address, title: str = "") -> viser.ViserServer:
@@ -164,7 +188,8 @@ def _start(address: Address, title: str = "") -> viser.ViserServer:
     serve_anyone, gate = module.serve, Gate(address)
 
     def serve_guarded(*arguments: Any, process_request: Answer, **options: Any) -> Any:
-        return serve_anyone(*arguments, process_request=gate.guard(process_request), **options)
+        guard = gate.guard(process_request)
+        return serve_anyone(*arguments, process_request=guard, create_connection=Door, **options)
 
     module.serve = serve_guarded  # type: ignore[assignment,misc]
     try:
@@ -190,10 +215,7 @@ def serve(address: Address, title: str, camera: Point, look_at: Point) -> viser.
     if server.get_port() != address.port:
         stop(server)
         raise PortInUse(f"another process has just taken port {address.port}; start again")
-    for message in (messages.ShareUrlRequest, messages.ShareUrlDisconnect):
-        server._websock_server.unregister_handler(message)
     _check_fields(server)
-    server._websock_server.on_client_connect(_check_camera)
     server.gui.main_panel.dock_right()
     server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
     server.initial_camera.position = camera

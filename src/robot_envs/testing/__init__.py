@@ -6,7 +6,8 @@ def test_my_arm():
     check_robot_env("my_arm/Reach-v0", backends=("bullet", "ros"))
 """
 
+from robot_envs.testing.episodes import check_stands
 from robot_envs.testing.rollouts import differences, rollout
 from robot_envs.testing.suite import check_robot_env
 
-__all__ = ["check_robot_env", "differences", "rollout"]
+__all__ = ["check_robot_env", "check_stands", "differences", "rollout"]

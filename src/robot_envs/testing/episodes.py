@@ -1,11 +1,17 @@
 """Checks of single episodes: results, resets, ends, refusals, pictures and goals."""
 
+import math
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
 import gymnasium
 import numpy as np
 
+from bullet_gazebo.physics.pose import conjugate, rotate
+from robot_envs.backends import make_backend
+from robot_envs.robot import Robot
+from robot_envs.scene import Scene
 from robot_envs.task import GoalTask
 from robot_envs.testing.rollouts import (
     Subject,
@@ -16,9 +22,42 @@ from robot_envs.testing.rollouts import (
     rollout,
     same,
 )
-from robot_envs.world_state import InitialState
+from robot_envs.world_state import InitialState, LinkQuery, StateQuery
 
+LOWER = 0.8  # of the height at which a robot starts: it hasn't sunk
+UPRIGHT = 0.9  # cosine of the largest tilt
 TRIES = 20  # episodes, to find one that doesn't end by itself
+
+
+def check_stands(robot: Robot, joints: Mapping[str, float], seconds: float = 5.0) -> None:
+    """Checks that a robot with a free base stands while its controllers hold where its joints start.
+
+    Args:
+        robot: a robot that is spawned on the ground.
+        joints: where its joints start [rad, m]; others start at 0.
+        seconds: simulated time [s].
+
+    Raises:
+        AssertionError: if it sinks or tilts.
+    """
+    root = robot.links.root
+    backend = make_backend(Scene([robot]), None, robot.control_period)
+    try:
+        backend.look(StateQuery(links=(LinkQuery(root),)))
+        state = backend.reset(InitialState(joints=joints))
+        start = state.links[root].pose
+        for _ in range(round(seconds / robot.control_period)):
+            state = backend.act({})
+        end = state.links[root].pose
+    finally:
+        backend.close()
+    up = rotate(conjugate(start.orientation), (0.0, 0.0, 1.0))
+    level = rotate(end.orientation, up)[2]
+    height, began = end.position[2], start.position[2]
+    assert height > LOWER * began and level > UPRIGHT, (
+        f"it doesn't stand: after {seconds:g} s '{root}' is at a height of {height:.3f} m, having begun at "
+        f"{began:.3f} m, and tilted by {math.degrees(math.acos(max(-1.0, min(1.0, level)))):.0f} degrees"
+    )
 
 
 def observations(subject: Subject) -> None:

@@ -72,7 +72,26 @@ def test_a_file_that_is_missing_is_told_once(bad, tmp_path):
     path = bad('<xacro:include filename="none.xacro"/>')
     assert refused(path) == f"{path}: No such file or directory: {tmp_path}/none.xacro"
     path = bad('<xacro:include filename="$(find no_such_package)/a.xacro"/>')
-    assert refused(path) == f"{path}: package 'no_such_package' not found on ROS_PACKAGE_PATH"
+    assert refused(path) == (
+        f"{path}: package 'no_such_package' not found on ROS_PACKAGE_PATH; "
+        "./ws --with FOLDER ... finds those in FOLDER"
+    )
+
+
+def test_a_warning_is_told_once_with_its_first_place(bad, capfd):
+    both = "".join(f'<xacro:property name="{name}" value="2"/>' for name in ("len", "max"))
+    path = bad(f'<xacro:macro name="m">{both}</xacro:macro>' + "<xacro:m/>" * 9)
+    expand(path)
+    expand(path)
+    told = capfd.readouterr().err
+    assert [line for line in told.splitlines() if line.startswith("warning: ")] == [
+        "warning: redefining global symbol: len",
+        "warning: redefining global symbol: max",
+    ]
+    assert told.count("in file: ") == 2
+    program = [sys.executable, "-c", f"from file_access import expansion; {PROGRAM}", path]
+    done = subprocess.run(program, capture_output=True, text=True, check=True)
+    assert done.stderr == told and "<robot" in done.stdout
 
 
 @pytest.mark.slow

@@ -39,8 +39,8 @@ def test_the_arm_that_comes_along(new):
     assert reaches(made, task)
     assert f"written: {folder}" in told
     assert {path.name for path in folder.iterdir()} == {
-        *("package.xml", "CMakeLists.txt", "setup.py", "README.md"),
-        *("config", "launch", "src", "test", "urdf"),
+        *("package.xml", "CMakeLists.txt", "setup.py", "README.md", ".gitignore"),
+        *("config", "launch", "scripts", "src", "test", "urdf"),
     }
     texts = [path for path in folder.rglob("*.*") if path.is_file() and path.suffix != ".pyc"]
     assert len(texts) > 10 and not [path for path in texts if "%{" in path.read_text()]
@@ -154,6 +154,40 @@ def test_a_joint_without_a_motor_stays_so_and_is_told(new):
     _, made, _, told = new("my_tail", text)
     assert made.joints == ("swing",)
     assert "without a motor, and that tasks don't see: hinge" in told
+    assert "mimic" not in told
+
+
+def test_a_joint_that_mimics_another_is_told(new):
+    limit = '<limit lower="0" upper="1" effort="1" velocity="1"/><mimic joint="swing"/>'
+    follower = JOINT.format("finger", "revolute", "rod", "tip", limit)
+    *_, told = new("my_gripper", robot(*BARE, FIXED, LINK.format("tip", ""), follower))
+    assert "note: <mimic> isn't followed yet, so that these swing freely: finger\n" in told
+
+
+def test_its_readme_and_report_name_no_place_by_detours(new, tmp_path):
+    """A README is read in clones, elsewhere."""
+    others = tmp_path / "others/my_parts"
+    others.mkdir(parents=True)
+    (others / "package.xml").write_text(
+        "<package><name>my_parts</name><version>1.0.0</version><description>d</description>"
+        '<maintainer email="a@b.c">a</maintainer><license>l</license></package>'
+    )
+    (others / "rod.xacro").write_text(robot(LINK.format("rod", "")))
+    include = '<xacro:include filename="$(find my_parts)/rod.xacro"/>'
+    path = os.environ["ROS_PACKAGE_PATH"]
+    os.environ["ROS_PACKAGE_PATH"] = f"{others.parent}:{path}"  # which the fixture puts back
+    folder, *_, told = new(
+        "my_needy",
+        robot(BARE[0], FIXED, SWING, include),
+        "--to",
+        str(tmp_path / "others/../packages"),
+    )
+    assert f"written: {folder}\n" in told
+    readme = (folder / "README.md").read_text()
+    assert str(tmp_path) not in readme
+    assert "\n./ws --with FOLDER --with ../my_needy test ../my_needy\n" in readme
+    assert "`FOLDER` has what the robot needs of other packages: `my_parts`." in readme
+    assert (folder / ".gitignore").read_text() == "__pycache__/\n"
 
 
 def test_it_is_written_beside_the_checkout(root, tmp_path, monkeypatch, capsys):

@@ -96,8 +96,8 @@ def test_the_lowest_point_of_all_shapes(tmp_path):
         (f'<mesh filename="{tmp_path}/rod.stl" scale="1 1 0.5"/>', 0.5, 1.5 * 0.5**0.5),
     ):
         found = f"<collision><geometry>{shape}</geometry></collision>"
-        assert standing_height(parse_urdf(robot(LINK.format("base", found)))) == height
+        assert standing_height(parse_urdf(robot(LINK.format("base", found))), {}) == height
         origin = '<origin xyz="0 0 -1" rpy="0.7853981633974483 0 0"/>'
         turned = found.replace("<geometry", f"{origin}<geometry")
-        low = standing_height(parse_urdf(robot(LINK.format("base", turned))))
+        low = standing_height(parse_urdf(robot(LINK.format("base", turned))), {})
         assert 0.999999 + tilted <= low < 1.001 + tilted

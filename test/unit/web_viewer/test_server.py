@@ -13,7 +13,7 @@ from websockets.http11 import Request, Response
 from websockets.sync.client import connect
 
 from web_viewer.address import Address, PortInUse, find_address
-from web_viewer.server import Gate, _is_camera, serve, stop
+from web_viewer.server import Gate, _is_camera, is_used, serve, stop
 
 TOKEN = "a-token"
 WINDOW = ("the window", "moves the simulation")
@@ -128,6 +128,22 @@ def test_a_path_that_is_too_long_is_not_found():
     assert ask(gate, "/" + 7000 * "a", host="127.0.0.1:8080").status_code == 404
 
 
+@pytest.mark.parametrize(
+    ("path", "headers"),
+    [
+        ("/?token=\udcff", []), ("//[", []), ("http://[/", []),
+        ("/", [("Host", "127.0.0.1")]), ("/", 2 * [("Origin", "http://a")]), ("/", 2 * [("Cookie", "a=1")]),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("token", ["", TOKEN])
+def test_no_request_is_an_error_of_the_page(token, path, headers):
+    named = Headers([("Host", "127.0.0.1:8080"), *headers])
+    guarded = Gate(Address("127.0.0.1", 8080, token)).guard(
+        lambda connection, request: Response(404, "Not Found", Headers())
+    )
+    assert guarded(None, Request(path, named)).status_code in (400, 403, 404)
+
+
 @pytest.fixture
 def page():
     made = serve(find_address("127.0.0.1", None), "a page", (1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
@@ -191,6 +207,39 @@ def test_a_camera_that_cant_be_calculated_with_isnt_taken(bad):
     plain = {name: value for name, value in CAMERA.items() if name != "type"}
     assert _is_camera(ViewerCameraMessage(**plain))
     assert not _is_camera(ViewerCameraMessage(**{**plain, **bad}))
+
+
+UPLOAD = {
+    "type": "FileTransferStartUpload", "source_component_uuid": "", "transfer_uuid": "t", "filename": "x",
+    "mime_type": "y", "part_count": 0, "size_bytes": 0,
+}  # fmt: skip
+
+
+def test_only_messages_of_our_pages_come_in(page):
+    """A file of no parts would set the field whose id it names."""
+    box, code = page.gui.add_checkbox("c", False), msgspec.msgpack.encode
+    change = {"type": "GuiUpdateMessage", "uuid": box._impl.uuid, "updates": {"value": True}}
+    upload = UPLOAD | {"source_component_uuid": box._impl.uuid}
+    share = {"type": "ShareUrlRequest"}
+    bad = [
+        upload,
+        share,
+        {**CAMERA, "fov": "wide"},
+        {"type": "GuiUpdateMessage"},
+        {"type": []},
+        7,
+        {},
+    ]
+    dropped = [*map(code, bad), b"", b"\xc1", 5000 * b"\x91", "a text"]
+    assert is_used(code(change)) and is_used(code(CAMERA)) and not any(map(is_used, dropped))
+    address = f"ws://127.0.0.1:{page.get_port()}"
+    with connect(address, subprotocols=[f"viser-v{version('viser')}"], max_size=None) as browser:
+        for message in [*dropped, code(change)]:
+            browser.send(message)
+        deadline = time.monotonic() + 60.0
+        while box.value is False:
+            assert time.monotonic() < deadline
+    assert box.value is True
 
 
 def test_a_page_with_such_a_camera_is_none(page):

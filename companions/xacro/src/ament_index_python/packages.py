@@ -13,5 +13,6 @@ def get_package_share_directory(package_name: str) -> str:
         return str(rospkg.RosPack().get_path(package_name))
     except rospkg.ResourceNotFound as error:
         raise PackageNotFoundError(
-            f"package '{package_name}' not found on ROS_PACKAGE_PATH"
+            f"package '{package_name}' not found on ROS_PACKAGE_PATH; "
+            "./ws --with FOLDER ... finds those in FOLDER"
         ) from error
