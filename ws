@@ -100,8 +100,10 @@ run_tests() {  # [--fast] [ARG...]
     done
     # Three processes for two cores, because tests over ROS wait a quarter of their time. Each file stays
     # in one process, which makes its fixtures once. Without reordering, long files start first.
-    [[ ${#arguments[@]} -gt 0 ]] ||
+    if [[ ${#arguments[@]} -eq 0 ]]; then
+        [[ -n $fast ]] || say "all tests take up to two hours, ./ws test --fast takes a minute or two"
         arguments=(--numprocesses 3 --dist loadfile --no-loadscope-reorder)
+    fi
     [[ -z $fast ]] || arguments=(-m "not ($NOT_FAST)" "${arguments[@]}")
     cd -- "$ROOT"
     unset PYTHONDONTWRITEBYTECODE  # hundreds of processes import the same modules

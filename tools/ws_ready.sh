@@ -97,7 +97,7 @@ watch_step() {  # log, begin
     # Reading from a pipe into which no one writes waits without a process of its own.
     exec {silence}<> <(:)
     while ! read -rt "$PERIOD" -u "$silence" && kill -0 $$ 2>/dev/null; do
-        last=$(tail -c 2000 -- "$1" | tr '\r' '\n' | grep -a '[[:alnum:]]' | grep -av uninstall | tail -n 1 | cut -c 1-100) || true
+        last=$(tail -c 2000 -- "$1" | tr '\r' '\n' | grep -a '[[:alnum:]]' | grep -Eav 'uninstall|existing installation' | tail -n 1 | cut -c 1-100) || true
         last=${last#"${last%%[![:space:]]*}"}
         say "    $(duration $((SECONDS - $2))): ${last:-nothing said so far}"
     done

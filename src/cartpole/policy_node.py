@@ -15,6 +15,7 @@ from rl_workbench.errors import WorkbenchError, error_line
 from rl_workbench.starting import Interrupt, run_command
 from rl_workbench.tools.flags import WHICH, env_options, number
 from rl_workbench.tools.runs import open_run
+from rl_workbench.training.progress import tell
 from robot_envs.backends import IN_PROCESS, LOCKSTEP, REALTIME, need_ros
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError
@@ -53,6 +54,7 @@ def main(argv: list[str] | None = None) -> int:
         flags, parameters, name = ros_options(words, NODE)
         arguments = parse(flags, parameters)
         need_ros("it")
+        tell(f"loading the policy of {arguments.run}")
         with interrupt.reading():
             from robot_envs.deployment.policy_node import PolicyNode, run_node
 

@@ -237,7 +237,7 @@ def is_running() -> bool:
     if _is_registered(f"{NODE}/pause_physics") and _lives():
         raise RunsByItself(
             f"the simulator under {master.uri()} runs in real time: end it, so that the script starts its"
-            " own, or start it with lockstep:=true"
+            ' own, or start it with GZSERVER_ARGS="--lockstep --seed 0" in its environment'
         )
     return False
 

@@ -168,6 +168,10 @@ def _completed(
     interface = f"{request.interface.capitalize()}JointInterface" if request.interface else None
     free = request.base == "free"
     control = f"{request.name}_control.urdf.xacro"
+    if (made / "urdf" / control).exists():
+        raise CannotWrite(
+            f"the package has a urdf/{control} of its own: rename that file, or the package"
+        )
 
     def with_more(survey: Survey | None) -> str:
         text = contents.control_text(request.name, copied.place, survey, loose)

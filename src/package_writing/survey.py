@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 import numpy as np
+import yaml
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.joint import JointHandle
@@ -31,6 +32,7 @@ EFFORT, POSITION, VELOCITY = (
 )
 SHARE = 0.6  # of a joint's range, about its middle, from which postures to reach are drawn
 WIDEST = 1.8  # [rad, m], largest half-width of that range
+FARTHEST = 1e6  # [rad, m], of the range's middle
 FASTEST = 5.0  # [rad/s], of wheels
 # Of the height at which a robot stands: how much higher than its lowest link feet may be.
 FOOT = 0.05
@@ -91,6 +93,9 @@ def look_at(
     except (ControlError, DescriptionError, FileError) as error:
         raise CannotWrite(str(error)) from error
     movable = [joint.name for joint in model.movable_joints]
+    for name in movable:
+        if yaml.reader.Reader.NON_PRINTABLE.search(name):
+            raise CannotWrite(f"rename the joint {name!r}: YAML can't hold its control characters")
     driven = {each.joint: each.interface for each in control.transmissions}
     added = not driven
     _check_passive(passive, movable, driven)
@@ -177,6 +182,10 @@ def _range(joint: JointHandle) -> tuple[float, float]:
             "range there, or make it continuous"
         )
     middle, half = (lower + upper) / 2.0, min(SHARE * (upper - lower) / 2.0, WIDEST)
+    if not abs(middle) <= FARTHEST:
+        raise CannotWrite(
+            f"joint '{joint.name}' can't move from {lower:g} to {upper:g}: mend its <limit>"
+        )
     return _inwards(middle - half, math.ceil), _inwards(middle + half, math.floor)
 
 

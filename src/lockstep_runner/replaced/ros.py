@@ -3,6 +3,7 @@
 Messages to and from the simulator travel with its time; connections to services are kept.
 """
 
+import contextlib
 import io
 import math
 import re
@@ -24,7 +25,7 @@ from rospy.topics import _PublisherImpl, _SubscriberImpl, _TopicImpl
 from lockstep_runner import originals
 from lockstep_runner.notices import tell_once
 from lockstep_runner.runner import ScriptRunner
-from lockstep_runner.world import NODE
+from lockstep_runner.world import NODE, RunsByItself, is_running
 from lockstep_runner.world import SERVICE as ADVANCE
 from ros_calls import master
 from ros_calls.service import ServiceClient
@@ -253,6 +254,7 @@ def _bytes(request: Any) -> bytes:
 def replace_time(runner: ScriptRunner) -> None:
     """Replaces rospy's sleep, spin, Timer and time readings."""
     _replace_spin(runner)
+    _replace_init(rospy.init_node)
     sleep, start_timer = rospy.timer.sleep, rospy.timer.Timer.__init__
 
     def ros_sleep(duration: float | genpy.Duration) -> None:
@@ -274,6 +276,22 @@ def replace_time(runner: ScriptRunner) -> None:
     rospy.timer.Timer.__init__ = timer
     for owner, name in ((rospy, "get_time"), (rospy, "get_rostime"), (rospy.Time, "now")):
         setattr(owner, name, _counted(runner, getattr(owner, name)))
+
+
+def _replace_init(begin: Callable[..., None]) -> None:
+    """Has rospy.init_node say at once that there is no simulator; it waits for a master without end."""
+
+    def init_node(*args: Any, **kwds: Any) -> None:
+        with contextlib.suppress(RunsByItself):  # the first wait ends the script with the reason
+            if not is_running():
+                tell_once(
+                    "none",
+                    f"no simulator in lock-step under {master.uri()} yet: unless the script starts one, "
+                    "end it and start one: roslaunch gazebo_ros empty_world.launch lockstep:=true",
+                )
+        begin(*args, **kwds)
+
+    rospy.init_node = rospy.client.init_node = init_node
 
 
 def _replace_spin(runner: ScriptRunner) -> None:

@@ -72,6 +72,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     add("--suites", type=Path, metavar="FILE", help="suites, instead of config/benchmark.yaml")
     add("--algo", choices=ALGORITHMS, help="default dqn")
     add("--env-id", metavar="ID", help="default CartPole-v1")
+    add("--config", metavar="FILE", help="options of the training in YAML, as train takes them")
     add("--params", nargs="+", default=[], metavar="KEY=VALUE", help="options of the training")
     add("--total-timesteps", type=number(1), metavar="N", help="length of each training [steps]")
     add("--seeds", type=number(1), metavar="N", help=f"how many (the suite's, or {SEEDS})")
@@ -125,15 +126,18 @@ def _job(variant: Variant, seed: int, folder: Path) -> Job:
 def _suite(arguments: argparse.Namespace) -> Suite:
     steps = arguments.total_timesteps
     if arguments.suite:
-        if arguments.algo or arguments.env_id or arguments.params or steps:
+        if arguments.algo or arguments.env_id or arguments.config or arguments.params or steps:
             raise WorkbenchError(
-                "a suite says what is trained: it takes no --algo, --env-id, --total-timesteps or --params"
+                "a suite says what is trained: it takes no --algo, --env-id, --config, --total-timesteps "
+                "or --params"
             )
         return read_suite(arguments.suite, arguments.suites)
     if arguments.suites:
         raise WorkbenchError(f"which suite of {arguments.suites}? Name one")
     kind, env_id = arguments.algo or "dqn", arguments.env_id or "CartPole-v1"
     given = {"env_id": env_id, **key_values(arguments.params, "--params")}
+    if arguments.config:
+        given["config"] = arguments.config
     if steps:
         given["total_timesteps"] = str(steps)
     name = f"{kind}__{as_file_name(given['env_id'])}"
@@ -226,7 +230,10 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
     runs, results = _examine(planned, episodes)
     results = [replace(each, fault=each.fault.replace(f"{folder}/", "")) for each in results]
     if all(each.steps is None for each in results):
-        raise WorkbenchError(f"no training produced a result; see {planned[0].job.log}")
+        fault = results[0].fault
+        raise WorkbenchError(
+            f"no training has a result; the first one ({planned[0].job.log}): {fault}"
+        )
     groups = figures.grouped(results)
     summary = figures.summary_table(groups, figures.RESULTS_SUMMARY)
     every = figures.table(results, figures.RESULTS)
@@ -292,14 +299,14 @@ def _examine(planned: list[_Planned], episodes: int) -> "tuple[list[Run], list[R
 
     runs, results = [], []
     for count, (name, seed, job) in enumerate(planned, 1):
-        each = f"{episodes} episodes each by the best and the last policy"
-        tell(f"evaluating {count} of {len(planned)}: {each} of {job.name}")
         try:
             runs.append(open_run(job.folder))
         except WorkbenchError as error:
             fault = last_words(job.log) or str(error)  # the log says why a training couldn't begin
             results.append(RunResult(name, seed, job.folder.name, fault=fault))
         else:
+            each = f"{episodes} episodes each by the best and the last policy"
+            tell(f"evaluating {count} of {len(planned)}: {each} of {job.name}")
             results.append(examine(runs[-1], name, episodes, warn, also_last=True))
     return runs, results
 

@@ -30,8 +30,11 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         content, agreement = export(run, policy, arguments.seed)
     write_file(arguments.out, lambda stream: stream.write(content))
     open_exported(arguments.out)  # checks that the file on disk is readable
-    rest = ", the others differ by rounding" if agreement.equal < agreement.observations else ""
+    others, share = agreement.observations - agreement.equal, agreement.largest_difference
+    same = f"are the same, but for {others} where scores tie" if others else "are the same"
+    if share:
+        same = f"differ by at most {share:.1g} of their range"
     tell(
-        f"{arguments.out}: the policy of {policy.checkpoint}, {policy.steps} steps; the same action "
-        f"in {agreement.equal} of {agreement.observations} observations{rest}"
+        f"{arguments.out}: the policy of {policy.checkpoint}, {policy.steps} steps; over "
+        f"{agreement.observations} observations its actions {same}"
     )

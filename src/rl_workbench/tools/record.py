@@ -88,6 +88,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         raise WorkbenchError(f"--fps: a GIF has at most {MAX_GIF_RATE:g} frames a second")
     check_writable(out)
     draw_without_display()
+    tell(f"recording {', '.join(arguments.checkpoint)} of {arguments.run}")
     with contextlib.ExitStack() as stack:
         policies = {}
         for which in arguments.checkpoint:

@@ -17,7 +17,9 @@ from web_viewer.table import NAME as SCALARS
 
 SUMMARY = "summary.json"
 SUITE_RECORD = "suite.json"  # in the folder of a benchmark
-RECORDED = {"env_id": str, "env_kwargs": dict, "exp_name": str, "seed": int}  # types in config.json
+RECORDED = {  # types in config.json
+    "algorithm": str, "env_id": str, "env_kwargs": dict, "exp_name": str, "seed": int,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -58,8 +60,9 @@ def open_run(folder: Path) -> Run:
     try:
         run = config["run"]
         for name, kind in RECORDED.items():
-            if not isinstance(run[name], kind):
-                raise TypeError(f"{name} is {run[name]!r}")
+            value = config[name] if name == "algorithm" else run[name]
+            if not isinstance(value, kind):
+                raise TypeError(f"{name} is {value!r}")
         env_kwargs = {**run["env_kwargs"], **run.get("eval_env_kwargs", {})}
         names = run["exp_name"], run["env_id"]
         return Run(folder, config["algorithm"], *names, env_kwargs, run["seed"], config)

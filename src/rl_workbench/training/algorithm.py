@@ -125,6 +125,6 @@ def load_policy(
     try:
         made: Policy = import_module(options.kind.implementation).load_policy(options, content, env)
         return made
-    except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
+    except (LookupError, TypeError, ValueError, RuntimeError, AttributeError) as error:
         reason = str(error).split("\n")[0]
         raise WorkbenchError(f"{origin} doesn't fit {options.run.env_id}: {reason}") from error

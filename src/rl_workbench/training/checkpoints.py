@@ -147,9 +147,14 @@ def candidates(run: Path, best_first: bool = False) -> list[Path]:
     the start.
     """
     best, others = [run / BEST], [run / LAST, *_numbered(run)]
-    found: dict[tuple[int, int], Path] = {}
+    found: dict[object, Path] = {}
     for path in best + others if best_first else others + best:
-        with contextlib.suppress(FileNotFoundError):
+        try:
             status = path.stat()
+        except FileNotFoundError:
+            continue
+        except OSError:  # a link to itself, ...: reading it tells
+            found[path] = path
+        else:
             found.setdefault((status.st_dev, status.st_ino), path)
     return list(found.values())

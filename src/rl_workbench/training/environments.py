@@ -6,9 +6,12 @@ same robot), `own_robot_options` (the options by which a copy has a robot of its
 `side_by_side(count)` (a context manager within which that many start, or close, at the same time).
 """
 
+import hashlib
 import re
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
+from pathlib import Path
 from typing import Any, TypeGuard
 
 import gymnasium
@@ -191,6 +194,15 @@ def robot_options(
         return None
     named = _attribute(env, "same_robot_options") or {}
     return {name: [given.get(name), *values] for name, values in named.items()}
+
+
+def source_digest(env: gymnasium.Env[Any, Any]) -> str:
+    """Returns the digest of the files that the environment's task is written in, or else its class."""
+    kinds = type(_attribute(env, "task") or env.unwrapped).__mro__
+    modules = [sys.modules.get(kind.__module__) for kind in kinds]
+    paths = [Path(path) for each in modules if (path := getattr(each, "__file__", None))]
+    content = b"".join(path.read_bytes() for path in sorted(set(paths)) if path.is_file())
+    return hashlib.sha256(content).hexdigest()
 
 
 def _attribute(env: gymnasium.Env[Any, Any], name: str) -> Any:

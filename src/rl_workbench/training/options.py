@@ -181,7 +181,10 @@ def _flat(record: Any, origin: str) -> dict[str, Any]:
     parts = [found.get(name) for name in ("hyperparameters", "run")]
     if not isinstance(found.get("algorithm"), str) or not all(isinstance(p, dict) for p in parts):
         raise WorkbenchError(f"{origin} isn't the record of a training")
-    plain = json.loads(json.dumps(record))
+    try:
+        plain = json.loads(json.dumps(record))
+    except (TypeError, ValueError, RecursionError) as error:  # of a foreign checkpoint
+        raise WorkbenchError(f"{origin} isn't the record of a training: {error}") from error
     return {"algorithm": plain["algorithm"], **plain["hyperparameters"], **plain["run"]}
 
 

@@ -4,11 +4,14 @@ import contextlib
 import io
 import os
 import sys
+import time
+from collections.abc import Callable
 from typing import Any, TextIO
 
 from rl_workbench.training.callbacks import Callback, EpisodeResult
 
 LINE_EVERY = 20  # [episodes]
+SILENCE = 60.0  # [s] without a line
 WIDTH = 100  # [columns] of the bar on a terminal that doesn't report its size
 
 
@@ -37,9 +40,18 @@ class Progress(Callback):
         unit: "step" or "episode".
         done: How many of them were done before.
         stream: By default standard error.
+        clock: Returns the time [s].
     """
 
-    def __init__(self, total: int, unit: str, done: int, stream: TextIO | None = None) -> None:
+    def __init__(
+        self,
+        total: int,
+        unit: str,
+        done: int,
+        stream: TextIO | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._clock, self._told, self._total = clock, clock(), total
         self._stream = stream or sys.stderr or io.StringIO()  # it may have been closed by 2>&-
         self._counts_steps = unit == "step"
         self._bar: Any = None
@@ -55,6 +67,9 @@ class Progress(Callback):
     def on_step(self, training: Any) -> None:
         if self._counts_steps:
             self._advance(training.steps)
+        if self._bar is None and self._clock() - self._told >= SILENCE:
+            total = f" of {self._total}" if self._counts_steps else ""
+            self.say(f"step {training.steps}{total}, episode {len(training.history.returns) + 1}")
 
     def on_episode(self, training: Any, episode: EpisodeResult) -> None:
         if not self._counts_steps:
@@ -79,6 +94,7 @@ class Progress(Callback):
 
     def say(self, text: str) -> None:
         """Prints a line above the bar."""
+        self._told = self._clock()
         if self._bar is not None:
             self._bar.write(writable(text, self._stream), file=self._stream)
         else:

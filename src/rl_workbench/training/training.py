@@ -1,6 +1,7 @@
 """The frame of every training: open or resume a folder, learn, evaluate, keep the best, save, report."""
 
 import contextlib
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -24,10 +25,18 @@ from rl_workbench.training.callbacks import (
     EvaluationResult,
     ScalarLogger,
 )
-from rl_workbench.training.checkpoints import Checkpoints, candidates, fitting, read_newest
+from rl_workbench.training.checkpoints import (
+    BEST,
+    Checkpoints,
+    candidates,
+    fitting,
+    read,
+    read_newest,
+)
 from rl_workbench.training.environments import (
     close_all,
     robot_options,
+    source_digest,
     training_environments,
 )
 from rl_workbench.training.evaluator import Evaluation, Evaluator
@@ -77,7 +86,9 @@ class Training:
                 options, self._algorithm, self._envs[0], interrupt.requested, tell
             )
             making.callback(self._evaluator.close)
+            self._rescored = None
             if self._resumed:
+                self._rescored = self._score_of_a_changed_task()
                 self._load(self._resumed)
             making.pop_all()
         # [steps] of the last checkpoint; -1: there is none, or it is outdated.
@@ -118,6 +129,17 @@ class Training:
         with fitting("state of the random generators"):
             restore_random_states(content["random"])
 
+    def _score_of_a_changed_task(self) -> tuple[int, float] | None:
+        """Returns step and score of the best policy so far, if what it was scored by isn't the same now."""
+        before, path = read_record(self.folder).get("task"), self.folder / BEST
+        if before in (None, source_digest(self._envs[0])) or not path.exists():
+            return None
+        content = read(path)
+        self._algorithm.load_state_dict(content)
+        tell(f"the task's file has changed: {path.name} is evaluated again")
+        score = self._evaluator.evaluate(-math.inf, tell, is_last=True)
+        return None if score is None else (int(content["steps"]), score.confirmed)
+
     def _make_progress(self) -> Progress:
         if self._run.total_timesteps:
             return Progress(self._run.total_timesteps, "step", self.steps)
@@ -147,7 +169,9 @@ class Training:
         record = self.options.record()
         shared = robot_options(self._envs[0], self._run.training_environment)
         run_folder.write_record(
-            self.folder, {**record, "shared_robot": shared}, bool(self._resumed)
+            self.folder,
+            {**record, "shared_robot": shared, "task": source_digest(self._envs[0])},
+            bool(self._resumed),
         )
         settings = {**record["run"], **record["hyperparameters"]}
         self.log = ScalarLog(self.folder, settings, self._log_bytes, tell)
@@ -177,12 +201,15 @@ class Training:
         if AT_THE_END in self._resumed and not self._is_complete():
             with fitting("score"):
                 self.history.best = evaluation_of(self._resumed[AT_THE_END])
+        if self._rescored is not None:
+            self.history.best, self._saved_at = self._rescored, -1
         total = f" after episode {len(self.history.returns)} of {run.episodes}"
         if run.total_timesteps:
             total = f" of {run.total_timesteps}"
         tell(f"resuming at step {algorithm.steps}{total}: {self.folder}")
         self._resumed = None  # it holds a replay buffer's worth of memory
         self._callbacks.call("on_training_start", self)
+        self._save()  # unless nothing has changed
         if algorithm.steps:
             self._evaluate_if_due()  # the interruption may have come before it
 

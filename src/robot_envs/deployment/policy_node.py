@@ -25,6 +25,7 @@ from robot_envs.world_state import Command, JointState
 LATE_PERIODS, LATE_AT_LEAST = 5, 0.1  # control periods, and [s]
 POLL = 0.05  # [s] of wall time between two looks at what else might end a wait
 PATIENCE = 2.0  # [s] of wall time, until what is missing is logged
+REPORTING = 1.0  # [s] of wall time between two lines about why the robot stands still
 SENDING = 1.0  # [s] of wall time, for each of the last commands to be sent
 
 
@@ -71,12 +72,16 @@ class PolicyNode:
         except ValueError as error:
             raise RobotEnvError(str(error)) from error
         self._wanted: Any = None  # a goal that has come
-        self._reported = ""  # why the robot stands still
+        self._reason = self._reported = ""  # why the robot stands still, now and in the last line
+        self._unreported, self._next_report = (
+            0,
+            0.0,
+        )  # changes since that line, and time of the next one
         self._last: Mapping[str, JointState] | None = None  # joints; None: nothing was commanded
         self._should_end: Callable[[], bool] = rospy.is_shutdown
         self._is_killed, self._ended = threading.Event(), threading.Event()
         self._joints = JointListener(
-            full_name(robot, "joint_states"), robot.model, robot.joints, robot.limits
+            full_name(robot, "joint_states"), robot.model, robot.joints, robot.limits, self._late
         )
         self._sensors = SensorListener(robot, task.query.sensors, rospy.get_time)
         self._controllers = ControllerWatch(robot, self._ended)
@@ -88,6 +93,7 @@ class PolicyNode:
             )
             for port in robot.ports
         }
+        self._pushing = {port.name for port in robot.ports if port.quantity != "position"}
         if isinstance(task, GoalTask):
             rospy.Subscriber("~goal", Float64MultiArray, self._take_goal, queue_size=1)
 
@@ -127,6 +133,7 @@ class PolicyNode:
         while not self._is_over():
             now = rospy.get_time()
             if now < before:  # a simulation was reset
+                self._let_go()
                 self._joints.forget()
                 self._sensors.forget()
                 began = before = self._begin()
@@ -142,6 +149,7 @@ class PolicyNode:
         while (missing := self._missing()) and not self._is_over():
             if time.monotonic() - beginning > PATIENCE:
                 self._report(f"waiting for {missing}", lockstep_hint)
+            self._let_go()
             rospy.rostime.wallsleep(POLL)
         if not missing:
             self._report("")
@@ -155,10 +163,19 @@ class PolicyNode:
         if joints and (fault := self._joints.fault()):
             return f"a possible state: {fault}"
         missing = [f"the state of {', '.join(joints)} on {self._joints.topic}"] if joints else []
-        deaf = [each for each in self._topics.values() if each.get_num_connections() == 0]
         missing += [f"a message on {topic}" for topic in self._sensors.missing()]
-        missing += [f"a subscriber of {each.resolved_name}" for each in deaf]
+        missing += [f"a subscriber of {topic}" for topic in self._unheard()]
         return ", and ".join(missing)
+
+    def _unheard(self) -> list[str]:
+        topics = self._topics.values()
+        return [each.resolved_name for each in topics if each.get_num_connections() == 0]
+
+    def _let_go(self) -> None:
+        """Commands no velocity and no effort, if something was commanded; a commanded position stands."""
+        if self._last is not None:
+            commands = self._pilot.stop(self._last)
+            self._publish({name: commands[name] for name in self._pushing})
 
     def _sleep_until(self, due: float, seen: float) -> None:
         """Sleeps until a ROS time [s], or until time has gone back behind `seen`, or the run should end."""
@@ -197,6 +214,8 @@ class PolicyNode:
             return f"no joint state on {self._joints.topic} for {self._late:g} s"
         if trouble := self._sensors.trouble(self._late):
             return trouble
+        if unheard := self._unheard():
+            return f"nobody listens to {', '.join(unheard)} any more"
         return self._controllers.trouble
 
     def _aim_if_told(self) -> None:
@@ -210,10 +229,16 @@ class PolicyNode:
             rospy.logwarn(f"{error}; it keeps the one it has")
 
     def _report(self, reason: str, hint: Callable[[], str] = str) -> None:
-        """Logs once why the robot stands still, with a hint, and once that it moves again."""
-        if reason != self._reported:
-            (rospy.logwarn if reason else rospy.loginfo)(f"{reason}{hint()}" or "continuing")
-        self._reported = reason
+        """Logs why the robot stands still, with a hint, or that it moves again; at most a line a second."""
+        self._unreported += reason != self._reason
+        self._reason = reason
+        if reason == self._reported or time.monotonic() < self._next_report:
+            return
+        log = rospy.logwarn if reason else rospy.loginfo
+        others = f" ({self._unreported - 1} other changes before)" if self._unreported > 1 else ""
+        log((f"{reason}{hint()}" or "continuing") + others)
+        self._reported, self._unreported = reason, 0
+        self._next_report = time.monotonic() + REPORTING
 
     def _publish(self, commands: Mapping[str, Command]) -> None:
         for name, command in commands.items():

@@ -15,7 +15,7 @@ from robot_envs.world_state import JointState
 from ros_utils.readiness import controller_faults
 from ros_utils.service_client import ServiceFailed
 
-AHEAD = 1.0  # [s] that the stamp of a joint state may be ahead of ROS time
+OFF = 1.0  # [s] that the stamp of a joint state may be off ROS time: clocks of machines differ
 ASKING = 1.0  # [s] of wall time between two questions to the controller manager
 
 
@@ -24,22 +24,28 @@ class JointListener:
 
     States without velocities are ignored, and so are those whose stamp isn't newer than the one before: a
     driver that repeats itself reports nothing new. A state that the joint can't have, or a stamp in the
-    future, is a fault until the joint's next good state.
+    future or long past, is a fault until the joint's next good state.
 
     Args:
         topic: of the joint states.
         model: of the robot: joints may be named model::joint.
         joints: their plain names.
         limits: of the joints that have any.
+        late: how old a stamp may be [s], at least 1 s.
     """
 
     def __init__(
-        self, topic: str, model: str, joints: Sequence[str], limits: Mapping[str, JointLimits]
+        self,
+        topic: str,
+        model: str,
+        joints: Sequence[str],
+        limits: Mapping[str, JointLimits],
+        late: float = OFF,
     ) -> None:
         self._names = {f"{model}::{name}": name for name in joints} | {
             name: name for name in joints
         }
-        self._joints, self._limits = tuple(joints), limits
+        self._joints, self._limits, self._late = tuple(joints), limits, max(late, OFF)
         self._faults: dict[str, str] = {}  # by joint
         self._lock = threading.Lock()
         self._known: dict[str, tuple[JointState, rospy.Time, float]] = {}  # with stamp and arrival
@@ -62,7 +68,8 @@ class JointListener:
                 name = self._names.get(full)
                 if name is None:
                     continue
-                if fault := self._fault(name, stamp.to_sec() - now, *values):
+                ahead = 0.0 if stamp == zero else stamp.to_sec() - now
+                if fault := self._fault(name, ahead, *values):
                     self._faults[name] = fault
                     continue
                 if name in self._known and zero != stamp <= self._known[name][1]:
@@ -73,10 +80,10 @@ class JointListener:
     def _fault(
         self, name: str, ahead: float, position: float, velocity: float, effort: float
     ) -> str:
-        if ahead > AHEAD:
-            return (
-                f"joint states are stamped {ahead:.1f} s in the future: the machines' clocks differ"
-            )
+        if ahead > OFF or -ahead > self._late:
+            when = f"{ahead:.1f} s in the future" if ahead > 0.0 else f"{-ahead:.1f} s in the past"
+            why = "" if ahead > 0.0 else ", or they are held up"
+            return f"joint states are stamped {when}: the machines' clocks differ{why}"
         bad = impossible(self._limits.get(name, JointLimits()), position, velocity)
         if not bad and not math.isfinite(effort):
             bad = f"effort {effort:g}"

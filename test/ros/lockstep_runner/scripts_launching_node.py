@@ -80,7 +80,7 @@ class LaunchingTest(unittest.TestCase):
             _, err = process.communicate(timeout=BOUND)
         self.assertEqual(process.returncode, 2, err)
         self.assertIn("runs in real time", err)
-        self.assertIn("lockstep:=true", err)
+        self.assertIn('GZSERVER_ARGS="--lockstep --seed 0"', err)
 
     def test_a_simulator_that_dies_is_told_of(self):
         text = (

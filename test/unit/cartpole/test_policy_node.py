@@ -112,7 +112,9 @@ def test_a_mistake_in_a_task_is_one_line_with_its_place(run: Path, monkeypatch, 
 def test_without_a_master_it_says_so(run: Path, monkeypatch, capsys) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
     assert policy_node.main([str(run)]) == 1
-    assert "there is no ROS master at http://127.0.0.1:1" in capsys.readouterr().err
+    told = capsys.readouterr()
+    assert "there is no ROS master at http://127.0.0.1:1" in told.err
+    assert told.out == f"loading the policy of {run}\n"
 
 
 @pytest.mark.parametrize("opens", ["open_run", "open_exported"])

@@ -58,3 +58,16 @@ def test_silence_ends_with_a_late_message(runner, monkeypatch):
     for _ in range(2):
         wait("/turtle/scan", LaserScan, 25.0)
     assert spans == [ros.SILENCE, 25.0 - ros.SILENCE] * 2
+
+
+def test_without_a_simulator_a_node_says_so_before_it_waits_for_the_master(monkeypatch, capsys):
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    told = []
+    for name in ("init_node", "client"):
+        monkeypatch.setattr(rospy, name, getattr(rospy, name))
+    monkeypatch.setattr(rospy.client, "init_node", rospy.client.init_node)
+    ros._replace_init(lambda name: told.append((name, capsys.readouterr().err)))
+    rospy.init_node("script")
+    ((name, err),) = told
+    assert name == "script" and "no simulator in lock-step under http://127.0.0.1:1 yet" in err
+    assert "roslaunch gazebo_ros empty_world.launch lockstep:=true" in err

@@ -53,6 +53,13 @@ from package_writing.cli import main
         ),
         (robot(*BARE, FIXED, PLUGIN.format("<robotNamespace>a b</robotNamespace>")), [], "'a b'"),
         (robot(*BARE, FIXED).replace('value="0.5"', 'value="1e30"'), [], "can't take a step"),
+        (robot(*BARE, FIXED).replace("swing", "sw\x7fing"), [], r"rename the joint 'sw\x7fing'"),
+        (robot(*BARE, FIXED).replace("swing", "sw\x85\x90ing"), [], r"rename the joint 'sw\x85\x90ing'"),
+        (
+            robot(*BARE, FIXED).replace('lower="-1" upper="2"', 'lower="0" upper="1e308"'),
+            [],
+            "'swing' can't move from 0 to 1e+308",
+        ),
         (robot(*BARE, FIXED), ["size=3"], "NAME:=VALUE"),
         (robot(*BARE, FIXED), ["--height", "nan"], "--height"),
         (robot(*BARE, FIXED), ["--passive", "swign"], "did you mean 'swing'?"),
@@ -70,6 +77,13 @@ def test_a_robot_that_can_not_be_used_is_one_line(tmp_path, capsys, text, argume
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("new_robot: ") and words in line, line
     assert [path.name for path in tmp_path.iterdir()] == ["robot.urdf"], "nothing is left behind"
+
+
+def test_a_file_named_as_the_packages_own_is_refused(tmp_path, capsys):
+    source = tmp_path / "my_arm_control.urdf.xacro"
+    source.write_text(robot(*BARE, FIXED))
+    assert main(["my_arm", "--urdf", str(source), "--to", str(tmp_path)]) == 1
+    assert "has a urdf/my_arm_control.urdf.xacro of its own" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

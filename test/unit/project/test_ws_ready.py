@@ -138,7 +138,8 @@ PERIOD=0.1
 declare -A TITLE=([one]="the step") REMEDY=([one]="nothing")
 key_one() {{ echo 1; }}
 plan_one() {{ echo "not much"; }}
-make_one() {{ echo "half way"; echo "Can't uninstall 'numpy'"; read -r line <"$ROOT/go"; echo "$line"; }}
+make_one() {{ echo "half way"; printf '%s\\n' "Found existing installation: numpy" "Can't uninstall 'numpy'"
+    read -r line <"$ROOT/go"; echo "$line"; }}
 next_thing() {{ echo ", go on"; }}
 choose_place one
 make_ready one
@@ -158,8 +159,9 @@ def test_a_step_that_takes_long_says_how_far_it_is(root, tmp_path):
     assert re.fullmatch(r"ws: \[1/1\] the step: done in \d+ s\n", told[-2])
     assert re.fullmatch(r"ws: ready after \d+ s, go on\n", told[-1])
     assert (
-        tmp_path / ".ws/log/one.log"
-    ).read_text() == "half way\nCan't uninstall 'numpy'\nthrough\n"
+        (tmp_path / ".ws/log/one.log").read_text()
+        == "half way\nFound existing installation: numpy\nCan't uninstall 'numpy'\nthrough\n"
+    )
 
 
 def test_what_a_killed_ws_leaves_running_keeps_the_lock(root, tmp_path):

@@ -91,7 +91,10 @@ class Reception:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)  # its machine may go
         client.settimeout(SILENCE)  # rospy resets it after the header
         try:
-            self._handle(client, address)
+            if _says_nothing(client):  # it only looked whether anybody listens
+                client.close()
+            else:
+                self._handle(client, address)
         finally:
             self._forget(client)
 
@@ -121,6 +124,14 @@ class _Listener:
                 raise
             time.sleep(RECOVERY)
             raise TimeoutError(str(error)) from error
+
+
+def _says_nothing(client: socket.socket) -> bool:
+    """Returns whether a connection is closed before its first byte."""
+    try:
+        return not client.recv(1, socket.MSG_PEEK)
+    except OSError:  # the handler will meet it, too
+        return False
 
 
 def _crowded() -> bool:

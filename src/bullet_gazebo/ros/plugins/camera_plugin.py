@@ -31,6 +31,7 @@ class CameraPlugin(SensorPlugin):
     """Publishes the pictures of its cameras, of one time, while somebody looks at one of them."""
 
     kind = "camera"  # of sensor
+    latch = False  # a new subscriber has a picture taken
 
     def __init__(self, context: PluginContext) -> None:
         self._context = context
@@ -47,7 +48,7 @@ class CameraPlugin(SensorPlugin):
         self._eyes = [
             (camera, CameraTopics(
                 context, camera, topics, scope, (side + names[0], side + names[1]),
-                0.0 if side == SIDES[0] else baseline, side,
+                0.0 if side == SIDES[0] else baseline, side, latch=self.latch,
             ))
             for side, camera in _cameras(sensor)
         ]  # fmt: skip
@@ -70,6 +71,8 @@ class MulticameraPlugin(CameraPlugin):
 
 class TriggeredCameraPlugin(CameraPlugin):
     """Publishes pictures once for each trigger, at the next step."""
+
+    latch = True  # the last picture is all there is
 
     def __init__(self, context: PluginContext) -> None:
         super().__init__(context)

@@ -51,6 +51,7 @@ class CameraTopics:
         baseline: [m] to the camera on the left.
         own: prefix of its service, if the plugin has several cameras.
         frame: `<frameName>` if None.
+        latch: whether a new subscriber gets the last picture.
     """
 
     def __init__(
@@ -63,6 +64,7 @@ class CameraTopics:
         baseline: float,
         own: str = "",
         frame: str | None = None,
+        latch: bool = False,
     ) -> None:
         self._context, self._camera = context, camera
         given = context.text("frameName", "") if frame is None else frame
@@ -70,7 +72,7 @@ class CameraTopics:
         self.info = camera_info(context, camera, baseline)
         image = topic_in(scope, names[0])
         colours = 3 * camera.width * camera.height
-        self._image = topics.advertise(image, Image, QUEUE, latch=True, content=colours)
+        self._image = topics.advertise(image, Image, QUEUE, latch, content=colours)
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
         show_camera(context, f"{image}/compressed", CompressedImage, camera)
         self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)

@@ -136,6 +136,16 @@ class Sensors(SensorCase):
                 trigger.publish()
             wait_until(lambda count=count: self.step(1) and len(heard.messages) >= count)
             self.assertEqual(len(heard.messages), count)
+        self.hear("/shot/image_raw", Image).after(1)  # the last one, for who comes later
+
+    def test_a_new_subscriber_gets_no_old_picture(self):
+        first = self.hear("/eye/image_raw", Image)
+        self.assertTrue(wait_until(lambda: self.step(10) and first.messages))
+        first.close()
+        time = self.step(2000)
+        later = self.hear("/eye/image_raw", Image)
+        self.assertTrue(wait_until(lambda: self.step(1) and later.messages))
+        self.assertGreaterEqual(later.stamps(1)[0], time)
 
     def test_depths_of_both_depth_cameras(self):
         for name, organised in (("kinect", True), ("depth", False)):

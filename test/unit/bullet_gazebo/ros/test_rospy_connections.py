@@ -59,9 +59,10 @@ class Server:
         self._tcp = TCPServer(Reception(self._handle).greet)
         self._tcp.server_sock = connections._Listener(self._tcp.server_sock)
         self._tcp.start()
-        self.handled = 0
+        self.handled = self.met = 0
 
     def _handle(self, client: socket.socket, address: tuple[str, int]) -> None:
+        self.met += 1
         with client, contextlib.suppress(OSError, ROSHandshakeException, KeyError):
             header = rospy.impl.tcpros_base.read_ros_handshake_header(client, io.BytesIO(), 4096)
             client.sendall(header["service"].encode())
@@ -124,6 +125,15 @@ def test_garbage_ends_its_own_connection_only(server, garbage) -> None:
     client.shutdown(socket.SHUT_WR)
     assert ends(client)
     assert server.greet() == b"/any"
+
+
+def test_who_only_looks_whether_anybody_listens_is_no_fault(server) -> None:
+    """rospy's handler would log a warning."""
+    with server.connect() as client:
+        client.shutdown(socket.SHUT_WR)
+        assert ends(client)
+    assert server.greet() == b"/any"
+    assert server.met == 1
 
 
 def test_silent_clients_push_each_other_out_and_nobody_else(server, monkeypatch) -> None:

@@ -1,5 +1,6 @@
 """`rl-workbench benchmark`: suites, trainings as processes, tables that leave no failure out."""
 
+import argparse
 import json
 import os
 import re
@@ -21,6 +22,7 @@ from rl_workbench.tools import results
 from rl_workbench.tools.benchmark import (
     CONFIG,
     _suite,
+    add_flags,
     check_package,
     default_file,
     make_variant,
@@ -312,3 +314,18 @@ def test_the_training_is_told_all_of_its_options(tmp_path: Path) -> None:
     assert told[:4] == ["train", f"--run-dir={tmp_path / 'run'}", "--algo", "dqn"]
     assert {"--preset=tutorial", "--seed=1", "--exp-name=wide"} <= set(told)
     assert told[told.index("--params") + 1 :] == ["hidden_sizes=[64,32]"]
+
+
+def test_an_algorithm_that_does_not_fit_is_said_at_the_end(tmp_path: Path, capsys) -> None:
+    words = ["benchmark", "--algo=dqn", "--env-id=Pendulum-v1", "--seeds=1", f"--out={tmp_path}"]
+    assert cli.main(words) == 1
+    said, err = capsys.readouterr()
+    assert "evaluating" not in said and "Pendulum-v1" in err and "discrete" in err
+
+
+def test_options_come_from_a_file_as_in_train(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    parser = argparse.ArgumentParser()
+    add_flags(parser)
+    suite = _suite(parser.parse_args(["--config", str(file)]))
+    assert f"--config={file.resolve()}" in training_flags(suite.variants[0], 0)

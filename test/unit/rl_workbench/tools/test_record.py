@@ -135,7 +135,8 @@ def test_best_last_and_random_side_by_side(robot_run: Path, tmp_path: Path, caps
     with Image.open(out) as video:
         assert video.size == (3 * 64, 48 + 8)
         assert video.info["duration"] == 100
-    told = capsys.readouterr().out.splitlines()
+    first, *told = capsys.readouterr().out.splitlines()
+    assert first == f"recording best, last, random of {robot_run}"
     assert [line.split(":")[0] for line in told] == ["best", "last", "random", str(out)]
 
 
@@ -234,7 +235,8 @@ def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(
 def test_several_are_seen_beside_each_other(robot_run: Path, tmp_path: Path, capsys):
     out = tmp_path / "a.html"
     assert record(robot_run, out, "--checkpoint", "best", "last", "random", "--fps", "10") == 0
-    told = capsys.readouterr().out.splitlines()
+    first, *told = capsys.readouterr().out.splitlines()
+    assert first == f"recording best, last, random of {robot_run}"
     assert [line.split(":")[0] for line in told] == ["best", "last", "random", str(out)]
     nodes = viser_recording.of_page(out.read_text()).at()
     captions = [nodes[f"/caption{number}"]["text"] for number in range(3)]

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import torch
 from support.training.training_runs import EXACT
 
 from rl_workbench.errors import WorkbenchError
@@ -21,3 +22,16 @@ def test_a_checkpoint_of_another_environment(whole: Callable[[str], Path], name:
     env = make_environment("Acrobot-v1")
     with pytest.raises(WorkbenchError, match=r"last.pt doesn't fit Acrobot-v1: |6 and 3: --algo"):
         load_policy(options, content, env, "last.pt")
+
+
+@pytest.mark.parametrize("name", EXACT)
+@pytest.mark.parametrize("wrong", [torch.zeros(3, 3), [], {}, None, ""])
+def test_a_foreign_checkpoint_of_other_things(
+    whole: Callable[[str], Path], name: str, wrong: object
+) -> None:
+    content = read(whole(name) / "last.pt")
+    options = recorded_options(content["config"], "last.pt")
+    env = make_environment(options.run.env_id)
+    others = {each: wrong for each in content if each != "config"}
+    with pytest.raises(WorkbenchError, match=r"^last.pt doesn't fit |the checkpoint holds another"):
+        load_policy(options, others, env, "last.pt")

@@ -85,3 +85,15 @@ def test_without_a_standard_error_it_goes_nowhere(monkeypatch, capsys) -> None:
         show_episode(bar, [1.0] * count, 1)
     bar.close()
     assert capsys.readouterr().out == "", "standard output is for results"
+
+
+@pytest.mark.parametrize(
+    ("unit", "told"), [("step", "step 7 of 900, episode 3"), ("episode", "step 7, episode 3")]
+)
+def test_a_minute_without_a_line_gets_one(unit: str, told: str) -> None:
+    now, stream = [0.0], io.StringIO()
+    progress = Progress(900, unit, 0, stream, lambda: now[0])
+    training = SimpleNamespace(steps=7, history=History(returns=[1.0, 2.0]))
+    for now[0] in (59.0, 60.0, 119.0):
+        progress.on_step(training)
+    assert stream.getvalue().splitlines() == [told]

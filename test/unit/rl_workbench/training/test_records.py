@@ -4,9 +4,11 @@ import json
 from pathlib import Path
 
 import pytest
+import torch
 from support.training.training_runs import ALL, EXACT, flags, resume, small, summary, train
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools.runs import open_run
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm
 from rl_workbench.training.options import EXTENDING, recorded_options
 from rl_workbench.training.train import choose
@@ -19,6 +21,21 @@ def test_a_record_comes_back(name: str) -> None:
     content = options.record()
     assert recorded_options(content, "here") == options
     assert recorded_options(json.loads(json.dumps(content)), "here") == options
+
+
+def test_a_checkpoints_record_of_tensors_is_one_line() -> None:
+    content = small("dqn").record()
+    content["run"]["seed"] = torch.zeros(0)
+    with pytest.raises(WorkbenchError, match=r"^here isn't the record of a training: .*Tensor"):
+        recorded_options(content, "here")
+
+
+@pytest.mark.parametrize("value", [None, {}, [], 3])
+def test_an_algorithm_without_a_name_is_one_line(tmp_path: Path, value: object) -> None:
+    content = small("dqn").record() | {"algorithm": value}
+    (tmp_path / "config.json").write_text(json.dumps(content))
+    with pytest.raises(WorkbenchError, match="its record is damaged: algorithm is "):
+        open_run(tmp_path)
 
 
 @pytest.fixture(scope="module")

@@ -22,6 +22,7 @@ from support.training.training_runs import (
 )
 
 from rl_workbench.training import checkpoints as run_checkpoints
+from rl_workbench.training import training
 from rl_workbench.training.checked import CheckedEnvironment
 from rl_workbench.training.checkpoints import Checkpoints
 
@@ -102,6 +103,31 @@ def test_a_complete_training_prolonged_is_a_longer_one(tmp_path: Path, name: str
     assert rows(run) == rows(whole)
     mine, other = checkpoint(run), checkpoint(whole)
     assert_same(mine, other)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_after_a_change_of_the_task_the_best_is_evaluated_again(
+    tmp_path: Path, monkeypatch, capsys, name: str
+) -> None:
+    interrupt = InterruptAfter(1)
+    run = train(tmp_path / "run", name)
+    best = checkpoint(run, "best.pt")
+    step_of_best, score = best.get("best_at_the_end", best["history"]["best"])
+    step = CheckedEnvironment.step
+
+    def halved(env: CheckedEnvironment, action: object) -> tuple:
+        seen, reward, *rest = step(env, action)
+        return seen, reward / 2, *rest
+
+    monkeypatch.setattr(CheckedEnvironment, "step", halved)
+    assert resume(run, interrupt) and "evaluated again" not in capsys.readouterr().out
+    monkeypatch.setattr(training, "source_digest", lambda env: "another")
+    resume(run)
+    after = checkpoint(run)["history"]["best"]
+    assert "best.pt is evaluated again" in capsys.readouterr().out
+    assert after == [step_of_best, score / 2] and record(run)["task"] == "another"
+    resume(run)
+    assert checkpoint(run)["history"]["best"] == after
 
 
 def test_an_evaluation_that_a_checkpoint_knows_of_is_not_held_again(tmp_path: Path) -> None:
