@@ -2,8 +2,8 @@
 
 All shapes that never move are one Embree scene, which is built when one comes, goes or is moved. What moves,
 balls, and large meshes are met in their own frames, into which rays are brought: meshes by Embree scenes that
-are kept, boxes, balls (whose triangles trimesh would have to make) and cylinders analytically. So nothing is built while things move. A ray is only compared
-with shapes whose bounding ball it meets. Worlds of one process share the Embree scenes that are equal.
+are kept, the others analytically. So nothing is built while things move, and no ball waits for trimesh. A ray
+is only compared with shapes whose bounding ball it meets. Worlds of one process share equal Embree scenes.
 """
 
 import hashlib
