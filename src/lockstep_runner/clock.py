@@ -38,7 +38,7 @@ class Sleeper:
     wake: float  # [ns] on the scale of Clock.passed
     until: Condition | None
     order: int
-    skips_pauses: bool
+    in_pause: float  # [s of wall time] that the wait lasts while the world is paused
     came: bool = False
     resting: threading.Lock = field(default_factory=threading.Lock)
 
@@ -103,7 +103,7 @@ class Clock:
         seconds: float,
         until: Condition | None = None,
         topics: Collection[str] = (),
-        skips_pauses: bool = False,
+        in_pause: float = math.inf,
     ) -> bool:
         """Blocks the calling thread in simulated time.
 
@@ -111,7 +111,7 @@ class Clock:
             seconds: longest wait [s of simulated time]; may be infinity.
             until: ends the wait once true; checked after messages, callbacks and other threads' turns.
             topics: topics whose messages may make it true.
-            skips_pauses: whether a paused world ends the wait of a thread other than the main one, too.
+            in_pause: longest wait of a thread other than the main one in a paused world [s of wall time].
 
         Returns:
             Whether `until` became true.
@@ -119,7 +119,7 @@ class Clock:
         # Whole nanoseconds: no tick would reach a fraction, and the thread would never wake.
         span = seconds if seconds == math.inf else round(max(0.0, seconds) * NANOSECONDS)
         if threading.current_thread() is not threading.main_thread():
-            return self._rest(span, until, skips_pauses)
+            return self._rest(span, until, in_pause)
         self.driving = True
         try:
             return self._drive(span, until, topics)
@@ -161,14 +161,14 @@ class Clock:
         for sleeper in sleepers:
             sleeper.resting.release()
 
-    def _rest(self, span: float, until: Condition | None, skips_pauses: bool) -> bool:
+    def _rest(self, span: float, until: Condition | None, in_pause: float) -> bool:
         """Blocks a thread until the main one wakes it; returns whether `until` became true."""
         with self._guard:
             if self._released:
                 return False
             self._order += 1
             ident = threading.get_ident()
-            sleeper = Sleeper(ident, self.passed + span, until, self._order, skips_pauses)
+            sleeper = Sleeper(ident, self.passed + span, until, self._order, in_pause)
             self._sleepers.append(sleeper)
             self._running.pop(ident, None)
             self._guard.notify_all()
@@ -189,6 +189,7 @@ class Clock:
             ticks = self.world.longest
             if wake < math.inf:
                 ticks = math.ceil((wake - self.passed) / self.world.step - 1e-6)
+                ticks = max(ticks, wake > self.passed)  # a nanosecond takes a tick, too
             if ticks > 0 and not self._advance(min(ticks, self.world.longest), topics):
                 return self._wait_paused(end, until)
             self._wake_the_due()
@@ -234,7 +235,8 @@ class Clock:
 
     def _wait_paused(self, end: float, until: Condition | None) -> bool:
         """Ends a plain sleep in a paused world at once; other waits last in wall time, as others may act."""
-        self._end_sleeps()
+        begins: dict[int, float] = {}  # when a wait in this pause began, by its order
+        self._end_sleeps(begins)
         if until is None and end < math.inf:
             return False
         look, longest = PAUSED_LOOKS
@@ -243,18 +245,19 @@ class Clock:
             originals.sleep(look)
             look = min(look * 1.5, longest)
             self.exchange()
-            self._end_sleeps()
+            self._end_sleeps(begins)
             if until is not None and until():
                 return True
             if not self.world.paused:
                 return self._drive(end - self.passed, until, ())
         return False
 
-    def _end_sleeps(self) -> None:
+    def _end_sleeps(self, begins: dict[int, float]) -> None:
         """Wakes the threads that a paused world doesn't keep, each once."""
+        now = originals.monotonic()
         with self._guard:
             for sleeper in self._sleepers:
-                if sleeper.skips_pauses:
+                if now - begins.setdefault(sleeper.order, now) >= sleeper.in_pause:
                     sleeper.wake = self.passed
         self._wake_the_due()
 

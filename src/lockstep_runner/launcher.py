@@ -47,6 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(args: argparse.Namespace, code: types.CodeType) -> int:
     from lockstep_runner.replaced import install
+    from lockstep_runner.replaced.python_threads import end_executors
     from lockstep_runner.runner import watch
 
     runner = install(args)
@@ -56,6 +57,7 @@ def _run(args: argparse.Namespace, code: types.CodeType) -> int:
     show, sys.excepthook = sys.excepthook, _hide_ourselves(sys.excepthook, args.script)
     try:
         script.run(args.script, args.arguments, code)
+        end_executors()
         others = [
             each
             for each in threading.enumerate()

@@ -113,20 +113,20 @@ class ScriptRunner:
         seconds: float,
         until: Condition | None = None,
         topics: Collection[str] = (),
-        skips_pauses: bool = False,
+        in_pause: float = math.inf,
     ) -> bool:
         """As Clock.wait."""
         self._settle()
         before = self.clock.waits
         try:
-            return self.clock.wait(seconds, until, topics, skips_pauses)
+            return self.clock.wait(seconds, until, topics, in_pause)
         finally:
             if self.clock.waits != before:
                 self.triggers.waited()
 
     def wait_for_event(self, seconds: float, until: Condition) -> bool:
         """As `wait`, for a condition that any callback may make true."""
-        return self.wait(seconds, until, self.clock.callbacks.heard())
+        return self.wait(seconds, until, self.clock.callbacks.heard(), in_pause=seconds)
 
     @_ends_with_the_world(True)
     def waits_for_others(self, seconds: float) -> bool:

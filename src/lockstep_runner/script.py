@@ -14,6 +14,7 @@ import threading
 import tokenize
 import types
 from collections.abc import Callable, Sequence
+from typing import Any
 
 # Python 3's complaints about what only Python 2 allowed.
 PYTHON_2 = re.compile(
@@ -133,19 +134,34 @@ GO_BETWEENS = frozenset(
 )
 
 
+class Task:
+    """A function that the script gave to an executor."""
+
+    def __init__(self, call: Callable[..., Any]) -> None:
+        self._call = call
+
+    def __call__(self, *args: Any, **kwds: Any) -> Any:
+        return self._call(*args, **kwds)
+
+
 def is_the_script(depth: int) -> bool:
     """Returns whether the function `depth` frames above the caller is the script's or its modules'.
 
     A wait in Python's own `queue`, `threading` and `concurrent.futures` counts as their caller's, one in
-    a `threading.Timer` as the script's.
+    a `threading.Timer` or `Task` as the script's.
     """
     frame: types.FrameType | None = sys._getframe(depth + 1)
-    while frame is not None and _module(frame) in GO_BETWEENS:
-        if _module(frame) == "threading" and frame.f_code is threading.Timer.run.__code__:
-            return True
+    while frame is not None and frame.f_code not in BEGIN_OF_THREADS:
+        if _module(frame) not in GO_BETWEENS:
+            return _is_a_script(frame)
         frame = frame.f_back
-    if frame is None:
-        return False
+    return frame is not None
+
+
+BEGIN_OF_THREADS = (threading.Timer.run.__code__, Task.__call__.__code__)
+
+
+def _is_a_script(frame: types.FrameType) -> bool:
     path = frame.f_code.co_filename
     if path.startswith("<frozen"):
         return False

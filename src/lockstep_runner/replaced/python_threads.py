@@ -25,10 +25,11 @@ from lockstep_runner.clock import Clock
 from lockstep_runner.looks import LOOK
 from lockstep_runner.notices import tell_once
 from lockstep_runner.runner import ScriptRunner
-from lockstep_runner.script import caller, is_the_script
+from lockstep_runner.script import Task, caller, is_the_script
 
 # [s] a time limit with less than this left is over: the rest is floating-point error.
 ROUNDING = 1e-6
+LONGEST_SLEEP = 9e9  # [s]; Python counts nanoseconds in 64 bits
 
 
 _rounded = threading.local()  # `passed`: when a thread's time limit was all but over
@@ -80,7 +81,8 @@ def _replace_waits(runner: ScriptRunner) -> None:
 
     def join(self: threading.Thread, timeout: float | None = None) -> None:
         if _is_covered(runner) and self is not threading.current_thread():
-            ended = runner.wait(_span(timeout), lambda: not self.is_alive())
+            span = _span(timeout)
+            ended = runner.wait(span, lambda: not self.is_alive(), in_pause=span)
             if not (ended or runner.is_over):
                 return
         originals.join(self, timeout)
@@ -149,10 +151,14 @@ class _Tasks:
     busy: int = 0  # threads that run a task
     over: bool = False  # shut down: its threads end after the last task
 
-    def wait_for_begin(self, workers: int) -> None:
-        """Waits until the last task has begun, unless all workers are busy."""
+    def wait_for_begin(self, executor: Any) -> None:
+        """Waits until the last task has begun, unless all workers are busy or the executor is broken."""
         self.submitted += 1
-        while self.begun < self.submitted and self.busy < workers:
+        while (
+            self.begun < self.submitted
+            and self.busy < executor._max_workers
+            and not executor._broken
+        ):
             originals.condition_wait(self.guard, LOOK)
 
     @contextlib.contextmanager
@@ -179,15 +185,12 @@ class _Tasks:
                 self.clock.began(thread)  # it computes until it ends; resting ones end later
 
 
-class _Task:
-    """A function that the script submitted to an executor."""
+class _Task(Task):
+    """A task of an executor whose tasks are counted."""
 
     def __init__(self, call: Callable[..., Any], tasks: _Tasks) -> None:
+        super().__init__(call)
         self.tasks = tasks
-        self._call = call
-
-    def __call__(self, *args: Any, **kwds: Any) -> Any:
-        return self._call(*args, **kwds)
 
 
 def replace_futures(runner: ScriptRunner) -> None:
@@ -204,7 +207,7 @@ def replace_futures(runner: ScriptRunner) -> None:
         tasks = executors.setdefault(self, _Tasks(runner.clock))
         with tasks.guard:
             future = submit(self, _Task(call, tasks), *args, **kwds)
-            tasks.wait_for_begin(self._max_workers)
+            tasks.wait_for_begin(self)
         return future
 
     def running(item: Any) -> None:
@@ -222,6 +225,14 @@ def replace_futures(runner: ScriptRunner) -> None:
     pools._WorkItem.run = running  # type: ignore[method-assign, assignment]
 
 
+def end_executors() -> None:
+    """Ends all executors' threads after their tasks, as Python does at its exit."""
+    with pools._global_shutdown_lock:
+        pools._shutdown = True
+    for work in list(pools._threads_queues.values()):
+        work.put(None)
+
+
 def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
     """Replaces time.sleep, and with `virtual_wall_clock` Python's clocks."""
 
@@ -237,9 +248,9 @@ def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
         elif _is_wall_time(runner):
             _sleep_in_wall_time(runner, seconds)
         elif runner.is_connected():
-            if seconds < 0:
-                raise ValueError("sleep length must be non-negative")
-            runner.wait(seconds, skips_pauses=True)
+            if not 0.0 <= seconds <= LONGEST_SLEEP:
+                originals.sleep(seconds)  # raises
+            runner.wait(seconds, in_pause=0.0)
         else:
             originals.sleep(seconds)
 

@@ -253,6 +253,27 @@ class LockstepTest(unittest.TestCase):
         )
         self.assertEqual(self.check(lockstep(written(script))), "0.0\n")
 
+    def test_what_is_left_at_the_end_of_a_script_ends(self):
+        """An executor that nobody shut down, one that can't begin, a timer in a paused world."""
+        script = HEAD + (
+            "import threading\n"
+            "from concurrent.futures import BrokenExecutor, ThreadPoolExecutor\n"
+            "left = ThreadPoolExecutor(2)\n"
+            "print(left.submit(lambda: 5).result())\n"
+            "late = left.submit(time.sleep, 0.5)\n"
+            "late.add_done_callback(lambda _: print('slept', rospy.get_time()))\n"
+            "def fails():\n    raise RuntimeError\n"
+            "try:\n    ThreadPoolExecutor(1, initializer=fails).submit(int).result()\n"
+            "except BrokenExecutor:\n    print('broken')\n"
+        )
+        out = self.check(lockstep(written(script)))
+        self.assertEqual(out.split(), ["5", "broken", "slept", "0.5"])
+        paused = HEAD + (
+            "import threading\npause()\n"
+            "threading.Timer(0.1, lambda: print('off', rospy.get_time())).start()\n"
+        )
+        self.assertEqual(self.check(lockstep(written(paused))), "off 0.0\n")
+
     def test_the_script_is_as_without_us(self):
         script = written(
             "import os, sys\nprint(__name__, sys.argv[1:], os.getcwd(), os.path.basename(__file__))\n"

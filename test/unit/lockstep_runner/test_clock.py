@@ -40,6 +40,11 @@ def test_a_wait_is_as_long_as_it_was_asked_for_in_whole_ticks(clock):
     assert max(clock.world.calls) <= clock.world.longest
 
 
+def test_a_wait_below_a_nanosecond_s_share_of_a_tick_ends(clock):
+    assert not clock.wait(1e-9)
+    assert clock.passed == MS
+
+
 def test_a_call_that_is_left_in_the_middle_has_taken_its_time(clock):
     """A signal's handler raises."""
 
