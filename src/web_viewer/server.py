@@ -126,9 +126,8 @@ def _check_fields(server: viser.ViserServer) -> None:
     pages.unregister_handler(messages.GuiUpdateMessage, gui._handle_gui_updates)
 
     async def checked(client: Any, message: messages.GuiUpdateMessage) -> None:
-        uuid, updates = message.uuid, message.updates
-        handle = gui._gui_input_handle_from_uuid.get(uuid) if isinstance(uuid, str) else None
-        if handle is None or not isinstance(updates, dict) or set(updates) != {"value"}:
+        handle, updates = gui._gui_input_handle_from_uuid.get(message.uuid), message.updates
+        if handle is None or set(updates) != {"value"}:
             return
         if acceptable(handle._impl.value, handle._impl.props, updates["value"]):
             await gui._handle_gui_updates(client, message)
@@ -152,7 +151,7 @@ def _is_camera(message: messages.ViewerCameraMessage) -> bool:
 
 
 USED = {  # what pages of ours send, and its check, by type; a field's value is checked by `_check_fields`
-    "GuiUpdateMessage": lambda each: True,
+    "GuiUpdateMessage": lambda each: isinstance(each.uuid, str) and isinstance(each.updates, dict),
     "ViewerCameraMessage": _is_camera,
     "GetRenderResponseMessage": lambda each: isinstance(each.payload, bytes),
 }

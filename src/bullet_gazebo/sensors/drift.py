@@ -4,6 +4,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from bullet_gazebo.sensors.noise import checked_deviation
+
 HOUR = 3600.0  # [s]
 AXES = 3
 
@@ -23,6 +25,8 @@ class DriftingError:
         self.offset = read(named("Offset"), 0.0)
         self.drift = read(named("Drift"), 0.0)
         self.frequency = read(named("DriftFrequency"), 1.0 / HOUR)  # [Hz]
+        for number in self.frequency:
+            checked_deviation(float(number), f"<{named('DriftFrequency')}>")
         noise = read("gaussianNoise", 0.0) if prefix in ("accel", "rate") else np.zeros(AXES)
         own = read(named("GaussianNoise"), 0.0)
         self.noise = np.where(own != 0.0, own, noise)

@@ -1,6 +1,7 @@
 """Lasers: ranges along a fan or grid of rays (docs/contract/sensors.md 2)."""
 
 import math
+from functools import cached_property
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
@@ -11,7 +12,7 @@ from bullet_gazebo.physics.files.sdf_parts import value
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.sensors.noise import Noise, read_noise
 from bullet_gazebo.sensors.rays import RayScene, frames
-from bullet_gazebo.sensors.sensing import Mount, sensor_of, sensor_pose, slower
+from bullet_gazebo.sensors.sensing import FURTHEST, Mount, sensor_of, sensor_pose, slower
 
 KINDS = ("ray", "gpu_ray", "lidar", "gpu_lidar")
 RENDERED = ("gpu_ray", "gpu_lidar")  # they see visuals, the others collisions
@@ -70,19 +71,20 @@ class Laser:
             )
         self.low = value(ray, "range/min", where, 0.0)
         self.high = value(ray, "range/max", where, 0.0)
-        if not 0.0 <= self.low < self.high:
+        if not 0.0 <= self.low < self.high <= FURTHEST:
             raise DescriptionError(
-                f"{where}: <range> is {self.low:g} to {self.high:g} m; it must be 0 or more, and rise"
+                f"{where}: <range> is {self.low:g} to {self.high:g} m; it must rise, from 0 to {FURTHEST:g}"
             )
         self.noise: Noise | None = read_noise(ray, where)
-        angles = (
-            self.horizontal.angles(self.horizontal.samples),
-            self.vertical.angles(self.vertical.samples),
-        )
-        self._rays = _directions(*angles).reshape(-1, 3)
 
+    @cached_property
+    def _rays(self) -> np.ndarray:
+        fans = self.horizontal, self.vertical
+        return _directions(*(fan.angles(fan.samples) for fan in fans)).reshape(-1, 3)
+
+    @cached_property
     def directions(self) -> np.ndarray:
-        """Returns the directions of the readings in the sensor's axes: (rows, columns, 3), of length 1."""
+        """The directions of the readings in the sensor's axes: (rows, columns, 3), of length 1."""
         fans = self.horizontal, self.vertical
         return _directions(*(fan.angles(fan.readings) for fan in fans))
 

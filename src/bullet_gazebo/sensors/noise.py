@@ -53,7 +53,7 @@ def read_noise(parent: Element | None, where: str) -> Noise | None:
     Its type is an attribute, or a child as in `<ray>` and `<camera>`.
 
     Raises:
-        DescriptionError: if a number can't be read, or a deviation is impossible.
+        DescriptionError: if a number can't be read, or is impossible.
     """
     element = None if parent is None else parent.find("noise")
     if element is None:
@@ -65,8 +65,11 @@ def read_noise(parent: Element | None, where: str) -> Noise | None:
     if kind == GAUSSIAN[1]:
         names.append("precision")
     found = {name: value(element, name, f"{where}, <noise>", 0.0) for name in names}
-    for name in DEVIATIONS:
-        checked_deviation(found[name], f"{where}, <noise>: <{name}>")
+    for name, number in found.items():
+        what = f"{where}, <noise>: <{name}>"
+        checked_deviation(number if name in DEVIATIONS else abs(number), what)
+        if name == "precision" and 0.0 < abs(number) < 1.0 / LARGEST:
+            raise DescriptionError(f"{what} is {number:g}; it must be {1.0 / LARGEST:g} or more")
     return Noise(**found)
 
 

@@ -12,12 +12,14 @@ from bullet_gazebo.physics.files.sdf_parts import read_pose, value
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.sensors.noise import Noise, read_noise
 from bullet_gazebo.sensors.rays import RayScene, frames
-from bullet_gazebo.sensors.sensing import Mount, sensor_of, slower
+from bullet_gazebo.sensors.sensing import FURTHEST, Mount, sensor_of, slower
 from bullet_gazebo.sensors.shading import colours
 
 KINECT = "libgazebo_ros_openni_kinect.so"
 DEPTH_KINDS = ("depth", "depth_camera", "rgbd_camera")
-MOST_PIXELS = 4_000_000
+MOST_PIXELS = 2_100_000  # full HD: services wait while a picture is made
+LONGEST_SIDE = 65_500  # of a JPEG
+PIECE = 1 << 17  # pixels that are looked at together
 
 
 class CameraView(NamedTuple):
@@ -36,7 +38,7 @@ class PinholeCamera:
     """A camera.
 
     Attributes:
-        across, down: (height, width) of a pixel's point, to the right and down, for each metre of depth.
+        across, down: (width,), (height, 1): a pixel's point to the right and down, for each metre of depth.
 
     Args:
         element: a `<camera>`.
@@ -65,17 +67,15 @@ class PinholeCamera:
         self.format = (element.findtext("image/format") or "R8G8B8").strip()
         self.near = value(element, "clip/near", where, 0.1)
         self.far = value(element, "clip/far", where, 100.0)
-        if not 0.0 <= self.near < self.far:
+        if not 0.0 <= self.near < self.far <= FURTHEST:
             raise DescriptionError(f"{where}: <clip> is {self.near:g} to {self.far:g} m")
         self.noise: Noise | None = read_noise(element, where)
         self.focal_length = self.width / (2.0 * math.tan(self.field_of_view / 2.0))  # [pixels]
-        right = (np.arange(self.width) + 0.5 - self.width / 2.0) / self.focal_length
-        down = (np.arange(self.height) + 0.5 - self.height / 2.0) / self.focal_length
-        self.across, self.down = x, y = np.meshgrid(right, down)
-        ahead = np.stack([np.ones_like(x), -x, -y], axis=-1).reshape(-1, 3)
-        lengths = np.linalg.norm(ahead, axis=1)
-        self._directions = ahead / lengths[:, None]
-        self._cosines = 1.0 / lengths
+        self.across, down = (
+            (np.arange(count) + 0.5 - count / 2.0) / self.focal_length
+            for count in (self.width, self.height)
+        )
+        self.down = down[:, None]
 
     def picture(self, scene: RayScene, link: Pose, in_colour: bool = True) -> CameraView:
         """Returns what the camera sees, without noise; black if not `in_colour`.
@@ -85,16 +85,30 @@ class PinholeCamera:
             link: pose of its link in the world.
             in_colour: whether colours are wanted.
         """
-        turns, places = frames([link.compose(self.pose)])
-        directions = np.einsum("ij,kj->ki", turns[0], self._directions)
-        clips = self.near / self._cosines, self.far / self._cosines
-        hits = scene.cast(places[0], directions, *clips)
+        pose = link.compose(self.pose)
         shape = self.height, self.width
-        seen = np.zeros((*shape, 3), np.uint8)
+        seen = CameraView(np.zeros((*shape, 3), np.uint8), np.zeros(shape))
+        rows = max(1, PIECE // self.width)
+        for first in range(0, self.height, rows):
+            piece = slice(first, first + rows)
+            self._see(CameraView(*(each[piece] for each in seen)), piece, scene, pose, in_colour)
+        return seen
+
+    def _see(
+        self, seen: CameraView, rows: slice, scene: RayScene, pose: Pose, in_colour: bool
+    ) -> None:
+        """Fills in some rows of a view."""
+        turns, places = frames([pose])
+        axes = np.broadcast_arrays(1.0, -self.across, -self.down[rows])
+        ahead = np.stack(axes, axis=-1).reshape(-1, 3)
+        lengths = np.linalg.norm(ahead, axis=1)
+        directions = np.einsum("ij,kj->ki", turns[0], ahead / lengths[:, None])
+        cosines = 1.0 / lengths
+        hits = scene.cast(places[0], directions, self.near / cosines, self.far / cosines)
+        seen.depths[:] = (hits.distances * cosines).reshape(seen.depths.shape)
         if in_colour:
             found = colours(scene, hits, places[0], directions)
-            seen = np.rint(np.clip(found, 0.0, 255.0)).astype(np.uint8).reshape(*shape, 3)
-        return CameraView(seen, (hits.distances * self._cosines).reshape(shape))
+            seen.colours[:] = np.rint(np.clip(found, 0.0, 255.0)).reshape(seen.colours.shape)
 
 
 def noisy(
@@ -187,6 +201,6 @@ class DepthSensor(CameraSensor):
 
 def _pixels(element: Element, path: str, where: str, default: int) -> int:
     count = value(element, path, where, default)
-    if count != int(count) or not 1 <= count <= MOST_PIXELS:
-        raise DescriptionError(f"{where}: <{path}> is {count:g}")
+    if count != int(count) or not 1 <= count <= LONGEST_SIDE:
+        raise DescriptionError(f"{where}: <{path}> is {count:g}; 1 to {LONGEST_SIDE} are possible")
     return int(count)

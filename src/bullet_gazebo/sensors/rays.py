@@ -1,9 +1,9 @@
 """What rays of light or sound meet first in a world, by Embree where it is installed.
 
 All shapes that never move are one Embree scene, which is built when one comes, goes or is moved. What moves,
-and large meshes, are met in their own frames, into which rays are brought: meshes by Embree scenes that are
-kept, boxes, balls and cylinders analytically. So nothing is built while things move. A ray is only compared
-with shapes whose bounding ball it meets. Worlds of one process share the Embree scenes that are equal.
+balls, and large meshes are met in their own frames, into which rays are brought: meshes by Embree scenes that
+are kept, the others analytically. So nothing is built while things move, and no ball waits for trimesh. A ray
+is only compared with shapes whose bounding ball it meets. Worlds of one process share equal Embree scenes.
 """
 
 import hashlib
@@ -25,7 +25,6 @@ from bullet_gazebo.sensors.intersection import DISTANCES, NORMALS, reach
 
 logger = logging.getLogger(__name__)
 LARGE = 2000  # triangles of a mesh that isn't built anew with its neighbours
-CURVED = ("sphere", "cylinder")  # their triangles lie a little within them
 NONE = -1
 MARGIN = 1e-5  # [m], and relative: of the comparison of rays and balls, in float32
 
@@ -103,6 +102,7 @@ class RayScene:
             self._find_centres()
         self._is_fresh = True
 
+    @np.errstate(over="ignore", invalid="ignore")  # of what is light years away
     def cast(
         self, origin: np.ndarray, directions: np.ndarray, near: Any = 0.0, far: Any = math.inf
     ) -> Hits:
@@ -153,10 +153,9 @@ class RayScene:
         met = self._still_triangles.first(starts, directions)
         targets = self._still[met.parts]  # the last one is NONE
         found = Hits(met.distances, targets, met.triangles, met.weights)
-        for kind in self._curved:
-            some = np.flatnonzero(self._kinds[targets] == kind)
-            exact = self._distances(kind, targets[some], starts[some], directions[some])
-            found.distances[some] = np.where(exact < np.inf, exact, found.distances[some])
+        some = np.flatnonzero(self._are_cylinders[targets])  # their triangles lie within them
+        exact = self._distances("cylinder", targets[some], starts[some], directions[some])
+        found.distances[some] = np.where(exact < np.inf, exact, found.distances[some])
         return found
 
     def _meet_mesh(
@@ -235,7 +234,8 @@ class RayScene:
             if shape.kind == "plane":
                 continue
             self._sizes[index, : len(shape.size)] = shape.size
-            if shape.kind != "mesh" and not target.model.description.static:
+            is_still = target.model.description.static and shape.kind != "sphere"
+            if shape.kind != "mesh" and not is_still:
                 apart.append(index)
                 self._radii[index] = reach(shape.kind, shape.size)
                 continue
@@ -250,7 +250,7 @@ class RayScene:
             meshes[index] = _built([corners])
         self._still, self._apart = np.array([*still, NONE]), np.array(apart, int)
         self._apart_meshes, self._still_triangles = meshes, _built(triangles)
-        self._curved = [kind for kind in CURVED if kind in self._kinds[still]]
+        self._are_cylinders = self._kinds == "cylinder"
         self._analytic = [kind for kind in DISTANCES if kind in self._kinds[apart]]
         moves = [not targets[index].model.description.static for index in apart]
         self._moving = self._apart[np.array(moves, bool)]

@@ -14,6 +14,9 @@ from bullet_gazebo.sensors.rays import RayScene
 from bullet_gazebo.sensors.schedule import Schedule
 from bullet_gazebo.simulator import Simulator
 
+FURTHEST = 1e9  # [m] that a sensor reaches
+LARGEST = 1e30  # number of a plugin: messages have 32-bit floats
+
 
 class Sensing:
     """The sensors of a simulator.
@@ -80,7 +83,10 @@ class Mount:
 
     def number(self, tag: str, default: float) -> float:
         """Returns the number in the plugin's child element `tag`; a faulty one is a DescriptionError."""
-        return value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)
+        found = value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)
+        if found != default and abs(found) > LARGEST:
+            raise DescriptionError(f"<{tag}> is {found:g}; it must be within ±{LARGEST:g}")
+        return found
 
     def deviation(self) -> float:
         """Returns the plugin's `<gaussianNoise>`; an impossible one is a DescriptionError."""

@@ -75,7 +75,7 @@ def main():
         drawn.place("rover", {"base_link": base, **wheels})
         at = base.compose(sensor.pose)
         ranges = laser.measure(scene, at, 0.0, random).ranges.ravel()
-        rays = laser.directions().reshape(-1, 3)
+        rays = laser.directions.reshape(-1, 3)
         points = [
             r * way if math.isfinite(r) else None for r, way in zip(ranges, rays, strict=True)
         ]

@@ -20,12 +20,11 @@ class BlockLaserPlugin(SensorPlugin):
     def __init__(self, context: PluginContext) -> None:
         self._topic = LaserTopic(context, PointCloud, self._message, "/world", empty="/")
         self._deviation = context.deviation()
-        self._directions = self._topic.laser.directions().reshape(-1, 3)
 
     def _message(self, scan: Scan, now: int, random: np.random.Generator) -> PointCloud:
         ranges, intensities = scan.ranges.ravel(), scan.intensities.ravel()
         with np.errstate(invalid="ignore"):  # inf * 0
-            points = ranges[:, None] * self._directions
+            points = ranges[:, None] * self._topic.laser.directions.reshape(-1, 3)
         if self._deviation:
             draws = random.normal(0.0, self._deviation, (len(ranges), 4))
             draws[~np.isfinite(ranges)] = 0.0

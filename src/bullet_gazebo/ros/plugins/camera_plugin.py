@@ -24,6 +24,7 @@ from bullet_gazebo.sensors.sensing import sensor_of
 
 MULTICAMERA = "multicamera"
 SIDES = ("left/", "right/")
+MOST_WAITING = 20  # triggers
 
 
 class CameraPlugin(SensorPlugin):
@@ -36,6 +37,7 @@ class CameraPlugin(SensorPlugin):
         self._context = context
         self._sensor = sensor = sensor_of(context, (self.kind,))
         topics = SensorTopics(context, rate_of(context, sensor), self._on_clock)
+        self._is_heard = topics.is_heard
         self._scope = scope = scope_of(context)
         offer_rate(context, topics, scope)
         baseline = context.number("hackBaseline", 0.0)
@@ -85,13 +87,14 @@ class TriggeredCameraPlugin(CameraPlugin):
 
     def _on_trigger(self, _: Empty) -> None:
         with self._context.sim.lock:
-            self._waiting += 1
+            self._waiting = min(self._waiting + 1, MOST_WAITING)
         self._clock.look()
 
     def _update(self, now: int) -> None:
         if self._waiting:
             self._waiting -= 1
-            self._take(now)
+            if self._is_heard():
+                self._take(now)
         if not self._waiting:
             self._clock.look()
 

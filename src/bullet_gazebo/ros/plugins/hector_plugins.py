@@ -34,6 +34,7 @@ from bullet_gazebo.ros.plugins.sensor_topics import (
 from bullet_gazebo.sensors.drift import DriftingError
 from bullet_gazebo.sensors.imu import Imu, LinkMotion, motion_of
 from bullet_gazebo.sensors.laser import LaserSensor, nearest
+from bullet_gazebo.sensors.noise import checked_deviation
 
 MOST = 1e6  # that dynamic_reconfigure sets
 EQUATOR = 6378137.0  # [m], radius of WGS84
@@ -317,7 +318,10 @@ def _reader(context: PluginContext) -> Callable[[str, float], np.ndarray]:
     def read(tag: str, default: float) -> np.ndarray:
         words = context.text(tag, str(default)).split()
         count = 1 if len(words) == 1 else 3
-        return np.broadcast_to(numbers(" ".join(words), f"<{tag}>", count), 3)
+        found = numbers(" ".join(words), f"<{tag}>", count)
+        for number in found:
+            checked_deviation(abs(number), f"<{tag}>")
+        return np.broadcast_to(found, 3)
 
     return read
 

@@ -4,11 +4,14 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import rosgraph.names
 import rospy
 from geometry_msgs.msg import Quaternion, Vector3
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
 
+from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.control_plugin import find_param
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
@@ -36,9 +39,15 @@ def namespace_of(context: PluginContext, absent: str, empty: str) -> str:
 
 
 def topic_in(namespace: str, name: str) -> str:
-    """Returns a topic's full name; a name that begins with a slash ignores the namespace."""
+    """Returns a topic's full name; a name that begins with a slash ignores the namespace.
+
+    Raises:
+        DescriptionError: for what ROS takes for no name.
+    """
     full = rospy.names.ns_join(namespace, name) if namespace else name
     plain = "/".join(filter(None, full.split("/")))
+    if not plain or not rosgraph.names.is_legal_name(full):
+        raise DescriptionError(f"'{shown(full)}' is no name of a topic")
     return str(rospy.resolve_name(f"/{plain}" if full.startswith("/") else plain))
 
 
@@ -141,7 +150,7 @@ class SensorTopics:
     ) -> None:
         self._context = context
         self._waking: list[Topic] = []
-        self._clock = context.clock(rate, measure, self._is_heard, at_once)
+        self._clock = context.clock(rate, measure, self.is_heard, at_once)
 
     def set_rate(self, rate: float) -> None:
         """Measures at another rate [Hz] from now on; the caller holds the simulator's lock."""
@@ -169,7 +178,8 @@ class SensorTopics:
             self._waking.append(topic)
         return topic
 
-    def _is_heard(self) -> bool:
+    def is_heard(self) -> bool:
+        """Returns whether a topic that wakes it has subscribers."""
         return any(topic.is_heard for topic in self._waking)
 
 

@@ -45,9 +45,9 @@ class VelodynePlugin(SensorPlugin):
         self._high = min(context.number("max_range", math.inf), laser.high)
         self._least = context.number("min_intensity", -math.inf)
         self._deviation = context.deviation()
-        self._directions = laser.directions().transpose(1, 0, 2)
         self._rings = np.broadcast_to(
-            np.arange(laser.vertical.readings), self._directions.shape[:2]
+            np.arange(laser.vertical.readings),
+            (laser.horizontal.readings, laser.vertical.readings),
         )
 
     def _message(self, scan: Scan, now: int, random: np.random.Generator) -> PointCloud2:
@@ -57,7 +57,8 @@ class VelodynePlugin(SensorPlugin):
             ranges = ranges + random.normal(0.0, self._deviation, ranges.shape)
             seen &= self._within(ranges)
         points = np.zeros(int(seen.sum()), POINT)
-        places = ranges[seen][:, None] * self._directions[seen]
+        directions = self._topic.laser.directions.transpose(1, 0, 2)
+        places = ranges[seen][:, None] * directions[seen]
         points["x"], points["y"], points["z"] = places.T
         points["intensity"], points["ring"] = intensities[seen], self._rings[seen]
         return PointCloud2(

@@ -1,9 +1,11 @@
 """Sensors' plugins without a master: bad ones are told in a line, and all go with their model."""
 
 import gc
+import tracemalloc
 from collections import Counter
 
 import pytest
+import rospy
 from hypothesis import HealthCheck, Phase, given, settings
 from support.mutations.xml_trees import mutated_xml
 from support.ros.silent_topics import SilentPublisher, SilentService, silence
@@ -13,7 +15,9 @@ from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
+from bullet_gazebo.ros.plugins.camera_plugin import MOST_WAITING
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
+from bullet_gazebo.sensors.pinhole import PinholeCamera
 from bullet_gazebo.simulator import Simulator
 
 MODEL = """<sdf version="1.6"><model name="m"><link name="l"><inertial><mass>1</mass></inertial>
@@ -25,8 +29,10 @@ SCAN = (
     "<range><min>{}</min><max>{}</max></range>{}</ray>"
 )
 NOISE = "<noise><type>gaussian</type><stddev>{}</stddev></noise>"
+ROUNDED = "<noise><type>gaussian_quantized</type><precision>1e-300</precision></noise>"
 OWN_NOISE = "<bodyName>l</bodyName><gaussianNoise>-1</gaussianNoise>"
-SIZE = "<image><width>100000</width><height>100000</height></image>"
+SIZE = "<image><width>{}</width><height>{}</height></image>"
+TOPIC = "<bodyName>l</bodyName><topicName>{}</topicName>"
 CAMERA = "<camera>{}</camera>"
 
 
@@ -42,19 +48,26 @@ def of_model(library, inside):
     return f'<plugin name="p" filename="lib{library}.so">{inside}</plugin>'
 
 
+def hector(tag, number):
+    return of_model("hector_gazebo_ros_gps", f"<bodyName>l</bodyName><{tag}>{number}</{tag}>")
+
+
 BAD = {  # what is wrong: a link's part, a model's part, and words of the line
     "no rays": (laser("0"), "", "sensor 'bad', <horizontal>: 0 samples"),
     "ten million rays": (laser("10000000"), "", "sensor 'bad', <horizontal>: 1e+07 samples"),
     "half a ray": (laser("1.5"), "", "1.5 samples"),
     "range of NaN": (laser(low="nan"), "", "<range/min>"),
     "endless range": (laser(high="inf"), "", "<range/max>"),
+    "range beyond a message": (laser(high="1e39"), "", "<range> is 0.1 to 1e+39 m"),
     "range backwards": (laser(low="5", high="1"), "", "<range> is 5 to 1 m"),
     "absurd noise": (laser(more=NOISE.format("1e400")), "", "<stddev>"),
     "more noise than there is": (laser(more=NOISE.format("1e308")), "", "<stddev> is 1e+308"),
     "negative noise": (laser(more=NOISE.format(-1)), "", "<stddev> is -1"),
     "negative rate": (laser(before="<update_rate>-1</update_rate>"), "", "<update_rate> is -1"),
     "camera's negative rate": (camera(own="<updateRate>-1</updateRate>"), "", "<updateRate> is -1"),
-    "a huge picture": (camera(SIZE), "", "4000000 pixels"),
+    "a huge picture": (camera(SIZE.format(2000, 2000)), "", "2100000 pixels"),
+    "a picture that is no JPEG": (camera(SIZE.format(70000, 1)), "", "<image/width> is 70000"),
+    "an endless picture": (camera("<clip><far>1e300</far></clip>"), "", "<clip> is 0.1 to 1e+300 m"),
     "no picture": (camera("<image><width>0</width></image>"), "", "<image/width> is 0"),
     "half a circle": (camera("<horizontal_fov>4</horizontal_fov>"), "", "<horizontal_fov> is 4 rad"),
     "wrong sensor": (laser(kind="camera"), "", "the camera sensor 'bad', not to a sensor of type ray"),
@@ -62,6 +75,12 @@ BAD = {  # what is wrong: a link's part, a model's part, and words of the line
     "unknown link": ("", of_model("gazebo_ros_p3d", "<bodyName>x</bodyName>"), "no link 'x'"),
     "unknown joint": ("", of_model("gazebo_ros_ft_sensor", "<jointName>x</jointName>"), "no joint 'x'"),
     "negative deviation": ("", of_model("gazebo_ros_imu", OWN_NOISE), "<gaussianNoise> is -1"),
+    "a topic with a blank": ("", of_model("gazebo_ros_p3d", TOPIC.format("a b")), "'/a b' is no name"),
+    "a topic without a name": ("", of_model("gazebo_ros_p3d", TOPIC.format("/")), "'/' is no name"),
+    "a number beyond a message": (camera(own="<Cx>1e308</Cx>"), "", "<Cx> is 1e+308"),
+    "a drift beyond reason": ("", hector("drift", "1e308"), "<drift>"),
+    "a negative frequency": ("", hector("driftFrequency", -1), "<driftFrequency> is -1"),
+    "rounding to nothing": (laser(more=ROUNDED), "", "<precision> is 1e-300"),
     "unknown plugin": ("", of_model("nothing_at_all", ""), "plugin libnothing_at_all.so"),
     "no cameras": ("", of_model("realsense_gazebo_plugin", "<prefix>d435</prefix>"), "no sensor 'd435depth'"),
 }  # fmt: skip
@@ -119,6 +138,54 @@ def test_an_impossible_sensor_is_told_in_a_line(node, fault):
     assert words in line
     assert "\n" not in line
     assert node.sim.now == 4_000_000
+
+
+def test_rates_that_are_nearly_none_measure_nothing(node):
+    assert not node.spawn(MODEL.format(laser(before="<update_rate>1e-320</update_rate>"), ""))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("sensor", [laser(), laser(kind="gpu_ray"), camera()])
+def test_a_sensor_light_years_away_sees_nothing_without_a_word(node, sensor):
+    assert not node.spawn(MODEL.format(sensor.replace(">", "><pose>1e300 0 0 0 0 0</pose>", 1), ""))
+
+
+def test_an_unheard_laser_of_a_million_rays_keeps_no_memory(node, monkeypatch):
+    monkeypatch.setattr(SilentPublisher, "has_connections", lambda self: False)
+    text = MODEL.format(laser("1000000"), "")
+    node.spawn(text)
+    tracemalloc.start()
+    try:
+        node.spawn(text)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 4_000_000
+
+
+@pytest.mark.parametrize(("heard", "pictures"), [(True, MOST_WAITING), (False, 0)])
+def test_a_storm_of_triggers_costs_no_more_than_some_pictures(node, monkeypatch, heard, pictures):
+    monkeypatch.setattr(SilentPublisher, "has_connections", lambda self: heard)
+    taken, triggers = [], []
+
+    def subscribe(name, kind, callback, **_):
+        triggers.append(callback)
+        return SilentPublisher(name, kind)
+
+    monkeypatch.setattr(rospy, "Subscriber", subscribe)
+    picture = PinholeCamera.picture
+    monkeypatch.setattr(
+        PinholeCamera, "picture", lambda *args: taken.append(args) or picture(*args)
+    )
+    text = MODEL.format(SENSOR.format("camera", CAMERA.format(""), "triggered_camera", ""), "")
+    model = node.sim.world.spawn("m", parse_sdf(text), Pose())
+    node.plugins.load(model, "/")
+    for _ in range(500):
+        triggers[0](None)
+    with node.sim.lock:
+        node.sim.advance(100)
+    node.plugins.unload(model)
+    assert len(taken) == pictures
 
 
 def test_nothing_of_a_model_with_all_sensors_stays_when_it_goes(node, root):
