@@ -89,7 +89,7 @@ class SensorReaders:
             values = sensor.values(now)
             for array in (values or {}).values():
                 if isinstance(array, np.ndarray):
-                    array.flags.writeable = False
+                    array.setflags(write=False)
             if values is not None:
                 self._taken[name] = Taken(now, values)
 
