@@ -72,6 +72,7 @@ class Simulator:
         # Called under the lock before each advance, and how many moves are still told of as one.
         self.before_advance: list[Callable[[], None]] = []
         self._moves_under_way = 0
+        self.resets = 0  # of the world or the simulation
         # Called under the lock with a seed from which all random numbers start again.
         self.reseeded: list[Callable[[int], None]] = []
         # What sends messages after the ticks, and whether those who step the world call them.
@@ -310,6 +311,7 @@ class Simulator:
         """Resets the world, or the simulation with `everything`; the caller holds the lock."""
         if everything:
             self.now = 0
+        self.resets += 1
         self.world.reset(joints=everything)
         for robot in self.robots:
             robot.joints_moved(self.now, self.relatch)

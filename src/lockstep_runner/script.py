@@ -134,7 +134,7 @@ GO_BETWEENS = frozenset(
 )
 
 
-class Task:
+class SubmittedCall:
     """A function that the script gave to an executor."""
 
     def __init__(self, call: Callable[..., Any]) -> None:
@@ -148,7 +148,7 @@ def is_the_script(depth: int) -> bool:
     """Returns whether the function `depth` frames above the caller is the script's or its modules'.
 
     A wait in Python's own `queue`, `threading` and `concurrent.futures` counts as their caller's, one in
-    a `threading.Timer` or `Task` as the script's.
+    a `threading.Timer` or `SubmittedCall` as the script's.
     """
     frame: types.FrameType | None = sys._getframe(depth + 1)
     while frame is not None and frame.f_code not in BEGIN_OF_THREADS:
@@ -158,7 +158,7 @@ def is_the_script(depth: int) -> bool:
     return frame is not None
 
 
-BEGIN_OF_THREADS = (threading.Timer.run.__code__, Task.__call__.__code__)
+BEGIN_OF_THREADS = (threading.Timer.run.__code__, SubmittedCall.__call__.__code__)
 
 
 def _is_a_script(frame: types.FrameType) -> bool:

@@ -176,6 +176,7 @@ class RobotHardware:
             description: joints and transmissions.
             gains: the parameters `<ns>/gazebo_ros_control/pid_gains`: joints by name.
         """
+        self.robot = description.robot
         self.interfaces: dict[str, dict[str, JointHandle]] = {}
         for transmission in description.transmissions:
             joint = description.joints.get(transmission.joint)

@@ -139,7 +139,7 @@ class ControllerManager:
                 c.name,
                 c.state,
                 c.type_name,
-                (Claim(f"hardware_interface::{c.interface}", c.claimed),),
+                tuple(Claim(f"hardware_interface::{each}", c.claims[each]) for each in c.claims),
             )
             for c in self.loaded
         ]

@@ -31,11 +31,15 @@ class Transmission:
 
 @dataclass(frozen=True)
 class RobotDescription:
-    """Joints by name, in document order, and their transmissions; `warnings` are for the log."""
+    """Joints by name, in document order, and their transmissions; `warnings` are for the log.
+
+    `robot` is the whole URDF file, for controllers that know wheels.
+    """
 
     joints: dict[str, JointHandle]
     transmissions: list[Transmission]
     warnings: list[str]
+    robot: Element
 
     def limited_by(self, params: object) -> "RobotDescription":
         """Returns the description with limits overridden by the parameters `<ns>/joint_limits`."""
@@ -70,7 +74,46 @@ def read_description(text: str) -> RobotDescription:
         if found.joint in transmissions:
             warnings.append(f"Joint '{found.joint}' has several transmissions; the first is used.")
         transmissions.setdefault(found.joint, found)
-    return RobotDescription(joints, list(transmissions.values()), warnings)
+    return RobotDescription(joints, list(transmissions.values()), warnings, robot)
+
+
+def distance(robot: Element, joint: str, other: str) -> float:
+    """Returns how far two joints are from each other [m], as if none above them were turned."""
+    return math.dist(_place(robot, joint), _place(robot, other))
+
+
+def _place(robot: Element, joint: str) -> list[float]:
+    above = {each.find("child"): each for each in robot.findall("joint")}
+    joints = {child.get("link"): each for child, each in above.items() if child is not None}
+    found = robot.find(f"joint[@name='{joint}']")
+    place = [0.0, 0.0, 0.0]
+    while found is not None:
+        origin, parent = found.find("origin"), found.find("parent")
+        text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
+        try:
+            place = [a + float(b) for a, b in zip(place, text.split(), strict=True)]
+        except ValueError as error:
+            raise ControlError(f"robot_description: a joint is at '{text}'") from error
+        found = None if parent is None else joints.get(parent.get("link"))
+    return place
+
+
+def wheel_radius(robot: Element, joint: str) -> float:
+    """Returns the radius [m] of the cylinder or sphere with which the child of a joint collides.
+
+    Raises:
+        ControlError: if it has neither.
+    """
+    child = robot.find(f"joint[@name='{joint}']/child")
+    link = "" if child is None else child.get("link", "")
+    for kind in ("cylinder", "sphere"):
+        shape = robot.find(f"link[@name='{link}']/collision/geometry/{kind}")
+        if shape is not None:
+            return _float(shape, "radius")
+    raise ControlError(
+        f"robot_description: link '{link}' collides by neither a cylinder nor a sphere, so the wheels' "
+        "radius must be given as a parameter"
+    )
 
 
 def _joint(element: Element) -> JointHandle:

@@ -110,6 +110,10 @@ class Body(ABC):
         """Puts the root link's frame at `pose`, its origin moving with `twist`."""
 
     @abstractmethod
+    def set_base_twist(self, twist: Twist) -> None:
+        """Gives a free root link's frame another velocity; nothing moves by that."""
+
+    @abstractmethod
     def link_state(self, name: str) -> tuple[Pose, Twist]:
         """Returns pose and twist of the frame of link `name`, in the world."""
 

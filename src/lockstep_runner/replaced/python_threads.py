@@ -25,7 +25,7 @@ from lockstep_runner.clock import Clock
 from lockstep_runner.looks import LOOK
 from lockstep_runner.notices import tell_once
 from lockstep_runner.runner import ScriptRunner
-from lockstep_runner.script import Task, caller, is_the_script
+from lockstep_runner.script import SubmittedCall, caller, is_the_script
 
 # [s] a time limit with less than this left is over: the rest is floating-point error.
 ROUNDING = 1e-6
@@ -185,7 +185,7 @@ class _Tasks:
                 self.clock.began(thread)  # it computes until it ends; resting ones end later
 
 
-class _Task(Task):
+class _Task(SubmittedCall):
     """A task of an executor whose tasks are counted."""
 
     def __init__(self, call: Callable[..., Any], tasks: _Tasks) -> None:

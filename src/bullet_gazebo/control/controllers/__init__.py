@@ -8,6 +8,7 @@ import importlib
 import importlib.util
 
 from bullet_gazebo.control.controllers.base import Controller, Input, Output
+from bullet_gazebo.control.controllers.diff_drive import DiffDriveController
 from bullet_gazebo.control.controllers.forward import (
     EffortGroup,
     EffortJoint,
@@ -28,6 +29,10 @@ from bullet_gazebo.control.controllers.pid_controllers import (
     EffortJointVelocity,
     VelocityJointPosition,
 )
+from bullet_gazebo.control.controllers.steering import (
+    AckermannSteeringController,
+    FourWheelSteeringController,
+)
 from bullet_gazebo.control.errors import ControlError, faults
 
 __all__ = ["BUILT_IN", "Controller", "Input", "Output", "find_type"]
@@ -36,6 +41,9 @@ BUILT_IN: dict[str, type[Controller]] = {
     controller.type_name: controller
     for controller in (
         JointStateController,
+        DiffDriveController,
+        AckermannSteeringController,
+        FourWheelSteeringController,
         EffortJoint,
         EffortJointPosition,
         EffortJointVelocity,

@@ -18,7 +18,8 @@ class Output:
 
     `topic` is relative to the controller's namespace, or to the manager's if `shared`. `kind` is a ROS
     message type, whose messages are published as they are, or names one of the records that the ROS
-    adapters convert: JointState, JointControllerState, ...
+    adapters convert: JointState, JointControllerState, ... With `whole` every one is sent, however fast
+    the world runs.
 
     `sink` takes the records, once a ROS adapter has set it. `listeners` returns the number of subscribers,
     so that a controller needs to make no record without any.
@@ -27,6 +28,7 @@ class Output:
     topic: str
     kind: str | type
     shared: bool = False
+    whole: bool = False
     sink: Callable[[Any], None] | None = None
     listeners: Callable[[], int] = one_listener
 
@@ -45,13 +47,15 @@ class Output:
 class Input:
     """A topic that a controller subscribes to when it is loaded.
 
-    `kind` is Float64 (`receive` takes a number), Float64MultiArray (a sequence of numbers), or a ROS message
-    type (the message). `receive` is called between two ticks; a ControlError that it raises is logged.
+    `kind` is Float64 (`receive` takes a number), Float64MultiArray (a sequence of numbers), Twist (what it
+    says ahead, to the left and about), or a ROS message type (the message). `receive` is called between two
+    ticks; a ControlError that it raises is logged. `publishers` returns how many there are.
     """
 
     topic: str
     kind: str | type
     receive: Callable[[Any], None]
+    publishers: Callable[[], int] = one_listener
 
 
 class Controller(ABC):
@@ -70,6 +74,8 @@ class Controller(ABC):
         self.inputs: list[Input] = []
         self.outputs: list[Output] = []
         self.pids: dict[str, Pid] = {}  # by namespace below the controller's; tunable while it runs
+        # By name what dynamic_reconfigure changes while it runs: present value, least and most.
+        self.tunables: dict[str, tuple[Any, Any, Any]] = {}
         self.loops: list[Loop] = []  # whose gains the physics step must be able to follow
 
     @classmethod
@@ -83,6 +89,11 @@ class Controller(ABC):
             ControlError: if a parameter or a joint is missing or wrong.
         """
 
+    @property
+    def claims(self) -> Mapping[str, tuple[str, ...]]:
+        """The claimed joints by hardware interface."""
+        return {self.interface: self.claimed}
+
     def starting(self, now: int) -> None:
         """Called when the controller is started, and when a reset makes it start over."""
 
@@ -92,6 +103,9 @@ class Controller(ABC):
 
     def stopping(self) -> None:
         """Called when the controller is stopped; its joints keep their commands."""
+
+    def tune(self, values: Mapping[str, Any]) -> None:
+        """Takes new values of `tunables`, all of them."""
 
     def joints_moved(self, now: int) -> None:
         """Called when something other than time has changed the joints' state."""
@@ -109,6 +123,21 @@ def number_param(params: Mapping[str, object], key: str, place: str) -> float:
             f"parameter {place}/{key} is missing or is not a finite number: {value!r}"
         )
     return float(value)
+
+
+def option(params: Mapping[str, object], key: str, place: str, default: Any) -> Any:
+    """Returns the parameter `key`, of the same type as its `default`; a number is finite.
+
+    Raises:
+        ControlError: if it is of another type.
+    """
+    value = params.get(key, default)
+    if isinstance(default, float):
+        return number_param({key: value}, key, place)
+    if not isinstance(value, type(default)) or isinstance(value, bool) != isinstance(default, bool):
+        kind = type(default).__name__
+        raise ControlError(f"parameter {place}/{key} must be of type {kind}: {value!r}")
+    return value
 
 
 def joint_param(

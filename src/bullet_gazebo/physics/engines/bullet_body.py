@@ -288,9 +288,16 @@ class BulletBody(Body):
         # PyBullet's base pose and velocity are those of the centre of mass, not of the link's frame.
         com = pose.compose(self._com)
         self._put_base(com)
+        self._push(subtract(com.position, pose.position), twist)
+
+    def set_base_twist(self, twist: Twist) -> None:
+        com = Pose(*pybullet.getBasePositionAndOrientation(self.id, self._client))
+        self._push(subtract(com.position, com.compose(self._com.inverse()).position), twist)
+
+    def _push(self, arm: Vector, twist: Twist) -> None:
+        """Gives the frame whose centre of mass is at `arm` from it [m] a twist."""
         if not self._fixed:
             linear, angular = twist
-            arm = subtract(com.position, pose.position)
             pybullet.resetBaseVelocity(
                 self.id, add(linear, cross(angular, arm)), angular, physicsClientId=self._client
             )

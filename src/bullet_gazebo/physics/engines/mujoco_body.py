@@ -11,7 +11,7 @@ import numpy as np
 from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription, Shape
 from bullet_gazebo.physics.engine import FASTEST, FURTHEST, OVERLAP, Body, Contact, Side, Twist
 from bullet_gazebo.physics.engines.mujoco_model import Elements, geoms_of, priority, wxyz, xyzw
-from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, conjugate, rotate, scale
+from bullet_gazebo.physics.pose import ZERO, Pose, Quaternion, Vector, add, conjugate, rotate, scale
 
 FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
@@ -315,9 +315,20 @@ class MujocoBody(Body):
             self._state.model.body_pos[root] = pose.position
             self._state.model.body_quat[root] = orientation
             return
-        q, v = self._free
+        q, _ = self._free
         self._qpos[q : q + FREE_POSITIONS] = (*pose.position, *orientation)
-        turning = rotate(conjugate(pose.orientation), twist[1])  # MuJoCo has it in the body's axes
+        self._push(pose.orientation, twist)
+
+    def set_base_twist(self, twist: Twist) -> None:
+        self._state.stale = True
+        if self._free is not None:
+            q, _ = self._free
+            self._push(xyzw(self._qpos[q + 3 : q + FREE_POSITIONS]), twist)
+
+    def _push(self, orientation: Quaternion, twist: Twist) -> None:
+        assert self._free is not None
+        _, v = self._free
+        turning = rotate(conjugate(orientation), twist[1])  # MuJoCo has it in the body's axes
         self._qvel[v : v + FREE_VELOCITIES] = (*twist[0], *turning)
 
     def link_state(self, name: str) -> tuple[Pose, Twist]:

@@ -8,15 +8,32 @@ import genpy
 import numpy as np
 from bullet_gazebo_msgs.msg import SensorReading, SensorValue
 from control_msgs.msg import JointControllerState
+from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
 from gazebo_msgs.msg import ContactState
-from geometry_msgs.msg import Point, Quaternion, Twist, Vector3, Wrench
+from geometry_msgs.msg import (
+    Point,
+    PoseWithCovariance,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistStamped,
+    TwistWithCovariance,
+    Vector3,
+    Wrench,
+)
 from geometry_msgs.msg import Pose as PoseMsg
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
 
 from bullet_gazebo.control.controllers.joint_state import JointStateSample
 from bullet_gazebo.control.controllers.pid_controllers import JointControllerSample
+from bullet_gazebo.control.controllers.steering import SteeringSample
+from bullet_gazebo.control.controllers.vehicle import TwistSample
 from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.drives.odometry import OdometrySample
 from bullet_gazebo.physics import pose as poses
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.state import ContactPair
@@ -64,6 +81,42 @@ def to_joint_state(sample: JointStateSample) -> JointState:
 
 def to_joint_controller_state(sample: JointControllerSample) -> JointControllerState:
     return JointControllerState(Header(stamp=to_time(sample.stamp)), *sample[1:])
+
+
+def to_odometry(sample: OdometrySample) -> Odometry:
+    pose, twist = [0.0] * 36, [0.0] * 36
+    pose[::7], twist[::7] = sample.pose_covariance, sample.twist_covariance
+    return Odometry(
+        Header(stamp=to_time(sample.stamp), frame_id=sample.frame),
+        sample.child,
+        PoseWithCovariance(to_pose_msg(Pose(sample.position, sample.orientation)), pose),
+        TwistWithCovariance(to_twist_msg((sample.linear, sample.angular)), twist),
+    )
+
+
+def to_transform(now: int, frame: str, child: str, pose: Pose) -> TFMessage:
+    """Returns the one transform that places `child` at `pose` in `frame`, at the time `now` [ns]."""
+    transform = Transform(Vector3(*pose.position), Quaternion(*pose.orientation))
+    header = Header(stamp=to_time(now), frame_id=frame)
+    return TFMessage([TransformStamped(header, child, transform)])
+
+
+def to_odometry_transform(sample: OdometrySample) -> TFMessage:
+    """Returns the transform of an odometry."""
+    pose = Pose(sample.position, sample.orientation)
+    return to_transform(sample.stamp, sample.frame, sample.child, pose)
+
+
+def to_twist_stamped(sample: TwistSample) -> TwistStamped:
+    twist = to_twist_msg(((sample.linear, 0.0, 0.0), (0.0, 0.0, sample.angular)))
+    return TwistStamped(Header(stamp=to_time(sample.stamp)), twist)
+
+
+def to_four_wheel_steering(sample: SteeringSample) -> FourWheelSteeringStamped:
+    data = FourWheelSteering(
+        front_steering_angle=sample.front, rear_steering_angle=sample.rear, speed=sample.speed
+    )
+    return FourWheelSteeringStamped(Header(stamp=to_time(sample.stamp)), data)
 
 
 def to_contact_state(pair: ContactPair) -> ContactState:

@@ -218,7 +218,8 @@ def registered_together() -> Iterator[None]:
         yield
     finally:
         RegManager.reg_added = reg_added
-    for code, text, _ in calls():
+    answers: Any = calls()
+    for code, text, _ in answers:
         if code != 1:
             rospy.logfatal("unable to register a service with the master: %s", text)
 

@@ -4,13 +4,18 @@ import math
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from functools import partial
 from typing import Any
 
 import rospy
 from control_msgs.msg import JointControllerState, JointTrajectoryControllerState, PidState
 from dynamic_reconfigure.encoding import Config
+from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
+from geometry_msgs.msg import Twist, TwistStamped
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
+from tf2_msgs.msg import TFMessage
 
 from bullet_gazebo.control.controllers.base import Controller, Input, Output
 from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryController
@@ -18,7 +23,15 @@ from bullet_gazebo.control.errors import ControlError, faults
 from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.control.pid import Gains, Pid, PidSample
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
-from bullet_gazebo.ros.common.messages import to_joint_controller_state, to_joint_state, to_time
+from bullet_gazebo.ros.common.messages import (
+    to_four_wheel_steering,
+    to_joint_controller_state,
+    to_joint_state,
+    to_odometry,
+    to_odometry_transform,
+    to_time,
+    to_twist_stamped,
+)
 from bullet_gazebo.ros.common.publishing import ThinnedTopic, Thinner
 from bullet_gazebo.ros.control.trajectory_action import TrajectoryTopics, to_controller_state
 from bullet_gazebo.simulator import Simulator
@@ -29,10 +42,19 @@ OUTPUTS: dict[str, tuple[type, Convert, int]] = {  # kind: message, conversion, 
     "JointState": (JointState, to_joint_state, 4),
     "JointControllerState": (JointControllerState, to_joint_controller_state, 1),
     "TrajectorySample": (JointTrajectoryControllerState, to_controller_state, 1),
+    "OdometrySample": (Odometry, to_odometry, 100),
+    "TransformSample": (TFMessage, to_odometry_transform, 100),
+    "SteeringSample": (FourWheelSteeringStamped, to_four_wheel_steering, 100),
+    "TwistSample": (TwistStamped, to_twist_stamped, 100),
 }
 INPUTS: dict[str, tuple[type, Convert]] = {  # kind: message, the controller's command
     "Float64": (Float64, lambda message: message.data),
     "Float64MultiArray": (Float64MultiArray, lambda message: message.data),
+    "FourWheelSteering": (
+        FourWheelSteering,
+        lambda message: (message.speed, message.front_steering_angle, message.rear_steering_angle),
+    ),
+    "Twist": (Twist, lambda message: (message.linear.x, message.linear.y, message.angular.z)),
 }
 REPEAT = 1.0  # [s] between two logs of the same complaint
 MOST = 100_000.0
@@ -75,6 +97,8 @@ class ControllerTopics:
             full = rospy.names.ns_join(own, place)
             topics = PidTopics(self._sim, self._thinner, pid, full, self._manager.loops_changed)
             self._closing.callback(topics.shutdown)
+        if controller.tunables:
+            self._closing.callback(self._tuner(controller, own).shutdown)
         if isinstance(controller, JointTrajectoryController):
             self._closing.callback(TrajectoryTopics(self._sim, controller, own).shutdown)
         for port in controller.inputs:
@@ -89,30 +113,47 @@ class ControllerTopics:
             rospy.names.ns_join(namespace, output.topic), kind, queue_size=queue, tcp_nodelay=True
         )
         self._closing.callback(publisher.unregister)
-        topic = ThinnedTopic(
-            self._thinner,
-            publisher.resolved_name,
-            lambda sample: _publish(publisher, convert(sample)),
-        )
-        self._closing.callback(topic.close)
+        forward: Callable[[Any], None] = partial(_publish, publisher, convert)
+        if not output.whole:
+            topic = ThinnedTopic(self._thinner, publisher.resolved_name, forward)
+            self._closing.callback(topic.close)
+            forward = topic.send
 
         def send(sample: object) -> None:
             if isinstance(output.kind, type) and not isinstance(sample, output.kind):
                 raise TypeError(f"{publisher.name} takes {output.kind.__name__}, not {sample!r}")
             if publisher.get_num_connections():
-                topic.send(sample)
+                forward(sample)
 
         output.sink, output.listeners = send, publisher.get_num_connections
         self._closing.callback(setattr, output, "sink", None)
 
+    def _tuner(self, controller: Controller, namespace: str) -> DynamicServer:
+        """Returns the reconfigure server of a controller's own parameters."""
+        initial = {name: value for name, (value, _, _) in controller.tunables.items()}
+        parameters = [
+            Parameter(name, "bool" if isinstance(value, bool) else "double", value, least, most)
+            for name, (value, least, most) in controller.tunables.items()
+        ]
+
+        def apply(config: Config, level: int) -> Config:
+            if level == FIRST:
+                config.update(initial)
+            elif all(math.isfinite(config[name]) for name in initial):
+                with self._sim.lock:
+                    controller.tune(config)
+            return config
+
+        return DynamicServer(parameters, apply, namespace)
+
     def _subscribe(self, port: Input, namespace: str) -> None:
         topic = rospy.names.ns_join(namespace, port.topic)
-        known = isinstance(port.kind, str)
+        of_numbers = port.kind in ("Float64", "Float64MultiArray")
         kind, read = INPUTS[port.kind] if isinstance(port.kind, str) else (port.kind, _unchanged)
 
         def receive(message: object) -> None:
             command = read(message)
-            if known and not _finite(command):
+            if of_numbers and not _finite(command):
                 rospy.logerr_throttle(
                     REPEAT, f"{topic}: a command is not finite: no effort, or the position is held"
                 )
@@ -129,6 +170,7 @@ class ControllerTopics:
 
         subscriber = rospy.Subscriber(topic, kind, receive, queue_size=1, tcp_nodelay=True)
         self._closing.callback(subscriber.unregister)
+        port.publishers = subscriber.get_num_connections
 
     def shutdown(self) -> None:
         """Closes all of them."""
@@ -139,10 +181,10 @@ def _unchanged(message: Any) -> Any:
     return message
 
 
-def _publish(publisher: rospy.Publisher, message: Any) -> None:
-    """Publishes a message; a user's bad one must not end the thread that sends for all."""
+def _publish(publisher: rospy.Publisher, convert: Convert, sample: Any) -> None:
+    """Publishes a sample; a user's bad message must not end the thread that sends for all."""
     try:
-        publisher.publish(message)
+        publisher.publish(convert(sample))
     except rospy.ROSException as error:
         rospy.logerr_throttle(REPEAT, f"{publisher.name}: a message is lost: {error}")
 

@@ -140,6 +140,24 @@ class PluginContext(Mount):
             # A new list: the old one may be in use by the tick that removes an update.
             self.sim.listeners = [*self.sim.listeners, guarded]
 
+    def on_move(self, moved: Callable[[], None]) -> None:
+        """Calls `moved`, as `on_update` its update, after a service has moved bodies or reset time."""
+
+        def guarded() -> None:
+            try:
+                moved()
+            except BaseException:  # noqa: BLE001 - a user's code must not stop the world
+                self.report("is not told of moves any more, because it raised")
+                self._forget(guarded)
+
+        with self.sim.lock:
+            self.sim.moved = [*self.sim.moved, guarded]
+        self.closing(partial(self._forget, guarded))
+
+    def _forget(self, moved: Callable[[], None]) -> None:
+        with self.sim.lock:
+            self.sim.moved = [each for each in self.sim.moved if each is not moved]
+
     def release(self) -> None:
         """Ends the updates and clocks, and closes what was opened."""
         for clock in self._clocks:

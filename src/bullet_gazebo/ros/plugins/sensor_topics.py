@@ -85,7 +85,12 @@ class Topic:
     """A topic of a sensor; see `SensorTopics.advertise`."""
 
     def __init__(
-        self, name: str, kind: type, queue: int, latch: bool, newcomers: "Newcomers"
+        self,
+        name: str,
+        kind: type,
+        queue: int,
+        latch: bool = False,
+        newcomers: "Newcomers | None" = None,
     ) -> None:
         self._publisher = rospy.Publisher(
             name,

@@ -151,7 +151,7 @@ def test_a_parameter_that_is_no_table_is_a_warning(setting, places) -> None:
     assert any("no table" in each for each in setting.errors)
 
 
-@pytest.mark.parametrize("plugin", ["gazebo_ros_diff_drive", "my_robot_control"])
+@pytest.mark.parametrize("plugin", ["fetch_drive", "my_robot_control"])
 def test_a_foreign_control_plugin_is_told_in_a_line_of_its_own(setting, plugin) -> None:
     setting.spawn("bumper", plugin)
     (told,) = setting.errors

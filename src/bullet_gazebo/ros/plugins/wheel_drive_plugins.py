@@ -1,0 +1,147 @@
+"""libgazebo_ros_diff_drive.so and libgazebo_ros_skid_steer_drive.so (docs/contract/sensors.md 1 and 6)."""
+
+import logging
+
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from bullet_gazebo.drives.odometry import (
+    NANOSECONDS,
+    POSE,
+    TWIST,
+    UNKNOWN,
+    OdometrySample,
+)
+from bullet_gazebo.drives.wheels import Ramp, side_speeds
+from bullet_gazebo.physics.files.elements import truth
+from bullet_gazebo.ros.common.messages import to_time
+from bullet_gazebo.ros.plugins.drive_topics import (
+    DrivePlugin,
+    LinkTransforms,
+    Wheels,
+    advertised,
+    choice,
+    encoder_of,
+    length,
+)
+from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
+from bullet_gazebo.ros.plugins.sensor_topics import MODEL, namespace_of, topic_in
+
+LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
+
+
+class DiffDrivePlugin(DrivePlugin):
+    """Two wheels; a command holds until the next one or a reset."""
+
+    def __init__(self, context: PluginContext) -> None:
+        super().__init__(
+            context, namespace_of(context, MODEL, MODEL), context.number("updateRate", 100.0)
+        )
+        self._separation = length(context, "wheelSeparation", 0.34)
+        self._wheels = Wheels(
+            context,
+            {"leftJoint": "left_joint", "rightJoint": "right_joint"},
+            length(context, "wheelDiameter", 0.15),
+            context.number("wheelTorque", 5.0),
+        )
+        self._ramp = Ramp(context.number("wheelAcceleration", 0.0), 2)
+        self._driven = self.sim.now  # [ns]
+        self._encoder = encoder_of(context, self._separation)
+        # The original's order is right, left.
+        self._joints = self._wheels.joints[::-1]
+        self._joint_states = self._transforms = None
+        if choice(context, "publishWheelJointState", default=False):
+            name = topic_in(self.namespace, "joint_states")
+            self._joint_states = advertised(context, name, JointState, 1000)
+        if choice(context, "publishWheelTF", default=False):
+            self._transforms = LinkTransforms(self, [(each, each.child) for each in self._joints])
+        level = LEVELS.get(context.text("rosDebugLevel", "").lower())
+        if level is not None:
+            logging.getLogger("rosout").setLevel(level)
+        published = truth(context.text("publishTf", "true"))
+        self.begin(odometry=published, tf=published and choice(context, "publishOdomTF", True))
+
+    def update(self, now: int) -> None:
+        if self._encoder is not None:
+            self._encoder.step(self._wheels.speeds, self.sim.world.time_step)
+        if not self.period.is_over(now):
+            return
+        self.report(now)
+        if self._transforms is not None:
+            self._transforms.publish(now)
+        if self._joint_states is not None and self._joint_states.is_heard:
+            self._joint_states.publish(self._joint_state(now))
+        self._drive(now)
+
+    def _drive(self, now: int) -> None:
+        ahead, _, turn = self.command
+        targets = side_speeds(ahead, turn, self._separation)
+        seconds, self._driven = max(now - self._driven, 0) / NANOSECONDS, now
+        self._wheels.drive(self._ramp.next(targets, self._wheels.speeds, seconds))
+
+    def _joint_state(self, now: int) -> JointState:
+        names = [joint.name for joint in self._joints]
+        positions = [self.model.joint_state(name)[0] for name in names]
+        return JointState(header=Header(stamp=to_time(now)), name=names, position=positions)
+
+    def sample(self, now: int) -> OdometrySample:
+        if self._encoder is not None:
+            return self._encoder.sample(now, self.frame, self.child)
+        return self.truth(now, POSE, TWIST)
+
+    def restart(self) -> None:
+        self._driven = self.sim.now
+        self._ramp.restart()
+        if self._encoder is not None:
+            self._encoder.restart()
+        self._wheels.drive((0.0, 0.0))
+
+
+class SkidSteerPlugin(DrivePlugin):
+    """Two wheels on each side, which slip sideways in turns."""
+
+    def __init__(self, context: PluginContext) -> None:
+        super().__init__(
+            context, namespace_of(context, "", "/"), context.number("updateRate", 100.0)
+        )
+        self._separation = length(context, "wheelSeparation", 0.4)
+        self._wheels = Wheels(
+            context,
+            {
+                "leftFrontJoint": "left_front_joint",
+                "leftRearJoint": "left_rear_joint",
+                "rightFrontJoint": "right_front_joint",
+                "rightRearJoint": "right_rear_joint",
+            },
+            length(context, "wheelDiameter", 0.15),
+            context.number("torque", 5.0),
+        )
+        x, y, yaw = (
+            context.number(f"covariance_{axis}", default)
+            for axis, default in (("x", 1e-4), ("y", 1e-4), ("yaw", 1e-2))
+        )
+        self._covariance = (x, y, UNKNOWN, UNKNOWN, UNKNOWN, yaw)
+        self.begin(tf=choice(context, "broadcastTF", default=False))
+
+    def update(self, now: int) -> None:
+        if self.period.is_over(now):
+            self.report(now)
+            self._drive()
+
+    def _drive(self) -> None:
+        ahead, _, turn = self.command
+        left, right = side_speeds(ahead, turn, self._separation)
+        self._wheels.drive((left, left, right, right))
+
+    def restart(self) -> None:
+        self._drive()
+
+    def sample(self, now: int) -> OdometrySample:
+        found = self.truth(now, self._covariance, self._covariance)
+        return found._replace(position=(*found.position[:2], 0.0))
+
+
+LIBRARIES = {
+    "libgazebo_ros_diff_drive.so": DiffDrivePlugin,
+    "libgazebo_ros_skid_steer_drive.so": SkidSteerPlugin,
+}

@@ -1,0 +1,193 @@
+#!/usr/bin/env python3
+"""Vehicles over ROS: commands, odometry, tf, times and resets of plugins and controllers."""
+
+import unittest
+
+import rospy
+import rostest
+from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
+from dynamic_reconfigure.client import Client as DynamicClient
+from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
+from gazebo_msgs.msg import ModelState
+from gazebo_msgs.srv import GetModelState, SetModelState, SpawnModel, SpawnModelRequest
+from geometry_msgs.msg import Twist, TwistStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Empty
+from support.robots.vehicles import RADIUS, TRACK, four_wheels, two_wheels
+from support.ros.calls import BOUND, call, delete_model, wait_until
+from support.ros.manager import Manager
+from support.ros.subscribed import Listener
+from tf2_msgs.msg import TFMessage
+
+MS = 1_000_000
+DIFF = {
+    "libgazebo_ros_diff_drive.so": {
+        "leftJoint": "left_joint", "rightJoint": "right_joint", "wheelSeparation": TRACK,
+        "wheelDiameter": 2.0 * RADIUS, "publishWheelJointState": "true",
+    }
+}  # fmt: skip
+CONTROL = {"libgazebo_ros_control.so": {}}
+COVARIANCES = {
+    f"{what}_covariance_diagonal": [0.001, 0.001, 0.001, 0.001, 0.001, 0.03]
+    for what in ("pose", "twist")
+}
+
+
+class Drives(unittest.TestCase):
+    def spawn(self, urdf, namespace="/"):
+        call("/gazebo/reset_simulation", Empty)
+        rospy.set_param("/robot_description", urdf)
+        request = SpawnModelRequest(model_name="bot", model_xml=urdf, robot_namespace=namespace)
+        request.initial_pose.position.z = RADIUS
+        answer = call("/gazebo/spawn_urdf_model", SpawnModel, request)
+        self.assertTrue(answer.success, answer.status_message)
+        self.addCleanup(delete_model, "bot")
+
+    def step(self, ticks):
+        answer = call("/gazebo/step_world", StepWorld, StepWorldRequest(ticks=ticks))
+        self.assertTrue(answer.success, answer.status_message)
+
+    def hear(self, topic, kind):
+        heard = Listener(topic, kind)
+        self.addCleanup(heard.close)
+        return heard
+
+    def publisher(self, topic, kind=Twist):
+        publisher = rospy.Publisher(topic, kind, queue_size=1, latch=True)
+        self.addCleanup(publisher.unregister)
+        self.assertTrue(wait_until(publisher.get_num_connections))
+        return publisher
+
+    def stamps(self, heard, count):
+        self.assertTrue(heard.wait_for(lambda messages: len(messages) >= count))
+        return [message.header.stamp.to_nsec() // MS for message in heard.messages]
+
+    def state(self):
+        return call("/gazebo/get_model_state", GetModelState, "bot", "world")
+
+    def follow(self, publisher, message, odometry):
+        """Publishes until the robot moves: a message that is underway when a step begins is late."""
+        publisher.publish(message)
+        return wait_until(
+            lambda: self.step(20) or abs(odometry.messages[-1].twist.twist.linear.x) > 1e-3
+        )
+
+    def test_two_wheels_drive_by_their_plugin(self):
+        self.spawn(two_wheels(**DIFF))
+        odometry, tf = self.hear("/odom", Odometry), self.hear("/tf", TFMessage)
+        joints = self.hear("/joint_states", JointState)
+        self.step(500)
+        self.assertEqual(self.stamps(odometry, 49), list(range(11, 500, 10)))
+        command = Twist()
+        command.linear.x = 0.2
+        begin = self.state().pose.position.x
+        self.assertTrue(self.follow(self.publisher("/cmd_vel"), command, odometry))
+        self.step(5000)
+        way = self.state().pose.position.x - begin
+        self.assertAlmostEqual(way, 1.0, delta=0.04)
+        self.assertEqual(joints.messages[-1].name, ["right_joint", "left_joint"])
+        self.assertTrue(tf.wait_for(lambda messages: len(messages) >= len(odometry.messages)))
+        for message, transforms in zip(odometry.messages, tf.messages, strict=False):
+            (transform,) = transforms.transforms
+            place, move = message.pose.pose.position, transform.transform.translation
+            self.assertEqual((place.x, place.y, place.z), (move.x, move.y, move.z))
+            self.assertEqual(message.header.stamp, transform.header.stamp)
+        self.assertEqual(transform.child_frame_id, "base_footprint")
+
+    def test_odometry_is_the_models_state_at_once_after_a_move(self):
+        self.spawn(two_wheels(**DIFF))
+        odometry = self.hear("/odom", Odometry)
+        self.step(15)
+        state = ModelState(model_name="bot", reference_frame="world")
+        state.pose.position.x, state.pose.position.z, state.pose.orientation.w = 2.0, RADIUS, 1.0
+        self.assertTrue(call("/gazebo/set_model_state", SetModelState, state).success)
+        self.assertEqual(self.stamps(odometry, 2), [11, 15])
+        place, wanted = odometry.messages[-1].pose.pose.position, self.state().pose.position
+        for axis in ("x", "y", "z"):
+            self.assertAlmostEqual(getattr(place, axis), getattr(wanted, axis), delta=1e-9)
+        call("/gazebo/reset_simulation", Empty)
+        self.step(25)
+        self.assertEqual(self.stamps(odometry, 5)[2:], [0, 11, 21])
+
+    def test_a_diff_drive_controller_drives_and_tells(self):
+        params = COVARIANCES | {
+            "type": "diff_drive_controller/DiffDriveController", "left_wheel": "left_joint",
+            "right_wheel": "right_joint", "publish_cmd": True, "cmd_vel_timeout": 100.0,
+        }  # fmt: skip
+        rospy.set_param("/base", params)
+        self.spawn(two_wheels(**CONTROL))
+        manager = Manager()
+        self.assertIn(params["type"], manager.types().types)
+        self.assertTrue(wait_until(lambda: manager.start("base")))
+        odometry, tf = self.hear("/base/odom", Odometry), self.hear("/tf", TFMessage)
+        commands = self.hear("/base/cmd_vel_out", TwistStamped)
+        self.step(100)
+        self.assertEqual(self.stamps(odometry, 4), [21, 41, 61, 81])
+        command = Twist()
+        command.linear.x = 0.2
+        self.assertTrue(self.follow(self.publisher("/base/cmd_vel"), command, odometry))
+        tuner = DynamicClient("/base", timeout=BOUND)
+        self.addCleanup(tuner.close)
+        tuned = tuner.update_configuration({"wheel_separation_multiplier": 1.2})
+        self.assertEqual((tuned["wheel_separation_multiplier"], tuned["publish_rate"]), (1.2, 50.0))
+        self.step(2000)
+        self.assertTrue(commands.wait_for(lambda each: each[-1].twist.linear.x == 0.2))
+        self.assertAlmostEqual(odometry.messages[-1].twist.twist.linear.x, 0.2, delta=1e-3)
+        self.assertTrue(
+            tf.wait_for(lambda each: each[-1].transforms[0].header.stamp.to_nsec() >= 2e9)
+        )
+        self.assertGreater(len(odometry.messages), 100)
+        call("/gazebo/reset_simulation", Empty)
+        self.step(30)
+        self.assertTrue(odometry.wait_for(lambda each: each[-1].header.stamp.to_nsec() == 21 * MS))
+        self.assertEqual(self.stamps(odometry, 2)[-2:], [0, 21])
+        place = odometry.messages[-1].pose.pose.position
+        self.assertAlmostEqual(place.x, 0.0, delta=1e-3)
+
+    def test_four_wheels_steer_by_their_own_message(self):
+        corners = [f"{side}_{end}" for end in ("front", "rear") for side in ("left", "right")]
+        rospy.set_param("/base", COVARIANCES | {
+            "type": "four_wheel_steering_controller/FourWheelSteeringController",
+            "front_wheel": [f"{each}_joint" for each in corners[:2]],
+            "rear_wheel": [f"{each}_joint" for each in corners[2:]],
+            "front_steering": [f"{each}_steering" for each in corners[:2]],
+            "rear_steering": [f"{each}_steering" for each in corners[2:]],
+            "cmd_vel_timeout": 100.0,
+        })  # fmt: skip
+        self.spawn(four_wheels(steered=tuple(corners), **CONTROL))
+        self.assertTrue(wait_until(lambda: Manager().start("base")))
+        odometry = self.hear("/base/odom", Odometry)
+        steering = self.hear("/base/odom_steer", FourWheelSteeringStamped)
+        self.step(100)
+        command = FourWheelSteering(speed=0.2, front_steering_angle=0.3, rear_steering_angle=-0.3)
+        topic = self.publisher("/base/cmd_four_wheel_steering", FourWheelSteering)
+        self.assertTrue(self.follow(topic, command, odometry))
+        self.step(1000)
+        self.assertTrue(
+            steering.wait_for(lambda each: abs(each[-1].data.rear_steering_angle + 0.3) < 0.02)
+        )
+        self.assertGreater(odometry.messages[-1].twist.twist.angular.z, 0.2)
+
+    def test_a_skid_steer_and_a_planar_move_lie_in_the_robots_namespace(self):
+        torque = {"wheelSeparation": TRACK, "wheelDiameter": 2.0 * RADIUS, "broadcastTF": 1}
+        for number, (library, elements) in enumerate(
+            {
+                "libgazebo_ros_skid_steer_drive.so": torque,
+                "libgazebo_ros_planar_move.so": {},
+            }.items()
+        ):
+            with self.subTest(library):
+                self.spawn(four_wheels(**{library: elements}), f"/rover{number}")
+                odometry = self.hear(f"/rover{number}/odom", Odometry)
+                self.step(200)
+                command = Twist()
+                command.linear.x = 0.3
+                topic = self.publisher(f"/rover{number}/cmd_vel")
+                self.assertTrue(self.follow(topic, command, odometry))
+                delete_model("bot")
+
+
+if __name__ == "__main__":
+    rospy.init_node("drives_test")
+    rostest.rosrun("cartpole", "drives", "__main__")
