@@ -35,6 +35,8 @@ class FakeMaster:
             self._server.register_function(partial(self._lookup, known), method)
         self._server.register_function(lambda caller, key: [1, "", key in self.params], "hasParam")
         self._server.register_function(self._set_param, "setParam")
+        self._server.register_function(self._register_service, "registerService")
+        self._server.register_multicall_functions()
         for method in ("getName", "getMasterUri"):
             self._server.register_function(partial(self._tell, method), method)
         self._server.register_function(lambda caller, name: "nonsense", "nonsense")
@@ -48,6 +50,10 @@ class FakeMaster:
 
     def _set_param(self, caller, key, value):
         self.params[key] = value
+        return [1, "", 0]
+
+    def _register_service(self, caller, name, address, uri):
+        self.services[name] = address
         return [1, "", 0]
 
     def _tell(self, method, caller):

@@ -8,13 +8,16 @@
 - `answer_xmlrpc`: rospy has no way to answer one more XML-RPC call (gazebo_ros.test, `gz`)
 - `stop_hearing_clock`, `set_time`: the node that publishes /clock would hear it over a socket to itself
   (gazebo_parameters.test, gazebo_ros.test)
+- `registered_together`: clients find some services before the others (test_rospy_internals.py)
 - `register_again`: rospy doesn't register at a master that was started again (test_master_watch.py)
 """
 
+import contextlib
 import select
 import time
 import types
-from collections.abc import Callable
+import xmlrpc.client
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -24,7 +27,7 @@ import rospy.impl.registration
 import rospy.impl.simtime
 from rospy.impl import tcpros_pubsub
 from rospy.impl.masterslave import ROSHandler
-from rospy.impl.registration import RegManager
+from rospy.impl.registration import Registration, RegManager
 from rospy.impl.tcpros_pubsub import QueuedConnection
 from rospy.topics import Poller, _PublisherImpl, _SubscriberImpl, _TopicImpl
 
@@ -190,6 +193,35 @@ def stop_hearing_clock() -> None:
 def set_time(now: genpy.Time) -> None:
     """Sets the simulated time of this process's rospy, as a message on /clock does in other nodes."""
     rospy.rostime._set_rostime(now)
+
+
+@contextlib.contextmanager
+def registered_together() -> Iterator[None]:
+    """Registers the services that a block offers at its end, in one call of the master.
+
+    So a client that finds one of them finds the others.
+
+    Raises:
+        OSError: the master doesn't answer.
+    """
+    proxy = rospy.core.xmlrpcapi(master.uri())
+    calls, reg_added = xmlrpc.client.MultiCall(proxy), RegManager.reg_added
+
+    def add(manager: RegManager, name: str, what: str, kind: str) -> None:
+        if kind == Registration.SRV:
+            calls.registerService(rospy.get_name(), name, what, manager.uri)
+        else:
+            reg_added(manager, name, what, kind)
+
+    RegManager.reg_added = add
+    try:
+        yield
+    finally:
+        RegManager.reg_added = reg_added
+    answers: Any = calls()
+    for code, text, _ in answers:
+        if code != 1:
+            rospy.logfatal("unable to register a service with the master: %s", text)
 
 
 def witness() -> tuple[str, str]:

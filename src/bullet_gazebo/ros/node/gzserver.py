@@ -36,7 +36,11 @@ from bullet_gazebo.ros.common.rospy_connections import (
     bound_messages,
     hang_up_on_nonsense,
 )
-from bullet_gazebo.ros.common.rospy_internals import answer_xmlrpc, free_polls_at_once
+from bullet_gazebo.ros.common.rospy_internals import (
+    answer_xmlrpc,
+    free_polls_at_once,
+    registered_together,
+)
 from bullet_gazebo.ros.node.master_watch import MasterWatch, NameLoss, NodeNameTaken, refuse_twin
 from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
@@ -152,6 +156,10 @@ class GazeboNode:
         load_plugins(self.sim, plugins)
         if not network:
             return
+        with registered_together():
+            self._offer_services(plugins, thinner)
+
+    def _offer_services(self, plugins: PluginRegistry, thinner: Thinner) -> None:
         # Clients take the world for ready once it can be paused, so the step service comes first.
         stepping: list[object] = []
         if self.sim.lockstep:

@@ -1,6 +1,7 @@
 """How the node ends that could not be made ready."""
 
 import argparse
+import contextlib
 import socket
 from types import SimpleNamespace
 from unittest.mock import Mock
@@ -32,6 +33,7 @@ PARTS = ("SceneOffer", "WorldControl", "answer_xmlrpc", "free_polls_at_once", "b
 def test_no_model_is_spawned_before_all_services_are_there(monkeypatch):
     for name in PARTS:
         monkeypatch.setattr(gzserver, name, Mock())
+    monkeypatch.setattr(gzserver, "registered_together", contextlib.nullcontext)
     gates = []
 
     def others(_):

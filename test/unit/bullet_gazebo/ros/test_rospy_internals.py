@@ -12,9 +12,15 @@ from types import SimpleNamespace
 
 import pytest
 import rospy.topics
+from rospy.impl.registration import Registration, RegManager
 from rospy.impl.tcpros_pubsub import QueuedConnection
+from support.ros.ros_fakes import FakeMaster
 
-from bullet_gazebo.ros.common.rospy_internals import free_polls_at_once, wait_until_sent
+from bullet_gazebo.ros.common.rospy_internals import (
+    free_polls_at_once,
+    registered_together,
+    wait_until_sent,
+)
 
 
 class SlowTransport:
@@ -95,3 +101,17 @@ def test_a_topic_that_is_gone_leaves_no_file_open(monkeypatch) -> None:
         assert list(poller.error_iter()) == []
     del poller
     assert len(os.listdir("/proc/self/fd")) == len(before)
+
+
+def test_services_are_registered_together(monkeypatch) -> None:
+    """Else a client finds some of them, and calls one that isn't there yet."""
+    fake = FakeMaster()
+    monkeypatch.setenv("ROS_MASTER_URI", fake.uri)
+    manager = SimpleNamespace(uri="http://127.0.0.1:1", master_uri=fake.uri)
+    names = ["/gazebo/spawn_sdf_model", "/gazebo/pause_physics"]
+    with registered_together():
+        for name in names:
+            RegManager.reg_added(manager, name, "rosrpc://127.0.0.1:1", Registration.SRV)
+            assert not fake.services
+    assert list(fake.services) == names
+    fake.close()
