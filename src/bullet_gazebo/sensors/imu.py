@@ -130,7 +130,7 @@ class ModelImu:
         return (*found, HERE)
 
     def _rate(self, mount: Mount) -> float:
-        return mount.number("updateRate", 0.0)
+        return mount.rate()
 
     def start(self) -> None:
         """Lets the next measurement be one, without acceleration, if it is the first."""
@@ -184,7 +184,7 @@ class ImuSensor(ModelImu):
     def _rate(self, mount: Mount) -> float:
         assert mount.sensor is not None
         return slower(
-            mount.number("updateRateHZ", 1.0 if mount.plugin.filename else 0.0), mount.sensor.rate
+            mount.rate("updateRateHZ", 1.0 if mount.plugin.filename else 0.0), mount.sensor.rate
         )
 
     def _distorted(self, sample: InertialSample, random: np.random.Generator) -> InertialSample:

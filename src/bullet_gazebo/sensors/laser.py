@@ -157,7 +157,7 @@ class RangeSensor(LaserSensor):
 
     def __init__(self, mount: Mount) -> None:
         super().__init__(mount)
-        self.rate = slower(mount.number("updateRate", 0.0), self.rate)
+        self.rate = slower(mount.rate(), self.rate)
         self._deviation = mount.deviation()
 
     def values(self, now: int) -> dict[str, np.ndarray]:

@@ -144,10 +144,7 @@ def with_noise(
 
 def rate_of(mount: Mount, sensor: Sensor) -> float:
     """Returns the slower one of a plugin's `<updateRate>` and the sensor's rate [Hz]; 0 is every step."""
-    own = mount.number("updateRate", 0.0)
-    if own < 0.0:
-        raise DescriptionError(f"<updateRate> is {own:g}")
-    return slower(own, sensor.rate)
+    return slower(mount.rate(), sensor.rate)
 
 
 class CameraSensor:

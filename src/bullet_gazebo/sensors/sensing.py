@@ -88,6 +88,13 @@ class Mount:
             raise DescriptionError(f"<{tag}> is {found:g}; it must be within ±{LARGEST:g}")
         return found
 
+    def rate(self, tag: str = "updateRate", default: float = 0.0) -> float:
+        """Returns the plugin's own rate [Hz]; 0 is every step. A negative one is a DescriptionError."""
+        found = self.number(tag, default)
+        if found < 0.0:
+            raise DescriptionError(f"<{tag}> is {found:g}")
+        return found
+
     def deviation(self) -> float:
         """Returns the plugin's `<gaussianNoise>`; an impossible one is a DescriptionError."""
         return checked_deviation(self.number("gaussianNoise", 0.0), "<gaussianNoise>")

@@ -80,7 +80,7 @@ class FtSensorPlugin(ForcePlugin):
             raise DescriptionError("<jointName> is missing")
         self._joint = JointForces(context.sim, context.model, joint)
         frame = self._joint.link.rpartition("::")[2]
-        super().__init__(context, self._joint, frame, context.number("updateRate", rate))
+        super().__init__(context, self._joint, frame, context.rate("updateRate", rate))
 
     def _forces(self) -> Forces | None:
         return self._joint.wrench()

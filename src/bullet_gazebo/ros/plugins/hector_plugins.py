@@ -73,7 +73,7 @@ class HectorTimer:
         self._seeds = context.sensing.seeds
         self._last = context.sim.now
         period = context.number("updatePeriod", 0.0)
-        self.rate = 1.0 / period if period > 0.0 else context.number("updateRate", default)
+        self.rate = 1.0 / period if period > 0.0 else context.rate("updateRate", default)
         clock = context.clock(self.rate, self._measure, at_once=False)
         ticks = max(clock.period, 1)
         offset = math.fmod(context.number("updateOffset", 0.0), ticks / NANOSECONDS)

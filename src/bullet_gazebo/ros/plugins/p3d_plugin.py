@@ -50,7 +50,7 @@ class P3dPlugin(SensorPlugin):
         self._deviation = context.deviation()
         namespace = namespace_of(context, absent="", empty="/")
         self._frame = frame_of(namespace, frame)
-        rate = context.number("updateRate", 0.0)
+        rate = context.rate()
         SensorTopic(context, topic_in(namespace, topic), Odometry, rate, self._measure)
 
     def _measure(self, now: int) -> Odometry:

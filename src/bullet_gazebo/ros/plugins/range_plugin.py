@@ -18,7 +18,7 @@ class RangePlugin(SensorPlugin):
     """Publishes the smallest range, at most the largest that the sensor measures."""
 
     def __init__(self, context: PluginContext) -> None:
-        own = context.number("updateRate", 0.0)
+        own = context.rate()
         self._topic = LaserTopic(context, Range, self._message, "/range", empty="/", own_rate=own)
         self._deviation = context.deviation()
         self._is_sound = context.text("radiation", "infrared") == "ultrasound"

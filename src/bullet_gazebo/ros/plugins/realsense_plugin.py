@@ -59,7 +59,7 @@ class _Eye:
         self.context, self._link = context, sensor.link
         self.camera = camera_of(sensor)
         self.element, topic = EYES[name]
-        rate = context.number(f"{self.element.rstrip('12')}UpdateRate", sensor.rate)
+        rate = context.rate(f"{self.element.rstrip('12')}UpdateRate", sensor.rate)
         self.topics = SensorTopics(context, rate, self.take)
         self.scope = topic_in("", context.plugin.name)
         self.topic = context.text(f"{self.element}TopicName", topic)

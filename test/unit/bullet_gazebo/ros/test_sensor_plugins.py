@@ -64,6 +64,12 @@ BAD = {  # what is wrong: a link's part, a model's part, and words of the line
     "more noise than there is": (laser(more=NOISE.format("1e308")), "", "<stddev> is 1e+308"),
     "negative noise": (laser(more=NOISE.format(-1)), "", "<stddev> is -1"),
     "negative rate": (laser(before="<update_rate>-1</update_rate>"), "", "<update_rate> is -1"),
+    "truth's negative rate": (
+        "",
+        '<plugin name="p" filename="libgazebo_ros_p3d.so"><bodyName>base</bodyName><topicName>t</topicName>'
+        "<updateRate>-1</updateRate></plugin>",
+        "<updateRate> is -1",
+    ),
     "camera's negative rate": (camera(own="<updateRate>-1</updateRate>"), "", "<updateRate> is -1"),
     "a huge picture": (camera(SIZE.format(2000, 2000)), "", "2100000 pixels"),
     "a picture that is no JPEG": (camera(SIZE.format(70000, 1)), "", "<image/width> is 70000"),
