@@ -133,7 +133,7 @@ class Realtime(SecondRobot):
         robot = self.session.connect(self.scene, 0.01)
         self.addCleanup(robot.close)
         robot.look(StateQuery())
-        with self.assertRaisesRegex(RobotEnvError, "in real time gives the joints alone"):
+        with self.assertRaisesRegex(RobotEnvError, "in real time gives joints and sensors alone"):
             robot.look(StateQuery(models=("pendulum",)))
 
     def test_models_are_placed(self):

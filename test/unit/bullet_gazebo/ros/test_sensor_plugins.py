@@ -66,7 +66,7 @@ BAD = {  # what is wrong: a link's part, a model's part, and words of the line
     "negative rate": (laser(before="<update_rate>-1</update_rate>"), "", "<update_rate> is -1"),
     "truth's negative rate": (
         "",
-        '<plugin name="p" filename="libgazebo_ros_p3d.so"><bodyName>base</bodyName><topicName>t</topicName>'
+        '<plugin name="p" filename="libgazebo_ros_p3d.so"><bodyName>l</bodyName><topicName>t</topicName>'
         "<updateRate>-1</updateRate></plugin>",
         "<updateRate> is -1",
     ),
