@@ -78,7 +78,11 @@ def read_description(text: str) -> RobotDescription:
 
 
 def distance(robot: Element, joint: str, other: str) -> float:
-    """Returns how far two joints are from each other [m], as if none above them were turned."""
+    """Returns how far two joints are from each other [m], as if none above them were turned.
+
+    Raises:
+        ControlError: if the joints above one of them form a loop, or an origin is no three numbers.
+    """
     return math.dist(_place(robot, joint), _place(robot, other))
 
 
@@ -87,7 +91,11 @@ def _place(robot: Element, joint: str) -> list[float]:
     joints = {child.get("link"): each for child, each in above.items() if child is not None}
     found = robot.find(f"joint[@name='{joint}']")
     place = [0.0, 0.0, 0.0]
+    visited = set()
     while found is not None:
+        if found in visited:
+            raise ControlError(f"robot_description: the joints above '{joint}' form a loop")
+        visited.add(found)
         origin, parent = found.find("origin"), found.find("parent")
         text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
         try:

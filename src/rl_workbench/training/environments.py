@@ -7,6 +7,7 @@ same robot), `own_robot_options` (the options by which a copy has a robot of its
 """
 
 import hashlib
+import inspect
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -85,7 +86,8 @@ def _check_names(env_id: str, options: Mapping[str, Any]) -> None:
     """Refuses other code than the registration names: options may come from the record of a foreign run."""
     spec = spec_of(env_id)
     for name, value in (spec.kwargs if spec else {}).items():
-        if name in options and isinstance(value, str) and _CODE.fullmatch(value):
+        is_code = isinstance(value, str) and _CODE.fullmatch(value)
+        if is_code and options.get(name, value) != value:
             raise WorkbenchError(
                 f"can't make {env_id}: its {name} is {value}; no option changes it"
             )
@@ -197,11 +199,19 @@ def robot_options(
 
 
 def source_digest(env: gymnasium.Env[Any, Any]) -> str:
-    """Returns the digest of the files that the environment's task is written in, or else its class."""
+    """Returns the digest of the files that the environment's task is written in, or else its class.
+
+    Those of Python, Gymnasium and abstract classes don't count: other versions of them are the same task.
+    """
     kinds = type(_attribute(env, "task") or env.unwrapped).__mro__
-    modules = [sys.modules.get(kind.__module__) for kind in kinds]
+    names = dict.fromkeys(kind.__module__ for kind in kinds if not inspect.isabstract(kind))
+    modules = [
+        sys.modules.get(name)
+        for name in names
+        if name.partition(".")[0] not in sys.stdlib_module_names | {"gymnasium", "builtins"}
+    ]
     paths = [Path(path) for each in modules if (path := getattr(each, "__file__", None))]
-    content = b"".join(path.read_bytes() for path in sorted(set(paths)) if path.is_file())
+    content = b"".join(path.read_bytes() for path in paths if path.is_file())
     return hashlib.sha256(content).hexdigest()
 
 

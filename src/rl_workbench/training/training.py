@@ -86,7 +86,7 @@ class Training:
                 options, self._algorithm, self._envs[0], interrupt.requested, tell
             )
             making.callback(self._evaluator.close)
-            self._rescored = None
+            self._rescored, self._task = None, source_digest(self._envs[0])
             if self._resumed:
                 self._rescored = self._score_of_a_changed_task()
                 self._load(self._resumed)
@@ -132,13 +132,16 @@ class Training:
     def _score_of_a_changed_task(self) -> tuple[int, float] | None:
         """Returns step and score of the best policy so far, if what it was scored by isn't the same now."""
         before, path = read_record(self.folder).get("task"), self.folder / BEST
-        if before in (None, source_digest(self._envs[0])) or not path.exists():
+        if before in (None, self._task) or not path.exists():
             return None
         content = read(path)
         self._algorithm.load_state_dict(content)
         tell(f"the task's file has changed: {path.name} is evaluated again")
         score = self._evaluator.evaluate(-math.inf, tell, is_last=True)
-        return None if score is None else (int(content["steps"]), score.confirmed)
+        if score is None:  # interrupted: the next resumption evaluates it
+            self._task = before
+            return None
+        return int(content["steps"]), score.confirmed
 
     def _make_progress(self) -> Progress:
         if self._run.total_timesteps:
@@ -170,7 +173,7 @@ class Training:
         shared = robot_options(self._envs[0], self._run.training_environment)
         run_folder.write_record(
             self.folder,
-            {**record, "shared_robot": shared, "task": source_digest(self._envs[0])},
+            {**record, "shared_robot": shared, "task": self._task},
             bool(self._resumed),
         )
         settings = {**record["run"], **record["hyperparameters"]}

@@ -8,6 +8,7 @@ from bullet_gazebo.control.controllers.vehicle import (
     VehicleController,
     VehicleOptions,
     length_param,
+    multiplier_param,
     names_param,
 )
 from bullet_gazebo.control.errors import ControlError
@@ -83,11 +84,11 @@ class DiffDriveController(VehicleController):
         radius = length_param(
             params, "wheel_radius", name, lambda: wheel_radius(hardware.robot, first[0])
         )
-        both = option(params, "wheel_radius_multiplier", name, 1.0)
+        both = multiplier_param(params, "wheel_radius_multiplier", name)
         scales = {
-            LEFT: option(params, LEFT, name, both),
-            RIGHT: option(params, RIGHT, name, both),
-            SEPARATION: option(params, SEPARATION, name, 1.0),
+            LEFT: multiplier_param(params, LEFT, name, both),
+            RIGHT: multiplier_param(params, RIGHT, name, both),
+            SEPARATION: multiplier_param(params, SEPARATION, name),
         }
         left, right = (Side(joints, radius) for joints in sides)
         options = VehicleOptions.read(params, name)

@@ -13,6 +13,7 @@ from bullet_gazebo.control.controllers.vehicle import (
     VehicleController,
     VehicleOptions,
     length_param,
+    multiplier_param,
     names_param,
 )
 from bullet_gazebo.control.errors import ControlError
@@ -80,9 +81,9 @@ class AckermannSteeringController(SteeringController):
         radius = length_param(
             params, "wheel_radius", name, lambda: wheel_radius(hardware.robot, wheel.name)
         )
-        base *= option(params, "wheel_separation_h_multiplier", name, 1.0)
+        base *= multiplier_param(params, "wheel_separation_h_multiplier", name)
         found = cls(name, VehicleOptions.read(params, name), wheel, fork, base, radius)
-        found.scale_radius = option(params, "wheel_radius_multiplier", name, 1.0)
+        found.scale_radius = multiplier_param(params, "wheel_radius_multiplier", name)
         found.scale_angle = option(params, "steer_pos_multiplier", name, 1.0)
         return found
 

@@ -228,12 +228,23 @@ def length_param(
     """Returns the parameter `key` [m], or what `look_up` finds in the robot's description.
 
     Raises:
-        ControlError: if it isn't above 0, or there is nothing to be found.
+        ControlError: if it isn't above 0 and finite, or there is nothing to be found.
     """
     found = number_param(params, key, place) if key in params else look_up()
-    if found <= 0.0:
-        raise ControlError(f"parameter {place}/{key} must be above 0: {found}")
+    if not 0.0 < found < math.inf:
+        raise ControlError(f"parameter {place}/{key} must be above 0 and finite: {found}")
     return found
+
+
+def multiplier_param(
+    params: Mapping[str, object], key: str, place: str, default: float = 1.0
+) -> float:
+    """Returns the parameter `key`, a factor of a length.
+
+    Raises:
+        ControlError: if it isn't above 0 and finite.
+    """
+    return length_param(params, key, place, lambda: default)
 
 
 def names_param(params: Mapping[str, object], key: str, place: str) -> list[str]:

@@ -46,7 +46,10 @@ ATTRIBUTES = {
     "gaussian_noise": "noise", "offset": "offset", "drift": "drift", "drift_frequency": "frequency",
     "scale_error": "scale",
 }  # fmt: skip
-MODEL = [Parameter(name, "double", 0.0, -MOST, MOST) for name in ATTRIBUTES]
+MODEL = [
+    Parameter(name, "double", 0.0, 0.0 if name == "drift_frequency" else -MOST, MOST)
+    for name in ATTRIBUTES
+]
 
 
 class HectorTimer:
@@ -146,9 +149,12 @@ class HectorImuPlugin(SensorPlugin):
         """Offers a service that sets the drift of `error`: to zero if the request has no bias."""
 
         def answer(request: Any) -> Any:
-            bias = getattr(request, "bias", Vector3())
+            vector = getattr(request, "bias", Vector3())
+            bias = (vector.x, vector.y, vector.z)
+            if not all(map(math.isfinite, bias)):
+                raise rospy.ServiceException(f"the bias is not finite: {bias}")
             with self._context.sim.lock:
-                error.restart((bias.x, bias.y, bias.z))
+                error.restart(bias)
             return kind._response_class()
 
         with suppress(rospy.ServiceException):  # another robot's has the name
@@ -156,13 +162,13 @@ class HectorImuPlugin(SensorPlugin):
             self._context.closing(offered.shutdown)
 
     def _configure(self, error: DriftingError, wanted: Config, level: int) -> Config:
-        """Sets an error model; the first call asks for the file's."""
+        """Sets an error model; the first call asks for the file's, a number that isn't finite is left out."""
         with self._context.sim.lock:
-            for parameter in MODEL:
-                if level == FIRST:
-                    wanted[parameter.name] = float(getattr(error, ATTRIBUTES[parameter.name])[0])
+            for name, attribute in ATTRIBUTES.items():
+                if level == FIRST or not math.isfinite(wanted[name]):
+                    wanted[name] = float(getattr(error, attribute)[0])
                 else:
-                    setattr(error, ATTRIBUTES[parameter.name], np.full(3, wanted[parameter.name]))
+                    setattr(error, attribute, np.full(3, wanted[name]))
         return wanted
 
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:

@@ -33,7 +33,9 @@ RED, BLUE = (220, 30, 30), (40, 90, 220)
 POINT, LENGTH, EDGE = 0.02, 0.15, 0.006  # [m]; of points, of frustums and of their edges
 OPACITY = 0.2
 NOTHING = "<div style='padding: 0 0.8em'>no sensor has a topic that can be drawn</div>"
-FAULTS = (ValueError, KeyError, TypeError, OSError, Image.DecompressionBombError)
+FAULTS = (
+    ArithmeticError, LookupError, OSError, TypeError, ValueError, Image.DecompressionBombError,
+)  # fmt: skip
 """What a message may raise that somebody else made."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from typing import Any
+from xml.etree.ElementTree import fromstring
 
 import pytest
 from support.robots.vehicles import RADIUS, TRACK, WHEELBASE, bicycle, four_wheels, two_wheels
@@ -178,6 +179,10 @@ def test_wrong_commands_are_refused(world):
         ({"right_wheel": "no_joint"}, "joint 'no_joint' is not in"),
         ({"pose_covariance_diagonal": [1.0]}, "base/pose_covariance_diagonal must be a list of 6"),
         ({"wheel_radius": 0}, "base/wheel_radius must be above 0"),
+        ({"wheel_separation_multiplier": -1}, "base/wheel_separation_multiplier must be above 0"),
+        ({"wheel_radius_multiplier": 0.0}, "base/wheel_radius_multiplier must be above 0"),
+        ({"left_wheel_radius_multiplier": 0}, "base/left_wheel_radius_multiplier must be above 0"),
+        ({"right_wheel_radius_multiplier": -1}, "base/right_wheel_radius_multiplier must be above"),
         ({"open_loop": 1}, "base/open_loop must be of type bool"),
         ({"linear": {"x": {"has_jerk_limits": True}}}, "base/linear/x/max_jerk is missing"),
         ({"publish_rate": "fast"}, "base/publish_rate is missing or is not a finite number"),
@@ -187,6 +192,18 @@ def test_wrong_parameters_are_named(sim, wrong, complaint):
     robot = add_robot(sim, "bot", two_wheels())
     with pytest.raises(ControlError, match=complaint):
         BUILT_IN[DIFF["type"]].create("base", DIFF | wrong, robot.hardware)
+
+
+def test_a_description_without_a_distance_is_refused(sim):
+    robot = add_robot(sim, "bot", two_wheels())
+    description, create = robot.hardware.robot, BUILT_IN[DIFF["type"]].create
+    description.find("joint[@name='left_joint']/origin").set("xyz", "nan 0 0")
+    with pytest.raises(ControlError, match="base/wheel_separation must be above 0 and finite"):
+        create("base", DIFF, robot.hardware)
+    back = '<joint name="back"><parent link="left_wheel"/><child link="base"/></joint>'
+    description.append(fromstring(back))
+    with pytest.raises(ControlError, match="the joints above 'left_joint' form a loop"):
+        create("base", DIFF, robot.hardware)
 
 
 COVARIANCES = {key: DIFF[key] for key in DIFF if "covariance" in key}
@@ -203,6 +220,14 @@ FOUR = COVARIANCES | {
     "front_steering": ["left_front_steering", "right_front_steering"],
     "rear_steering": ["left_rear_steering", "right_rear_steering"],
 }
+
+
+@pytest.mark.parametrize("key", ["wheel_separation_h_multiplier", "wheel_radius_multiplier"])
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_a_bicycle_of_no_length_is_refused(sim, key, value):
+    robot = add_robot(sim, "bot", bicycle())
+    with pytest.raises(ControlError, match=f"base/{key} must be above 0"):
+        BUILT_IN[ACKERMANN["type"]].create("base", ACKERMANN | {key: value}, robot.hardware)
 
 
 def test_a_bicycle_follows_the_circle_of_its_fork(world):

@@ -12,6 +12,7 @@ from sensor_msgs.msg import Image as ImageMessage
 from std_msgs.msg import Header
 
 from bullet_gazebo.ros.window.sensor_panel import (
+    FAULTS,
     MOST_POINTS,
     draw_cloud,
     draw_depths,
@@ -75,3 +76,11 @@ def test_pictures_of_colours_and_depths_fit_the_page():
 def test_foreign_depths_are_refused(encoding):
     with pytest.raises((KeyError, ValueError)):
         draw_depths(ImageMessage(height=9, width=9, encoding=encoding, data=b"abcd"))
+
+
+@pytest.mark.parametrize(
+    "limits", [{"angle_increment": 1e-320}, {"angle_increment": 0.1, "angle_max": math.inf}]
+)
+def test_a_scan_without_end_is_a_fault_of_its_message(limits):
+    with pytest.raises(FAULTS):
+        draw_scan(LaserScan(**({"angle_max": 1.0, "ranges": [1.0]} | limits)))

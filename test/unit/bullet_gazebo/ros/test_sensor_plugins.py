@@ -1,12 +1,18 @@
 """Sensors' plugins without a master: bad ones are told in a line, and all go with their model."""
 
 import gc
+import math
 import tracemalloc
 from collections import Counter
 
 import pytest
 import rospy
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
+from geometry_msgs.msg import Vector3
+from hector_gazebo_plugins.srv import SetBiasRequest
 from hypothesis import HealthCheck, Phase, given, settings
+from sensor_msgs.msg import Imu, LaserScan
 from support.mutations.xml_trees import mutated_xml
 from support.ros.silent_topics import SilentPublisher, SilentService, silence
 
@@ -131,6 +137,17 @@ class Node:
 
 
 @pytest.fixture
+def published(monkeypatch):
+    """All messages, whatever their topic."""
+    messages = []
+    publish = SilentPublisher.publish
+    monkeypatch.setattr(
+        SilentPublisher, "publish", lambda *args: messages.append(args[1]) or publish(*args)
+    )
+    return messages
+
+
+@pytest.fixture
 def node(monkeypatch):
     node = Node(silence(monkeypatch))
     yield node
@@ -146,8 +163,37 @@ def test_an_impossible_sensor_is_told_in_a_line(node, fault):
     assert node.sim.now == 4_000_000
 
 
-def test_rates_that_are_nearly_none_measure_nothing(node):
+def test_rates_that_are_nearly_none_measure_only_for_a_listener_that_comes(node, published):
     assert not node.spawn(MODEL.format(laser(before="<update_rate>1e-320</update_rate>"), ""))
+    scans = [each for each in published if isinstance(each, LaserScan)]
+    assert [each.header.stamp.to_nsec() for each in scans] == [0, 3_000_000]  # and after a reset
+
+
+def test_errors_of_an_imu_that_cannot_be_are_refused(node, published, monkeypatch):
+    handlers = {}
+
+    def service(name, kind, handler):
+        handlers[name] = handler
+        return SilentService(name)
+
+    monkeypatch.setattr(rospy, "Service", service)
+    plugin = of_model("hector_gazebo_ros_imu", "<bodyName>l</bodyName><topicName>felt</topicName>")
+    model = node.sim.world.spawn("m", parse_sdf(MODEL.format("", plugin)), Pose())
+    node.plugins.load(model, "/")
+    wanted = {"drift_frequency": -1.0, "drift": 0.5, "offset": math.nan}
+    answer = handlers["/felt/accel/set_parameters"](ReconfigureRequest(encode_config(wanted)))
+    values = {each.name: each.value for each in answer.config.doubles}
+    assert (values["drift_frequency"], values["drift"], values["offset"]) == (0.0, 0.5, 0.0)
+    with pytest.raises(rospy.ServiceException, match="not finite"):
+        handlers["/felt/set_rate_bias"](SetBiasRequest(Vector3(math.nan, 0.0, 0.0)))
+    with node.sim.lock:
+        node.sim.advance(3)
+    felt = [each for each in published if isinstance(each, Imu)]
+    node.plugins.unload(model)
+    assert felt
+    for each in felt:
+        for vector in (each.linear_acceleration, each.angular_velocity):
+            assert all(map(math.isfinite, (vector.x, vector.y, vector.z)))
 
 
 @pytest.mark.filterwarnings("error")

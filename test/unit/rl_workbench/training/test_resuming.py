@@ -1,5 +1,6 @@
 """Interrupted anywhere and resumed: a training ends with the bits with which it would have ended."""
 
+import hashlib
 import shutil
 import sys
 from pathlib import Path
@@ -25,6 +26,8 @@ from rl_workbench.training import checkpoints as run_checkpoints
 from rl_workbench.training import training
 from rl_workbench.training.checked import CheckedEnvironment
 from rl_workbench.training.checkpoints import Checkpoints
+from rl_workbench.training.environments import source_digest
+from rl_workbench.training.evaluator import Evaluator
 
 pytestmark = pytest.mark.slow
 
@@ -121,13 +124,23 @@ def test_after_a_change_of_the_task_the_best_is_evaluated_again(
 
     monkeypatch.setattr(CheckedEnvironment, "step", halved)
     assert resume(run, interrupt) and "evaluated again" not in capsys.readouterr().out
+    before = record(run)["task"]
     monkeypatch.setattr(training, "source_digest", lambda env: "another")
+    with monkeypatch.context() as interrupted:
+        interrupted.setattr(Evaluator, "evaluate", lambda *_, **__: None)
+        resume(run)
+    assert record(run)["task"] == before, "the next resumption evaluates it"
     resume(run)
     after = checkpoint(run)["history"]["best"]
     assert "best.pt is evaluated again" in capsys.readouterr().out
     assert after == [step_of_best, score / 2] and record(run)["task"] == "another"
     resume(run)
     assert checkpoint(run)["history"]["best"] == after
+
+
+def test_python_s_and_gymnasium_s_files_are_no_part_of_a_task() -> None:
+    own = Path(sys.modules[OnlyOne.__module__].__file__).read_bytes()
+    assert source_digest(OnlyOne()) == hashlib.sha256(own).hexdigest()
 
 
 def test_an_evaluation_that_a_checkpoint_knows_of_is_not_held_again(tmp_path: Path) -> None:

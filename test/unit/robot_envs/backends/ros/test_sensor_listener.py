@@ -103,6 +103,28 @@ def test_messages_become_readings(heard: Heard) -> None:
     assert np.array_equal(found.read(0.0)["camera"].image, colours[..., [0, 0, 0]])
 
 
+@pytest.mark.parametrize(
+    ("name", "topic", "old", "new", "most"),
+    [
+        ("imu", "/imu", "<updateRateHZ>100</updateRateHZ>", "", 3.0),  # by default it is 1 Hz
+        ("imu", "/imu", "<updateRateHZ>100", "<updateRateHZ>500", 0.03),  # the sensor is slower
+        ("sonar", "/sonar", "<topicName>sonar", "<updateRate>2</updateRate><topicName>sonar", 1.5),
+        ("old_imu", "/old_imu", "<updateRate>60", "<updateRate>20", 0.15),
+    ],
+)
+def test_the_slower_rate_of_sensor_and_plugin_counts(
+    heard: Heard, name: str, topic: str, old: str, new: str, most: float
+) -> None:
+    text = str(SEEING.urdf)
+    assert old in text
+    found = listener(heard, name, robot=replace(SEEING, urdf=text.replace(old, new)))
+    heard.send(topic, heard.topics[topic][0](header=HEADER))
+    heard.now = most - 0.001
+    assert found.trouble(late=0.01) == ""
+    heard.now = most + 0.001
+    assert found.trouble(late=0.01) == f"no message on {topic} for {most:g} s"
+
+
 def test_late_and_unreadable_messages_are_told(heard: Heard) -> None:
     found = listener(heard, "front_laser", "camera")
     heard.send("/scan", LaserScan(header=HEADER, ranges=[0.1]))
