@@ -245,7 +245,10 @@ class RealtimeWorld(RobotBackend):
         self._pause()
         if not came:
             missing = ", ".join(self._sensors.missing())
-            raise SimulatorError(f"no message on {missing} for {STATE_TIMEOUT:g} s since the reset")
+            raise SimulatorError(
+                self._sensors.fault()
+                or f"no message on {missing} for {STATE_TIMEOUT:g} s since the reset"
+            )
 
     def _place_model(self, name: str, motion: Motion) -> None:
         pose, (linear, angular) = motion

@@ -166,6 +166,11 @@ class SensorListener:
                 if name not in self._heard
             ]
 
+    def fault(self) -> str:
+        """Returns why the newest message of a sensor can't be read; empty if all can."""
+        with self._arrived:
+            return next(iter(self._faults.values()), "")
+
     def wait(self, timeout: float) -> bool:
         """Returns whether something has come of all, at the latest after so long [s of wall time]."""
         with self._arrived:
@@ -185,7 +190,7 @@ class SensorListener:
                 since = max(heard.arrival, self._resumed)
                 if now - since > most and name not in self._faults:
                     return f"no message on {self._subscribers[name].resolved_name} for {most:g} s"
-            return next(iter(self._faults.values()), "")
+            return self.fault()
 
     def resume(self) -> None:
         """Tells that a world which stood still moves on from now."""

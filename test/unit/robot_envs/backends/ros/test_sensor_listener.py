@@ -177,6 +177,17 @@ def test_a_world_that_stood_paused_while_a_policy_learned_goes_on(
         world.act({})
 
 
+def test_after_a_reset_the_fault_of_messages_is_told_first(
+    heard: Heard, world: RealtimeWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world.look(StateQuery(sensors=("front_laser", "camera")))
+    strange = picture("yuv422", np.zeros((2, 2, 2), np.uint8))
+    monkeypatch.setattr(world._sensors, "forget", lambda: heard.send("/eye/image_raw", strange))
+    monkeypatch.setattr(world._sensors, "wait", lambda _: False)
+    with pytest.raises(SimulatorError, match="^the sensor 'camera': pictures are yuv422"):
+        world.reset(InitialState())
+
+
 def test_late_and_unreadable_messages_are_told(heard: Heard) -> None:
     found = listener(heard, "front_laser", "camera")
     heard.send("/scan", LaserScan(header=HEADER, ranges=[0.1]))
