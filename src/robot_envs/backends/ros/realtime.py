@@ -201,6 +201,7 @@ class RealtimeWorld(RobotBackend):
         self._set_model = SimulatorService("/gazebo/set_model_state", SetModelState)
         self._get_link = SimulatorService("/gazebo/get_link_state", GetLinkState)
         self._held: dict[str, Any] = {}
+        self._is_paused = False
         self._begin = 0.0  # [s] of the episode
         self._topics = {
             name: CommandTopic(scene, full_name(robot, port.name), port.single)
@@ -222,6 +223,7 @@ class RealtimeWorld(RobotBackend):
             for topic in self._topics.values():
                 topic.wait()
             self._pause()
+            self._is_paused = True
             self._reset_world()
             for name, motion in self.scene.placed_models(initial).items():
                 self._place_model(name, motion)
@@ -267,6 +269,9 @@ class RealtimeWorld(RobotBackend):
         self._world.check_holder(self)
         with self._simulator:
             self._unpause()
+            if self._is_paused:
+                self._sensors.resume()
+                self._is_paused = False
             last = self._states.time
             due = None if self._period is None or last is None else last + self._period
             for name, command in commands.items():

@@ -9,9 +9,11 @@ import rospy
 from gazebo_msgs.msg import ContactsState
 from sensor_msgs.msg import Image, Imu, LaserScan, Range
 
-from bullet_gazebo.physics.description import Plugin, library_of
+from bullet_gazebo.physics.description import DescriptionError, Plugin, library_of
+from bullet_gazebo.physics.files.sdf_parts import value
 from bullet_gazebo.sensors.laser import KINDS as LASERS
 from bullet_gazebo.sensors.pinhole import DEPTH_KINDS
+from bullet_gazebo.sensors.sensing import slower
 from file_access.text import did_you_mean
 from robot_envs.backends.ros.lockstep import contact_of
 from robot_envs.errors import RobotEnvError
@@ -79,17 +81,21 @@ class _Driver(NamedTuple):
     empty: str | None  # namespace of an empty <robotNamespace>; None: the model's name
     message: type
     read: Callable[[Any], Values]
+    rate: tuple[str, float] = ("", 0.0)  # element of the plugin's own, and without it [Hz]
 
 
+_OWN_RATE = ("updateRate", 0.0)
 _LASER = _Driver("topicName", "/world", None, LaserScan, _scan)
-_CAMERA = _Driver("imageTopicName", "image_raw", None, Image, _image)
-_DEPTH = _Driver("depthImageTopicName", "depth/image_raw", None, Image, _depth)
+_CAMERA = _Driver("imageTopicName", "image_raw", None, Image, _image, _OWN_RATE)
+_DEPTH = _Driver("depthImageTopicName", "depth/image_raw", None, Image, _depth, _OWN_RATE)
 _DRIVERS = {
     "libgazebo_ros_laser.so": _LASER,
     "libgazebo_ros_gpu_laser.so": _LASER,
-    "libgazebo_ros_range.so": _Driver("topicName", "/range", "/", Range, _range),
-    "libgazebo_ros_imu_sensor.so": _Driver("topicName", "imu_data", "/", Imu, _imu),
-    "libgazebo_ros_imu.so": _Driver("topicName", "/default_imu", "/", Imu, _imu),
+    "libgazebo_ros_range.so": _Driver("topicName", "/range", "/", Range, _range, _OWN_RATE),
+    "libgazebo_ros_imu_sensor.so": _Driver(
+        "topicName", "imu_data", "/", Imu, _imu, ("updateRateHZ", 1.0)
+    ),
+    "libgazebo_ros_imu.so": _Driver("topicName", "/default_imu", "/", Imu, _imu, _OWN_RATE),
     "libgazebo_ros_camera.so": _CAMERA,
     "libgazebo_ros_depth_camera.so": _DEPTH,
     "libgazebo_ros_openni_kinect.so": _DEPTH,
@@ -132,6 +138,7 @@ class SensorListener:
         self._heard: dict[str, _Heard] = {}
         self._faults: dict[str, str] = {}
         self._periods: dict[str, float] = {}  # [s]
+        self._resumed = 0.0  # [s] of the clock
         self._subscribers = {name: self._subscribed(robot, name) for name in names}
 
     def _subscribed(self, robot: Robot, name: str) -> rospy.Subscriber:
@@ -167,14 +174,22 @@ class SensorListener:
             )
 
     def trouble(self, late: float) -> str:
-        """Returns what can't be read, or is older than `late` [s] and three periods; empty if all is well."""
+        """Returns what can't be read, or is older than `late` [s] and three periods; empty if all is well.
+
+        Time counts from the last `resume` at the earliest.
+        """
         now = self._clock()
         with self._arrived:
             for name, heard in self._heard.items():
                 most = max(late, LATE_PERIODS * self._periods[name])
-                if now - heard.arrival > most and name not in self._faults:
+                since = max(heard.arrival, self._resumed)
+                if now - since > most and name not in self._faults:
                     return f"no message on {self._subscribers[name].resolved_name} for {most:g} s"
             return next(iter(self._faults.values()), "")
+
+    def resume(self) -> None:
+        """Tells that a world which stood still moves on from now."""
+        self._resumed = self._clock()
 
     def read(self, begin: float) -> Sensors:
         """Returns the newest readings, whose times are counted from `begin` [s]."""
@@ -197,7 +212,7 @@ class SensorListener:
 
 
 def _source(robot: Robot, name: str) -> tuple[str, _Driver, float]:
-    """Returns the topic of a sensor, how it is read, and the sensor's rate [Hz]."""
+    """Returns the topic of a sensor, how it is read, and the slower of its rate and the plugin's [Hz]."""
     known = {
         each.name: (each.kind, next(iter(each.plugins), None), each.rate)
         for each in robot.links.sensors
@@ -216,6 +231,12 @@ def _source(robot: Robot, name: str) -> tuple[str, _Driver, float]:
         raise RobotEnvError(
             f"the topic of the sensor '{plain}' isn't known: name it in the robot's sensor_topics"
         )
+    if own and of_sensor is not None:
+        try:
+            own_rate = value(of_sensor.element, own.rate[0], f"the sensor '{plain}'", own.rate[1])
+        except DescriptionError as error:
+            raise RobotEnvError(str(error)) from error
+        rate = slower(own_rate, rate)
     if given:
         return given, driver, rate
     assert of_sensor is not None

@@ -1,9 +1,10 @@
 """What a robot's sensors send, in real time: topics and messages, without ROS's servers."""
 
+import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,8 +13,13 @@ from sensor_msgs.msg import Image, Imu, LaserScan, Range
 from std_msgs.msg import Header
 from support.scenes.seeing_rover import NAMES, SEEING
 
-from robot_envs import RobotEnvError
+from robot_envs import InitialState, RobotEnvError, SimulatorError, StateQuery
+from robot_envs.backends.ros import realtime
+from robot_envs.backends.ros.realtime import RealtimeWorld
+from robot_envs.backends.ros.running import SharedWorld
 from robot_envs.backends.ros.sensor_listener import SensorListener
+from robot_envs.scene import Scene
+from robot_envs.world_state import JointState
 
 HEADER = Header(stamp=rospy.Time(7, 500_000_000))
 
@@ -101,6 +107,74 @@ def test_messages_become_readings(heard: Heard) -> None:
     assert np.array_equal(found.read(0.0)["deep"].depth, depths, equal_nan=True)
     heard.send("/eye/image_raw", picture("mono8", colours[..., 0]))
     assert np.array_equal(found.read(0.0)["camera"].image, colours[..., [0, 0, 0]])
+
+
+@pytest.mark.parametrize(
+    ("name", "topic", "old", "new", "most"),
+    [
+        ("imu", "/imu", "<updateRateHZ>100</updateRateHZ>", "", 3.0),  # by default it is 1 Hz
+        ("imu", "/imu", "<updateRateHZ>100", "<updateRateHZ>500", 0.03),  # the sensor is slower
+        ("sonar", "/sonar", "<topicName>sonar", "<updateRate>2</updateRate><topicName>sonar", 1.5),
+        ("old_imu", "/old_imu", "<updateRate>60", "<updateRate>20", 0.15),
+    ],
+)
+def test_the_slower_rate_of_sensor_and_plugin_counts(
+    heard: Heard, name: str, topic: str, old: str, new: str, most: float
+) -> None:
+    text = str(SEEING.urdf)
+    assert old in text
+    found = listener(heard, name, robot=replace(SEEING, urdf=text.replace(old, new)))
+    heard.send(topic, heard.topics[topic][0](header=HEADER))
+    heard.now = most - 0.001
+    assert found.trouble(late=0.01) == ""
+    heard.now = most + 0.001
+    assert found.trouble(late=0.01) == f"no message on {topic} for {most:g} s"
+
+
+def test_a_pause_makes_nothing_late(heard: Heard) -> None:
+    found = listener(heard, "front_laser")
+    heard.send("/scan", LaserScan(header=HEADER))
+    heard.now = 60.0
+    found.resume()
+    heard.now = 64.9
+    assert found.trouble(late=5.0) == ""
+    heard.now = 65.1
+    assert found.trouble(late=5.0) == "no message on /scan for 5 s"
+
+
+@pytest.fixture
+def world(heard: Heard, monkeypatch: pytest.MonkeyPatch) -> RealtimeWorld:
+    """A world whose services do nothing; it has a clock, and joint states at once."""
+    joints = {name: JointState(0.0, 0.0, 0.0) for name in Scene([SEEING]).joints}
+    states = SimpleNamespace(
+        time=7.5, forget_unless_at=lambda _: None, wait_until=lambda _: (7.52, joints)
+    )
+    idle = SimpleNamespace(
+        wait=lambda: None, publish=lambda _: None, join=lambda _: None,
+        claim=lambda _: None, check_holder=lambda _: None,
+    )  # fmt: skip
+    answer = SimpleNamespace(success=True)
+    monkeypatch.setattr(realtime, "RunningSimulator", contextlib.nullcontext)
+    monkeypatch.setattr(realtime, "SimulatorService", lambda *_: lambda *_: answer)
+    monkeypatch.setattr(realtime, "CommandTopic", lambda *_: idle)
+    monkeypatch.setattr(realtime, "JointStates", lambda _: states)
+    monkeypatch.setattr(realtime, "time", SimpleNamespace(monotonic=lambda: heard.now))
+    return RealtimeWorld(Scene([SEEING]), 0.02, cast(SharedWorld, idle))
+
+
+def test_a_world_that_stood_paused_while_a_policy_learned_goes_on(
+    heard: Heard, world: RealtimeWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world.look(StateQuery(sensors=("front_laser",)))
+    listening = world._sensors
+    scan = LaserScan(header=HEADER, ranges=[0.5])
+    monkeypatch.setattr(listening, "wait", lambda _: heard.send("/scan", scan) or True)
+    world.reset(InitialState())
+    heard.now = 60.0
+    assert world.act({}).sensors["front_laser"].ranges.tolist() == [0.5]
+    heard.now = 65.1
+    with pytest.raises(SimulatorError, match="no message on /scan for 5 s"):
+        world.act({})
 
 
 def test_late_and_unreadable_messages_are_told(heard: Heard) -> None:
