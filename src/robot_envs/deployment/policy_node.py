@@ -16,7 +16,7 @@ from robot_envs.backends.ros.bringup import full_name
 from robot_envs.backends.ros.running import lockstep_hint
 from robot_envs.backends.ros.sensor_listener import SensorListener
 from robot_envs.deployment.pilot import Pilot
-from robot_envs.deployment.reports import ControllerWatch, JointListener
+from robot_envs.deployment.reports import OFF, ControllerWatch, JointListener
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.task import GoalTask, Task
@@ -83,7 +83,9 @@ class PolicyNode:
         self._joints = JointListener(
             full_name(robot, "joint_states"), robot.model, robot.joints, robot.limits, self._late
         )
-        self._sensors = SensorListener(robot, task.query.sensors, rospy.get_time)
+        self._sensors = SensorListener(
+            robot, task.query.sensors, rospy.get_time, max(self._late, OFF)
+        )
         self._controllers = ControllerWatch(robot, self._ended)
         self._topics = {
             port.name: rospy.Publisher(

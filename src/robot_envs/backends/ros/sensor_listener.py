@@ -39,11 +39,15 @@ def _range(message: Range) -> Values:
 
 def _imu(message: Imu) -> Values:
     turn, spin, push = message.orientation, message.angular_velocity, message.linear_acceleration
-    return {
+    found = {
         "orientation": np.array([turn.x, turn.y, turn.z, turn.w]),
         "angular_velocity": np.array([spin.x, spin.y, spin.z]),
         "linear_acceleration": np.array([push.x, push.y, push.z]),
     }
+    for name, numbers in found.items():
+        if not np.isfinite(numbers).all():
+            raise ValueError(f"{name} is {numbers.tolist()}")
+    return found
 
 
 def _image(message: Image) -> Values:
@@ -127,13 +131,21 @@ class SensorListener:
         robot: whose plugins, or `sensor_topics`, name the topics.
         names: of its sensors.
         clock: tells the time of arrival [s].
+        off: how far stamps may be off that clock [s]; then, too, a reading counts only if its stamp is newer
+            than the one before. None: the clock isn't that of the stamps.
 
     Raises:
         RobotEnvError: if the robot has no such sensor, or none whose topic is known.
     """
 
-    def __init__(self, robot: Robot, names: Sequence[str], clock: Callable[[], float]) -> None:
-        self._clock = clock
+    def __init__(
+        self,
+        robot: Robot,
+        names: Sequence[str],
+        clock: Callable[[], float],
+        off: float | None = None,
+    ) -> None:
+        self._clock, self._off = clock, off
         self._arrived = threading.Condition()
         self._heard: dict[str, _Heard] = {}
         self._faults: dict[str, str] = {}
@@ -148,14 +160,25 @@ class SensorListener:
         def receive(message: Any) -> None:
             with self._arrived:
                 try:
-                    stamp = message.header.stamp.to_sec()
-                    self._heard[name] = _Heard(stamp, self._clock(), driver.read(message))
-                    self._faults.pop(name, None)
+                    self._take(name, driver, message)
                 except ValueError as error:
                     self._faults[name] = f"the sensor '{name}': {error}"
                 self._arrived.notify_all()
 
         return rospy.Subscriber(topic, driver.message, receive, queue_size=1, tcp_nodelay=True)
+
+    def _take(self, name: str, driver: _Driver, message: Any) -> None:
+        stamp, now = message.header.stamp.to_sec(), self._clock()
+        if self._off is not None and stamp:
+            if abs(now - stamp) > self._off:
+                raise ValueError(
+                    f"stamps are {abs(now - stamp):.1f} s off the clock: the machines' clocks differ, "
+                    "or messages are held up"
+                )
+            if name in self._heard and stamp <= self._heard[name].stamp:
+                return
+        self._heard[name] = _Heard(stamp, now, driver.read(message))
+        self._faults.pop(name, None)
 
     def missing(self) -> list[str]:
         """Returns the topics that nothing has come on."""

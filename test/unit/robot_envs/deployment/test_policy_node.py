@@ -106,6 +106,10 @@ def test_messages_that_cannot_be_read_are_told_before_those_that_are_missing(
     assert furuta._missing() == "a message on /eye/image_raw"
 
 
+def test_sensors_stamps_may_be_as_far_off_as_those_of_joints(furuta: PolicyNode) -> None:
+    assert furuta._sensors._off == furuta._joints._late == 1.0
+
+
 def test_reasons_that_change_fast_are_a_line_a_second(
     furuta: PolicyNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:

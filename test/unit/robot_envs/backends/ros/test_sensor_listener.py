@@ -188,6 +188,33 @@ def test_after_a_reset_the_fault_of_messages_is_told_first(
         world.reset(InitialState())
 
 
+def test_old_and_repeated_readings_are_no_arrivals(heard: Heard) -> None:
+    found = SensorListener(SEEING, ("front_laser",), lambda: heard.now, off=1.0)
+    heard.now = 7.6
+    heard.send("/scan", LaserScan(header=HEADER, ranges=[float("nan")]))
+    heard.now = 7.8
+    heard.send("/scan", LaserScan(header=HEADER, ranges=[0.2]))
+    assert found.trouble(late=0.1) == "no message on /scan for 0.1 s"
+    heard.now = 107.5
+    heard.send("/scan", LaserScan(header=HEADER, ranges=[0.2]))
+    assert "'front_laser': stamps are 100.0 s off the clock" in found.trouble(late=0.1)
+    heard.send("/scan", LaserScan(header=Header(stamp=rospy.Time(107, 400_000_000))))
+    assert found.trouble(late=0.1) == ""
+    heard.now = 8.0  # time has gone back
+    found.forget()
+    heard.send("/scan", LaserScan(header=HEADER))
+    assert found.trouble(late=0.1) == "" and found.missing() == []
+
+
+def test_an_imu_that_reports_no_numbers_is_told(heard: Heard) -> None:
+    found = listener(heard, "imu")
+    broken = Imu(header=HEADER)
+    broken.angular_velocity.y = float("nan")
+    heard.send("/imu", broken)
+    assert found.fault() == "the sensor 'imu': angular_velocity is [0.0, nan, 0.0]"
+    assert found.missing() == ["/imu"]
+
+
 def test_late_and_unreadable_messages_are_told(heard: Heard) -> None:
     found = listener(heard, "front_laser", "camera")
     heard.send("/scan", LaserScan(header=HEADER, ranges=[0.1]))
