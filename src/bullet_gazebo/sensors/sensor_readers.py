@@ -68,6 +68,7 @@ class SensorReaders:
         self._schedule = sensing.schedule
         self._taken: dict[str, Taken] = {}
         made = [(name, *find_sensor(sim, sensing, name)) for name in self.names]
+        self._mounts = [mount for _, mount, _ in made]
         self._clocks = []
         for name, mount, maker in made:
             try:
@@ -79,13 +80,18 @@ class SensorReaders:
             self._clocks.append(self._schedule.begin(sensor.rate, take, lambda: True))
         self._schedule.review()
 
+    @property
+    def is_stale(self) -> bool:
+        """Whether one of the sensors' models was deleted."""
+        return any(_is_gone(mount) for mount in self._mounts)
+
     def _taker(self, name: str, mount: Mount, sensor: Measuring) -> Callable[[int], None]:
         if isinstance(sensor, ModelImu):
             sensor.start()
 
         def take(now: int) -> None:
-            if mount.sim.world.models.get(mount.model.name) is not mount.model:
-                return  # it was deleted
+            if _is_gone(mount):
+                return
             values = sensor.values(now)
             for array in (values or {}).values():
                 if isinstance(array, np.ndarray):
@@ -103,6 +109,11 @@ class SensorReaders:
         """Ends the measurements."""
         for clock in self._clocks:
             self._schedule.fail(clock)
+
+
+def _is_gone(mount: Mount) -> bool:
+    """Returns whether the sensor's model was deleted."""
+    return mount.sim.world.models.get(mount.model.name) is not mount.model
 
 
 def find_sensor(sim: Simulator, sensing: Sensing, name: str) -> tuple[Mount, Maker]:

@@ -162,8 +162,11 @@ class PolicyNode:
         joints = self._joints.missing()
         if joints and (fault := self._joints.fault()):
             return f"a possible state: {fault}"
+        silent = self._sensors.missing()
+        if silent and (fault := self._sensors.fault()):
+            return f"a message that can be read: {fault}"
         missing = [f"the state of {', '.join(joints)} on {self._joints.topic}"] if joints else []
-        missing += [f"a message on {topic}" for topic in self._sensors.missing()]
+        missing += [f"a message on {topic}" for topic in silent]
         missing += [f"a subscriber of {topic}" for topic in self._unheard()]
         return ", and ".join(missing)
 

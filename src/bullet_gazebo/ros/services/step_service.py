@@ -121,7 +121,8 @@ class StepService:
         self._current = Addresses(sim)
         self._prepared: dict[int, _Prepared] = {}  # by handle
         self._readers: SensorReaders | None = None  # that the last step asked for
-        self._readers_version = sim.world.version
+        self._is_reading = False  # whether the step under way asks for them
+        sim.before_advance.append(self._end_unread)
         # Contacts are those of the last tick, until a reset or a placing makes them void.
         self._knows_contacts = False
         self._services = [
@@ -163,12 +164,14 @@ class StepService:
             commanded = prepared.commanded
             try:
                 prepared.check(request)
-                if prepared.sensors or (self._readers and request.ticks):
+                if prepared.sensors:
                     self._sense(prepared.sensors)
                 commanded.send(list(request.commands[: commanded.size]))
             except (ControlError, UnknownName) as error:
                 return self._refused(str(error))
+            self._is_reading = bool(prepared.sensors)
             self._advance(request.ticks, commanded, request.commands[commanded.size :])
+            self._is_reading = False
             try:
                 if request.ticks > SLICE:
                     self._check_layout(prepared)
@@ -180,15 +183,20 @@ class StepService:
 
     def _sense(self, names: tuple[str, ...]) -> None:
         """Lets these sensors measure from now on, and no others."""
-        version = self._sim.world.version
-        before = self._readers
-        if before and (before.names, self._readers_version) == (names, version):
+        if self._readers and self._readers.names == names and not self._readers.is_stale:
             return
-        self._readers, self._readers_version = None, version
-        if before:
-            before.end()
-        if names:
-            self._readers = SensorReaders(self._sim, self._sensing, names)
+        self._end_readers()
+        self._readers = SensorReaders(self._sim, self._sensing, names)
+
+    def _end_unread(self) -> None:
+        """Ends the readers when somebody else lets time pass: who asked for them may be gone."""
+        if not self._is_reading:
+            self._end_readers()
+
+    def _end_readers(self) -> None:
+        if self._readers:
+            self._readers.end()
+        self._readers = None
 
     def _sensed(self) -> list[SensorReading]:
         assert self._readers is not None  # the step has asked for them

@@ -201,6 +201,7 @@ class RealtimeWorld(RobotBackend):
         self._set_model = SimulatorService("/gazebo/set_model_state", SetModelState)
         self._get_link = SimulatorService("/gazebo/get_link_state", GetLinkState)
         self._held: dict[str, Any] = {}
+        self._is_paused = False
         self._begin = 0.0  # [s] of the episode
         self._topics = {
             name: CommandTopic(scene, full_name(robot, port.name), port.single)
@@ -222,6 +223,7 @@ class RealtimeWorld(RobotBackend):
             for topic in self._topics.values():
                 topic.wait()
             self._pause()
+            self._is_paused = True
             self._reset_world()
             for name, motion in self.scene.placed_models(initial).items():
                 self._place_model(name, motion)
@@ -243,7 +245,10 @@ class RealtimeWorld(RobotBackend):
         self._pause()
         if not came:
             missing = ", ".join(self._sensors.missing())
-            raise SimulatorError(f"no message on {missing} for {STATE_TIMEOUT:g} s since the reset")
+            raise SimulatorError(
+                self._sensors.fault()
+                or f"no message on {missing} for {STATE_TIMEOUT:g} s since the reset"
+            )
 
     def _place_model(self, name: str, motion: Motion) -> None:
         pose, (linear, angular) = motion
@@ -267,6 +272,9 @@ class RealtimeWorld(RobotBackend):
         self._world.check_holder(self)
         with self._simulator:
             self._unpause()
+            if self._is_paused:
+                self._sensors.resume()
+                self._is_paused = False
             last = self._states.time
             due = None if self._period is None or last is None else last + self._period
             for name, command in commands.items():

@@ -138,6 +138,7 @@ class SensorListener:
         self._heard: dict[str, _Heard] = {}
         self._faults: dict[str, str] = {}
         self._periods: dict[str, float] = {}  # [s]
+        self._resumed = 0.0  # [s] of the clock
         self._subscribers = {name: self._subscribed(robot, name) for name in names}
 
     def _subscribed(self, robot: Robot, name: str) -> rospy.Subscriber:
@@ -165,6 +166,11 @@ class SensorListener:
                 if name not in self._heard
             ]
 
+    def fault(self) -> str:
+        """Returns why the newest message of a sensor can't be read; empty if all can."""
+        with self._arrived:
+            return next(iter(self._faults.values()), "")
+
     def wait(self, timeout: float) -> bool:
         """Returns whether something has come of all, at the latest after so long [s of wall time]."""
         with self._arrived:
@@ -173,14 +179,22 @@ class SensorListener:
             )
 
     def trouble(self, late: float) -> str:
-        """Returns what can't be read, or is older than `late` [s] and three periods; empty if all is well."""
+        """Returns what can't be read, or is older than `late` [s] and three periods; empty if all is well.
+
+        Time counts from the last `resume` at the earliest.
+        """
         now = self._clock()
         with self._arrived:
             for name, heard in self._heard.items():
                 most = max(late, LATE_PERIODS * self._periods[name])
-                if now - heard.arrival > most and name not in self._faults:
+                since = max(heard.arrival, self._resumed)
+                if now - since > most and name not in self._faults:
                     return f"no message on {self._subscribers[name].resolved_name} for {most:g} s"
-            return next(iter(self._faults.values()), "")
+            return self.fault()
+
+    def resume(self) -> None:
+        """Tells that a world which stood still moves on from now."""
+        self._resumed = self._clock()
 
     def read(self, begin: float) -> Sensors:
         """Returns the newest readings, whose times are counted from `begin` [s]."""

@@ -3,6 +3,7 @@
 import pytest
 from bullet_gazebo_msgs.srv import PreparedStepRequest, PrepareStepRequest, StepWorldRequest
 
+from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import ground_plane
 from bullet_gazebo.ros.services import step_service
@@ -11,6 +12,9 @@ QUESTION = {
     "model_states_of": ["crate"], "link_states_of": ["crate", "crate"], "contacts_of": ["crate"],
     "link_frames": ["", "ground_plane::link"],
 }  # fmt: skip
+EYE = """<sdf version="1.6"><model name="eye"><static>true</static><link name="link">
+<sensor name="sonar" type="ray"><update_rate>30</update_rate><ray><scan><horizontal><samples>1</samples>
+</horizontal></scan><range><min>0.1</min><max>9</max></range></ray></sensor></link></model></sdf>"""
 
 
 def test_a_prepared_step_has_the_numbers_of_step_world(objects):
@@ -117,3 +121,51 @@ def test_a_prepared_step_says_what_has_gone_during_a_long_request(objects, monke
     monkeypatch.setattr(sim.lock, "yield_turn", lambda: sim.delete_model(sim.world.models["crate"]))
     answer = objects.prepared(linked, 600)
     assert "the ticks are done, but meanwhile there is no link" in answer.status_message
+
+
+@pytest.fixture
+def eye(world):
+    world.sim.world.spawn("eye", parse_sdf(EYE), Pose())
+    return world
+
+
+def test_sensors_measure_until_somebody_else_lets_time_pass(eye):
+    sim = eye.sim
+    silent = list(sim.listeners)
+    looking, blind = eye.prepare(sensors=["sonar"]), eye.prepare()
+    for advance in (
+        lambda: eye.call(1),
+        lambda: eye.prepared(blind, 1),
+        lambda: sim.advance(1),  # as advance_world does
+    ):
+        assert eye.prepared(looking, 1).sensors
+        eye.call(0)  # without ticks
+        eye.prepared(blind, 0)
+        assert sim.listeners != silent
+        advance()
+        assert sim.listeners == silent
+
+
+def test_sensors_keep_their_clocks_whatever_else_comes_or_goes(eye):
+    sim = eye.sim
+
+    def times(change):
+        sim.reset(everything=True)
+        found = []
+        for step in range(12):
+            if step == 4:
+                change()
+            prepared = eye.prepare(sensors=["sonar"])
+            found.append(eye.prepared(prepared, 8).sensors[0].now)
+        eye.call(1)
+        return found
+
+    expected = times(lambda: None)
+    assert len(set(expected)) > 2
+    assert times(lambda: sim.world.spawn("ground_plane", ground_plane(), Pose())) == expected
+
+    def replace():
+        sim.delete_model(sim.world.models["eye"])
+        sim.world.spawn("eye", parse_sdf(EYE), Pose())
+
+    assert times(replace) != expected, "a new model's sensor has a clock of its own"

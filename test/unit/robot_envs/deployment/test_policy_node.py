@@ -94,6 +94,18 @@ def test_it_stops_when_nobody_listens_any_more(furuta: PolicyNode) -> None:
     assert furuta._trouble(0.0) == f"nobody listens to {topic.resolved_name} any more"
 
 
+def test_messages_that_cannot_be_read_are_told_before_those_that_are_missing(
+    furuta: PolicyNode,
+) -> None:
+    fault = "the sensor 'camera': pictures are yuv422"
+    furuta._sensors = SimpleNamespace(missing=lambda: ["/eye/image_raw"], fault=lambda: fault)
+    for name in FURUTA.joints:
+        furuta._joints._known[name] = JointState(0.0, 0.0, 0.0), rospy.Time(5), 5.0
+    assert furuta._missing() == f"a message that can be read: {fault}"
+    furuta._sensors.fault = str
+    assert furuta._missing() == "a message on /eye/image_raw"
+
+
 def test_reasons_that_change_fast_are_a_line_a_second(
     furuta: PolicyNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,9 +1,10 @@
 """What a robot's sensors send, in real time: topics and messages, without ROS's servers."""
 
+import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,8 +13,13 @@ from sensor_msgs.msg import Image, Imu, LaserScan, Range
 from std_msgs.msg import Header
 from support.scenes.seeing_rover import NAMES, SEEING
 
-from robot_envs import RobotEnvError
+from robot_envs import InitialState, RobotEnvError, SimulatorError, StateQuery
+from robot_envs.backends.ros import realtime
+from robot_envs.backends.ros.realtime import RealtimeWorld
+from robot_envs.backends.ros.running import SharedWorld
 from robot_envs.backends.ros.sensor_listener import SensorListener
+from robot_envs.scene import Scene
+from robot_envs.world_state import JointState
 
 HEADER = Header(stamp=rospy.Time(7, 500_000_000))
 
@@ -123,6 +129,63 @@ def test_the_slower_rate_of_sensor_and_plugin_counts(
     assert found.trouble(late=0.01) == ""
     heard.now = most + 0.001
     assert found.trouble(late=0.01) == f"no message on {topic} for {most:g} s"
+
+
+def test_a_pause_makes_nothing_late(heard: Heard) -> None:
+    found = listener(heard, "front_laser")
+    heard.send("/scan", LaserScan(header=HEADER))
+    heard.now = 60.0
+    found.resume()
+    heard.now = 64.9
+    assert found.trouble(late=5.0) == ""
+    heard.now = 65.1
+    assert found.trouble(late=5.0) == "no message on /scan for 5 s"
+
+
+@pytest.fixture
+def world(heard: Heard, monkeypatch: pytest.MonkeyPatch) -> RealtimeWorld:
+    """A world whose services do nothing; it has a clock, and joint states at once."""
+    joints = {name: JointState(0.0, 0.0, 0.0) for name in Scene([SEEING]).joints}
+    states = SimpleNamespace(
+        time=7.5, forget_unless_at=lambda _: None, wait_until=lambda _: (7.52, joints)
+    )
+    idle = SimpleNamespace(
+        wait=lambda: None, publish=lambda _: None, join=lambda _: None,
+        claim=lambda _: None, check_holder=lambda _: None,
+    )  # fmt: skip
+    answer = SimpleNamespace(success=True)
+    monkeypatch.setattr(realtime, "RunningSimulator", contextlib.nullcontext)
+    monkeypatch.setattr(realtime, "SimulatorService", lambda *_: lambda *_: answer)
+    monkeypatch.setattr(realtime, "CommandTopic", lambda *_: idle)
+    monkeypatch.setattr(realtime, "JointStates", lambda _: states)
+    monkeypatch.setattr(realtime, "time", SimpleNamespace(monotonic=lambda: heard.now))
+    return RealtimeWorld(Scene([SEEING]), 0.02, cast(SharedWorld, idle))
+
+
+def test_a_world_that_stood_paused_while_a_policy_learned_goes_on(
+    heard: Heard, world: RealtimeWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world.look(StateQuery(sensors=("front_laser",)))
+    listening = world._sensors
+    scan = LaserScan(header=HEADER, ranges=[0.5])
+    monkeypatch.setattr(listening, "wait", lambda _: heard.send("/scan", scan) or True)
+    world.reset(InitialState())
+    heard.now = 60.0
+    assert world.act({}).sensors["front_laser"].ranges.tolist() == [0.5]
+    heard.now = 65.1
+    with pytest.raises(SimulatorError, match="no message on /scan for 5 s"):
+        world.act({})
+
+
+def test_after_a_reset_the_fault_of_messages_is_told_first(
+    heard: Heard, world: RealtimeWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world.look(StateQuery(sensors=("front_laser", "camera")))
+    strange = picture("yuv422", np.zeros((2, 2, 2), np.uint8))
+    monkeypatch.setattr(world._sensors, "forget", lambda: heard.send("/eye/image_raw", strange))
+    monkeypatch.setattr(world._sensors, "wait", lambda _: False)
+    with pytest.raises(SimulatorError, match="^the sensor 'camera': pictures are yuv422"):
+        world.reset(InitialState())
 
 
 def test_late_and_unreadable_messages_are_told(heard: Heard) -> None:
