@@ -120,7 +120,10 @@ def test_the_file_acts_as_the_policy(tmp_path: Path, name: str, capsys) -> None:
     capsys.readouterr()
     assert work("export", run, "--out", out) == 0
     told = capsys.readouterr().out
-    assert told.startswith(f"{out}: the policy of {run.resolve()}/") and "of 1000 obs" in told
+    assert (
+        told.startswith(f"{out}: the policy of {run.resolve()}/")
+        and "over 1000 observations" in told
+    )
     policy, file = load_learned(open_run(run)), open_exported(out)
     observations = seen_by(policy.env.observation_space)
     wanted = np.array([policy.act(each) for each in observations])
