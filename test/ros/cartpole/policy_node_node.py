@@ -48,7 +48,8 @@ OVER, AGAIN, STOPPED = "an episode would be over here", "continuing", "the robot
 
 SENSORS = """<gazebo reference="cart">
   <sensor name="imu" type="imu"><update_rate>50</update_rate>
-    <plugin name="i" filename="libgazebo_ros_imu_sensor.so"><topicName>imu</topicName></plugin></sensor>
+    <plugin name="i" filename="libgazebo_ros_imu_sensor.so"><topicName>imu</topicName>
+      <updateRateHZ>50</updateRateHZ></plugin></sensor>
   <sensor name="laser" type="ray"><update_rate>50</update_rate>
     <plugin name="l" filename="libgazebo_ros_laser.so">
       <robotNamespace>front</robotNamespace><topicName>scan</topicName></plugin></sensor></gazebo>"""
