@@ -115,9 +115,11 @@ class Reader:
 
     def work(self, arguments: list[str]) -> None:
         """Runs a command of the workbench here, with the package as it is now."""
-        for name in [each for each in sys.modules if each.partition(".")[0] == "my_arm"]:
-            del sys.modules[name]
-        assert workbench.main(arguments) == 0, arguments
+        try:
+            assert workbench.main(arguments) == 0, arguments
+        finally:  # the next command, and the next test, find what is written then
+            for name in [each for each in sys.modules if each.partition(".")[0] == "my_arm"]:
+                del sys.modules[name]
 
     def launch(self, words: list[str]) -> None:
         self.end_simulation()
