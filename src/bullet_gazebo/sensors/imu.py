@@ -22,8 +22,8 @@ from bullet_gazebo.physics.pose import (
 )
 from bullet_gazebo.sensors.noise import read_noise
 from bullet_gazebo.sensors.sensing import Mount, sensor_of, slower
+from bullet_gazebo.simulator import NANOSECONDS
 
-NANOSECONDS = 1_000_000_000
 HERE = Pose()
 LONGEST_STEP = 0.01  # [s]
 

@@ -190,10 +190,8 @@ class DepthSensor(CameraSensor):
         return depths
 
     def values(self, now: int) -> dict[str, np.ndarray]:
-        """Returns `depth` (height, width) of float32, and `image` (height, width, 3) of uint8."""
-        view = self.view()
-        image = with_noise(self._mount, self.camera, view.colours, now)
-        return {"depth": self.depths(view).astype(np.float32), "image": image}
+        """Returns `depth` (height, width) of float32."""
+        return {"depth": self.depths(self.view(in_colour=False)).astype(np.float32)}
 
 
 def _pixels(element: Element, path: str, where: str, default: int) -> int:

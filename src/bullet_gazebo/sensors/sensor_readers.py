@@ -80,10 +80,9 @@ class SensorReaders:
             self._clocks.append(self._schedule.begin(sensor.rate, take, lambda: True))
         self._schedule.review()
 
-    @property
-    def is_stale(self) -> bool:
-        """Whether one of the sensors' models was deleted."""
-        return any(_is_gone(mount) for mount in self._mounts)
+    def serves(self, names: Sequence[str]) -> bool:
+        """Returns whether these are the sensors, all on models that are there: then their clocks go on."""
+        return self.names == tuple(names) and not any(map(_is_gone, self._mounts))
 
     def _taker(self, name: str, mount: Mount, sensor: Measuring) -> Callable[[int], None]:
         if isinstance(sensor, ModelImu):

@@ -17,7 +17,7 @@ class Reading:
     | laser | `ranges`, `intensities` |
     | laser with the plugin of a range sensor | `ranges`, of the nearest ray alone |
     | camera | `image` |
-    | depth camera | `depth`, `image` |
+    | depth camera | `depth` |
     | IMU | `orientation`, `angular_velocity`, `linear_acceleration` |
     | contact sensor | `contacts` |
 

@@ -144,6 +144,8 @@ class InProcessWorld(RobotBackend):
         self._links, self._reads_more = links, query != NOTHING
 
     def _sense(self, names: Sequence[str]) -> None:
+        if self._readers is not None and self._readers.serves(names):
+            return
         sensing = self._sensing = self._sensing or Sensing(self._sim)
         readers = SensorReaders(self._sim, sensing, names)
         if self._readers is not None:

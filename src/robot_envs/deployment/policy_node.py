@@ -73,10 +73,8 @@ class PolicyNode:
             raise RobotEnvError(str(error)) from error
         self._wanted: Any = None  # a goal that has come
         self._reason = self._reported = ""  # why the robot stands still, now and in the last line
-        self._unreported, self._next_report = (
-            0,
-            0.0,
-        )  # changes since that line, and time of the next one
+        self._unreported = 0  # changes since that line
+        self._next_report = 0.0  # [s of wall time] of the next one
         self._last: Mapping[str, JointState] | None = None  # joints; None: nothing was commanded
         self._should_end: Callable[[], bool] = rospy.is_shutdown
         self._is_killed, self._ended = threading.Event(), threading.Event()

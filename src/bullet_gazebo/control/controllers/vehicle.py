@@ -96,10 +96,8 @@ class VehicleController(Controller):
         self._odom = Output("odom", "OdometrySample", whole=True)
         self._tf = Output("/tf", "TransformSample", whole=True)
         self._cmd_out = Output("cmd_vel_out", "TwistSample")
-        self.outputs = [self._odom]
         self.tf_on = options.tf
-        self.outputs.append(self._tf)
-        self.outputs += [self._cmd_out] if options.publish_cmd else []
+        self.outputs = [self._odom, self._tf, *([self._cmd_out] if options.publish_cmd else [])]
         self.cmd_vel = Input("cmd_vel", "Twist", self.command)
         self.inputs = [self.cmd_vel]
 
@@ -206,9 +204,8 @@ class VehicleController(Controller):
         """Sends the odometry at a time [ns]."""
         if self._odom.wanted:
             self._odom.send(self.sample(now))
-        if (
-            self.tf_on and self._tf.wanted and now != self._sent
-        ):  # tf refuses a second one of the same time
+        # tf refuses a second transform of the same time.
+        if self.tf_on and self._tf.wanted and now != self._sent:
             self._sent = now
             self._tf.send(self.sample(now))
 

@@ -6,9 +6,18 @@ from collections.abc import Sequence
 import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 
-from bullet_gazebo.drives.odometry import OdometrySample, Period, Triple, WheelOdometry
+from bullet_gazebo.drives.odometry import (
+    NANOSECONDS,
+    POSE,
+    TWIST,
+    OdometrySample,
+    Period,
+    Triple,
+    WheelOdometry,
+)
 from bullet_gazebo.physics.description import DescriptionError, Joint
 from bullet_gazebo.physics.pose import to_rpy
 from bullet_gazebo.ros.common.messages import (
@@ -56,16 +65,6 @@ def advertised(context: PluginContext, name: str, kind: type, queue: int) -> Top
     topic = Topic(name, kind, queue_of(context, queue))
     context.closing(topic.close)
     return topic
-
-
-def encoder_of(context: PluginContext, separation: float) -> WheelOdometry | None:
-    """Returns what adds up the turns of wheels at that distance [m]; None for the true pose."""
-    source = context.text("odometrySource", "world")
-    if source not in ("world", "encoder"):
-        rospy.logwarn(
-            "Plugin %s: no <odometrySource> is called '%s'", context.plugin.filename, source
-        )
-    return WheelOdometry(separation) if source == "encoder" else None
 
 
 class DrivePlugin(SensorPlugin):
@@ -176,6 +175,74 @@ class DrivePlugin(SensorPlugin):
             self.period.restart(now)
             self.restart()
         self.report(now)
+
+
+class WheeledPlugin(DrivePlugin):
+    """A vehicle that may report by the turns of its wheels, and where its joints are.
+
+    Subclasses call `measure_by` when they are made.
+    """
+
+    _encoder: WheelOdometry | None = None  # None: the true pose is reported
+    _joint_states: Topic | None = None
+    _transforms: "LinkTransforms | None" = None
+    _driven = 0  # [ns]
+
+    def measure_by(self, separation: float, joints: Sequence[tuple[Joint, str]]) -> None:
+        """Reads the elements that choose what is reported.
+
+        Args:
+            separation: of the wheels that measure [m].
+            joints: of the vehicle, each with the name of its child frame.
+        """
+        context = self.context
+        source = context.text("odometrySource", "world")
+        if source == "encoder":
+            self._encoder = WheelOdometry(separation)
+        elif source != "world":
+            rospy.logwarn(
+                "Plugin %s: no <odometrySource> is called '%s'", context.plugin.filename, source
+            )
+        if choice(context, "publishWheelJointState", default=False):
+            name = topic_in(self.namespace, "joint_states")
+            self._joint_states = advertised(context, name, JointState, 1000)
+        if choice(context, "publishWheelTF", default=False):
+            self._transforms = LinkTransforms(self, joints)
+
+    def wheel_speeds(self) -> Sequence[float]:
+        """Returns the speeds of the left and right wheels that measure [m/s]."""
+        raise NotImplementedError
+
+    def joint_state(self, now: int) -> JointState:
+        """Returns the message of the joints at a time [ns]."""
+        raise NotImplementedError
+
+    def drive(self, seconds: float) -> None:
+        """Follows the command, so long after the last call [s]."""
+        raise NotImplementedError
+
+    def update(self, now: int) -> None:
+        if self._encoder is not None:
+            self._encoder.step(self.wheel_speeds(), self.sim.world.time_step)
+        if not self.period.is_over(now):
+            return
+        self.report(now)
+        if self._transforms is not None:
+            self._transforms.publish(now)
+        if self._joint_states is not None and self._joint_states.is_heard:
+            self._joint_states.publish(self.joint_state(now))
+        seconds, self._driven = max(now - self._driven, 0) / NANOSECONDS, now
+        self.drive(seconds)
+
+    def sample(self, now: int) -> OdometrySample:
+        if self._encoder is not None:
+            return self._encoder.sample(now, self.frame, self.child)
+        return self.truth(now, POSE, TWIST)
+
+    def restart(self) -> None:
+        self._driven = self.sim.now
+        if self._encoder is not None:
+            self._encoder.restart()
 
 
 class Wheels:

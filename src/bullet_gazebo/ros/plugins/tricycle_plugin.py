@@ -5,24 +5,15 @@ import math
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from bullet_gazebo.drives.odometry import NANOSECONDS, POSE, TWIST, OdometrySample
 from bullet_gazebo.ros.common.messages import to_time
-from bullet_gazebo.ros.plugins.drive_topics import (
-    DrivePlugin,
-    LinkTransforms,
-    Wheels,
-    advertised,
-    choice,
-    encoder_of,
-    length,
-)
+from bullet_gazebo.ros.plugins.drive_topics import WheeledPlugin, Wheels, length
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import MODEL, namespace_of, topic_in
+from bullet_gazebo.ros.plugins.sensor_topics import MODEL, namespace_of
 
 QUARTER = 0.5 * math.pi  # [rad]
 
 
-class TricyclePlugin(DrivePlugin):
+class TricyclePlugin(WheeledPlugin):
     """A wheel that is driven and steered, and two that measure; a command turns it to an angle [rad]."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -38,38 +29,21 @@ class TricyclePlugin(DrivePlugin):
         }
         diameter = length(context, "encoderWheelDiameter", 0.15)
         self._encoders = Wheels(context, encoders, diameter, 0.0)
-        self._encoder = encoder_of(context, length(context, "encoderWheelSeparation", 0.5))
         self._acceleration = number("wheelAcceleration", 0.0)
         self._deceleration = number("wheelDeceleration", self._acceleration)
         self._tolerance = number("wheelSpeedTolerance", 0.01)  # [m/s]
         self._turning = number("steeringSpeed", 0.0)  # [rad/s]
         self._near = number("steeringAngleTolerance", 0.01)  # [rad]
-        self._driven = self.sim.now  # [ns]
         self._joints = self._steering.joints + self._wheel.joints + self._encoders.joints
-        self._joint_states = self._transforms = None
-        if choice(context, "publishWheelJointState", default=False):
-            name = topic_in(namespace, "joint_states")
-            self._joint_states = advertised(context, name, JointState, 1000)
-        if choice(context, "publishWheelTF", default=False):
-            self._transforms = LinkTransforms(self, [(each, each.name) for each in self._joints])
+        separation = length(context, "encoderWheelSeparation", 0.5)
+        self.measure_by(separation, [(each, each.name) for each in self._joints])
         self.begin()
 
-    def update(self, now: int) -> None:
-        if self._encoder is not None:
-            # As in the original, which measures turns to the right.
-            self._encoder.step(self._encoders.speeds[::-1], self.sim.world.time_step)
-        if not self.period.is_over(now):
-            return
-        self.report(now)
-        if self._transforms is not None:
-            self._transforms.publish(now)
-        if self._joint_states is not None and self._joint_states.is_heard:
-            self._joint_states.publish(self._joint_state(now))
-        self._drive(now)
+    def wheel_speeds(self) -> list[float]:
+        return self._encoders.speeds[::-1]  # as in the original, which measures turns to the right
 
-    def _drive(self, now: int) -> None:
+    def drive(self, seconds: float) -> None:
         ahead, _, angle = self.command
-        seconds, self._driven = max(now - self._driven, 0) / NANOSECONDS, now
         self._wheel.drive([self._approached(ahead, seconds)])
         self._steer(max(-QUARTER, min(QUARTER, angle)))
 
@@ -92,7 +66,7 @@ class TricyclePlugin(DrivePlugin):
         if self._turning <= 0.0 and gap:
             self.model.body.reset_joint(self.model.joint_index(name), target)
 
-    def _joint_state(self, now: int) -> JointState:
+    def joint_state(self, now: int) -> JointState:
         states = [self.model.joint_state(joint.name) for joint in self._joints]
         return JointState(
             Header(stamp=to_time(now)),
@@ -102,15 +76,8 @@ class TricyclePlugin(DrivePlugin):
             [0.0] * len(states),
         )
 
-    def sample(self, now: int) -> OdometrySample:
-        if self._encoder is not None:
-            return self._encoder.sample(now, self.frame, self.child)
-        return self.truth(now, POSE, TWIST)
-
     def restart(self) -> None:
-        self._driven = self.sim.now
-        if self._encoder is not None:
-            self._encoder.restart()
+        super().restart()
         self._wheel.drive([0.0])
         self._steering.drive([0.0])
 

@@ -5,32 +5,24 @@ import logging
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from bullet_gazebo.drives.odometry import (
-    NANOSECONDS,
-    POSE,
-    TWIST,
-    UNKNOWN,
-    OdometrySample,
-)
+from bullet_gazebo.drives.odometry import UNKNOWN, OdometrySample
 from bullet_gazebo.drives.wheels import Ramp, side_speeds
 from bullet_gazebo.physics.files.elements import truth
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.drive_topics import (
     DrivePlugin,
-    LinkTransforms,
+    WheeledPlugin,
     Wheels,
-    advertised,
     choice,
-    encoder_of,
     length,
 )
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import MODEL, namespace_of, topic_in
+from bullet_gazebo.ros.plugins.sensor_topics import MODEL, namespace_of
 
 LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
 
 
-class DiffDrivePlugin(DrivePlugin):
+class DiffDrivePlugin(WheeledPlugin):
     """Two wheels; a command holds until the next one or a reset."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -45,55 +37,31 @@ class DiffDrivePlugin(DrivePlugin):
             context.number("wheelTorque", 5.0),
         )
         self._ramp = Ramp(context.number("wheelAcceleration", 0.0), 2)
-        self._driven = self.sim.now  # [ns]
-        self._encoder = encoder_of(context, self._separation)
         # The original's order is right, left.
         self._joints = self._wheels.joints[::-1]
-        self._joint_states = self._transforms = None
-        if choice(context, "publishWheelJointState", default=False):
-            name = topic_in(self.namespace, "joint_states")
-            self._joint_states = advertised(context, name, JointState, 1000)
-        if choice(context, "publishWheelTF", default=False):
-            self._transforms = LinkTransforms(self, [(each, each.child) for each in self._joints])
+        self.measure_by(self._separation, [(each, each.child) for each in self._joints])
         level = LEVELS.get(context.text("rosDebugLevel", "").lower())
         if level is not None:
             logging.getLogger("rosout").setLevel(level)
         published = truth(context.text("publishTf", "true"))
         self.begin(odometry=published, tf=published and choice(context, "publishOdomTF", True))
 
-    def update(self, now: int) -> None:
-        if self._encoder is not None:
-            self._encoder.step(self._wheels.speeds, self.sim.world.time_step)
-        if not self.period.is_over(now):
-            return
-        self.report(now)
-        if self._transforms is not None:
-            self._transforms.publish(now)
-        if self._joint_states is not None and self._joint_states.is_heard:
-            self._joint_states.publish(self._joint_state(now))
-        self._drive(now)
+    def wheel_speeds(self) -> list[float]:
+        return self._wheels.speeds
 
-    def _drive(self, now: int) -> None:
+    def drive(self, seconds: float) -> None:
         ahead, _, turn = self.command
         targets = side_speeds(ahead, turn, self._separation)
-        seconds, self._driven = max(now - self._driven, 0) / NANOSECONDS, now
         self._wheels.drive(self._ramp.next(targets, self._wheels.speeds, seconds))
 
-    def _joint_state(self, now: int) -> JointState:
+    def joint_state(self, now: int) -> JointState:
         names = [joint.name for joint in self._joints]
         positions = [self.model.joint_state(name)[0] for name in names]
         return JointState(header=Header(stamp=to_time(now)), name=names, position=positions)
 
-    def sample(self, now: int) -> OdometrySample:
-        if self._encoder is not None:
-            return self._encoder.sample(now, self.frame, self.child)
-        return self.truth(now, POSE, TWIST)
-
     def restart(self) -> None:
-        self._driven = self.sim.now
+        super().restart()
         self._ramp.restart()
-        if self._encoder is not None:
-            self._encoder.restart()
         self._wheels.drive((0.0, 0.0))
 
 

@@ -183,7 +183,7 @@ class StepService:
 
     def _sense(self, names: tuple[str, ...]) -> None:
         """Lets these sensors measure from now on, and no others."""
-        if self._readers and self._readers.names == names and not self._readers.is_stale:
+        if self._readers and self._readers.serves(names):
             return
         self._end_readers()
         self._readers = SensorReaders(self._sim, self._sensing, names)

@@ -8,8 +8,7 @@ import rostest
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from dynamic_reconfigure.client import Client as DynamicClient
 from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
-from gazebo_msgs.msg import ModelState
-from gazebo_msgs.srv import GetModelState, SetModelState, SpawnModel, SpawnModelRequest
+from gazebo_msgs.srv import GetModelState, SpawnModel, SpawnModelRequest
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
@@ -104,21 +103,6 @@ class Drives(unittest.TestCase):
             self.assertEqual((place.x, place.y, place.z), (move.x, move.y, move.z))
             self.assertEqual(message.header.stamp, transform.header.stamp)
         self.assertEqual(transform.child_frame_id, "base_footprint")
-
-    def test_odometry_is_the_models_state_at_once_after_a_move(self):
-        self.spawn(two_wheels(**DIFF))
-        odometry = self.hear("/odom", Odometry)
-        self.step(15)
-        state = ModelState(model_name="bot", reference_frame="world")
-        state.pose.position.x, state.pose.position.z, state.pose.orientation.w = 2.0, RADIUS, 1.0
-        self.assertTrue(call("/gazebo/set_model_state", SetModelState, state).success)
-        self.assertEqual(self.stamps(odometry, 2), [11, 15])
-        place, wanted = odometry.messages[-1].pose.pose.position, self.state().pose.position
-        for axis in ("x", "y", "z"):
-            self.assertAlmostEqual(getattr(place, axis), getattr(wanted, axis), delta=1e-9)
-        call("/gazebo/reset_simulation", Empty)
-        self.step(25)
-        self.assertEqual(self.stamps(odometry, 5)[2:], [0, 11, 21])
 
     def test_a_diff_drive_controller_drives_and_tells(self):
         params = COVARIANCES | {
