@@ -1,22 +1,24 @@
 """Publishers and services without a master: each topic is always heard, and its messages are written."""
 
 import io
-from typing import ClassVar
+from collections import defaultdict
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import pytest
 import rospy
 
 
 class SilentPublisher:
-    """Writes what is published as rospy would, and counts it; `names` are those of open ones."""
+    """Writes what is published as rospy would, and keeps it; `names` are those of open ones."""
 
     names: ClassVar[list[str]] = []
+    messages: ClassVar[defaultdict[str, list[Any]]] = defaultdict(list)
 
     def __init__(self, name, kind, *_, **__):
         self.name = self.resolved_name = name
         self.impl = self
         self.names.append(name)
-        self.count = 0
 
     def has_connections(self):
         return True
@@ -26,37 +28,53 @@ class SilentPublisher:
 
     def publish(self, message):
         message.serialize(io.BytesIO())
-        self.count += 1
+        self.messages[self.name].append(message)
 
     def unregister(self):
         self.names.remove(self.name)
 
 
+class SilentSubscriber(SilentPublisher):
+    """`callbacks` are those of open ones, by topic."""
+
+    callbacks: ClassVar[dict[str, Callable]] = {}
+
+    def __init__(self, name, kind, callback=None, *_, **__):
+        super().__init__(name, kind)
+        self.callbacks[name] = callback
+
+    def unregister(self):
+        super().unregister()
+        del self.callbacks[self.name]
+
+
 class SilentService:
     """One for each name, as in rospy."""
 
-    names: ClassVar[list[str]] = []
+    handlers: ClassVar[dict[str, Callable]] = {}
 
-    def __init__(self, name, *_):
+    def __init__(self, name, _kind, handler, *_):
         self.name = name
-        if name in self.names:
+        if name in self.handlers:
             raise rospy.ServiceException("taken")
-        self.names.append(name)
+        self.handlers[name] = handler
 
     def shutdown(self, reason=""):
-        self.names.remove(self.name)
+        del self.handlers[self.name]
 
 
 def silence(patch: pytest.MonkeyPatch) -> list[str]:
     """Lets plugins be loaded without a node; returns the warnings and errors that they log from now on."""
     lines: list[str] = []
-    SilentPublisher.names.clear()
-    SilentService.names.clear()
+    for kept in (SilentPublisher.names, SilentPublisher.messages, SilentSubscriber.callbacks,
+                 SilentService.handlers):  # fmt: skip
+        kept.clear()
     patch.setattr(rospy, "Publisher", SilentPublisher)
-    patch.setattr(rospy, "Subscriber", SilentPublisher)
+    patch.setattr(rospy, "Subscriber", SilentSubscriber)
     patch.setattr(rospy, "Service", SilentService)
     patch.setattr(rospy, "get_param", lambda name, default=None: default)
     patch.setattr(rospy, "set_param", lambda name, value: None)
     for level in ("logerr", "logwarn"):
         patch.setattr(rospy, level, lambda text, *args: lines.append(text % args if args else text))
+        patch.setattr(rospy, f"{level}_throttle", lambda period, text: lines.append(text))
     return lines

@@ -163,24 +163,6 @@ class Drives(unittest.TestCase):
         )
         self.assertGreater(self.newest(odometry).twist.twist.angular.z, 0.2)
 
-    def test_a_skid_steer_and_a_planar_move_lie_in_the_robots_namespace(self):
-        torque = {"wheelSeparation": TRACK, "wheelDiameter": 2.0 * RADIUS, "broadcastTF": 1}
-        for number, (library, elements) in enumerate(
-            {
-                "libgazebo_ros_skid_steer_drive.so": torque,
-                "libgazebo_ros_planar_move.so": {},
-            }.items()
-        ):
-            with self.subTest(library):
-                self.spawn(four_wheels(**{library: elements}), f"/rover{number}")
-                odometry = self.hear(f"/rover{number}/odom", Odometry)
-                self.step(200)
-                command = Twist()
-                command.linear.x = 0.3
-                topic = self.publisher(f"/rover{number}/cmd_vel")
-                self.assertTrue(self.follow(topic, command, odometry))
-                delete_model("bot")
-
 
 if __name__ == "__main__":
     rospy.init_node("drives_test")

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
-import rospy
 from geometry_msgs.msg import Twist
 from support.robots.vehicles import (
     RADIUS,
@@ -18,6 +16,7 @@ from support.robots.vehicles import (
     three_wheels,
     two_wheels,
 )
+from support.ros.silent_topics import SilentPublisher, SilentSubscriber, silence
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, to_rpy
@@ -36,25 +35,10 @@ class Track:
     """A simulator with a vehicle whose plugins publish into `messages`."""
 
     def __init__(self, world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.messages: dict[str, list[Any]] = {}
-        self.callbacks: dict[str, Any] = {}
-        self.logged: list[str] = []
-        monkeypatch.setattr(rospy, "Publisher", self._publisher)
-        monkeypatch.setattr(rospy, "Subscriber", self._subscriber)
-        monkeypatch.setattr(rospy, "get_param", lambda name, default=None: default)
-        for level in ("logerr", "logwarn", "logerr_throttle", "logwarn_throttle"):
-            monkeypatch.setattr(rospy, level, lambda *text: self.logged.append(str(text)))
+        self.logged = silence(monkeypatch)
+        self.messages, self.callbacks = SilentPublisher.messages, SilentSubscriber.callbacks
         self.sim = Simulator(world, lockstep=True)
         self._plugins = PluginRegistry(self.sim, None)
-
-    def _publisher(self, name: str, *_: object, **__: object) -> Any:
-        kept = self.messages.setdefault(name, [])
-        heard = SimpleNamespace(has_connections=lambda: True)
-        return SimpleNamespace(impl=heard, publish=kept.append, unregister=lambda: None)
-
-    def _subscriber(self, name: str, _kind: type, callback: Any, **_: object) -> Any:
-        self.callbacks[name] = callback
-        return SimpleNamespace(unregister=lambda: None)
 
     def spawn(self, urdf: str, namespace: str = "/", height: float = RADIUS) -> Any:
         description = parse_urdf(urdf)
@@ -113,22 +97,6 @@ def test_two_wheels_drive_straight_and_turn_as_commanded(fine_or_coarse):
     assert (x - start[0], y) == pytest.approx((1.0, 0.0), abs=0.02)
     track.command(0.0, 1.0)
     assert track.turned(round(2.0 * math.pi * ticks)) == pytest.approx(2.0 * math.pi, rel=0.03)
-
-
-def test_a_circle_and_a_square_are_closed(track):
-    track.spawn(diff_drive())
-    track.advance(500)
-    track.command(0.3, 1.0)
-    assert track.turned(6300) == pytest.approx(6.3, rel=0.03)
-    x, y, _ = track.model.state()[0].position
-    assert math.hypot(x, y) < 0.03
-    for _ in range(4):
-        track.command(0.25, 0.0)
-        track.advance(2000)
-        track.command(0.0, 1.0)
-        track.advance(round(500 * math.pi))
-    end = track.model.state()[0].position
-    assert math.hypot(end[0] - x, end[1] - y) < 0.06
 
 
 def test_odometry_of_the_world_is_the_state_of_the_model(track):
@@ -228,6 +196,17 @@ def test_topics_lie_where_the_file_says(track):
     track.spawn(diff_drive(robotNamespace="", publishTf="false", rosDebugLevel="na"), "")
     assert set(track.callbacks) == {"/bot/cmd_vel"}
     assert track.messages == {}
+
+
+@pytest.mark.parametrize(
+    "library", ["libgazebo_ros_skid_steer_drive.so", "libgazebo_ros_planar_move.so"]
+)
+def test_topics_lie_in_the_robots_namespace(track, library):
+    elements = {"wheelSeparation": TRACK, "wheelDiameter": 2.0 * RADIUS, "broadcastTF": 1}
+    track.spawn(four_wheels(**{library: elements}), "/rover")
+    track.advance(100)
+    assert set(track.callbacks) == {"/rover/cmd_vel"}
+    assert set(track.messages) == {"/rover/odom", "/tf"}
 
 
 @pytest.mark.parametrize(

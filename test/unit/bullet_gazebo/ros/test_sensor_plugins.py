@@ -14,7 +14,7 @@ from hector_gazebo_plugins.srv import SetBiasRequest
 from hypothesis import HealthCheck, Phase, given, settings
 from sensor_msgs.msg import Imu, LaserScan
 from support.mutations.xml_trees import mutated_xml
-from support.ros.silent_topics import SilentPublisher, SilentService, silence
+from support.ros.silent_topics import SilentPublisher, SilentService, SilentSubscriber, silence
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.engines import make_engine
@@ -39,11 +39,13 @@ ROUNDED = "<noise><type>gaussian_quantized</type><precision>1e-300</precision></
 OWN_NOISE = "<bodyName>l</bodyName><gaussianNoise>-1</gaussianNoise>"
 SIZE = "<image><width>{}</width><height>{}</height></image>"
 TOPIC = "<bodyName>l</bodyName><topicName>{}</topicName>"
+SLOW = "<bodyName>l</bodyName><topicName>t</topicName><updateRate>-1</updateRate>"
 CAMERA = "<camera>{}</camera>"
 
 
 def laser(samples="4", low="0.1", high="5", more="", kind="ray", before=""):
-    return SENSOR.format(kind, before + SCAN.format(samples, low, high, more), "laser", "")
+    scan = before + SCAN.format(samples, low, high, more)
+    return SENSOR.format(kind, scan, "gpu_laser" if kind == "gpu_ray" else "laser", "")
 
 
 def camera(inside="", own=""):
@@ -70,12 +72,7 @@ BAD = {  # what is wrong: a link's part, a model's part, and words of the line
     "more noise than there is": (laser(more=NOISE.format("1e308")), "", "<stddev> is 1e+308"),
     "negative noise": (laser(more=NOISE.format(-1)), "", "<stddev> is -1"),
     "negative rate": (laser(before="<update_rate>-1</update_rate>"), "", "<update_rate> is -1"),
-    "truth's negative rate": (
-        "",
-        '<plugin name="p" filename="libgazebo_ros_p3d.so"><bodyName>l</bodyName><topicName>t</topicName>'
-        "<updateRate>-1</updateRate></plugin>",
-        "<updateRate> is -1",
-    ),
+    "truth's negative rate": ("", of_model("gazebo_ros_p3d", SLOW), "<updateRate> is -1"),
     "camera's negative rate": (camera(own="<updateRate>-1</updateRate>"), "", "<updateRate> is -1"),
     "a huge picture": (camera(SIZE.format(2000, 2000)), "", "2100000 pixels"),
     "a picture that is no JPEG": (camera(SIZE.format(70000, 1)), "", "<image/width> is 70000"),
@@ -98,17 +95,8 @@ BAD = {  # what is wrong: a link's part, a model's part, and words of the line
 }  # fmt: skip
 
 OURS = (
-    "Sensor",
-    "Plugin",
-    "Model",
-    "Target",
-    "Camera",
-    "Laser",
-    "Hector",
-    "Silent",
-    "Bullet",
-    "Link",
-)
+    "Sensor", "Plugin", "Model", "Target", "Camera", "Laser", "Hector", "Silent", "Bullet", "Link",
+)  # fmt: skip
 
 
 class Node:
@@ -123,6 +111,7 @@ class Node:
     def spawn(self, text):
         """Spawns, steps and deletes a model; returns the lines that were logged of it."""
         self.lines.clear()
+        SilentPublisher.messages.clear()
         description = parse_sdf(text)
         model = self.sim.world.spawn("m", description, Pose((0.0, 0.0, 1.0)))
         self.plugins.load(model, "/")
@@ -136,15 +125,9 @@ class Node:
         return [*self.lines, *description.warnings, *description.left_out]
 
 
-@pytest.fixture
-def published(monkeypatch):
-    """All messages, whatever their topic."""
-    messages = []
-    publish = SilentPublisher.publish
-    monkeypatch.setattr(
-        SilentPublisher, "publish", lambda *args: messages.append(args[1]) or publish(*args)
-    )
-    return messages
+def published(kind):
+    topics = SilentPublisher.messages.values()
+    return [each for topic in topics for each in topic if isinstance(each, kind)]
 
 
 @pytest.fixture
@@ -163,23 +146,17 @@ def test_an_impossible_sensor_is_told_in_a_line(node, fault):
     assert node.sim.now == 4_000_000
 
 
-def test_rates_that_are_nearly_none_measure_only_for_a_listener_that_comes(node, published):
+def test_rates_that_are_nearly_none_measure_only_for_a_listener_that_comes(node):
     assert not node.spawn(MODEL.format(laser(before="<update_rate>1e-320</update_rate>"), ""))
-    scans = [each for each in published if isinstance(each, LaserScan)]
-    assert [each.header.stamp.to_nsec() for each in scans] == [0, 3_000_000]  # and after a reset
+    times = [each.header.stamp.to_nsec() for each in published(LaserScan)]
+    assert times == [0, 3_000_000]  # and after a reset
 
 
-def test_errors_of_an_imu_that_cannot_be_are_refused(node, published, monkeypatch):
-    handlers = {}
-
-    def service(name, kind, handler):
-        handlers[name] = handler
-        return SilentService(name)
-
-    monkeypatch.setattr(rospy, "Service", service)
+def test_errors_of_an_imu_that_cannot_be_are_refused(node):
     plugin = of_model("hector_gazebo_ros_imu", "<bodyName>l</bodyName><topicName>felt</topicName>")
     model = node.sim.world.spawn("m", parse_sdf(MODEL.format("", plugin)), Pose())
     node.plugins.load(model, "/")
+    handlers = SilentService.handlers
     wanted = {"drift_frequency": -1.0, "drift": 0.5, "offset": math.nan}
     answer = handlers["/felt/accel/set_parameters"](ReconfigureRequest(encode_config(wanted)))
     values = {each.name: each.value for each in answer.config.doubles}
@@ -188,7 +165,7 @@ def test_errors_of_an_imu_that_cannot_be_are_refused(node, published, monkeypatc
         handlers["/felt/set_rate_bias"](SetBiasRequest(Vector3(math.nan, 0.0, 0.0)))
     with node.sim.lock:
         node.sim.advance(3)
-    felt = [each for each in published if isinstance(each, Imu)]
+    felt = published(Imu)
     node.plugins.unload(model)
     assert felt
     for each in felt:
@@ -218,13 +195,7 @@ def test_an_unheard_laser_of_a_million_rays_keeps_no_memory(node, monkeypatch):
 @pytest.mark.parametrize(("heard", "pictures"), [(True, MOST_WAITING), (False, 0)])
 def test_a_storm_of_triggers_costs_no_more_than_some_pictures(node, monkeypatch, heard, pictures):
     monkeypatch.setattr(SilentPublisher, "has_connections", lambda self: heard)
-    taken, triggers = [], []
-
-    def subscribe(name, kind, callback, **_):
-        triggers.append(callback)
-        return SilentPublisher(name, kind)
-
-    monkeypatch.setattr(rospy, "Subscriber", subscribe)
+    taken = []
     picture = PinholeCamera.picture
     monkeypatch.setattr(
         PinholeCamera, "picture", lambda *args: taken.append(args) or picture(*args)
@@ -232,8 +203,9 @@ def test_a_storm_of_triggers_costs_no_more_than_some_pictures(node, monkeypatch,
     text = MODEL.format(SENSOR.format("camera", CAMERA.format(""), "triggered_camera", ""), "")
     model = node.sim.world.spawn("m", parse_sdf(text), Pose())
     node.plugins.load(model, "/")
+    [trigger] = SilentSubscriber.callbacks.values()
     for _ in range(500):
-        triggers[0](None)
+        trigger(None)
     with node.sim.lock:
         node.sim.advance(100)
     node.plugins.unload(model)
@@ -247,7 +219,7 @@ def test_nothing_of_a_model_with_all_sensors_stays_when_it_goes(node, root):
     for _ in range(4):
         node.spawn(text)
         gc.collect()
-        assert not SilentPublisher.names and not SilentService.names
+        assert not SilentPublisher.names and not SilentService.handlers
         counts.append(Counter(type(each).__qualname__ for each in gc.get_objects()))
     grown = counts[-1] - counts[1]
     ours = {each for each in grown if each.startswith(OURS)}
