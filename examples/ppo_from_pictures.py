@@ -54,14 +54,13 @@ class BalanceFromPictures(ClassicTask):
         return max(0.0, 1.0 - 0.5 * lean**2 - 0.5 * way**2)
 
 
-def make(backend: str | None = None) -> RobotEnv:
-    """Makes the environment; `backend="ros"` moves the robot over ROS, and gives the same pictures."""
-    return RobotEnv(WITH_CAMERA, BalanceFromPictures(), backend)
+def make() -> Monitor:
+    return Monitor(RobotEnv(WITH_CAMERA, BalanceFromPictures()))
 
 
-def stacked(count: int, backend: str | None = None) -> VecEnv:
+def stacked(count: int) -> VecEnv:
     """Returns so many environments, whose observations are the last four frames."""
-    return VecFrameStack(DummyVecEnv([lambda: Monitor(make(backend))] * count), n_stack=4)
+    return VecFrameStack(DummyVecEnv([make] * count), n_stack=4)
 
 
 def main() -> None:
