@@ -1,32 +1,23 @@
 #!/usr/bin/env python3
 """policy_node.py on the cart-pole in real time: it balances, and stops at late states and at Ctrl-C."""
 
-import math
 import os
 import signal
 import threading
 import time
 import unittest
-from dataclasses import replace
-from types import SimpleNamespace
 
-import numpy as np
 import rospy
 import rostest
-from geometry_msgs.msg import Vector3
-from gymnasium.spaces import Box
-from sensor_msgs.msg import Imu, JointState, LaserScan
-from std_msgs.msg import Float64, Header
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 from std_srvs.srv import Empty
 from support.ros.programs import Place, Process
 from support.ros.subscribed import wait_until_heard
 from support.training import training_runs
 
 import cartpole  # noqa: F401 - registers the environments
-from cartpole.robot import ROBOT
 from rl_workbench import cli
-from robot_envs import StateQuery, Task
-from robot_envs.deployment import policy_node
 from ros_utils import ros_controllers, ros_gazebo
 from ros_utils.readiness import Ready
 
@@ -44,37 +35,6 @@ TRAINING = {
 MOVES, LATE = "the policy moves the robot", "no joint state on /joint_states for 1 s"
 CONTROLLER, BEYOND = "stand_cart_position_controller", "beyond its stops at -0.5 and 0.5"
 OVER, AGAIN, STOPPED = "an episode would be over here", "continuing", "the robot is stopped"
-
-
-SENSORS = """<gazebo reference="cart">
-  <sensor name="imu" type="imu"><update_rate>50</update_rate>
-    <plugin name="i" filename="libgazebo_ros_imu_sensor.so"><topicName>imu</topicName>
-      <updateRateHZ>50</updateRateHZ></plugin></sensor>
-  <sensor name="laser" type="ray"><update_rate>50</update_rate>
-    <plugin name="l" filename="libgazebo_ros_laser.so">
-      <robotNamespace>front</robotNamespace><topicName>scan</topicName></plugin></sensor></gazebo>"""
-SEEN = float(np.float32(0.5) * np.float32(0.1))
-
-
-class Follow(Task):
-    """The cart goes where two sensors say."""
-
-    query = StateQuery(sensors=("imu", "laser"))
-
-    def action_space(self):
-        return Box(-1.0, 1.0, (1,), np.float32)
-
-    observation_space = action_space
-
-    def apply(self, action, state):
-        return {CONTROLLER: float(action[0])}
-
-    def observe(self, state):
-        spin = state.sensors["imu"].angular_velocity[2]
-        return np.array([np.float32(spin) * state.sensors["laser"].ranges[0]])
-
-    def reward(self, state, action):
-        return 0.0
 
 
 class PolicyNode(unittest.TestCase):
@@ -221,35 +181,6 @@ class PolicyNode(unittest.TestCase):
             self.assertTrue(all(abs(each) <= 0.5 for each in self.commands))
         node.send(signal.SIGTERM)
         self.assertEqual(node.end(BOUND), 143, node.output)
-
-    def test_a_policy_gets_its_sensors_from_topics_and_stops_when_they_are_silent(self):
-        """In this process: the simulated robot has no such sensors, so the test sends what they would."""
-        robot = replace(ROBOT, urdf=ROBOT.xml.replace("</robot>", f"{SENSORS}</robot>"))
-        imu = rospy.Publisher("/imu", Imu, queue_size=1)
-        scan = rospy.Publisher("/front/scan", LaserScan, queue_size=1)
-        self.addCleanup(imu.unregister), self.addCleanup(scan.unregister)
-
-        def send(_):
-            header = Header(stamp=rospy.Time.now())
-            imu.publish(Imu(header=header, angular_velocity=Vector3(0.0, 0.0, 0.5)))
-            scan.publish(LaserScan(header=header, ranges=[0.1, math.inf]))
-
-        timer = rospy.Timer(rospy.Duration(0.02), send)
-        self.addCleanup(timer.shutdown)
-        over = threading.Event()
-        self.node = SimpleNamespace(output="")
-        with self.assertLogs("rosout", "INFO") as told:
-            node = policy_node.PolicyNode(robot, Follow(), lambda seen: seen, 0.02, late=1.0)
-            running = threading.Thread(target=node.run, args=(over.is_set,))
-            running.start()
-            self.addCleanup(running.join), self.addCleanup(over.set)
-            self.eventually("what was measured", lambda: self.commands[-1:] == [SEEN])
-            timer.shutdown()
-            silent = "no message on /imu for 1 s: the robot is stopped"
-            self.eventually("a stop", lambda: any(silent in each for each in told.output))
-            over.set()
-            running.join()
-        self.assertIn(STOPPED, told.output[-1])
 
     def test_waiting_for_a_simulator_in_lockstep_is_told(self):
         """Joint states that don't come, and the service that tells why."""

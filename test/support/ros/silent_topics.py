@@ -17,6 +17,7 @@ class SilentPublisher:
 
     def __init__(self, name, kind, *_, **__):
         self.name = self.resolved_name = name
+        self.data_class = kind
         self.impl = self
         self.names.append(name)
 
@@ -35,17 +36,23 @@ class SilentPublisher:
 
 
 class SilentSubscriber(SilentPublisher):
-    """`callbacks` are those of open ones, by topic."""
+    """`open` are those that hear what is sent, by topic."""
 
-    callbacks: ClassVar[dict[str, Callable]] = {}
+    open: ClassVar[dict[str, "SilentSubscriber"]] = {}
 
     def __init__(self, name, kind, callback=None, *_, **__):
         super().__init__(name, kind)
-        self.callbacks[name] = callback
+        self.callback = callback
+        self.open[name] = self
+
+    @classmethod
+    def send(cls, topic, message):
+        assert isinstance(message, cls.open[topic].data_class)
+        cls.open[topic].callback(message)
 
     def unregister(self):
         super().unregister()
-        del self.callbacks[self.name]
+        del self.open[self.name]
 
 
 class SilentService:
@@ -66,7 +73,7 @@ class SilentService:
 def silence(patch: pytest.MonkeyPatch) -> list[str]:
     """Lets plugins be loaded without a node; returns the warnings and errors that they log from now on."""
     lines: list[str] = []
-    for kept in (SilentPublisher.names, SilentPublisher.messages, SilentSubscriber.callbacks,
+    for kept in (SilentPublisher.names, SilentPublisher.messages, SilentSubscriber.open,
                  SilentService.handlers):  # fmt: skip
         kept.clear()
     patch.setattr(rospy, "Publisher", SilentPublisher)

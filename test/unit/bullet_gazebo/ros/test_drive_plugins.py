@@ -36,7 +36,7 @@ class Track:
 
     def __init__(self, world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         self.logged = silence(monkeypatch)
-        self.messages, self.callbacks = SilentPublisher.messages, SilentSubscriber.callbacks
+        self.messages, self.topics = SilentPublisher.messages, SilentSubscriber.open
         self.sim = Simulator(world, lockstep=True)
         self._plugins = PluginRegistry(self.sim, None)
 
@@ -55,7 +55,7 @@ class Track:
     ) -> None:
         message = Twist()
         message.linear.x, message.linear.y, message.angular.z = linear, y, angular
-        self.callbacks[topic](message)
+        SilentSubscriber.send(topic, message)
 
     def stamps(self, topic: str) -> list[int]:
         return [message.header.stamp.to_nsec() // MS for message in self.messages[topic]]
@@ -194,7 +194,7 @@ def test_wheels_accelerate_as_the_file_says(track):
 
 def test_topics_lie_where_the_file_says(track):
     track.spawn(diff_drive(robotNamespace="", publishTf="false", rosDebugLevel="na"), "")
-    assert set(track.callbacks) == {"/bot/cmd_vel"}
+    assert set(track.topics) == {"/bot/cmd_vel"}
     assert track.messages == {}
 
 
@@ -205,7 +205,7 @@ def test_topics_lie_in_the_robots_namespace(track, library):
     elements = {"wheelSeparation": TRACK, "wheelDiameter": 2.0 * RADIUS, "broadcastTF": 1}
     track.spawn(four_wheels(**{library: elements}), "/rover")
     track.advance(100)
-    assert set(track.callbacks) == {"/rover/cmd_vel"}
+    assert set(track.topics) == {"/rover/cmd_vel"}
     assert set(track.messages) == {"/rover/odom", "/tf"}
 
 

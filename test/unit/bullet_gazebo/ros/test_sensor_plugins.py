@@ -203,9 +203,9 @@ def test_a_storm_of_triggers_costs_no_more_than_some_pictures(node, monkeypatch,
     text = MODEL.format(SENSOR.format("camera", CAMERA.format(""), "triggered_camera", ""), "")
     model = node.sim.world.spawn("m", parse_sdf(text), Pose())
     node.plugins.load(model, "/")
-    [trigger] = SilentSubscriber.callbacks.values()
+    [trigger] = SilentSubscriber.open.values()
     for _ in range(500):
-        trigger(None)
+        trigger.callback(None)
     with node.sim.lock:
         node.sim.advance(100)
     node.plugins.unload(model)

@@ -1,12 +1,20 @@
 """The policy's node on a robot, without ROS's servers."""
 
+import math
 import threading
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import rospy
-from std_msgs.msg import Float64
+from geometry_msgs.msg import Vector3
+from gymnasium.spaces import Box
+from sensor_msgs.msg import Imu, LaserScan
+from std_msgs.msg import Header
+from support.ros.silent_topics import SilentPublisher, SilentSubscriber, silence
+from support.scenes.seeing_rover import SEEING
 
+from robot_envs import Commands, Robot, StateQuery, Task, WorldState
 from robot_envs.deployment import policy_node
 from robot_envs.deployment.policy_node import PolicyNode
 from robot_envs.robots.furuta import ROBOT as FURUTA
@@ -46,32 +54,29 @@ def test_a_reset_while_it_does_a_step_is_seen(monkeypatch: pytest.MonkeyPatch) -
     assert node.begun == 2 and node.let_go == 1, "it lets go before it begins anew"
 
 
-class Topic(SimpleNamespace):
-    """A publisher, or a subscriber, of nobody."""
-
-    def __init__(self, name: str, kind: type, *_: object, **options: object) -> None:
-        super().__init__(resolved_name=name, data_class=kind, listeners=1, sent=[])
-
-    def get_num_connections(self) -> int:
-        return self.listeners
-
-    def publish(self, message: Float64) -> None:
-        self.sent.append(message.data)
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """With publishers and subscribers of nobody; lines are what is logged."""
+    made = SimpleNamespace(now=5.0, lines=silence(monkeypatch))
+    monkeypatch.setattr(rospy, "get_time", lambda: made.now)
+    monkeypatch.setattr(policy_node, "ControllerWatch", lambda *_: SimpleNamespace(trouble=""))
+    monkeypatch.setattr(policy_node, "POLL", 0.0)
+    return made
 
 
 @pytest.fixture
-def furuta(monkeypatch: pytest.MonkeyPatch) -> PolicyNode:
-    monkeypatch.setattr(rospy, "Publisher", Topic)
-    monkeypatch.setattr(rospy, "Subscriber", Topic)
-    monkeypatch.setattr(rospy, "get_time", lambda: 5.0)
-    monkeypatch.setattr(policy_node, "ControllerWatch", lambda *_: SimpleNamespace(trouble=""))
-    monkeypatch.setattr(policy_node, "POLL", 0.0)
+def furuta(clock: SimpleNamespace) -> PolicyNode:
     return PolicyNode(FURUTA, SwingUp(), lambda _: [1.0], FURUTA.control_period)
 
 
 def commanded(node: PolicyNode) -> list[float]:
     (topic,) = node._topics.values()
-    return topic.sent
+    return [message.data for message in SilentPublisher.messages[topic.name]]
+
+
+def know_joints(node: PolicyNode, robot: Robot, arrival: float = 5.0) -> None:
+    for name in robot.joints:
+        node._joints._known[name] = JointState(0.0, 0.0, 0.0), rospy.Time(5), arrival
 
 
 def test_while_it_waits_again_no_effort_is_left_on(furuta: PolicyNode) -> None:
@@ -85,13 +90,14 @@ def test_while_it_waits_again_no_effort_is_left_on(furuta: PolicyNode) -> None:
     assert commanded(furuta) == [0.0, 0.0, 0.0]
 
 
-def test_it_stops_when_nobody_listens_any_more(furuta: PolicyNode) -> None:
-    for name in FURUTA.joints:
-        furuta._joints._known[name] = JointState(0.0, 0.0, 0.0), rospy.Time(5), 5.0
+def test_it_stops_when_nobody_listens_any_more(
+    furuta: PolicyNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    know_joints(furuta, FURUTA)
     assert furuta._trouble(0.0) == ""
+    monkeypatch.setattr(SilentPublisher, "get_num_connections", lambda self: 0)
     (topic,) = furuta._topics.values()
-    topic.listeners = 0
-    assert furuta._trouble(0.0) == f"nobody listens to {topic.resolved_name} any more"
+    assert furuta._trouble(0.0) == f"nobody listens to {topic.name} any more"
 
 
 def test_messages_that_cannot_be_read_are_told_before_those_that_are_missing(
@@ -99,11 +105,49 @@ def test_messages_that_cannot_be_read_are_told_before_those_that_are_missing(
 ) -> None:
     fault = "the sensor 'camera': pictures are yuv422"
     furuta._sensors = SimpleNamespace(missing=lambda: ["/eye/image_raw"], fault=lambda: fault)
-    for name in FURUTA.joints:
-        furuta._joints._known[name] = JointState(0.0, 0.0, 0.0), rospy.Time(5), 5.0
+    know_joints(furuta, FURUTA)
     assert furuta._missing() == f"a message that can be read: {fault}"
     furuta._sensors.fault = str
     assert furuta._missing() == "a message on /eye/image_raw"
+
+
+class Follow(Task):
+    """The rover goes as fast as two sensors say."""
+
+    query = StateQuery(sensors=("imu", "front_laser"))
+
+    def action_space(self) -> Box:
+        return Box(-1.0, 1.0, (1,), np.float32)
+
+    observation_space = action_space
+
+    def apply(self, action: np.ndarray, state: WorldState) -> Commands:
+        return {"wheels": (float(action[0]), 0.0)}
+
+    def observe(self, state: WorldState) -> np.ndarray:
+        spin = state.sensors["imu"].angular_velocity[2]
+        return np.array([np.float32(spin) * state.sensors["front_laser"].ranges[0]])
+
+    def reward(self, state: WorldState, action: np.ndarray) -> float:
+        return 0.0
+
+
+def test_a_policy_gets_its_sensors_from_topics_and_stops_when_they_are_silent(
+    clock: SimpleNamespace,
+) -> None:
+    node = PolicyNode(SEEING, Follow(), lambda seen: seen, 0.02, late=1.0)
+    know_joints(node, SEEING)
+    assert node._missing() == "a message on /imu, and a message on /scan"
+    header = Header(stamp=rospy.Time(5))
+    SilentSubscriber.send("/imu", Imu(header=header, angular_velocity=Vector3(0.0, 0.0, 0.5)))
+    SilentSubscriber.send("/scan", LaserScan(header=header, ranges=[0.1, math.inf]))
+    node._step(node._begin(), 0.0)
+    assert commanded(node) == [[float(np.float32(0.5) * np.float32(0.1)), 0.0]]
+    clock.now = 6.01
+    know_joints(node, SEEING, clock.now)
+    node._step(clock.now, 1.01)
+    assert commanded(node)[-1] == [0.0, 0.0]
+    assert clock.lines == ["no message on /imu for 1 s: the robot is stopped"]
 
 
 def test_sensors_stamps_may_be_as_far_off_as_those_of_joints(furuta: PolicyNode) -> None:
@@ -111,10 +155,9 @@ def test_sensors_stamps_may_be_as_far_off_as_those_of_joints(furuta: PolicyNode)
 
 
 def test_reasons_that_change_fast_are_a_line_a_second(
-    furuta: PolicyNode, monkeypatch: pytest.MonkeyPatch
+    furuta: PolicyNode, clock: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lines, now = [], 0.0
-    monkeypatch.setattr(rospy, "logwarn", lines.append)
+    lines, now = clock.lines, 0.0
     monkeypatch.setattr(rospy, "loginfo", lines.append)
     monkeypatch.setattr(policy_node, "time", SimpleNamespace(monotonic=lambda: now))
     for number in range(1000):

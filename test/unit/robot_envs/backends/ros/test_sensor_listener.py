@@ -1,7 +1,6 @@
 """What a robot's sensors send, in real time: topics and messages, without ROS's servers."""
 
 import contextlib
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
@@ -11,6 +10,7 @@ import pytest
 import rospy
 from sensor_msgs.msg import Image, Imu, LaserScan, Range
 from std_msgs.msg import Header
+from support.ros.silent_topics import SilentSubscriber, silence
 from support.scenes.seeing_rover import NAMES, SEEING
 
 from robot_envs import InitialState, RobotEnvError, SimulatorError, StateQuery
@@ -25,27 +25,16 @@ HEADER = Header(stamp=rospy.Time(7, 500_000_000))
 
 
 class Heard:
-    """In the place of subscribers: what they subscribe to, and a clock."""
+    """What is subscribed to, and a clock."""
 
-    def __init__(self) -> None:
-        self.topics: dict[str, tuple[type, Callable[[Any], None]]] = {}
-        self.now = 0.0  # [s]
-
-    def subscribe(self, topic: str, kind: type, receive: Callable, **_: object) -> SimpleNamespace:
-        self.topics[topic] = (kind, receive)
-        return SimpleNamespace(resolved_name=topic, unregister=lambda: self.topics.pop(topic))
-
-    def send(self, topic: str, message: Any) -> None:
-        kind, receive = self.topics[topic]
-        assert isinstance(message, kind)
-        receive(message)
+    topics, send = SilentSubscriber.open, SilentSubscriber.send
+    now = 0.0  # [s]
 
 
 @pytest.fixture
-def heard(monkeypatch: pytest.MonkeyPatch) -> Iterator[Heard]:
-    made = Heard()
-    monkeypatch.setattr(rospy, "Subscriber", made.subscribe)
-    yield made
+def heard(monkeypatch: pytest.MonkeyPatch) -> Heard:
+    silence(monkeypatch)
+    return Heard()
 
 
 def listener(heard: Heard, *names: str, robot: Any = SEEING) -> SensorListener:
@@ -124,7 +113,7 @@ def test_the_slower_rate_of_sensor_and_plugin_counts(
     text = str(SEEING.urdf)
     assert old in text
     found = listener(heard, name, robot=replace(SEEING, urdf=text.replace(old, new)))
-    heard.send(topic, heard.topics[topic][0](header=HEADER))
+    heard.send(topic, heard.topics[topic].data_class(header=HEADER))
     heard.now = most - 0.001
     assert found.trouble(late=0.01) == ""
     heard.now = most + 0.001
