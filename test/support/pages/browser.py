@@ -133,9 +133,7 @@ class Browser:
 
     def choose(self, now, wanted):
         """Chooses `wanted` in the list that shows `now`."""
-        self._press(
-            wait_for(lambda: self._middle(f"e.value === {json.dumps(now)}"), f"list {now!r}")
-        )
+        wait_for(lambda: self._press(f"e.value === {json.dumps(now)}"), f"list {now!r}")
         self.click(wanted)
         self.wait_for_value(wanted)
         open_lists = "[...document.querySelectorAll('[role=option]')].some(e => e.offsetParent)"
@@ -144,7 +142,7 @@ class Browser:
     def click(self, text):
         """Clicks the element with that text, in the middle, as a mouse does."""
         found = f"e.innerText && e.innerText.trim() === {json.dumps(text)}"
-        self._press(wait_for(lambda: self._middle(found), f"element {text!r}"))
+        wait_for(lambda: self._press(found), f"element {text!r}")
 
     def press_keys(self, selector, key, count):
         """Presses a key some times on the first element of a CSS selector."""
@@ -173,9 +171,14 @@ class Browser:
           return e && e.querySelector("[role=slider]");
         }})()"""
 
-    def _press(self, place):
+    def _press(self, condition):
+        """Presses in the middle of an element; whether it was there. A page that is being laid out moves it away."""
+        place = self._middle(condition)
+        if not place:
+            return False
         for kind in ("mousePressed", "mouseReleased"):
             self._do("Input.dispatchMouseEvent", type=kind, button="left", clickCount=1, **place)
+        return self.run("window.met")
 
     def _middle(self, condition):
         """Where the first visible element is that a JavaScript condition on `e` holds for, once it rests."""
@@ -189,6 +192,8 @@ class Browser:
                 a => a.playState === "running" && a.effect.target.contains(found[0]));
               if (!found.length || moving.length) return null;
               found[0].scrollIntoView({{block: "center"}});
+              window.met = false;
+              document.onmousedown = event => {{ window.met = found[0].contains(event.target); }};
               const box = found[0].getClientRects()[0];  // of a text in lines, the first one
               return {{x: box.x + box.width / 2, y: box.y + box.height / 2}};
             }})()"""

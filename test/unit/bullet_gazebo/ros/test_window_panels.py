@@ -156,6 +156,7 @@ def test_foreign_names_and_numbers_are_only_text_to_a_browser(server):
         (client,) = server.get_clients().values()
         for name in NAMES:
             client.add_notification("It wasn't done", name, auto_close_seconds=None)
+        wait_for(lambda: page.text.count("It wasn't done") == len(NAMES), "all notifications")
         page.choose(shown(NAMES[0]), shown(NAMES[4]))
         wait_for(lambda: handles(server, viser.GuiDropdownHandle)["Model"].value == NAMES[4], "it")
         panel.show(picture.links, positions)
