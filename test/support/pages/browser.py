@@ -172,7 +172,7 @@ class Browser:
         }})()"""
 
     def _press(self, condition):
-        """Presses in the middle of an element; whether it was there. A page that is being laid out moves it away."""
+        """Presses in the middle of an element; whether it was there: layout moves elements away."""
         place = self._middle(condition)
         if not place:
             return False
