@@ -57,9 +57,9 @@ class SensorCase(unittest.TestCase):
         assert answer.success, answer.status_message
         (cleanup or self.addCleanup)(call, "/gazebo/delete_model", DeleteModel, name)
 
-    def put(self, x=0.0, y=0.0, z=0.0, turning=0.0):
-        """Puts the bot somewhere, turning about z at a speed [rad/s]."""
-        state = ModelState(model_name="bot", reference_frame="world")
+    def put(self, x=0.0, y=0.0, z=0.0, turning=0.0, name="bot"):
+        """Puts a model somewhere, turning about z at a speed [rad/s]."""
+        state = ModelState(model_name=name, reference_frame="world")
         state.pose = Pose(Point(x, y, z), UPRIGHT)
         state.twist = Twist(Vector3(), Vector3(0.0, 0.0, turning))
         self.assertTrue(call("/gazebo/set_model_state", SetModelState, state).success)

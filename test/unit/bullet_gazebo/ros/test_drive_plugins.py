@@ -99,6 +99,22 @@ def test_two_wheels_drive_straight_and_turn_as_commanded(fine_or_coarse):
     assert track.turned(round(2.0 * math.pi * ticks)) == pytest.approx(2.0 * math.pi, rel=0.03)
 
 
+def test_a_circle_and_a_square_are_closed(track):
+    track.spawn(diff_drive())
+    track.advance(500)
+    track.command(0.3, 1.0)
+    assert track.turned(6300) == pytest.approx(6.3, rel=0.03)
+    x, y, _ = track.model.state()[0].position
+    assert math.hypot(x, y) < 0.03
+    for _ in range(4):
+        track.command(0.25, 0.0)
+        track.advance(2000)
+        track.command(0.0, 1.0)
+        track.advance(round(500 * math.pi))
+    end = track.model.state()[0].position
+    assert math.hypot(end[0] - x, end[1] - y) < 0.06
+
+
 def test_odometry_of_the_world_is_the_state_of_the_model(track):
     track.spawn(diff_drive(publishWheelTF="true", publishWheelJointState="1"))
     track.command(0.2, 0.5)
