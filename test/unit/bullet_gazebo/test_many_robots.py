@@ -1,5 +1,6 @@
 """Many robots in one world: neither the cost of one nor how it moves depends on how many others there are."""
 
+import gc
 import random
 import sys
 from collections.abc import Callable, Sequence
@@ -65,11 +66,14 @@ def work(action: Callable[..., object], *arguments: object) -> int:
         return trace
 
     before = sys.gettrace()
+    gc.collect()  # finalizers of other tests' leftovers are no work of this one
+    gc.disable()
     sys.settrace(trace)
     try:
         action(*arguments)
     finally:
         sys.settrace(before)
+        gc.enable()
     return count
 
 
