@@ -14,6 +14,7 @@ from setuptools.command.build_py import build_py
 DATA = {
     "config/*.yaml": "rl_workbench/share/config",
     "urdf/*": "robot_envs/share/cartpole/urdf",
+    "worlds/*": "robot_envs/share/cartpole/worlds",
     "config/robots/*": "robot_envs/share/cartpole/config/robots",
     "companions/cartpole_controller/config/*": "robot_envs/share/cartpole_controller/config",
 }
@@ -39,7 +40,13 @@ setup(
     package_dir={"": "src"},
     package_data={
         "bullet_gazebo.physics.files": ["models.sdf"],
-        "package_writing": ["parts/*", "template/**/*", "template/.gitignore.in"],
+        "package_writing": [
+            "parts/*",
+            "drive/**/*",
+            "reach/**/*",
+            "template/**/*",
+            "template/.gitignore.in",
+        ],
         "rl_workbench.tools": ["page.html"],
     },
     cmdclass={"build_py": BuildWithData},

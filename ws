@@ -76,9 +76,12 @@ For example:
        ./ws roslaunch gazebo_ros empty_world.launch gui:=false
        ./ws --with ~/my_ws roslaunch my_arm arm.launch
 
-To make the workspace ready, ws installs the packages of requirements/debian.txt (apt-get, through
-sudo unless you are root), installs requirements/base.txt into .ws/venv, and builds the catkin
-workspace .ws from this package and companions/. It does each step once; logs are in .ws/log.
+To make the workspace ready, ws installs the packages of requirements/debian.txt and ros.txt (apt-get,
+through sudo unless you are root), installs requirements/base.txt into .ws/venv as the lock file of
+its Python says, and builds the catkin workspace .ws from this package and companions/. It does each
+step once; logs are in .ws/log.
+On Debian 13 torch is Debian's unless CARTPOLE_TORCH=pip. Where the system isn't Debian, ws uses the
+ROS 1 that is sourced or lies in /opt/ros/one.
 Apart from Debian's packages everything lies in $CHECKOUT/.ws.
 If that can't be written, ws uses ~/.cache/cartpole; CARTPOLE_WS_DIR names another folder.
 
@@ -157,10 +160,11 @@ main() {
             steps=(debian venv test_tools companions build)
             [[ " $* " == *" --fast "* ]] || steps+=(extras)
             ;;
-        check) steps=(debian venv test_tools companions build) ;;
+        check) steps=(debian checkers venv test_tools companions build) ;;
         extras) steps=(debian venv extras companions build) ;;
         rviz | foreign) steps=(debian "$1" venv companions build) ;;
     esac
+    look_at_system /etc/os-release /opt/ros/one
     choose_place "${steps[@]}"
     make_ready "${steps[@]}"
     enter_workspace

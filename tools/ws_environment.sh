@@ -18,6 +18,12 @@ leave_other_workspaces() {
     export PYTHONNOUSERSITE=1  # ~/.local would otherwise come before the venv's base
     export PATH=$VENV/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin:$PATH
     export HOME=${HOME:-$STATE/home}
+    if [[ -n $ROS_PREFIX ]]; then
+        set +u  # setup files read unset variables
+        # shellcheck disable=SC1091
+        source "$ROS_PREFIX/setup.bash"
+        set -u
+    fi
 }
 
 declare -A CALLER=()  # of each path variable, what belongs to the caller's packages

@@ -8,6 +8,7 @@
 
 declare -A TITLE=(
     [debian]="Debian packages"
+    [checkers]="Debian packages for ws check"
     [rviz]="Debian packages for RViz"
     [foreign]="Debian packages that others build against"
     [venv]="Python packages"
@@ -20,14 +21,46 @@ NETWORK="check the network and the free disk space"
 COMPILER="mend what the compiler or CMake complains of; if that is nothing of yours, ./ws clean"
 # shellcheck disable=SC2034
 declare -A REMEDY=(
-    [debian]="$NETWORK; on other systems than Debian 12 see docs/catkin.md"
-    [rviz]=$NETWORK [foreign]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [extras]=$NETWORK
+    [debian]="$NETWORK; on other systems than Debian 12 and 13 see docs/catkin.md"
+    [checkers]=$NETWORK [rviz]=$NETWORK [foreign]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [extras]=$NETWORK
     [companions]=$COMPILER [build]=$COMPILER
 )
 
+# --- what the system offers ----------------------------------------------------------------
+
+python_version() { local link; link=$(readlink -f -- "$SYSTEM_PYTHON"); echo "${link##*python}"; }
+
+# Debian 12's torch is too old.
+uses_debians_torch() { [[ ${CARTPOLE_TORCH-} != pip && $SYSTEM == "debian 13" ]]; }
+
+# Debian has a ROS 1 of its own. On other systems what is sourced is taken, or else what lies in
+# /opt/ros/one, as for Ubuntu 24.04. Package sources are the user's: none is added here.
+SYSTEM='' ROS_PREFIX=''
+look_at_system() {  # os-release, folder of ROS
+    local ID='' VERSION_ID='' prefix prefixes
+    # shellcheck disable=SC1090
+    [[ ! -r $1 ]] || source "$1"
+    SYSTEM="$ID $VERSION_ID"
+    [[ $ID != debian ]] || return 0
+    IFS=: read -ra prefixes <<<"${CMAKE_PREFIX_PATH-}:$2"
+    for prefix in "${prefixes[@]}"; do
+        if [[ -e $prefix/share/rospy && -e $prefix/setup.bash ]]; then
+            ROS_PREFIX=$prefix
+            return 0
+        fi
+    done
+}
+
 # --- Debian packages -----------------------------------------------------------------------
 
-debian_list() { sed 's/#.*//' -- "$ROOT/requirements/$1" | xargs -n 1; }
+# Two lists make what every command needs: on other systems ROS may come from elsewhere.
+debian_list() {  # file
+    if [[ $1 == debian.txt ]]; then
+        [[ -n $ROS_PREFIX ]] || debian_list ros.txt
+        ! uses_debians_torch || echo python3-torch
+    fi
+    sed 's/#.*//' -- "$ROOT/requirements/$1" | xargs -n 1
+}
 
 debian_missing() {  # file
     local installed
@@ -38,6 +71,7 @@ debian_missing() {  # file
 
 # The key is what is missing, which is nothing when ready: a package removed later is noticed.
 key_debian() { debian_missing debian.txt; }
+key_checkers() { debian_missing check.txt; }
 key_rviz() { debian_missing rviz.txt; }
 key_foreign() { debian_missing foreign.txt; }
 
@@ -54,6 +88,7 @@ apt() {
 }
 
 plan_debian() { plan_packages debian.txt; }
+plan_checkers() { plan_packages check.txt; }
 plan_rviz() { plan_packages rviz.txt; }
 plan_foreign() { plan_packages foreign.txt; }
 plan_packages() {  # file
@@ -83,6 +118,7 @@ sizes_of_debian() {  # package...
 }
 
 make_debian() { make_packages debian.txt; }
+make_checkers() { make_packages check.txt; }
 make_rviz() { make_packages rviz.txt; }
 make_foreign() { make_packages foreign.txt; }
 make_packages() {  # file
@@ -106,13 +142,17 @@ make_packages() {  # file
 # --- Python packages -----------------------------------------------------------------------
 
 # The place counts: a virtual environment has its path written into its scripts.
-key_place() { readlink -f -- "$SYSTEM_PYTHON"; echo "$ROOT"; }
-key_venv() { key_place; cat -- "$ROOT/requirements/base.txt"; }
+key_place() { readlink -f -- "$SYSTEM_PYTHON"; echo "$ROOT${ROS_PREFIX:+ $ROS_PREFIX}"; }
+key_venv() { key_place; base_list; cat -- "$(lock_file)"; }
 key_test_tools() { key_venv; cat -- "$ROOT/requirements/test.txt"; }
 key_extras() { key_venv; cat -- "$ROOT/requirements/extras.txt"; }
 
+base_list() { sed "$(! uses_debians_torch || echo '/^torch==/d')" -- "$ROOT/requirements/base.txt"; }
+
+lock_file() { echo "$ROOT/requirements/lock-$(python_version).txt"; }
+
 plan_venv() {
-    if compgen -G "$VENV/lib/*/site-packages/torch" >/dev/null; then  # the largest, so most is there
+    if compgen -G "$VENV/lib/*/site-packages/pybullet*" >/dev/null; then  # a large one, so most is there
         echo "what has changed in requirements/base.txt"
     else
         size_of base.txt
@@ -124,8 +164,14 @@ plan_extras() { size_of extras.txt; }
 # What was measured is written in the files.
 size_of() { sed -n 's/^# Size: //p' -- "$ROOT/requirements/$1"; }
 
+# With base.txt, so that nothing here moves what is pinned there.
 pip_install() {  # file...
-    local files=()
+    local files=(--requirement "$WS/base.txt" --constraint "$(lock_file)")
+    if [[ ! -f $(lock_file) ]]; then
+        echo "ERROR: requirements/ has no lock file for Python $(python_version), only $(cd -- "$ROOT/requirements" && echo lock-*)"
+        return 1
+    fi
+    base_list >"$WS/base.txt"
     for file in "$@"; do files+=(--requirement "$ROOT/requirements/$file"); done
     env -u PIP_USER -u PIP_TARGET -u PIP_PREFIX -u PYTHONPATH -u PYTHONHOME PYTHONNOUSERSITE=1 \
         "$VENV/bin/python3" -m pip install --disable-pip-version-check --no-input --progress-bar off \
@@ -134,17 +180,18 @@ pip_install() {  # file...
 
 make_venv() {
     local place=$VENV/cartpole-place
-    if [[ ! -f $place || $(<"$place") != "$(key_place)" ]]; then
+    # Pip's torch would hide Debian's.
+    if [[ ! -f $place || $(<"$place") != "$(key_place)" ]] ||
+        { uses_debians_torch && compgen -G "$VENV/lib/*/site-packages/torch" >/dev/null; }; then
         env -u PYTHONPATH -u PYTHONHOME \
             "$SYSTEM_PYTHON" -m venv --clear --system-site-packages "$VENV"
         key_place >"$place"
     fi
-    pip_install base.txt
+    pip_install
 }
 
-# With base.txt, so that nothing here moves what is pinned there.
-make_test_tools() { pip_install base.txt test.txt; }
-make_extras() { pip_install base.txt extras.txt; }
+make_test_tools() { pip_install test.txt; }
+make_extras() { pip_install extras.txt; }
 
 # --- catkin workspaces ---------------------------------------------------------------------
 
@@ -154,7 +201,7 @@ FRONT=(bullet_gazebo_msgs gazebo_ros)
 
 # What CMake reads, and the names of what it links to; sources are used where they are.
 PARTS=(CMakeLists.txt LICENSE README.md package.xml pyproject.toml setup.py
-    benchmark config docs launch requirements rviz scripts src test urdf)  # of the package
+    benchmark config docs launch requirements rviz scripts src test urdf worlds)  # of the package
 
 companions_behind() {
     local folder
@@ -207,7 +254,7 @@ make_build() {
     done
     ln -s -- "${FRONT[@]/#/$ROOT/companions/}" "$WS/src/"
     leave_other_workspaces
-    CMAKE_PREFIX_PATH=$COMPANIONS/devel catkin_workspace "$WS"
+    CMAKE_PREFIX_PATH=$COMPANIONS/devel${CMAKE_PREFIX_PATH:+:$CMAKE_PREFIX_PATH} catkin_workspace "$WS"
 }
 
 catkin_workspace() {  # folder
@@ -219,8 +266,8 @@ catkin_workspace() {  # folder
         mkdir -p -- "$1/build"
         echo "$wanted" >"$made_for"
     fi
-    # pytest runs the tests, so catkin need not look for its test tools.
-    /usr/bin/catkin_make --directory "$1" --force-cmake \
+    # pytest runs the tests, so catkin need not look for its test tools. Messages in C++ and Python are enough.
+    ROS_LANG_DISABLE=geneus:genlisp:gennodejs "${ROS_PREFIX:-/usr}/bin/catkin_make" --directory "$1" --force-cmake \
         -DPYTHON_EXECUTABLE="$VENV/bin/python3" -DCATKIN_ENABLE_TESTING=OFF \
         -DCMAKE_BUILD_TYPE=Release
 }

@@ -80,8 +80,9 @@ def debian(tmp_path, checkout):
     (checkout / "companions/broken").mkdir(parents=True)
     (checkout / "companions/broken/package.xml").write_text("<package/>")
     (checkout / "requirements/debian.txt").write_text("one\ntwo\n")
+    (checkout / "requirements/ros.txt").write_text("")
     (checkout / "requirements/base.txt").write_text("# Size: 1 kB to fetch\n./no-such-folder\n")
-    return {"PATH": f"{folder}:/usr/bin:/bin", "STATE_FILE": str(state)}
+    return {"PATH": f"{folder}:/usr/bin:/bin", "STATE_FILE": str(state), "CARTPOLE_TORCH": "pip"}
 
 
 def lines(result):
@@ -102,8 +103,8 @@ def test_the_plan_comes_first_and_a_second_call_goes_on(ws, checkout, debian):
         f"[1/4] Debian packages ... (log: {place}/log/debian.log)",
         "[1/4] Debian packages: failed after 0 s (exit code 100): "
         "E: Failed to fetch http://deb.example/one.deb",
-        "what to do: check the network and the free disk space; on other systems than Debian 12 see "
-        f"docs/catkin.md; then call ws again, which continues from here (log: {place}/log/debian.log)",
+        "what to do: check the network and the free disk space; on other systems than Debian 12 and 13 "
+        f"see docs/catkin.md; then call ws again, which continues from here (log: {place}/log/debian.log)",
     ]
 
     second = ws("true", script=checkout / "ws", FREE="3M", **debian)
