@@ -8,14 +8,13 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.physics.description import Plugin
-from bullet_gazebo.physics.engine import FURTHEST
+from bullet_gazebo.physics.engine import FURTHEST, STRONGEST
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.stability import Log, StabilityWatch
 
 JointStates = Sequence[Sequence[float]]
 NANOSECONDS = 1_000_000_000
 FAST = 0.999 * FURTHEST  # [rad, m] in a step: only what has blown up moves like that
-STRONGEST = 1e9  # [N m, N]; of a motor without a limit: the engine's solver needs a finite number
 
 SLOWEST = 3600.0  # [s]; the longest control period
 

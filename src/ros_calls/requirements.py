@@ -14,9 +14,10 @@ from pathlib import Path
 FILE = "requirements/base.txt"
 PAGE = "docs/catkin.md"
 
-# For the simulator (PyBullet, meshes of all kinds), for its window, and for all programs.
-RAYS = ("embreex",) if platform.machine() == "x86_64" else ()  # elsewhere it has no wheel
-SIMULATOR = (*RAYS, "collada", "numpy", "pybullet", "scipy", "trimesh", "vhacdx", "xacro", "yaml")
+# For the simulator (physics, meshes of all kinds), for its window, and for all programs. Elsewhere PyBullet
+# and embreex have no wheels.
+PHYSICS = ("embreex", "pybullet") if platform.machine() == "x86_64" else ("mujoco",)
+SIMULATOR = (*PHYSICS, "collada", "numpy", "scipy", "trimesh", "vhacdx", "xacro", "yaml")
 WINDOW = (*SIMULATOR, "PIL", "viser", "websockets")
 ALL = (
     *WINDOW,

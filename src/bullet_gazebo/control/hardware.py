@@ -2,7 +2,8 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.joint import JointHandle
@@ -21,6 +22,8 @@ EFFORT = "EffortJointInterface"
 POSITION = "PositionJointInterface"
 VELOCITY = "VelocityJointInterface"
 STATE = "JointStateInterface"
+IMU = "ImuSensorInterface"
+FORCE_TORQUE = "ForceTorqueSensorInterface"
 FULL = 0.999  # of an effort limit
 PUSHED, BACK = 1e-3, 1e-4  # [rad, m] off a motor's command: pushed away, and back at it
 GAINS = "gazebo_ros_control/pid_gains"  # where, in the robot's namespace, gains of drives stand
@@ -161,6 +164,30 @@ class VelocityDrive(Drive):
         return self.joint.command, self._most
 
 
+class SensorHandle:
+    """A sensor as the controller sees that has it. This one measures nothing, as where no topics are.
+
+    Args:
+        name: of the sensor.
+        frame: that it measures in.
+    """
+
+    def __init__(self, name: str, frame: str) -> None:
+        self.name, self.frame = name, frame
+        self.value: Any = None  # what it has measured last, if that is known
+
+    def begin(self, moved: Callable[[int], None]) -> None:
+        """Measures from now on.
+
+        Args:
+            moved: called with the time [ns] after something other than time has moved bodies, with a fresh
+                `value`.
+        """
+
+    def end(self) -> None:
+        """Measures no more."""
+
+
 class RobotHardware:
     """The joints that have a transmission (docs/contract/gazebo_ros_control.md 6.3 and 6.4).
 
@@ -188,6 +215,8 @@ class RobotHardware:
         self.effort_joints = self._of(EFFORT)
         self.drives = self._drives(gains or {})
         self.halted = False
+        # By interface, what makes a controller's handles; each raises ControlError for a faulty sensor.
+        self.sensors: dict[str, list[Callable[[], SensorHandle]]] = {IMU: [], FORCE_TORQUE: []}
         self.enforcers: list[tuple[JointHandle, Enforcer]] = [
             (joint, effort_enforcer(joint.limits)) for joint in self.effort_joints
         ]

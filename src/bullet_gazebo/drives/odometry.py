@@ -8,6 +8,7 @@ from typing import NamedTuple
 Triple = tuple[float, float, float]
 STRAIGHT = 1e-6  # [rad]; below it an arc is a line
 NANOSECONDS = 1_000_000_000
+SLOWEST = 1e-9  # [Hz]
 UNKNOWN = 1e12  # the variance of what is not measured
 POSE = (1e-5, 1e-5, UNKNOWN, UNKNOWN, UNKNOWN, 1e-3)  # covariances of most plugins
 TWIST = (0.0,) * 6
@@ -133,14 +134,14 @@ class Period:
 
     def set_rate(self, rate: float) -> None:
         """Lets the next periods be as long as a rate says [Hz]."""
-        self._length = round(NANOSECONDS / rate) if rate > 0.0 else 0
+        self._length = round(NANOSECONDS / max(rate, SLOWEST)) if rate > 0.0 else 0
 
     def restart(self, now: int) -> None:
         """Lets a period begin at `now` [ns]."""
         self._due = now + self._length + self._late
 
     def time_set_back(self, now: int) -> None:
-        """Makes the next one due within a period, where time has gone back to `now` [ns]."""
+        """Makes the next one due within a period, as at `now` [ns] time was set back or the rate is new."""
         self._due = min(self._due, now + self._length + self._late)
 
     def is_over(self, now: int) -> bool:

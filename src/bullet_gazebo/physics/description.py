@@ -1,5 +1,6 @@
 """What a model consists of, whatever file it came from and whatever engine simulates it."""
 
+import math
 import os
 from collections import defaultdict
 from dataclasses import dataclass, field
@@ -138,6 +139,26 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class Mimic:
+    """What makes a joint follow another one: its position is multiplier · the other's + offset [rad, m].
+
+    Attributes:
+        driver: the joint that it follows.
+        effort: the most that moves it [N m, N].
+        pid: the parameters of a PID that moves it instead of a gear: "" for those that joints with gains
+            have anyway, None for a gear.
+        sensitiveness: the error [rad, m] below which the PID leaves it alone.
+    """
+
+    driver: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+    effort: float = math.inf
+    pid: str | None = None
+    sensitiveness: float = 0.0
+
+
+@dataclass(frozen=True)
 class Plugin:
     """A `<plugin>` element of a model. The library's file name selects the code.
 
@@ -206,6 +227,7 @@ class ModelDescription:
         left_out: plugins and the like, which nothing simulates.
         stand_ins: models of Gazebo's database that aren't installed, in whose place simpler ones stand.
         islands: links of a static model that no joint connects with the root, and their poses seen from it.
+        mimics: what makes joints follow others, by the follower's name, drivers before their followers.
         lumped: links that a fixed joint has made part of another one: that link, and their poses in it.
         initial_pose: where the file puts the model.
     """
@@ -222,6 +244,7 @@ class ModelDescription:
     left_out: list[str] = field(default_factory=list)
     stand_ins: list[str] = field(default_factory=list)
     islands: dict[str, Pose] = field(default_factory=dict)
+    mimics: dict[str, Mimic] = field(default_factory=dict)
     lumped: dict[str, tuple[str, Pose]] = field(default_factory=dict)
     initial_pose: Pose = Pose()
     static: bool = False

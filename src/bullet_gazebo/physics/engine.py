@@ -17,6 +17,8 @@ FURTHEST = math.pi
 a rotation has no direction, and explicit terms, such as centrifugal forces, add energy."""
 FASTEST = 1e9
 """The largest velocity [rad/s, m/s] of a body without joints, and of a motor."""
+GEAR = 0.05  # of the error of a joint that follows another one is mended in a step
+STRONGEST = 1e9  # [N m, N]; of a motor or gear without a limit: solvers need a finite number
 OVERLAP = 0.0025
 """The depth [m] from which two links overlap; PyBullet's margins around two meshes are 2 mm."""
 
@@ -98,6 +100,10 @@ class Body(ABC):
         """
 
     @abstractmethod
+    def set_gear(self, joint: str, effort: float) -> None:
+        """Has at most `effort` [N m, N] move a joint that follows another one (`Mimic`); 0 for none."""
+
+    @abstractmethod
     def set_friction(self, link: str, factor: float) -> None:
         """Multiplies the friction that the collisions of `link` were loaded with by `factor`."""
 
@@ -130,6 +136,10 @@ class Body(ABC):
         """Returns whether gravity acts on link `name`."""
 
 
+LinkOf = tuple[Body, str]
+"""A body and the name of a link of it."""
+
+
 class Engine(ABC):
     """A dynamics engine with velocity-stepped articulated bodies.
 
@@ -155,6 +165,23 @@ class Engine(ABC):
         moves into a new world now and then; motors and dampings then have to be set again.
         """
         return [body for _, body in bodies]
+
+    @abstractmethod
+    def fasten(self, first: LinkOf, second: LinkOf, pose: Pose) -> int:
+        """Fixes a link of one body to a link of another one; the two don't collide any more.
+
+        Args:
+            first: the first one.
+            second: the second one.
+            pose: where its frame is kept, seen from the frame of the first one.
+
+        Returns:
+            The number by which to unfasten it. It ends with either of the bodies.
+        """
+
+    @abstractmethod
+    def unfasten(self, number: int) -> None:
+        """Ends what `fasten` began."""
 
     @abstractmethod
     def set_gravity(self, gravity: Vector) -> None:

@@ -30,6 +30,7 @@ class Model:
         self.damping_added: Mapping[str, float] = {}  # [N m s/rad, N s/m] in addition to the file's
         self._motors: dict[str, tuple[float, float]] = {}  # speed [rad/s, m/s] and effort [N m, N]
         self._grip: dict[str, float] = {}  # factors of the friction of links
+        self._limp: list[str] = []  # joints that follow by another law than their gears
         self._joints = {joint: index for index, joint in enumerate(body.joint_names)}
 
     @property
@@ -100,6 +101,7 @@ class Model:
             joint = self.description.joints[name]
             self.body.reset_joint(self._joints[name], self.clamped(name, positions[name]))
             self._rest(self._below(joint.child))
+        self.put_followers()
 
     def set_joint_velocities(self, velocities: Mapping[str, float]) -> None:
         """Sets the `velocities` [rad/s, m/s] of joints; unknown names are ignored."""
@@ -107,6 +109,21 @@ class Model:
         for name in sorted(set(velocities) & set(self._joints)):
             index = self._joints[name]
             self.body.reset_joint(index, states[index][0], velocities[name])
+        self.put_followers()
+
+    def put_followers(self) -> None:
+        """Puts joints that follow others where those have them, within their stops."""
+        for name, mimic in self.description.mimics.items():
+            position, velocity = self.joint_state(mimic.driver)
+            wanted = mimic.multiplier * position + mimic.offset
+            self.body.reset_joint(
+                self._joints[name], self.clamped(name, wanted), mimic.multiplier * velocity
+            )
+
+    def release_follower(self, name: str) -> None:
+        """Takes the gear from a joint that follows another one."""
+        self._limp.append(name)
+        self.body.set_gear(name, 0.0)
 
     def clamped(self, name: str, position: float) -> float:
         """Returns `position` [rad, m] within the stops of joint `name`."""
@@ -199,6 +216,8 @@ class Model:
             body.set_damping(self._joints[name], damping)
         for link, factor in self._grip.items():
             body.set_friction(link, factor)
+        for name in self._limp:
+            body.set_gear(name, 0.0)
 
     def joint_states(self) -> list[tuple[float, float]]:
         """Returns position [rad, m] and velocity [rad/s, m/s] of each movable joint."""
@@ -213,6 +232,7 @@ class Model:
         if joints:
             for index in self._joints.values():
                 self.body.reset_joint(index, 0.0)
+            self.put_followers()
         self.place(self.initial_pose)
         self._rest(list(self._joints))
 

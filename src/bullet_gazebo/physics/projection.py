@@ -31,6 +31,7 @@ def place_link(model: Model, link: str, pose: Pose, twist: Twist) -> None:
         if _approach(model, carriers, link, pose) < CLOSE:
             break
     _match(model, carriers, link, twist)
+    model.put_followers()
 
 
 def _approach(model: Model, carriers: list[str], link: str, pose: Pose) -> float:

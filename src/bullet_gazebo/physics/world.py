@@ -38,6 +38,20 @@ class SolverSettings:
     max_contacts: int = 20
 
 
+@dataclass(eq=False)
+class Attachment:
+    """Two links that are fixed to each other; the second one is at `pose` in the first one's frame."""
+
+    first: tuple[Model, str]
+    second: tuple[Model, str]
+    pose: Pose
+    number: int = 0  # the engine's
+
+    def joins(self, model: Model) -> bool:
+        """Returns whether one of the links is of that model."""
+        return model in (self.first[0], self.second[0])
+
+
 class NameTaken(ValueError):
     """The world already has a model of that name."""
 
@@ -63,6 +77,7 @@ class World:
         self.engine = engine
         self.models: dict[str, Model] = {}
         self.lights: dict[str, Light] = {}
+        self.attachments: list[Attachment] = []
         self.version = 0  # counts what changes the look of the world: models and lights
         self._entities: dict[str, Entity] = {}
         self._joints: dict[str, Entity] = {}
@@ -86,6 +101,7 @@ class World:
         model = Model(name, description, body, pose)
         try:
             model.apply_damping(self.time_step)
+            model.put_followers()
         except Exception:
             self.engine.remove(body)
             raise
@@ -101,7 +117,10 @@ class World:
 
     def delete(self, name: str) -> None:
         """Takes model `name` out of the world."""
-        self.engine.remove(self.models.pop(name).body)
+        model = self.models.pop(name)
+        for each in self._of(model):
+            self.detach(each)
+        self.engine.remove(model.body)
         self._entities, self._joints = {}, {}
         self._index(*self.models.values())
 
@@ -135,6 +154,26 @@ class World:
     def is_world_frame(self, name: str) -> bool:
         """Returns whether `name` refers to the world itself: an entity of that name takes precedence."""
         return name in WORLD_FRAMES and name not in self._entities
+
+    def attach(self, first: tuple[Model, str], second: tuple[Model, str]) -> Attachment:
+        """Fixes a link to another one where they are now, until `detach`, a reset, or one's deletion."""
+        poses = [model.link_state(link)[0] for model, link in (first, second)]
+        made = Attachment(first, second, poses[1].relative_to(poses[0]))
+        self._fasten(made)
+        self.attachments.append(made)
+        return made
+
+    def detach(self, attachment: Attachment) -> None:
+        """Ends an attachment."""
+        self.attachments.remove(attachment)
+        self.engine.unfasten(attachment.number)
+
+    def _fasten(self, attachment: Attachment) -> None:
+        (one, link), (other, its) = attachment.first, attachment.second
+        attachment.number = self.engine.fasten((one.body, link), (other.body, its), attachment.pose)
+
+    def _of(self, model: Model) -> list[Attachment]:
+        return [each for each in self.attachments if each.joins(model)]
 
     def set_gravity(self, gravity: Vector) -> None:
         """Sets the acceleration of gravity [m/s²]."""
@@ -171,8 +210,12 @@ class World:
                 record.inertia = old
                 raise
             stale = model.body
+            for each in self._of(model):
+                self.engine.unfasten(each.number)
             model.move_into(fresh)
             self.engine.remove(stale)
+            for each in self._of(model):
+                self._fasten(each)
         model.apply_damping(self.time_step)
 
     def step(self) -> None:
@@ -180,7 +223,12 @@ class World:
         self.engine.step()
 
     def reset(self, joints: bool) -> None:
-        """Returns every model to where it was spawned, at rest; with `joints`, every joint to zero."""
+        """Returns every model to where it was spawned, at rest; with `joints`, every joint to zero.
+
+        Nothing is attached any more.
+        """
+        for attachment in list(self.attachments):
+            self.detach(attachment)
         self.engine.forget_contacts()
         for model in self.models.values():
             model.reset(joints)
@@ -193,9 +241,11 @@ class World:
         """Lets the engine free the memory of removed bodies."""
         models = list(self.models.values())
         bodies = self.engine.renewed([(model.description, model.body) for model in models])
-        for model, body in zip(models, bodies, strict=True):
-            if body is not model.body:
-                model.go_on_in(body)
+        fresh = [(m, body) for m, body in zip(models, bodies, strict=True) if body is not m.body]
+        for model, body in fresh:
+            model.go_on_in(body)
+        for each in self.attachments if fresh else ():  # all are in another world of the engine
+            self._fasten(each)
 
     def _index(self, *models: Model) -> None:
         """Maps plain and scoped names of new models to what a depth-first search from the world's root finds.

@@ -36,15 +36,16 @@ class ContactSensor:
                 logger.info("Sensor '%s': collision '%s' is '%s' here", sensor.name, name, taken)
         self._collisions = {(model.name, link, each) for each in found if each is not None}
 
+    def is_stale(self, now: int) -> bool:
+        """Returns whether a service has moved something since the last step, so that nothing is known."""
+        step = round(self._mount.sim.world.time_step * NANOSECONDS)
+        return now - self._mount.sensing.schedule.moved_at <= step
+
     def measure(self, now: int) -> list[ContactPair]:
         """Returns what they touched in the last step."""
-        # Contacts are those of the last step, which may have been before a service moved something.
-        world = self._mount.sim.world
-        step = round(world.time_step * NANOSECONDS)
-        is_stale = now - self._mount.sensing.schedule.moved_at <= step
-        if is_stale or not self._collisions:
+        if self.is_stale(now) or not self._collisions:
             return []
-        return contact_pairs(world, self._collisions)
+        return contact_pairs(self._mount.sim.world, self._collisions)
 
     def values(self, now: int) -> dict[str, list[ContactPair]]:
         """Returns `contacts`."""

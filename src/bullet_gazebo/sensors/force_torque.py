@@ -22,6 +22,7 @@ from bullet_gazebo.physics.pose import (
     scale,
     subtract,
 )
+from bullet_gazebo.sensors.sensing import Mount, sensor_of
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 
 NOTHING: Wrench = (ZERO, ZERO)
@@ -168,6 +169,28 @@ class JointForces:
     def _effort(self) -> float:
         robots = [robot for robot in self._sim.robots if robot.model is self._model]
         return self._forces.effort + sum(robot.effort_on(self._joint.name) for robot in robots)
+
+
+class ForceTorqueSensor:
+    """A sensor of type force_torque: see `JointForces`. It measures in each step.
+
+    Args:
+        mount: its place.
+
+    Raises:
+        DescriptionError: if the model lacks its joint.
+    """
+
+    rate = 0.0
+
+    def __init__(self, mount: Mount) -> None:
+        self._schedule = mount.sensing.schedule
+        self._joint = JointForces(mount.sim, mount.model, sensor_of(mount, ("force_torque",)).joint)
+
+    def measure(self, now: int) -> Wrench | None:
+        """Returns force [N] and torque [N m] in the last step; none after a move, None if not known."""
+        self._joint.look(now, self._schedule.moves)
+        return NOTHING if now == self._schedule.moved_at else self._joint.wrench()
 
 
 def _joint(description: ModelDescription, name: str) -> Joint:

@@ -1,17 +1,23 @@
-"""Measures sensors for those who ask for them by name: over ROS with a step, and in-process."""
+"""Measures sensors for those who ask by name, over ROS with a step and in-process, and for controllers."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.hardware import FORCE_TORQUE, IMU, RobotHardware, SensorHandle
 from bullet_gazebo.physics.description import DescriptionError, Plugin, library_of
+from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.sensors.contact import ContactSensor
+from bullet_gazebo.sensors.force_torque import ForceTorqueSensor
 from bullet_gazebo.sensors.imu import ImuSensor, ModelImu
 from bullet_gazebo.sensors.laser import KINDS, LaserSensor, RangeSensor
 from bullet_gazebo.sensors.pinhole import DEPTH_KINDS, CameraSensor, DepthSensor
+from bullet_gazebo.sensors.schedule import SensorClock
 from bullet_gazebo.sensors.sensing import Mount, Sensing
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import SCOPE, UnknownName
@@ -38,6 +44,10 @@ BY_KIND: dict[str, Maker] = {
 BY_LIBRARY: dict[str, Maker] = {  # of a sensor's plugin, or a model's
     "libgazebo_ros_range.so": RangeSensor,
     "libgazebo_ros_imu.so": ModelImu,
+}
+BY_INTERFACE: dict[str, tuple[str, type[ImuSensor | ForceTorqueSensor]]] = {  # of a kind of sensor
+    "imu": (IMU, ImuSensor),
+    "force_torque": (FORCE_TORQUE, ForceTorqueSensor),
 }
 WITHOUT = Plugin("", "", Element("plugin"))
 
@@ -144,3 +154,66 @@ def _sensors(sim: Simulator, sensing: Sensing) -> Iterator[tuple[str, Mount, Mak
             maker = BY_LIBRARY.get(library_of(plugin.filename))
             if maker is not None:
                 yield plugin.name, Mount(sim, model, plugin, sensing, None), maker
+
+
+class MeasuringHandle(SensorHandle):
+    """A sensor that measures by its own clock while a controller has begun it.
+
+    Args:
+        mount: its place.
+        kind: makes it.
+        frame: see `SensorHandle`.
+
+    Raises:
+        ControlError: if it can't be simulated.
+    """
+
+    def __init__(self, mount: Mount, kind: type[ImuSensor | ForceTorqueSensor], frame: str) -> None:
+        assert mount.sensor is not None
+        super().__init__(mount.sensor.name, frame)
+        try:
+            self._sensor = kind(mount)
+        except DescriptionError as error:
+            raise ControlError(f"the sensor '{self.name}' can't be simulated: {error}") from error
+        if isinstance(self._sensor, ImuSensor):
+            self._sensor.start()
+        self._schedule = mount.sensing.schedule
+        self._clock: SensorClock | None = None
+
+    def begin(self, moved: Callable[[int], None]) -> None:
+        self._told = moved
+        if self._clock is None:
+            self._clock = self._schedule.begin(self._sensor.rate, self._take, lambda: True)
+            self._schedule.review()
+
+    def end(self) -> None:
+        if self._clock is not None:
+            self._schedule.fail(self._clock)
+        self._clock = self.value = None
+
+    def _take(self, now: int) -> None:
+        self.value = self._sensor.measure(now)
+        if now == self._schedule.moved_at:
+            self._told(now)
+
+
+def offer_sensors(
+    hardware: RobotHardware, sim: Simulator, model: Model, sensing: Sensing | None
+) -> None:
+    """Lets controllers have a model's IMUs and force-torque sensors.
+
+    Without `sensing` they measure nothing.
+    """
+    for sensor in model.description.sensors:
+        if sensor.kind in BY_INTERFACE:
+            interface, kind = BY_INTERFACE[sensor.kind]
+            plugin = next(iter(sensor.plugins), WITHOUT)
+            link = sensor.link.rpartition(SCOPE)[2]
+            frame = (plugin.element.findtext("frameName") or link).strip().lstrip("/")
+            hardware.sensors[interface].append(
+                partial(SensorHandle, sensor.name, frame)
+                if sensing is None
+                else partial(
+                    MeasuringHandle, Mount(sim, model, plugin, sensing, sensor), kind, frame
+                )
+            )

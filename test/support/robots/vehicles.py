@@ -14,7 +14,7 @@ def _link(name: str, mass: float, shape: str, inertia: float, rpy: str = "0 0 0"
       <geometry>{shape}</geometry></collision></link>"""
 
 
-def _wheel(name: str, place: str, parent: str = "base", interface: str = "Velocity") -> str:
+def wheel(name: str, place: str, parent: str = "base", interface: str = "Velocity") -> str:
     rim = f'<cylinder radius="{RADIUS}" length="0.04"/>'
     return (
         _link(f"{name}_wheel", 0.5, rim, 0.0025, "1.5707963267948966 0 0")
@@ -48,7 +48,7 @@ def _steered(name: str, place: str, interface: str = "Velocity") -> str:
     pivot = _link(f"{name}_fork", 0.2, '<box size="0.02 0.02 0.02"/>', 0.001)
     pivot += _joint(f"{name}_steering", "revolute", "base", f"{name}_fork", place)
     pivot += _transmission(f"{name}_steering", "Position")
-    return pivot + _wheel(name, "0 0 0", f"{name}_fork", interface)
+    return pivot + wheel(name, "0 0 0", f"{name}_fork", interface)
 
 
 def _ball(name: str, place: str, friction: float) -> str:
@@ -73,7 +73,7 @@ def _vehicle(parts: list[str], plugins: Mapping[str, Mapping[str, object]]) -> s
 def two_wheels(**plugins: Mapping[str, object]) -> str:
     """Two wheels and a castor with little friction; plugins by library, with their elements."""
     half = 0.5 * TRACK
-    wheels = [_wheel("left", f"0 {half} 0"), _wheel("right", f"0 {-half} 0")]
+    wheels = [wheel("left", f"0 {half} 0"), wheel("right", f"0 {-half} 0")]
     return _vehicle([*wheels, _ball("castor", "-0.15 0 -0.05", 0.1)], plugins)
 
 
@@ -83,7 +83,7 @@ def four_wheels(steered: tuple[str, ...] = (), **plugins: Mapping[str, object]) 
     for name, x, y in (
         ("left_front", 1, 1), ("left_rear", -1, 1), ("right_front", 1, -1), ("right_rear", -1, -1),
     ):  # fmt: skip
-        make = _steered if name in steered else _wheel
+        make = _steered if name in steered else wheel
         parts.append(make(name, f"{0.5 * x * BASE} {0.5 * y * TRACK} 0"))
     return _vehicle(parts, plugins)
 
@@ -91,7 +91,7 @@ def four_wheels(steered: tuple[str, ...] = (), **plugins: Mapping[str, object]) 
 def three_wheels(front: str = "front", **plugins: Mapping[str, object]) -> str:
     """A steered wheel at the front, and two free ones below the middle."""
     half = 0.5 * TRACK
-    wheels = [_wheel("left", f"0 {half} 0"), _wheel("right", f"0 {-half} 0")]
+    wheels = [wheel("left", f"0 {half} 0"), wheel("right", f"0 {-half} 0")]
     return _vehicle([_steered(front, f"{WHEELBASE} 0 0"), *wheels], plugins)
 
 
@@ -106,5 +106,5 @@ def bicycle(**plugins: Mapping[str, object]) -> str:
     """A driven wheel and a steered one before it, with balls at the sides."""
     balls = [_ball(f"ball_{y}", f"0 {y} -0.048", 0.0) for y in (0.2, -0.2)]
     half = 0.5 * WHEELBASE
-    wheels = [_wheel("rear", f"{-half} 0 0"), _steered("front", f"{half} 0 0", "")]
+    wheels = [wheel("rear", f"{-half} 0 0"), _steered("front", f"{half} 0 0", "")]
     return _vehicle([*wheels, *balls], plugins)

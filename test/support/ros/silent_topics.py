@@ -3,6 +3,7 @@
 import io
 from collections import defaultdict
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import pytest
@@ -13,13 +14,16 @@ class SilentPublisher:
     """Writes what is published as rospy would, and keeps it; `names` are those of open ones."""
 
     names: ClassVar[list[str]] = []
+    open_ones: ClassVar[dict[str, "SilentPublisher"]] = {}
     messages: ClassVar[defaultdict[str, list[Any]]] = defaultdict(list)
 
     def __init__(self, name, kind, *_, **__):
         self.name = self.resolved_name = name
         self.data_class = kind
-        self.impl = self
+        self.impl, self.connections = self, [SimpleNamespace(endpoint_id="/listener")]
         self.names.append(name)
+        if type(self) is SilentPublisher:
+            self.open_ones[name] = self
 
     def has_connections(self):
         return True

@@ -13,6 +13,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 from ros_calls.requirements import ALL, SIMULATOR
 
@@ -30,9 +31,10 @@ STARTED = "\n".join(
 
 
 def distributions() -> dict[str, set[str]]:
-    """The modules of each package that requirements/base.txt names."""
+    """The modules of each package that requirements/base.txt names for this machine."""
     lines = (ROOT / "requirements/base.txt").read_text().splitlines()
-    names = [found[0].lower() for line in lines if (found := re.match(r"[\w-]+", line))]
+    needed = [Requirement(text) for line in lines if (text := line.partition("#")[0].strip())]
+    names = [each.name.lower() for each in needed if not each.marker or each.marker.evaluate()]
     modules: dict[str, set[str]] = {name: set() for name in names}
     for module, owners in metadata.packages_distributions().items():
         for owner in owners:

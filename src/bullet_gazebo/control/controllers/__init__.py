@@ -17,6 +17,7 @@ from bullet_gazebo.control.controllers.forward import (
     VelocityGroup,
     VelocityJoint,
 )
+from bullet_gazebo.control.controllers.gripper import EffortGripper, PositionGripper
 from bullet_gazebo.control.controllers.joint_state import JointStateController
 from bullet_gazebo.control.controllers.joint_trajectory import (
     EffortTrajectory,
@@ -28,6 +29,10 @@ from bullet_gazebo.control.controllers.pid_controllers import (
     EffortJointPosition,
     EffortJointVelocity,
     VelocityJointPosition,
+)
+from bullet_gazebo.control.controllers.sensor_controllers import (
+    ForceTorqueSensorController,
+    ImuSensorController,
 )
 from bullet_gazebo.control.controllers.steering import (
     AckermannSteeringController,
@@ -44,15 +49,19 @@ BUILT_IN: dict[str, type[Controller]] = {
         DiffDriveController,
         AckermannSteeringController,
         FourWheelSteeringController,
+        ImuSensorController,
+        ForceTorqueSensorController,
         EffortJoint,
         EffortJointPosition,
         EffortJointVelocity,
         EffortGroup,
         EffortGroupPosition,
         EffortTrajectory,
+        EffortGripper,
         PositionJoint,
         PositionGroup,
         PositionTrajectory,
+        PositionGripper,
         VelocityJoint,
         VelocityJointPosition,
         VelocityGroup,

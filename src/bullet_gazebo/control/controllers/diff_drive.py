@@ -105,6 +105,7 @@ class DiffDriveController(VehicleController):
     def tune(self, values: Mapping[str, Any]) -> None:
         self._rescale(values)
         self.period.set_rate(values["publish_rate"])
+        self.period.time_set_back(self._now)  # a period that has begun may be a long one
         self.tf_on = values["enable_odom_tf"]
 
     def remember(self) -> None:

@@ -108,6 +108,7 @@ class FourWheelSteeringController(SteeringController):
     """Four driven wheels on forks: front left, front right, rear left, rear right."""
 
     type_name = "four_wheel_steering_controller/FourWheelSteeringController"
+    _angles: tuple[float, float] | None  # of the axles [rad], if they are commanded
 
     def __init__(
         self, name: str, options: VehicleOptions, joints: list[list[JointHandle]],
@@ -116,7 +117,6 @@ class FourWheelSteeringController(SteeringController):
         super().__init__(name, replace(options, odom_frame="odom"))
         self.claim([*joints[0], *joints[1]], [*joints[2], *joints[3]])
         self._geometry, self._radius = geometry, radius
-        self._angles: tuple[float, float] | None = None  # of the axles [rad], if they are commanded
         self._steer = Output("odom_steer", "SteeringSample", whole=True)
         self.outputs.append(self._steer)
         steering = Input("cmd_four_wheel_steering", "FourWheelSteering", self.command_axles)
@@ -144,6 +144,10 @@ class FourWheelSteeringController(SteeringController):
         radius = length_param(params, "wheel_radius", name, lambda: wheel_radius(robot, left.name))
         geometry = SteeredWheels(base, track - 2.0 * offset, offset)
         return cls(name, VehicleOptions.read(params, name), joints, geometry, radius)
+
+    def _halt(self) -> None:
+        super()._halt()
+        self._angles = None
 
     def command(self, twist: Triple) -> None:
         super().command(twist)

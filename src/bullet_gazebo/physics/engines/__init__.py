@@ -7,7 +7,9 @@ name it.
 """
 
 import importlib.util
+import logging
 import os
+import platform
 import shlex
 import sys
 
@@ -17,13 +19,15 @@ BULLET = ("ode", "bullet", "simbody", "dart")  # Gazebo's names: PyBullet stands
 MUJOCO = "mujoco"
 ENGINES = (*BULLET, MUJOCO)
 
+logger = logging.getLogger(__name__)
+
 
 class EngineError(ValueError):
     """A physics engine is unknown or not installed; the text says what to do."""
 
 
 def make_engine(name: str = BULLET[0]) -> Engine:
-    """Returns a new, empty engine.
+    """Returns a new, empty engine; MuJoCo, with a warning, where PyBullet can't be had.
 
     Args:
         name: one of `ENGINES`.
@@ -33,6 +37,12 @@ def make_engine(name: str = BULLET[0]) -> Engine:
     """
     if name not in ENGINES:
         raise EngineError(f"physics engine '{name}' is not known; there are {', '.join(ENGINES)}")
+    if name in BULLET and importlib.util.find_spec("pybullet") is None:
+        logger.warning(
+            "There is no PyBullet for %s: MuJoCo is used, with other bits and without cameras",
+            platform.machine(),
+        )
+        name = MUJOCO
     if name == MUJOCO:
         if importlib.util.find_spec("mujoco") is None:
             workspace = os.environ.get("CARTPOLE_WS")  # the path of `ws`, which sets it

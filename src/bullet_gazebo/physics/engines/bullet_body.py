@@ -1,36 +1,26 @@
-"""A model in PyBullet, and the contacts of PyBullet's bodies."""
+"""A model in PyBullet."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import combinations
-from typing import Any
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Link, ModelDescription
-from bullet_gazebo.physics.engine import FASTEST, FURTHEST, OVERLAP, Body, Contact, Side, Twist
+from bullet_gazebo.physics.engine import (
+    FASTEST,
+    FURTHEST,
+    GEAR,
+    OVERLAP,
+    STRONGEST,
+    Body,
+    Twist,
+)
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
-from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, scale, subtract
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
 
 BASE = -1
 # PyBullet's defaults for which links collide: bits of a link's group, and of the groups that it meets.
 DYNAMIC, STATIC, EVERYTHING = 1, 2, -1
 NO_STOP = 1e16  # [rad, m]
-
-
-def contacts(client: int, sides: Mapping[tuple[int, int], Side]) -> list[Contact]:
-    """Returns where bodies touched in the last step, without those that were only near."""
-    found = pybullet.getContactPoints(physicsClientId=client)
-    return [_contact(each, sides) for each in found if each[9] > 0.0]
-
-
-def _contact(found: Sequence[Any], sides: Mapping[tuple[int, int], Side]) -> Contact:
-    """PyBullet has links, not shapes; the point on the second body, and the normal towards the first."""
-    _, first, second, first_link, second_link, _, point, normal, distance, force = found[:10]
-    along, direction, across, other = found[10:14]
-    friction: Vector = add(scale(direction, along), scale(other, across))
-    return Contact(
-        point, scale(normal, force), friction, normal, -distance,
-        sides[first, first_link], sides[second, second_link],
-    )  # fmt: skip
 
 
 class BulletBody(Body):
@@ -84,6 +74,8 @@ class BulletBody(Body):
             pybullet.setJointMotorControlArray, body, self._indices, pybullet.TORQUE_CONTROL, unused, unused
         )  # fmt: skip
         self._unused = unused
+        self._gears: dict[str, tuple[int, float]] = {}  # constraint and effort [N m, N]
+        self._add_gears()
         self._base = pose.compose(self._com)  # where the centre of mass was put last
         if not is_plane(description):
             self.reset_base(pose)
@@ -143,6 +135,41 @@ class BulletBody(Body):
             self.set_link_gravity(name, link.gravity)
             if link.inertia is not None and not self._description.static:
                 self._keep_moments(self._links[name], link.inertia)
+
+    def _add_gears(self) -> None:
+        """Adds a constraint for each joint that follows another one."""
+        places = dict(zip(self.joint_names, self._indices, strict=True))
+        for name, mimic in self._description.mimics.items():
+            gear = pybullet.createConstraint(
+                self.id, places[name], self.id, places[mimic.driver], pybullet.JOINT_GEAR,
+                [1, 0, 0], [0, 0, 0], [0, 0, 0], physicsClientId=self._client,
+            )  # fmt: skip
+            pybullet.changeConstraint(
+                gear, gearRatio=-mimic.multiplier, relativePositionTarget=mimic.offset, erp=GEAR,
+                physicsClientId=self._client,
+            )  # fmt: skip
+            self._gears[name] = gear, mimic.effort
+
+    def set_gear(self, joint: str, effort: float) -> None:
+        gear, _ = self._gears[joint]
+        self._gears[joint] = gear, effort
+        most = min(effort, STRONGEST)  # PyBullet takes the impulse of a step
+        pybullet.changeConstraint(gear, maxForce=most, physicsClientId=self._client)
+
+    def centre_of_mass(self, link: str) -> Pose:
+        """Returns the frame that PyBullet's constraints have for a link, in the world."""
+        index = self._links[link]
+        if index == BASE:
+            return Pose(*pybullet.getBasePositionAndOrientation(self.id, self._client))
+        state = pybullet.getLinkState(self.id, index, 0, 1, self._client)
+        return Pose(state[0], state[1])
+
+    def pieces(self, link: str) -> list[int]:
+        """Returns PyBullet's links that stand for a link, its own first."""
+        own = [
+            i for name, i in self._links.items() if self._description.links[name].part_of == link
+        ]
+        return [self._links[link], *own]
 
     def _check_meshes(self) -> None:
         """Refuses links whose meshes PyBullet has silently left out."""
@@ -252,6 +279,8 @@ class BulletBody(Body):
         pybullet.changeDynamics(
             self.id, BASE, maxJointVelocity=fastest, physicsClientId=self._client
         )
+        for name, (_, effort) in self._gears.items():
+            self.set_gear(name, effort)
 
     def set_friction(self, link: str, factor: float) -> None:
         # PyBullet has one friction for a link (engine_form.py), so a link may have been split into pieces.
@@ -325,12 +354,8 @@ class BulletBody(Body):
         if index == BASE:
             return self._base_state()
         state = pybullet.getLinkState(
-            self.id,
-            index,
-            computeLinkVelocity=1,
-            computeForwardKinematics=1,
-            physicsClientId=self._client,
-        )
+            self.id, index, 1, 1, self._client
+        )  # speeds, and present places
         pose = Pose(state[4], state[5])
         if name in self._offsets:
             pose = pose.compose(self._offsets[name])

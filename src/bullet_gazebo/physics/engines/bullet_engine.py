@@ -2,27 +2,24 @@
 
 import contextlib
 import locale
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from bullet_gazebo.heap import give_back
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
-from bullet_gazebo.physics.engine import Body, Contact, Engine, Side
+from bullet_gazebo.physics.engine import STRONGEST, Body, Contact, Engine, LinkOf, Side
 from bullet_gazebo.physics.engine_form import at_joints, parents_first
-from bullet_gazebo.physics.engines.bullet_body import (
-    BASE,
-    BulletBody,
-    contacts,
-    is_plane,
-)
+from bullet_gazebo.physics.engines.bullet_body import BASE, BulletBody, is_plane
 from bullet_gazebo.physics.engines.bullet_files import write_urdf
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
-from bullet_gazebo.physics.pose import ZERO, Pose, Vector, scale
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, scale
 from file_access.locks import scratch_folder
 
 MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
+ALL = 2**31 - 1  # constraints of a world
 PLANE = 1200  # [bytes] of a file, if it had been loaded from one
 MOST_WASTE = 1_000_000  # [bytes] of files that removed bodies were loaded from: 5 MB of memory
 
@@ -44,11 +41,14 @@ class BulletClient:
 
     def __init__(self, settings: BulletSettings) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
-        # The solver's result depends on the order of contact pairs: make it the same in every run. Each
-        # body has its own files, so caching them is of no use.
+        # The solver's result depends on the order of contact pairs, and on which bodies it solves together:
+        # make both the same in every run. Bodies that come near each other may share an island or not,
+        # depending on earlier episodes, so all islands are one (test_robots.py shows it with a gripper and
+        # its cube). Each body has its own files, so caching them is of no use.
         pybullet.setPhysicsEngineParameter(
-            deterministicOverlappingPairs=1, enableFileCaching=0, physicsClientId=self._client
-        )
+            deterministicOverlappingPairs=1, minimumSolverIslandSize=ALL, enableFileCaching=0,
+            physicsClientId=self._client,
+        )  # fmt: skip
         self._step = partial(pybullet.stepSimulation, self._client)
         self._gravity: Vector = ZERO
         self._time_step = 0.0
@@ -56,6 +56,8 @@ class BulletClient:
         self._sides: dict[tuple[int, int], Side] = {}  # by body and link
         self._weightless: set[tuple[int, int]] = set()  # body and link, where gravity doesn't act
         self._sizes: dict[int, int] = {}  # [bytes] by body
+        # By constraint the bodies and links that don't meet meanwhile.
+        self._fastened: dict[int, list[tuple[int, int, int, int]]] = {}
         self.waste = 0
         self.apply(settings)
 
@@ -146,13 +148,42 @@ class BulletClient:
         self._step()
 
     def contacts(self) -> list[Contact]:
-        """See `Engine.contacts`."""
-        return contacts(self._client, self._sides)
+        """Returns where bodies touched in the last step, without those that were only near."""
+        found = pybullet.getContactPoints(physicsClientId=self._client)
+        return [_contact(each, self._sides) for each in found if each[9] > 0.0]
 
     def forget_contacts(self) -> None:
         """See `Engine.forget_contacts`."""
         for body in self._bodies.values():
             body.forget_contacts()
+
+    def fasten(self, first: LinkOf, second: LinkOf, pose: Pose) -> int:
+        """See `Engine.fasten`."""
+        (one, link), (other, its) = first, second
+        assert isinstance(one, BulletBody)
+        assert isinstance(other, BulletBody)
+        centre = other.centre_of_mass(its).relative_to(other.link_state(its)[0])
+        wanted = one.link_state(link)[0].compose(pose).compose(centre)
+        place = wanted.relative_to(one.centre_of_mass(link))
+        pairs = [(a, b) for a in one.pieces(link) for b in other.pieces(its)]
+        number: int = pybullet.createConstraint(
+            one.id, pairs[0][0], other.id, pairs[0][1], pybullet.JOINT_FIXED, [0, 0, 0],
+            place.position, [0, 0, 0], place.orientation, [0, 0, 0, 1], self._client,
+        )  # fmt: skip
+        pybullet.changeConstraint(number, maxForce=STRONGEST, physicsClientId=self._client)
+        self._fastened[number] = [(one.id, other.id, a, b) for a, b in pairs]
+        self._let_meet(number, False)
+        return number
+
+    def unfasten(self, number: int) -> None:
+        """See `Engine.unfasten`."""
+        self._let_meet(number, True)
+        del self._fastened[number]
+        pybullet.removeConstraint(number, self._client)
+
+    def _let_meet(self, number: int, on: bool) -> None:
+        for pair in self._fastened[number]:
+            pybullet.setCollisionFilterPair(*pair, int(on), self._client)
 
     def _hold_up(self) -> None:
         """Cancels gravity on weightless links by a force: PyBullet's gravity acts on all of them."""
@@ -220,6 +251,12 @@ class BulletEngine(Engine):
         self._client, self._most_waste = fresh, MOST_WASTE
         return moved
 
+    def fasten(self, first: LinkOf, second: LinkOf, pose: Pose) -> int:
+        return self._client.fasten(first, second, pose)
+
+    def unfasten(self, number: int) -> None:
+        self._client.unfasten(number)
+
     def set_gravity(self, gravity: Vector) -> None:
         self._settings.gravity = gravity
         self._client.apply(self._settings)
@@ -251,3 +288,14 @@ def _moved(description: ModelDescription, body: Body, client: BulletClient) -> B
     fresh = client.load(description, body.link_state(description.root)[0])
     fresh.go_on_from(body)
     return fresh
+
+
+def _contact(found: Sequence[Any], sides: Mapping[tuple[int, int], Side]) -> Contact:
+    """PyBullet has links, not shapes; the point on the second body, and the normal towards the first."""
+    _, first, second, first_link, second_link, _, point, normal, distance, force = found[:10]
+    along, direction, across, other = found[10:14]
+    friction: Vector = add(scale(direction, along), scale(other, across))
+    return Contact(
+        point, scale(normal, force), friction, normal, -distance,
+        sides[first, first_link], sides[second, second_link],
+    )  # fmt: skip

@@ -9,12 +9,23 @@ import mujoco
 import numpy as np
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription, Shape
-from bullet_gazebo.physics.engine import FASTEST, FURTHEST, OVERLAP, Body, Contact, Side, Twist
+from bullet_gazebo.physics.engine import (
+    FASTEST,
+    FURTHEST,
+    GEAR,
+    OVERLAP,
+    STRONGEST,
+    Body,
+    Contact,
+    Side,
+    Twist,
+)
 from bullet_gazebo.physics.engines.mujoco_model import Elements, geoms_of, priority, wxyz, xyzw
 from bullet_gazebo.physics.pose import ZERO, Pose, Quaternion, Vector, add, conjugate, rotate, scale
 
 FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
+TENDON = mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON
 
 
 FREE_POSITIONS, FREE_VELOCITIES = 7, 6  # of a free base
@@ -38,6 +49,7 @@ class MujocoState:
     stale: bool = True  # whether poses and twists are those of another state
     loaded: bool = False  # whether efforts or wrenches act in the next step
     speeds: dict[int, float] = field(default_factory=dict)  # of motors, by degree of freedom
+    gears: dict[int, float] = field(default_factory=dict)  # lengths [rad, m] of tendons
 
     def __post_init__(self) -> None:
         self._watch()
@@ -48,11 +60,12 @@ class MujocoState:
         self._watch()
         self.stale, self.loaded = True, False
         self.speeds.clear()
+        self.gears.clear()
 
     def step(self) -> None:
         """Integrates by one time step; efforts and wrenches end with it."""
         np.copyto(self._before, self._positions)
-        if self.speeds:
+        if self.speeds or self.gears:
             mujoco.mj_step1(self.model, self.data)
             self._drive()
             mujoco.mj_step2(self.model, self.data)
@@ -95,8 +108,13 @@ class MujocoState:
         mujoco.mj_integratePos(model, data.qpos, data.qvel, model.opt.timestep)
 
     def _drive(self) -> None:
-        """Drives motors: dry friction brakes towards speed 0, a motor towards another speed."""
+        """Drives motors and gears: dry friction brakes towards speed 0, they move towards another speed."""
         data = self.data
+        for row in np.flatnonzero(data.efc_type == TENDON):
+            tendon = int(data.efc_id[row])
+            missing = self.gears[tendon] - data.ten_length[tendon]
+            speed = GEAR * missing / self.model.opt.timestep
+            data.efc_aref[row] += data.efc_KBIP[row, 1] * speed
         for row in np.flatnonzero(data.efc_type == FRICTION):
             speed = self.speeds.get(int(data.efc_id[row]))
             if speed:
@@ -188,6 +206,7 @@ class MujocoBody(Body):
         self.inertias = {name: link.inertia for name, link in description.links.items()}
         self._gravity = {name: link.gravity for name, link in description.links.items()}
         self._frictions: dict[str, float] = {}  # factors, by link
+        self._gears = {name: mimic.effort for name, mimic in description.mimics.items()}  # [N m, N]
         self._joints = []
         for joint in joints:
             lower, upper = (joint.lower, joint.upper) if joint.bounded else (1.0, -1.0)
@@ -211,6 +230,7 @@ class MujocoBody(Body):
         if elements.free is not None:
             index = elements.free.id
             self._free = int(model.jnt_qposadr[index]), int(model.jnt_dofadr[index])
+        self._tendons = {name: tendon.id for name, tendon in elements.tendons.items()}
         self._qpos, self._qvel, self._qfrc = data.qpos, data.qvel, data.qfrc_applied
         for link, moments in elements.moments.items():
             model.body_inertia[self._ids[link]] = moments
@@ -222,6 +242,8 @@ class MujocoBody(Body):
             self.set_damping(index, joint.damping)
             self.set_limits(index, joint.lower, joint.upper)
             self.set_motor(index, joint.speed, joint.effort)
+        for name, effort in self._gears.items():
+            self.set_gear(name, effort)
 
     def motion(self) -> BodyArrays:
         """Returns a copy of its state, with the base last."""
@@ -299,6 +321,12 @@ class MujocoBody(Body):
             self._state.speeds[place] = velocity
         else:
             self._state.speeds.pop(place, None)
+
+    def set_gear(self, joint: str, effort: float) -> None:
+        self._gears[joint] = effort
+        tendon = self._tendons[joint]
+        self._state.model.tendon_frictionloss[tendon] = min(effort, STRONGEST)
+        self._state.gears[tendon] = self.description.mimics[joint].offset
 
     def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
         self.moved = True

@@ -4,17 +4,24 @@ import logging
 from itertools import count
 
 import mujoco
+import numpy as np
 
 from bullet_gazebo.physics.description import ModelDescription
-from bullet_gazebo.physics.engine import Body, Contact, Engine, Side
+from bullet_gazebo.physics.engine import Body, Contact, Engine, LinkOf, Side
 from bullet_gazebo.physics.engine_form import check_bounds
 from bullet_gazebo.physics.engines.mujoco_body import MujocoBody, MujocoState
-from bullet_gazebo.physics.engines.mujoco_model import Elements, ModelWriter, compile_spec
+from bullet_gazebo.physics.engines.mujoco_model import (
+    Elements,
+    ModelWriter,
+    compile_spec,
+    wxyz,
+)
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector
 
 MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
 DEFAULT_STEP = 0.001  # [s]
 STIFFEST = 2.0  # steps: MuJoCo's shortest time constant of a constraint
+GRIPPED = 2.0  # of critical damping: between fingers with a gear a light object would rattle at 1
 # Constraints yield to a ten-thousandth of what acts against them, MuJoCo's minimum.
 IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 IMPRATIO = 10.0  # how much stiffer friction is than the contact, so that nothing at rest creeps
@@ -39,6 +46,7 @@ class MujocoEngine(Engine):
         self._bodies: dict[str, MujocoBody] = {}
         self._sides: dict[int, Side] = {}  # by number of the geom
         self._keys = count()
+        self._fastened: dict[int, tuple[LinkOf, LinkOf, Pose]] = {}
         model = compile_spec(mujoco.MjSpec())
         self._state = MujocoState(model, mujoco.MjData(model))
         self._configure()
@@ -55,6 +63,21 @@ class MujocoEngine(Engine):
 
     def remove(self, body: Body) -> None:
         self._bodies = {key: each for key, each in self._bodies.items() if each is not body}
+        self._fastened = {
+            number: joined
+            for number, joined in self._fastened.items()
+            if body not in (joined[0][0], joined[1][0])
+        }
+        self._compile()
+
+    def fasten(self, first: LinkOf, second: LinkOf, pose: Pose) -> int:
+        number = next(self._keys)
+        self._fastened[number] = first, second, pose
+        self._compile()
+        return number
+
+    def unfasten(self, number: int) -> None:
+        del self._fastened[number]
         self._compile()
 
     def set_gravity(self, gravity: Vector) -> None:
@@ -90,6 +113,7 @@ class MujocoEngine(Engine):
             for key, body in bodies.items()
         }
         written = {key: writer.write(bodies[key].pose) for key, writer in writers.items()}
+        self._weld(spec, {id(body): key for key, body in bodies.items()})
         model = compile_spec(spec)
         motions = {key: body.motion() for key, body in self._bodies.items()}
         self._state.replace(model)
@@ -97,6 +121,18 @@ class MujocoEngine(Engine):
         self._bind(written)
         for key, motion in motions.items():
             bodies[key].move(motion)
+
+    def _weld(self, spec: mujoco.MjSpec, keys: dict[int, str]) -> None:
+        for (one, link), (other, its), pose in self._fastened.values():
+            names = [f"{keys[id(one)]}:{link}", f"{keys[id(other)]}:{its}"]
+            data = np.zeros(mujoco.mjNEQDATA)
+            data[3:11] = *pose.position, *wxyz(pose.orientation), 1.0
+            spec.add_equality(
+                type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1=names[0],
+                name2=names[1], data=data,
+            )  # fmt: skip
+            if one is not other:
+                spec.add_exclude(bodyname1=names[0], bodyname2=names[1])
 
     def _bind(self, written: dict[str, Elements]) -> None:
         for key, elements in written.items():
@@ -129,7 +165,21 @@ class MujocoEngine(Engine):
         option.disableflags |= (
             mujoco.mjtDisableBit.mjDSBL_WARMSTART | mujoco.mjtDisableBit.mjDSBL_AUTORESET
         )
-        for reference in (model.jnt_solref, model.dof_solref, model.geom_solref):
+        for reference in (
+            model.jnt_solref,
+            model.dof_solref,
+            model.geom_solref,
+            model.tendon_solref_fri,
+            model.eq_solref,
+        ):
             reference[:] = (STIFFEST * self._time_step, 1.0)
-        for impedance in (model.jnt_solimp, model.dof_solimp, model.geom_solimp):
+        if model.ntendon:
+            model.geom_solref[:, 1] = GRIPPED
+        for impedance in (
+            model.jnt_solimp,
+            model.dof_solimp,
+            model.geom_solimp,
+            model.tendon_solimp_fri,
+            model.eq_solimp,
+        ):
             impedance[:] = IMPEDANCE

@@ -30,12 +30,13 @@ FASTENED = Inertia(mass=1.0, ixx=1.0, iyy=1.0, izz=1.0)  # of links that nothing
 
 @dataclass
 class Elements:
-    """A model in MuJoCo: bodies by link, joints by name, and its free joint, if it has one."""
+    """A model in MuJoCo: bodies by link, joints by name, its free joint, if it has one, and gears."""
 
     bodies: dict[str, mujoco.MjsBody] = field(default_factory=dict)
     joints: dict[str, mujoco.MjsJoint] = field(default_factory=dict)
     moments: dict[str, Vector] = field(default_factory=dict)  # that no real body has, by link
     free: mujoco.MjsJoint | None = None
+    tendons: dict[str, mujoco.MjsTendon] = field(default_factory=dict)  # by the joint that follows
 
 
 @dataclass
@@ -65,7 +66,16 @@ class ModelWriter:
                 order.append(joint.child)  # the list grows while it is walked
         if not model.static:
             self._keep_apart()
+            self._add_gears()
         return self._elements
+
+    def _add_gears(self) -> None:
+        """Adds a tendon for each joint that follows another one: its length is what should be the offset."""
+        for name, mimic in self.model.mimics.items():
+            tendon = self.spec.add_tendon(name=f"{self.key}:{name}")
+            tendon.wrap_joint(f"{self.key}:{name}", 1.0)
+            tendon.wrap_joint(f"{self.key}:{mimic.driver}", -mimic.multiplier)
+            self._elements.tendons[name] = tendon
 
     def _add_link(self, parent: mujoco.MjsBody, link: str, pose: Pose) -> mujoco.MjsBody:
         body = parent.add_body(

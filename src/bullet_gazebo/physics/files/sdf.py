@@ -30,6 +30,7 @@ from bullet_gazebo.physics.files.elements import (
     shown,
     truth,
 )
+from bullet_gazebo.physics.files.mechanisms import add_mechanisms
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
 from bullet_gazebo.physics.files.sdf_parts import (
     WORLD,
@@ -249,6 +250,7 @@ def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
     model.static, model.sensors, model.stand_ins = static, parts.sensors, parts.stand_ins
     detach_from_world(model)
     mend_moments(model)
+    add_mechanisms(model)
     return model
 
 

@@ -33,13 +33,14 @@ from bullet_gazebo.physics.files.elements import (
     rename_lumped,
     shown,
 )
+from bullet_gazebo.physics.files.mechanisms import add_mechanisms
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
 from bullet_gazebo.physics.files.sdf_parts import read_sensors
 from bullet_gazebo.physics.lumping import find_roots, lump_fixed_joints, unique
 from bullet_gazebo.physics.pose import Pose, from_rpy
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-UNUSED = {  # elements that urdfdom reads and the physics doesn't use, with their numbers
+CHECKED = {  # elements that urdfdom reads with the joint, and their numbers
     "mimic": ("multiplier", "offset"),
     "calibration": ("rising", "falling"),
     "safety_controller": ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"),
@@ -95,7 +96,7 @@ def read_joint(element: Element, warnings: list[str]) -> Joint:
     if dynamics is not None:
         joint.damping = read_number(dynamics, "damping", place)
         joint.friction = read_number(dynamics, "friction", place)
-    _check_unused(element, place)
+    _check_others(element, place)
     return joint
 
 
@@ -116,9 +117,9 @@ def _set_limit(joint: Joint, element: Element, place: str, warnings: list[str]) 
     joint.lower, joint.upper = min(lower, upper), max(lower, upper)
 
 
-def _check_unused(element: Element, place: str) -> None:
+def _check_others(element: Element, place: str) -> None:
     """Refuses what urdfdom, and so other programs, can't read."""
-    for tag, keys in UNUSED.items():
+    for tag, keys in CHECKED.items():
         child = element.find(tag)
         if child is None:
             continue
@@ -389,5 +390,6 @@ def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDe
             rename_lumped(plugin.element, model.lumped)
         except DescriptionError as error:
             warnings.append(f"plugin {shown(plugin.filename)}: {error}")
+    add_mechanisms(lumped, robot)
     reading.split_meshes(lumped)
     return lumped

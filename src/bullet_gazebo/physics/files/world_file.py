@@ -10,9 +10,10 @@ from bullet_gazebo.physics.description import (
     Light,
     LimitExceeded,
     ModelDescription,
+    Plugin,
 )
 from bullet_gazebo.physics.files import elements
-from bullet_gazebo.physics.files.elements import named, numbers, shown, truth
+from bullet_gazebo.physics.files.elements import named, numbers, read_plugin, shown, truth
 from bullet_gazebo.physics.files.reading import Reading, Resources
 from bullet_gazebo.physics.files.sdf import (
     FileContext,
@@ -30,12 +31,12 @@ from bullet_gazebo.physics.world import GRAVITY, TIME_STEP, ground_plane
 
 UPDATE_RATE = 1000.0  # [Hz], SDF's default
 ITERATIONS = 50  # of the solver, SDF's default
-NOT_SIMULATED = ("actor", "population", "road", "plugin", "joint")
+NOT_SIMULATED = ("actor", "population", "road", "joint")
 
 
 @dataclass
 class WorldDescription:
-    """The contents of a world file. `left_out` names what isn't simulated."""
+    """The contents of a world file. `plugins` are the world's own, `left_out` names what isn't simulated."""
 
     name: str = "default"
     models: dict[str, ModelDescription] = field(default_factory=dict)
@@ -46,6 +47,7 @@ class WorldDescription:
     iterations: int | None = None  # None: the engine's own
     warnings: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+    plugins: list[Plugin] = field(default_factory=list)
 
 
 def empty_world() -> WorldDescription:
@@ -85,6 +87,8 @@ def _read(root: Element, context: FileContext) -> WorldDescription:
     for child in element:
         if child.tag in ("model", "include", "light"):
             _add(world, child, context)
+        elif child.tag == "plugin":
+            world.plugins.append(read_plugin(child))
         elif child.tag in NOT_SIMULATED:
             world.left_out.append(f"{child.tag} '{shown(child.get('name', ''))}'")
     return world

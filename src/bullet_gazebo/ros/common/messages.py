@@ -21,21 +21,24 @@ from geometry_msgs.msg import (
     TwistWithCovariance,
     Vector3,
     Wrench,
+    WrenchStamped,
 )
 from geometry_msgs.msg import Pose as PoseMsg
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from bullet_gazebo.control.controllers.joint_state import JointStateSample
 from bullet_gazebo.control.controllers.pid_controllers import JointControllerSample
+from bullet_gazebo.control.controllers.sensor_controllers import SensorSample
 from bullet_gazebo.control.controllers.steering import SteeringSample
 from bullet_gazebo.control.controllers.vehicle import TwistSample
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.drives.odometry import OdometrySample
 from bullet_gazebo.physics import pose as poses
 from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.sensors.imu import InertialSample
 from bullet_gazebo.state import ContactPair
 
 NANOSECONDS = 1_000_000_000
@@ -59,6 +62,11 @@ def from_pose_msg(msg: PoseMsg) -> Pose:
     """Returns the pose with a unit quaternion; an all-zero one means no rotation."""
     p, q = msg.position, msg.orientation
     return Pose((p.x, p.y, p.z), poses.normalized((q.x, q.y, q.z, q.w)))
+
+
+def from_transform(msg: Transform) -> Pose:
+    """Returns the pose, as `from_pose_msg`."""
+    return from_pose_msg(PoseMsg(msg.translation, msg.rotation))
 
 
 def from_twist_msg(msg: Twist) -> tuple[poses.Vector, poses.Vector]:
@@ -117,6 +125,31 @@ def to_four_wheel_steering(sample: SteeringSample) -> FourWheelSteeringStamped:
         front_steering_angle=sample.front, rear_steering_angle=sample.rear, speed=sample.speed
     )
     return FourWheelSteeringStamped(Header(stamp=to_time(sample.stamp)), data)
+
+
+def to_imu(sample: InertialSample, now: int, frame: str, deviation: float = 0.0) -> Imu:
+    """Returns the message of a measurement; the covariances are those of the plugin's own noise."""
+    diagonal = [deviation**2, 0.0, 0.0, 0.0, deviation**2, 0.0, 0.0, 0.0, deviation**2]
+    return Imu(
+        header=Header(stamp=to_time(now), frame_id=frame),
+        orientation=Quaternion(*sample.orientation),
+        orientation_covariance=diagonal,
+        angular_velocity=Vector3(*sample.angular_velocity),
+        angular_velocity_covariance=diagonal,
+        linear_acceleration=Vector3(*sample.linear_acceleration),
+        linear_acceleration_covariance=diagonal,
+    )
+
+
+def to_sensor_imu(sample: SensorSample) -> Imu:
+    """Returns the message of an IMU that a controller reports; its covariances aren't known."""
+    return to_imu(sample.value, sample.stamp, sample.frame)
+
+
+def to_sensor_wrench(sample: SensorSample) -> WrenchStamped:
+    """Returns the message of a force-torque sensor that a controller reports."""
+    header = Header(stamp=to_time(sample.stamp), frame_id=sample.frame)
+    return WrenchStamped(header, to_wrench_msg(*sample.value))
 
 
 def to_contact_state(pair: ContactPair) -> ContactState:

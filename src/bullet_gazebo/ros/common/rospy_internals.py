@@ -77,6 +77,8 @@ def _has_sent(connection: Any) -> bool:
 def divert_messages(sink_of: Callable[[str], Sink | None]) -> None:
     """Passes messages for some nodes to a sink instead of their connections; once for a process.
 
+    A connection counts as connected once the topic's listeners know of it (`is_connected`).
+
     Args:
         sink_of: returns the sink of a node, or None if its messages are sent as usual; called for each new
             connection. `divert_connections` is for the existing ones.
@@ -90,7 +92,16 @@ def divert_messages(sink_of: Callable[[str], Sink | None]) -> None:
                 connection.write_data = partial(sink, topic.resolved_name)
         return bool(add_connection(topic, connection))
 
+    add = _PublisherImpl.add_connection
+
+    def adding(topic: _PublisherImpl, connection: Any) -> bool:
+        connection.is_being_added = True
+        added = bool(add(topic, connection))
+        connection.is_being_added = False
+        return added
+
     _TopicImpl.add_connection = diverting
+    _PublisherImpl.add_connection = adding
 
 
 def publish_without_yielding() -> None:
@@ -142,7 +153,10 @@ def is_connected(topic: str, node: str, publishes: bool) -> bool | None:
     """
     if publishes:
         publication = _topics().get_publisher_impl(topic)
-        return publication and any(each.endpoint_id == node for each in publication.connections)
+        return publication and any(
+            each.endpoint_id == node and not getattr(each, "is_being_added", False)
+            for each in publication.connections
+        )
     subscription = _topics().get_subscriber_impl(topic)
     return subscription and any(each.callerid_pub == node for each in subscription.connections)
 

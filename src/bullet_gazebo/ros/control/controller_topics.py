@@ -11,13 +11,14 @@ import rospy
 from control_msgs.msg import JointControllerState, JointTrajectoryControllerState, PidState
 from dynamic_reconfigure.encoding import Config
 from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from tf2_msgs.msg import TFMessage
 
 from bullet_gazebo.control.controllers.base import Controller, Input, Output
+from bullet_gazebo.control.controllers.gripper import GripperActionController
 from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryController
 from bullet_gazebo.control.errors import ControlError, faults
 from bullet_gazebo.control.manager import ControllerManager
@@ -29,10 +30,13 @@ from bullet_gazebo.ros.common.messages import (
     to_joint_state,
     to_odometry,
     to_odometry_transform,
+    to_sensor_imu,
+    to_sensor_wrench,
     to_time,
     to_twist_stamped,
 )
 from bullet_gazebo.ros.common.publishing import ThinnedTopic, Thinner
+from bullet_gazebo.ros.control.gripper_action import GripperAction
 from bullet_gazebo.ros.control.trajectory_action import TrajectoryTopics, to_controller_state
 from bullet_gazebo.simulator import Simulator
 
@@ -45,6 +49,8 @@ OUTPUTS: dict[str, tuple[type, Convert, int]] = {  # kind: message, conversion, 
     "OdometrySample": (Odometry, to_odometry, 100),
     "TransformSample": (TFMessage, to_odometry_transform, 100),
     "SteeringSample": (FourWheelSteeringStamped, to_four_wheel_steering, 100),
+    "InertialSample": (Imu, to_sensor_imu, 4),
+    "Wrench": (WrenchStamped, to_sensor_wrench, 4),
     "TwistSample": (TwistStamped, to_twist_stamped, 100),
 }
 INPUTS: dict[str, tuple[type, Convert]] = {  # kind: message, the controller's command
@@ -101,6 +107,8 @@ class ControllerTopics:
             self._closing.callback(self._tuner(controller, own).shutdown)
         if isinstance(controller, JointTrajectoryController):
             self._closing.callback(TrajectoryTopics(self._sim, controller, own).shutdown)
+        if isinstance(controller, GripperActionController):
+            self._closing.callback(GripperAction(self._sim, controller, own).shutdown)
         for port in controller.inputs:
             self._subscribe(port, own)
 

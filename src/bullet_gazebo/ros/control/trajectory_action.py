@@ -1,23 +1,16 @@
 """A trajectory controller's action, command topic and query service (docs/contract/ros_control.md 3.5)."""
 
-import threading
-import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 import rospy
-from actionlib import ServerGoalHandle
-from actionlib.action_server import ActionServer
-from actionlib.status_tracker import StatusTracker
-from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from control_msgs import msg, srv
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryController
 from bullet_gazebo.control.trajectory_goals import (
-    ABORTED,
-    SUCCEEDED,
+    GoalObserver,
     GoalOutcome,
     GoalRequest,
     Tolerance,
@@ -27,18 +20,8 @@ from bullet_gazebo.control.trajectory_goals import (
     TrajectorySample,
 )
 from bullet_gazebo.ros.common.messages import to_time
-from bullet_gazebo.ros.common.rospy_internals import wait_until_sent
+from bullet_gazebo.ros.control.actions import ControllerAction
 from bullet_gazebo.simulator import Simulator
-
-# [s] of wall time; of simulated time where a client asks for time by advance_world
-STATUS_PERIOD = 0.2
-STOP_TIMEOUT = 5.0  # [s]
-QUEUE = 50
-KEPT = 5.0  # [s] that an ended goal's status is published, as in actionlib
-MOST_KEPT = 100  # goals that have ended
-NEVER = rospy.Duration(10**9)
-ENDED = (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.REJECTED,
-         GoalStatus.RECALLED, GoalStatus.LOST)  # fmt: skip
 
 
 class TrajectoryTopics:
@@ -86,129 +69,29 @@ class TrajectoryTopics:
         return srv.QueryTrajectoryStateResponse(names, *zip(*states, strict=True))
 
 
-class TrajectoryAction:
-    """Serves the action from load to unload, in a thread of its own or along with steps in lock-step.
+class TrajectoryAction(ControllerAction):
+    """The action `follow_joint_trajectory`."""
 
-    Locks are taken in this order: the action server's, the simulator's, ours. The control tick holds the
-    simulator's and takes only ours, so it waits for no other node.
-    """
+    action = msg.FollowJointTrajectoryAction
 
     def __init__(
         self, sim: Simulator, controller: JointTrajectoryController, namespace: str
     ) -> None:
-        self._sim = sim
         self._controller = controller
-        self._news = threading.Condition()
-        self._kept: list[tuple[ServerGoalHandle, TrajectorySample | GoalOutcome]] = []
-        self._closing = False
-        self._status_due = 0.0  # [s]
-        self._name = rospy.names.ns_join(namespace, "follow_joint_trajectory")
-        self._server = SteadyActionServer(
-            self._name, msg.FollowJointTrajectoryAction, self._pursue, self._cancel, self._clock
-        )
-        self._server.start()
-        sim.outboxes.append(self)
-        self._thread = threading.Thread(target=self._deliver, name=self._name, daemon=True)
-        self._thread.start()
+        super().__init__(sim, rospy.names.ns_join(namespace, "follow_joint_trajectory"))
 
-    def shutdown(self) -> None:
-        """Publishes the last results, and closes the action; the controller was stopped before."""
-        self._sim.outboxes.remove(self)
-        with self._news:
-            self._closing = True
-            self._news.notify()
-        self._thread.join(STOP_TIMEOUT)
-        self._server.stop()
+    def pursue(self, key: str, goal: msg.FollowJointTrajectoryGoal, listener: GoalObserver) -> str:
+        return self._controller.pursue(key, _to_request(goal), listener)
 
-    def note(self, handle: ServerGoalHandle, news: TrajectorySample | GoalOutcome) -> None:
-        """Keeps a goal's feedback or result, to be published soon; new feedback replaces older one."""
-        with self._news:
-            # A result is a goal's last news. Without this, undelivered feedback would pile up.
-            if self._kept and self._kept[-1][0] is handle and isinstance(news, TrajectorySample):
-                self._kept.pop()
-            self._kept.append((handle, news))
-            self._news.notify()
+    def cancel(self, key: str) -> None:
+        self._controller.cancel(key)
 
-    def _pursue(self, handle: ServerGoalHandle) -> None:
-        request = _to_request(handle.get_goal())
-        goal = ActionGoal(self, handle)
-        try:
-            with self._sim.lock:
-                warning = self._controller.pursue(handle.get_goal_id().id, request, goal)
-        except TrajectoryRefused as refusal:
-            rospy.logerr("%s: %s", self._name, refusal)
-            result = msg.FollowJointTrajectoryResult(refusal.code, str(refusal))
-            handle.set_rejected(result, str(refusal))
-            return
-        if warning:
-            rospy.logwarn("%s: %s", self._name, warning)
-        handle.set_accepted()
+    def feedback(self, sample: TrajectorySample) -> msg.FollowJointTrajectoryFeedback:
+        return msg.FollowJointTrajectoryFeedback(*_fields(sample))
 
-    def _cancel(self, handle: ServerGoalHandle) -> None:
-        with self._sim.lock:
-            self._controller.cancel(handle.get_goal_id().id)
-
-    def has_messages(self) -> bool:
-        """Returns whether there is something to publish; called within a tick."""
-        return bool(self._kept) or self._status_is_due()
-
-    def deliver(self) -> None:
-        """Publishes feedback, results and, when it is due, the status."""
-        with self._news:
-            kept, self._kept = self._kept, []
-        for handle, news in kept:
-            if isinstance(news, GoalOutcome):
-                _settle(handle, news)
-            else:
-                handle.publish_feedback(msg.FollowJointTrajectoryFeedback(*_fields(news)))
-        if self._status_is_due():
-            self._status_due = self._clock() + STATUS_PERIOD
-            self._server.publish_status()
-
-    def _status_is_due(self) -> bool:
-        now = self._clock()
-        return not now < self._status_due <= now + STATUS_PERIOD  # time may have gone back
-
-    def _deliver(self) -> None:
-        """Publishes news at once until the action is closed."""
-        closing = False
-        while not (closing or rospy.is_shutdown()):
-            with self._news:
-                self._news.wait_for(self._has_news, STATUS_PERIOD)
-                closing = self._closing
-            if closing or not self._sim.deliver_with_steps:
-                self.deliver()
-
-    def _clock(self) -> float:
-        """Returns the time [s] for the status."""
-        return self._sim.sim_time if self._sim.deliver_with_steps else time.monotonic()
-
-    def _has_news(self) -> bool:
-        return self._closing or bool(self._kept and not self._sim.deliver_with_steps)
-
-
-class ActionGoal:
-    """Receives the controller's reports on one goal within a control tick, and passes them on."""
-
-    def __init__(self, action: TrajectoryAction, handle: ServerGoalHandle) -> None:
-        self._action = action
-        self._handle = handle
-
-    def feedback(self, sample: TrajectorySample) -> None:
-        self._action.note(self._handle, sample)
-
-    def finished(self, outcome: GoalOutcome) -> None:
-        self._action.note(self._handle, outcome)
-
-
-def _settle(handle: ServerGoalHandle, outcome: GoalOutcome) -> None:
-    result = msg.FollowJointTrajectoryResult(outcome.code, outcome.text)
-    if outcome.kind == SUCCEEDED:
-        handle.set_succeeded(result, outcome.text)
-    elif outcome.kind == ABORTED:
-        handle.set_aborted(result, outcome.text)
-    else:
-        handle.set_canceled(result, outcome.text)
+    def result(self, outcome: GoalOutcome | TrajectoryRefused) -> msg.FollowJointTrajectoryResult:
+        text = outcome.text if isinstance(outcome, GoalOutcome) else str(outcome)
+        return msg.FollowJointTrajectoryResult(outcome.code, text)
 
 
 def to_controller_state(sample: TrajectorySample) -> msg.JointTrajectoryControllerState:
@@ -246,87 +129,3 @@ def _to_request(goal: msg.FollowJointTrajectoryGoal) -> GoalRequest:
 
 def _tolerances(tolerances: Iterable[msg.JointTolerance]) -> dict[str, Tolerance]:
     return {each.name: Tolerance(each.position, each.velocity) for each in tolerances}
-
-
-class SteadyActionServer(ActionServer):
-    """An action server without a timer: its owner calls publish_status() now and then.
-
-    actionlib's own timer stands still with simulated time, and dies when it goes back. Until time passed its
-    old value, an ended goal's status would be kept, and a stamped cancel request would refuse all goals.
-    """
-
-    last_cancel: rospy.Time
-    status_list: list[StatusTracker]
-
-    def __init__(
-        self,
-        name: str,
-        action: type,
-        on_goal: Callable[[ServerGoalHandle], None],
-        on_cancel: Callable[[ServerGoalHandle], None],
-        clock: Callable[[], float],
-    ) -> None:
-        """`clock` returns the time [s] for which statuses are kept."""
-        self._clock = clock
-        super().__init__(name, action, on_goal, on_cancel, auto_start=False)
-        self._ended: dict[str, float] = {}  # [s] when goals were seen to have ended, by id
-
-    def initialize(self) -> None:
-        """Opens the five topics; called by start()."""
-        self.status_list_timeout = NEVER
-        self.status_pub = rospy.Publisher(
-            f"{self.ns}/status", GoalStatusArray, latch=True, queue_size=QUEUE
-        )
-        self.result_pub = rospy.Publisher(f"{self.ns}/result", self.ActionResult, queue_size=QUEUE)
-        self.feedback_pub = rospy.Publisher(
-            f"{self.ns}/feedback", self.ActionFeedback, queue_size=QUEUE
-        )
-        self.goal_sub = rospy.Subscriber(
-            f"{self.ns}/goal", self.ActionGoal, self.internal_goal_callback
-        )
-        self.cancel_sub = rospy.Subscriber(
-            f"{self.ns}/cancel", GoalID, self.internal_cancel_callback
-        )
-
-    def stop(self) -> None:
-        """Closes the topics after the last result was sent."""
-        with self.lock:
-            self.started = False
-            for publisher in (self.status_pub, self.result_pub):
-                wait_until_sent(publisher)
-            for topic in (self.goal_sub, self.cancel_sub, self.status_pub, self.feedback_pub,
-                          self.result_pub):  # fmt: skip
-                topic.unregister()
-
-    def internal_goal_callback(self, goal: object) -> None:
-        """Accepts a goal even if a cancel request from before time went back would refuse it."""
-        with self.lock:
-            if self.last_cancel > rospy.Time.now():
-                self.last_cancel = rospy.Time()
-            super().internal_goal_callback(goal)
-
-    def publish_status(self) -> None:
-        """Publishes the status of all goals, except those that ended a while ago."""
-        with self.lock:
-            self._forget_ended()
-            super().publish_status()
-
-    def _forget_ended(self) -> None:
-        now = self._clock()
-        ended = [_id(tracker) for tracker in self.status_list if _has_ended(tracker)]
-        kept = {goal: self._ended.get(goal, now) for goal in ended[-MOST_KEPT:]}
-        self._ended = {goal: since for goal, since in kept.items() if 0.0 <= now - since <= KEPT}
-        self.status_list = [
-            tracker
-            for tracker in self.status_list
-            if not _has_ended(tracker) or _id(tracker) in self._ended
-        ]
-
-
-def _id(tracker: StatusTracker) -> str:
-    return tracker.status.goal_id.id
-
-
-def _has_ended(tracker: StatusTracker) -> bool:
-    """Returns whether a goal has ended, or never came: its cancel request has a tracker, too."""
-    return tracker.status.status in ENDED or tracker.goal is None

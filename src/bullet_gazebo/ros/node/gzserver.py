@@ -15,6 +15,7 @@ import rospy
 from bullet_gazebo_msgs.msg import SceneSensor
 
 from bullet_gazebo.heap import use_one_arena
+from bullet_gazebo.physics.description import Plugin
 from bullet_gazebo.physics.engine import Engine
 from bullet_gazebo.physics.engines import BULLET, ENGINES, EngineError, make_engine
 from bullet_gazebo.physics.world import World
@@ -133,14 +134,15 @@ class GazeboNode:
         self.sim = Simulator(world, lockstep=args.lockstep, relatch=_flag("~relatch_on_reset"))
         self._watchdog = Watchdog(self.sim)
         recording = _recording(args)
-        fill_world(self.sim, read_world(args.world, interrupted), interrupted)
+        found = read_world(args.world, interrupted)
+        fill_world(self.sim, found, interrupted)
         if args.paused:
             self.sim.pause()
-        self._advertise(_flag("~enable_ros_network"), args.seed or 0)
+        self._advertise(_flag("~enable_ros_network"), args.seed or 0, found.plugins)
         self._recorder = None if recording is None else SimulationRecorder(self.sim, recording)
         MasterWatch().start()
 
-    def _advertise(self, network: bool, seed: int) -> None:
+    def _advertise(self, network: bool, seed: int, of_world: list[Plugin]) -> None:
         sensors: list[SceneSensor] = []
         scene = SceneOffer(self.sim, sensors)
         control = WorldControl(self.sim, self._watchdog, scene.show if network else None)
@@ -153,7 +155,7 @@ class GazeboNode:
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
         plugins = PluginRegistry(self.sim, thinner, seed, sensors)
-        load_plugins(self.sim, plugins)
+        load_plugins(self.sim, plugins, of_world if network else ())
         if not network:
             return
         with registered_together():
@@ -166,7 +168,7 @@ class GazeboNode:
             one_at_a_time = threading.Lock()
             stepping = [
                 StepService(self.sim, plugins.sensing, self._watchdog, one_at_a_time),
-                AdvanceService(self.sim, self._watchdog, thinner, one_at_a_time),
+                AdvanceService(self.sim, plugins.sensing, self._watchdog, thinner, one_at_a_time),
             ]
         spawning = threading.Lock()
         with spawning:  # once a model is there, clients use all other services without a wait

@@ -26,7 +26,7 @@ class PlanarMovePlugin(DrivePlugin):
     """Sets the model's velocity in each step: it floats, and nothing tips it over."""
 
     def __init__(self, context: PluginContext) -> None:
-        rate = context.number("odometryRate", RATE)
+        rate = context.rate("odometryRate", RATE)
         super().__init__(context, namespace_of(context, "", ""), rate, late=False)
         self._reports = rate > 0.0
         self._timeout = context.number("cmdTimeout", -1.0)
@@ -79,7 +79,7 @@ class ForceBasedMovePlugin(DrivePlugin):
     """Pushes a link by the errors of its model's velocity; the odometry adds velocities up."""
 
     def __init__(self, context: PluginContext) -> None:
-        rate = context.number("odometryRate", RATE)
+        rate = context.rate("odometryRate", RATE)
         super().__init__(context, namespace_of(context, "", ""), rate, late=False)
         self._reports = rate > 0.0
         self._gains = [

@@ -20,6 +20,7 @@ from bullet_gazebo.robot import ControlledRobot, control_period_of
 from bullet_gazebo.ros.control.controller_services import ControllerServices
 from bullet_gazebo.ros.control.controller_topics import PidTopics
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
+from bullet_gazebo.sensors.sensor_readers import offer_sensors
 
 POLL = 0.1  # [s]
 SIM_TYPE = "gazebo_ros_control/DefaultRobotHWSim"
@@ -83,18 +84,13 @@ class ControlPlugin:
     def _start(self, text: str) -> None:
         if not rosgraph.names.is_legal_name(self._namespace):
             raise ControlError(f"'{self._namespace}' is not a legal namespace")
-        limits = rospy.get_param(rospy.names.ns_join(self._namespace, "joint_limits"), {})
         kind = self._context.text("robotSimType", SIM_TYPE)
         if kind != SIM_TYPE:
             rospy.logwarn(
                 "Model '%s': the <robotSimType> %s is not simulated: its joints are moved by %s",
                 self._context.model.name, kind, SIM_TYPE,
             )  # fmt: skip
-        description = read_description(text).limited_by(limits)
-        for warning in description.warnings:
-            rospy.logwarn("gazebo_ros_control: %s", warning)
-        gains = rospy.get_param(rospy.names.ns_join(self._namespace, GAINS), {})
-        hardware = RobotHardware(description, gains if isinstance(gains, dict) else {})
+        hardware = self._hardware(text)
         manager = ControllerManager(hardware)
         with self._sim.lock:
             robot = ControlledRobot(
@@ -116,6 +112,17 @@ class ControlPlugin:
         self._started.callback(self._remove, robot)
         self._listen_to_emergency_stop(robot)
         rospy.loginfo("Loaded gazebo_ros_control for model '%s'.", self._context.model.name)
+
+    def _hardware(self, text: str) -> RobotHardware:
+        """Returns what the robot description and the parameters say, with the model's sensors."""
+        limits = rospy.get_param(rospy.names.ns_join(self._namespace, "joint_limits"), {})
+        description = read_description(text).limited_by(limits)
+        for warning in description.warnings:
+            rospy.logwarn("gazebo_ros_control: %s", warning)
+        gains = rospy.get_param(rospy.names.ns_join(self._namespace, GAINS), {})
+        hardware = RobotHardware(description, gains if isinstance(gains, dict) else {})
+        offer_sensors(hardware, self._sim, self._context.model, self._context.sensing)
+        return hardware
 
     def _remove(self, robot: ControlledRobot) -> None:
         with self._sim.lock:

@@ -99,15 +99,18 @@ class DrivePlugin(SensorPlugin):
         self._resets = self.sim.resets
         self._sent = -1  # [ns], stamp of the newest transform
 
-    def begin(self, odometry: bool = True, tf: bool = True) -> None:
-        """Opens the topics that are asked for, and takes part in the ticks."""
+    def begin(self, odometry: bool = True, tf: bool = True, command: str = "cmd_vel") -> None:
+        """Opens the topics that are asked for, and takes part in the ticks.
+
+        `command` is the topic of commands without `<commandTopic>`.
+        """
         context, text = self.context, self.context.text
         if odometry:
             name = topic_in(self.namespace, text("odometryTopic", "odom"))
             self._odometry = advertised(context, name, Odometry, 1)
         if tf:
             self.tf = advertised(context, "/tf", TFMessage, 100)
-        name = topic_in(self.namespace, text("commandTopic", "cmd_vel"))
+        name = topic_in(self.namespace, text("commandTopic", command))
         subscriber = rospy.Subscriber(name, Twist, self._receive, queue_size=1, tcp_nodelay=True)
         context.closing(subscriber.unregister)
         with self.sim.lock:

@@ -10,12 +10,12 @@ import rospy
 from sensor_msgs.msg import Imu as ImuMsg
 from std_srvs.srv import Empty, EmptyResponse
 
+from bullet_gazebo.ros.common.messages import to_imu
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
     SensorPlugin,
     SensorTopic,
     namespace_of,
-    to_imu,
     topic_in,
 )
 from bullet_gazebo.sensors.imu import ModelImu

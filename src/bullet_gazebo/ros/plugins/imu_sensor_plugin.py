@@ -7,13 +7,13 @@ of the two rates counts.
 from sensor_msgs.msg import Imu as ImuMsg
 
 from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.ros.common.messages import to_imu
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
     MODEL,
     SensorPlugin,
     SensorTopic,
     namespace_of,
-    to_imu,
     topic_in,
 )
 from bullet_gazebo.sensors.imu import ImuSensor

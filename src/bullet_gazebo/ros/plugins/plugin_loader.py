@@ -15,7 +15,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 import rospy
 from bullet_gazebo_msgs.msg import SceneSensor
@@ -202,7 +202,9 @@ class PluginRegistry:
         self._thinner = thinner
         self.sensing = Sensing(sim, seed)
         # Imported now, so that no spawn waits for it.
-        self._built_in = _built_in()
+        self._built_in = _built_in("LIBRARIES")
+        self._of_worlds = _built_in("WORLD_LIBRARIES")
+        self._loaded_of_world: list[object] = []
         self._loaded: dict[Model, list[tuple[PluginContext, LoadedPlugin | None]]] = {}
 
     def time_held(self, models: str) -> AbstractContextManager[None]:
@@ -244,6 +246,13 @@ class PluginRegistry:
                 context.release()
         _tell_missing_control(model)
 
+    def load_of_world(self, plugin: Plugin) -> bool:
+        """Starts a world's own plugin; returns False for an unknown one."""
+        factory = self._of_worlds.get(library_of(plugin.filename))
+        if factory is not None:
+            self._loaded_of_world.append(factory(self._sim))
+        return factory is not None
+
     def unload(self, model: Model) -> None:
         """Ends the plugins of `model`."""
         for context, plugin in self._loaded.pop(model, []):
@@ -278,8 +287,8 @@ class PluginRegistry:
             return None
 
 
-def _built_in() -> dict[str, Factory]:
-    """Returns the plugins of this folder: each module's LIBRARIES, file names of libraries and a factory."""
+def _built_in(table: str) -> dict[str, Callable[[Any], Any]]:
+    """Returns the plugins of this folder: each module's `table`, file names of libraries and a factory."""
     modules = [
         importlib.import_module(f"{__package__}.{found.name}")
         for found in pkgutil.iter_modules([os.path.dirname(__file__)])
@@ -287,7 +296,7 @@ def _built_in() -> dict[str, Factory]:
     return {
         library: factory
         for module in modules
-        for library, factory in getattr(module, "LIBRARIES", {}).items()
+        for library, factory in getattr(module, table, {}).items()
     }
 
 

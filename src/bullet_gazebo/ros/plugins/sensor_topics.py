@@ -6,16 +6,11 @@ from typing import Any
 import numpy as np
 import rosgraph.names
 import rospy
-from geometry_msgs.msg import Quaternion, Vector3
-from sensor_msgs.msg import Imu
-from std_msgs.msg import Header
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.elements import shown
-from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.control_plugin import find_param
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.sensors.imu import InertialSample
 from bullet_gazebo.sensors.laser import LaserSensor, Scan
 from bullet_gazebo.sensors.schedule import SensorClock
 from bullet_gazebo.sensors.sensing import slower
@@ -106,6 +101,12 @@ class Topic:
         """Whether it has subscribers."""
         topic = self._publisher.impl  # get_num_connections() takes a lock that callbacks hold
         return topic is not None and topic.has_connections()
+
+    @property
+    def is_heard_elsewhere(self) -> bool:
+        """Whether it has subscribers besides this node."""
+        topic, own = self._publisher.impl, rospy.get_name()
+        return topic is not None and any(each.endpoint_id != own for each in topic.connections)
 
     def publish(self, message: Any) -> None:
         self._publisher.publish(message)
@@ -247,17 +248,3 @@ class LaserTopic:
     def _measure(self, now: int) -> Any:
         scan, random = self._sensor.measure(now)
         return self._message(scan, now, random)
-
-
-def to_imu(sample: InertialSample, now: int, frame: str, deviation: float) -> Imu:
-    """Returns the message of a measurement; the covariances are those of the plugin's own noise."""
-    diagonal = [deviation**2, 0.0, 0.0, 0.0, deviation**2, 0.0, 0.0, 0.0, deviation**2]
-    return Imu(
-        header=Header(stamp=to_time(now), frame_id=frame),
-        orientation=Quaternion(*sample.orientation),
-        orientation_covariance=diagonal,
-        angular_velocity=Vector3(*sample.angular_velocity),
-        angular_velocity_covariance=diagonal,
-        linear_acceleration=Vector3(*sample.linear_acceleration),
-        linear_acceleration_covariance=diagonal,
-    )

@@ -17,7 +17,7 @@ class TricyclePlugin(WheeledPlugin):
     """A wheel that is driven and steered, and two that measure; a command turns it to an angle [rad]."""
 
     def __init__(self, context: PluginContext) -> None:
-        namespace, rate = namespace_of(context, MODEL, MODEL), context.number("updateRate", 100.0)
+        namespace, rate = namespace_of(context, MODEL, MODEL), context.rate("updateRate", 100.0)
         super().__init__(context, namespace, rate, base="base_link")
         number, torque = context.number, context.number("wheelTorque", 5.0)
         self._steering = Wheels(context, {"steeringJoint": "front_steering_joint"}, 2.0, torque)

@@ -27,7 +27,7 @@ class DiffDrivePlugin(WheeledPlugin):
 
     def __init__(self, context: PluginContext) -> None:
         super().__init__(
-            context, namespace_of(context, MODEL, MODEL), context.number("updateRate", 100.0)
+            context, namespace_of(context, MODEL, MODEL), context.rate("updateRate", 100.0)
         )
         self._separation = length(context, "wheelSeparation", 0.34)
         self._wheels = Wheels(
@@ -69,9 +69,7 @@ class SkidSteerPlugin(DrivePlugin):
     """Two wheels on each side, which slip sideways in turns."""
 
     def __init__(self, context: PluginContext) -> None:
-        super().__init__(
-            context, namespace_of(context, "", "/"), context.number("updateRate", 100.0)
-        )
+        super().__init__(context, namespace_of(context, "", "/"), context.rate("updateRate", 100.0))
         self._separation = length(context, "wheelSeparation", 0.4)
         self._wheels = Wheels(
             context,

@@ -22,9 +22,12 @@ from bullet_gazebo.ros.common.rospy_internals import (
     publish_without_yielding,
 )
 from bullet_gazebo.ros.services.step_requests import MAX_TICKS, SLICE
+from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.simulator import Simulator
 
-CONNECTING = 2.0  # [s of wall time] for a node to connect to its topics
+CONNECTING = (
+    20.0  # [s of wall time] for a node to connect to its topics; clients wait 30 s for an answer
+)
 LOOK = 0.002  # [s]
 MOST_BYTES = 256 * 2**20  # [bytes] for one node; beyond it the node listens and never asks
 
@@ -131,6 +134,7 @@ class AdvanceService:
     def __init__(
         self,
         sim: Simulator,
+        sensing: Sensing,
         watchdog: AbstractContextManager[object],
         thinner: Thinner,
         one_at_a_time: threading.Lock,
@@ -138,7 +142,7 @@ class AdvanceService:
         """A fault in a block of `watchdog` ends the node; with `one_at_a_time`, no one else's ticks come
         within a request's.
         """
-        self._sim = sim
+        self._sim, self._schedule = sim, sensing.schedule
         self._watchdog = watchdog
         self._one_at_a_time = one_at_a_time
         self._mailboxes = Mailboxes()
@@ -155,6 +159,10 @@ class AdvanceService:
         changes = self._mailboxes.changes
         topics = request.node, request.subscriptions, request.publications
         heard, sent = self._mailboxes.connect(*topics) if request.connect else ([], [])
+        if request.connect:
+            # Now, not when the thread that looks for listeners gets its turn.
+            with self._sim.lock:
+                self._schedule.review()
         response = self._carry_out(request, mailbox)
         response.topics_changed = changes
         response.subscriptions, response.publications = heard, sent

@@ -9,7 +9,7 @@ import os
 import re
 import threading
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +17,12 @@ import rospkg
 import rospy
 from gazebo_msgs import srv
 
-from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    Light,
+    ModelDescription,
+    Plugin,
+)
 from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.physics.files.reading import Reading, Resources
 from bullet_gazebo.physics.files.world_file import (
@@ -191,8 +196,12 @@ def fill_world(sim: Simulator, world: WorldDescription, interrupted: Callable[[]
                 rospy.logwarn("Model '%s' is left out: %s", name, error)
 
 
-def load_plugins(sim: Simulator, plugins: PluginRegistry) -> None:
-    """Starts the plugins of the models in the world file."""
+def load_plugins(sim: Simulator, plugins: PluginRegistry, of_world: Sequence[Plugin] = ()) -> None:
+    """Starts the plugins of the world file and of its models."""
+    unknown = [each.name or each.filename for each in of_world if not plugins.load_of_world(each)]
+    if unknown:
+        text = ", ".join(_listed([f"plugin '{shown(name)}'" for name in unknown]))
+        rospy.logwarn("The world: not simulated here, so left out: %s", text)
     with plugins.time_held("the world"):
         for model in list(sim.world.models.values()):
             plugins.load(model, "")

@@ -30,6 +30,8 @@ from file_access.text import did_you_mean
 
 MAX_TICKS = 1_000_000  # more than this is a mistake and would take minutes
 SLICE = 500  # ticks between which other services get their turn
+COMMANDS = (("command", "Float64"), ("command", "Float64MultiArray"), ("cmd_vel", "Twist"))
+COUNTS: dict[str | type, int] = {"Float64": 1, "Twist": 3}  # of others one for each joint
 Placing = tuple[dict[str, float], dict[str, float]]
 """Positions [rad, m] and velocities [rad/s, m/s] of joints by plain name."""
 Actuated = tuple[ControlledRobot, JointHandle]
@@ -102,7 +104,7 @@ class Addresses:
                 raise ControlError(f"controllers names one twice: '{name}'")
             found[id(controller)] = controller
             port = _command_port(controller)
-            count = 1 if port.kind == "Float64" else len(controller.claimed)
+            count = COUNTS.get(port.kind, len(controller.claimed))
             ports.append((port, size if port.kind == "Float64" else slice(size, size + count)))
             size += count
         pairs = [self._free_joint(name) for name in joints]
@@ -196,7 +198,7 @@ def _only(
 
 def _command_port(controller: Controller) -> Input:
     for port in controller.inputs:
-        if port.topic == "command" and port.kind in ("Float64", "Float64MultiArray"):
+        if (port.topic, port.kind) in COMMANDS:
             return port
     raise ControlError(f"controller '{controller.name}' ({controller.type_name}) takes no numbers")
 

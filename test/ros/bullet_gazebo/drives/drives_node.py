@@ -9,13 +9,13 @@ from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from dynamic_reconfigure.client import Client as DynamicClient
 from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
 from gazebo_msgs.srv import GetModelState, SpawnModel, SpawnModelRequest
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Empty
 from support.robots.vehicles import RADIUS, TRACK, four_wheels, two_wheels
 from support.ros.calls import BOUND, call, delete_model, wait_until
-from support.ros.manager import Manager
+from support.ros.manager import STRICT, Manager
 from support.ros.subscribed import Listener
 from tf2_msgs.msg import TFMessage
 
@@ -162,6 +162,32 @@ class Drives(unittest.TestCase):
             steering.wait_for(lambda each: abs(each[-1].data.rear_steering_angle + 0.3) < 0.02)
         )
         self.assertGreater(self.newest(odometry).twist.twist.angular.z, 0.2)
+
+    def test_controllers_report_an_imu_and_a_joints_forces(self):
+        imu = '<gazebo reference="base"><sensor name="imu" type="imu"/></gazebo>'
+        force = (
+            '<gazebo reference="left_joint"><sensor name="hub/ft" type="force_torque"/></gazebo>'
+        )
+        for name in ("imu", "force_torque"):
+            kind = "".join(part.title() for part in (*name.split("_"), "sensor", "controller"))
+            params = {"type": f"{name}_sensor_controller/{kind}", "publish_rate": 50}
+            rospy.set_param(f"/{name}_reporter", params)
+        self.spawn(two_wheels(**CONTROL).replace("</robot>", f"{imu}{force}</robot>"))
+        manager = Manager()
+        self.assertTrue(wait_until(lambda: manager.start("imu_reporter", "force_torque_reporter")))
+        heard = self.hear("/imu", Imu), self.hear("/hub/ft", WrenchStamped)
+        self.step(500)
+        felt, borne = map(self.newest, heard)
+        self.assertAlmostEqual(felt.linear_acceleration.z, 9.8, delta=0.5)
+        self.assertEqual((felt.header.frame_id, borne.header.frame_id), ("base", "left_wheel"))
+        call("/gazebo/reset_simulation", Empty)
+        for each in heard:
+            self.assertTrue(each.wait_for(lambda them: them[-1].header.stamp.to_nsec() == 0))
+        self.step(100)
+        for each in heard:
+            self.newest(each)
+        self.assertTrue(manager.switch([], ["imu_reporter"], STRICT))
+        self.assertTrue(manager.unload("imu_reporter"))
 
 
 if __name__ == "__main__":

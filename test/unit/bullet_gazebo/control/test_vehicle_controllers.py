@@ -155,7 +155,7 @@ def test_a_running_controller_is_tuned(world):
     assert (joints["left_joint"].command, joints["right_joint"].command) == pytest.approx(
         (2.0, 1.0)
     )
-    assert track.stamps()[1:3] == [31, 41]
+    assert track.stamps()[:3] == [11, 21, 31]
     assert track.sent["/tf"] == []
 
 
@@ -275,3 +275,23 @@ def test_four_steered_wheels_turn_round_their_centre_and_go_crabwise(world):
     assert (y / x, yaw) == pytest.approx((math.tan(0.3), 0.0), abs=0.05)
     steered = track.sent["odom_steer"][-1]
     assert (steered.front, steered.rear) == pytest.approx((0.3, 0.3), abs=0.01)
+
+
+def test_after_a_reset_axles_forget_their_commanded_angles(world):
+    track = Track(world, four_wheels(steered=tuple(CORNERS)), FOUR)
+    track.controller.command_axles((0.0, 0.4, -0.4))
+    track.advance(100)
+    fork = track.robot.hardware.joints["left_front_steering"]
+    assert fork.command > 0.05
+    track.sim.reset_simulation()
+    track.advance(100)
+    assert fork.command == 0.0
+
+
+def test_a_higher_rate_counts_at_once(world):
+    track = Track(world, two_wheels(), DIFF | {"publish_rate": 1.0})
+    track.advance(1100)
+    values = {name: value for name, (value, _, _) in track.controller.tunables.items()}
+    track.controller.tune(values | {"publish_rate": 50.0})
+    track.advance(45)
+    assert track.stamps() == [1001, 1121, 1141]

@@ -85,6 +85,21 @@ def test_an_engine_that_is_not_installed_is_named_with_the_command_that_installs
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.extras("mujoco")
+def test_mujoco_stands_in_where_there_is_no_pybullet_and_says_so():
+    """As on aarch64, in a process that can't import PyBullet."""
+    code = (
+        "import sys; sys.modules['pybullet'] = None; import gymnasium, cartpole;"
+        "from bullet_gazebo.physics.engines import make_engine; print(type(make_engine()).__name__);"
+        "env = gymnasium.make('cartpole/Balance-v0'); env.reset(seed=0); print(len(env.step(0)[0]))"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert answer.stdout.split() == ["MujocoEngine", "4"]
+    assert "There is no PyBullet for " in answer.stderr
+
+
 CHAIN = """<robot name="chain"><link name="base"><inertial><mass value="1"/>
   <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
   <link name="slider"><inertial><mass value="1"/>

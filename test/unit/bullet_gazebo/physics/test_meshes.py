@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.mutations.mesh_files import (
     CORNERS,
@@ -19,6 +20,7 @@ from support.mutations.mesh_files import (
 from support.robots.worlds import run
 
 from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.files import mesh_program
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
@@ -90,6 +92,28 @@ def test_meshes_are_found_by_every_uri(tmp_path, uri):
     text = urdf(uri.format("cube.stl", folder=tmp_path))
     model = parse_urdf(text, resources=Resources(package=package))
     assert model.links["b"].collisions[0].mesh == str(pack / "cube.stl")
+
+
+P3DX = {  # sizes [m]
+    "p3dx/chassis.stl": (0.42, 0.28, 0.18),
+    "p3dx/top.stl": (0.44, 0.38, 0.01),
+    "laser/hokuyo.dae": (0.05, 0.05, 0.07),
+    **{f"p3dx/{side}_wheel.stl": (0.18, 0.04, 0.18) for side in ("left", "right")},
+    **{f"p3dx/{side}_hubcap.stl": (0.1, 0.042, 0.1) for side in ("left", "right")},
+    **{f"p3dx/{end}_sonar.stl": (0.04, 0.24, 0.04) for end in ("front", "back")},
+    **{f"p3dx/{end}_rim.stl": (0.02, 0.28, 0.05) for end in ("front", "back")},
+    "p3dx/center_wheel.stl": (0.075, 0.018, 0.075),
+    "p3dx/center_hubcap.stl": (0.03, 0.02, 0.03),
+    "p3dx/swivel.stl": (0.06, 0.04, 0.05),
+}
+
+
+@pytest.mark.parametrize("name", P3DX)
+def test_what_robots_refer_to_in_gazebo_plugins_has_the_right_size(name):
+    folder = Path(__file__).parents[4] / "companions/gazebo_plugins"
+    mesh = mesh_program.load(folder / "test/multi_robot_scenario/meshes" / name)
+    sizes = mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)
+    assert sizes == pytest.approx(np.array(P3DX[name]), abs=2e-3)
 
 
 def test_a_static_mesh_is_hollow_where_it_is_hollow(sim, tmp_path):

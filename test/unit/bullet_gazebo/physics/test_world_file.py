@@ -137,7 +137,8 @@ def test_a_faulty_model_is_left_out_alone_and_named():
     assert "model 'bad': link 'l', inertial: <mass>: 'x' is not a number" in found.warnings[0]
     assert "'good' is there twice" in found.warnings[1]
     assert "'model://nowhere' is not found" in found.warnings[2]
-    assert found.left_out == ["actor 'walker'", "plugin 'p'"]
+    assert found.left_out == ["actor 'walker'"]
+    assert [each.name for each in found.plugins] == ["p"]
 
 
 @pytest.mark.parametrize(

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import pytest
-from geometry_msgs.msg import Twist
 from support.robots.vehicles import (
     RADIUS,
     TRACK,
@@ -16,59 +14,16 @@ from support.robots.vehicles import (
     three_wheels,
     two_wheels,
 )
-from support.ros.silent_topics import SilentPublisher, SilentSubscriber, silence
+from support.ros.track import Track
 
-from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, to_rpy
 from bullet_gazebo.ros.common.messages import from_pose_msg, from_twist_msg
-from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
-from bullet_gazebo.simulator import Simulator
 
 MS = 1_000_000
 DIFF = {
     "leftJoint": "left_joint", "rightJoint": "right_joint", "wheelSeparation": TRACK,
     "wheelDiameter": 2.0 * RADIUS,
 }  # fmt: skip
-
-
-class Track:
-    """A simulator with a vehicle whose plugins publish into `messages`."""
-
-    def __init__(self, world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.logged = silence(monkeypatch)
-        self.messages, self.topics = SilentPublisher.messages, SilentSubscriber.open
-        self.sim = Simulator(world, lockstep=True)
-        self._plugins = PluginRegistry(self.sim, None)
-
-    def spawn(self, urdf: str, namespace: str = "/", height: float = RADIUS) -> Any:
-        description = parse_urdf(urdf)
-        self.model = self.sim.world.spawn("bot", description, Pose((0.0, 0.0, height)))
-        self._plugins.load(self.model, namespace)
-        return self.model
-
-    def advance(self, ticks: int) -> None:
-        with self.sim.lock:
-            self.sim.advance(ticks)
-
-    def command(
-        self, linear: float, angular: float, topic: str = "/cmd_vel", y: float = 0.0
-    ) -> None:
-        message = Twist()
-        message.linear.x, message.linear.y, message.angular.z = linear, y, angular
-        SilentSubscriber.send(topic, message)
-
-    def stamps(self, topic: str) -> list[int]:
-        return [message.header.stamp.to_nsec() // MS for message in self.messages[topic]]
-
-    def turned(self, ticks: int) -> float:
-        """Advances, and returns by how much the vehicle has turned [rad]."""
-        total, last = 0.0, to_rpy(self.model.state()[0].orientation)[2]
-        for _ in range(0, ticks, 100):
-            self.advance(100)
-            yaw = to_rpy(self.model.state()[0].orientation)[2]
-            total += math.remainder(yaw - last, 2.0 * math.pi)
-            last = yaw
-        return total
 
 
 @pytest.fixture
@@ -329,3 +284,27 @@ def test_a_tricycle_steers_by_its_front_wheel(track, speed):
     assert state.position[0] == pytest.approx(angle, abs=0.02)
     children = {message.transforms[0].child_frame_id for message in track.messages["/tf"]}
     assert children == {"base_link", *state.name}
+
+
+@pytest.mark.parametrize(
+    ("library", "tag"),
+    [
+        ("libgazebo_ros_diff_drive.so", "updateRate"),
+        ("libgazebo_ros_skid_steer_drive.so", "updateRate"),
+        ("libgazebo_ros_tricycle_drive.so", "updateRate"),
+        ("libgazebo_ros_planar_move.so", "odometryRate"),
+        ("libhector_gazebo_ros_force_based_move.so", "odometryRate"),
+        ("libgazebo_ros_kobuki.so", "update_rate"),
+    ],
+)
+def test_a_negative_rate_leaves_a_vehicle_out_with_a_line(track, library, tag):
+    track.spawn(two_wheels(**{library: {tag: -1}}))
+    assert track.logged[-1].endswith(f"<{tag}> is -1")
+    assert not track.topics
+
+
+def test_a_rate_near_zero_is_a_very_long_period(track):
+    track.spawn(diff_drive(updateRate=1e-300))
+    track.advance(50)
+    assert not track.logged
+    assert not track.messages["/odom"]

@@ -14,8 +14,11 @@ import pytest
 import rospy.topics
 from rospy.impl.registration import Registration, RegManager
 from rospy.impl.tcpros_pubsub import QueuedConnection
+from rospy.topics import _PublisherImpl, _TopicImpl
+from std_msgs.msg import String
 from support.ros.ros_fakes import FakeMaster
 
+from bullet_gazebo.ros.common import rospy_internals
 from bullet_gazebo.ros.common.rospy_internals import (
     free_polls_at_once,
     registered_together,
@@ -115,3 +118,25 @@ def test_services_are_registered_together(monkeypatch) -> None:
             assert not fake.services
     assert list(fake.services) == names
     fake.close()
+
+
+def test_a_node_is_connected_once_the_topic_s_listeners_know_of_it(monkeypatch) -> None:
+    """Else what a sensor measures for it comes before or after the messages of the same request."""
+    for kind in (_TopicImpl, _PublisherImpl):
+        monkeypatch.setattr(kind, "add_connection", kind.add_connection)  # so that it is put back
+    rospy_internals.divert_messages(lambda node: None)
+    topic, seen = _PublisherImpl("/scan", String), []
+    topics = SimpleNamespace(get_publisher_impl=lambda name: topic)
+    monkeypatch.setattr(rospy_internals, "_topics", lambda: topics)
+
+    def is_connected() -> bool | None:
+        return rospy_internals.is_connected("/scan", "/script", publishes=True)
+
+    listener = SimpleNamespace(peer_subscribe=lambda *_: seen.append(is_connected()))
+    topic.add_subscriber_listener(listener)
+    node = SimpleNamespace(
+        endpoint_id="/script", cleanup_cb=None, fileno=lambda: None, set_cleanup_callback=print
+    )
+    seen.append(is_connected())
+    topic.add_connection(node)
+    assert [*seen, is_connected()] == [False, False, True]

@@ -1,0 +1,184 @@
+"""Mimic joints, link attacher, grasp fix, vacuum gripper (docs/contract/sensors.md 11.4, 12.3, 12.5).
+
+What the elements of mimic joints and of disable_link say is in the model itself
+(physics/files/mechanisms.py): here only `hasPID` is left, whose gains are parameters.
+"""
+
+import math
+
+import rospy
+from gazebo_ros_link_attacher.srv import Attach, AttachRequest, AttachResponse
+from std_msgs.msg import Bool
+from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
+
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.hardware import GAINS
+from bullet_gazebo.control.pid import Pid
+from bullet_gazebo.grippers import GraspHold, GripRule, PidFollower, Suction
+from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.files.mechanisms import DISABLE_LINK_LIBRARY, MIMIC_LIBRARIES
+from bullet_gazebo.physics.model import Model
+from bullet_gazebo.physics.world import Attachment
+from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
+from bullet_gazebo.ros.plugins.sensor_topics import (
+    SensorPlugin,
+    SensorTopic,
+    namespace_of,
+    topic_in,
+)
+from bullet_gazebo.simulator import Simulator
+
+LOOKS, MOST_COUNT = 5.0, 10.0  # a second of simulated time
+ANGLE, RELEASE = 120.0, 0.005  # [°], [m]
+
+
+class MimicPlugin:
+    """Gives a joint that follows another one the PID that it asks for; without gains it keeps its gear."""
+
+    def __init__(self, context: PluginContext) -> None:
+        name = context.among("mimicJoint", list(context.model.description.mimics))
+        mimic = context.model.description.mimics.get(name)
+        if mimic is None or mimic.pid is None:  # the model has told what is wrong
+            return
+        namespace = rospy.names.ns_join(rospy.get_namespace(), context.given_namespace or "")
+        place = rospy.names.ns_join(namespace, mimic.pid or f"{GAINS}/{name}")
+        gains = rospy.get_param(place, None)
+        if gains is None:
+            return
+        try:
+            pid = Pid.from_params(gains, place)
+        except ControlError as error:
+            raise DescriptionError(str(error)) from error
+        with context.sim.lock:
+            follower = PidFollower(context.model, name, pid)
+        context.on_update(follower.update)
+        context.on_move(follower.moved)
+
+    def shutdown(self) -> None:
+        """Does nothing: the model goes."""
+
+
+def _done(context: PluginContext) -> None:
+    """The description has no link any more that touches anything."""
+
+
+class LinkAttacher:
+    """A world's services that fix links to each other, and release them."""
+
+    def __init__(self, sim: Simulator) -> None:
+        self._sim = sim
+        self._attached: dict[tuple[str, ...], Attachment] = {}
+        self._services = [
+            rospy.Service("/link_attacher_node/attach", Attach, self._attach),
+            rospy.Service("/link_attacher_node/detach", Attach, self._detach),
+        ]
+
+    def _attach(self, request: AttachRequest) -> AttachResponse:
+        key = _names(request)
+        with self._sim.lock:
+            first, second = self._link(*key[:2]), self._link(*key[2:])
+            if first is None or second is None or first == second:
+                rospy.logerr("attach: there are no two links '%s::%s' and '%s::%s'", *key)
+                return AttachResponse(ok=False)
+            self._release(key)
+            self._attached[key] = self._sim.world.attach(first, second)
+        return AttachResponse(ok=True)
+
+    def _detach(self, request: AttachRequest) -> AttachResponse:
+        with self._sim.lock:
+            released = self._release(_names(request))
+        return AttachResponse(ok=released)
+
+    def _release(self, key: tuple[str, ...]) -> bool:
+        attachment = self._attached.pop(key, None)
+        if attachment not in self._sim.world.attachments:
+            return False
+        self._sim.world.detach(attachment)
+        return True
+
+    def _link(self, model: str, link: str) -> tuple[Model, str] | None:
+        found = self._sim.world.models.get(model)
+        return (found, link) if found is not None and link in found.link_names else None
+
+
+def _names(request: AttachRequest) -> tuple[str, ...]:
+    names = (request.model_name_1, request.link_name_1, request.model_name_2, request.link_name_2)
+    return tuple(map(str, names))
+
+
+class GraspFixPlugin(SensorPlugin):
+    """Holds what each `<arm>` grips."""
+
+    def __init__(self, context: PluginContext) -> None:
+        most = context.number("max_grip_count", MOST_COUNT)
+        rule = GripRule(
+            math.radians(context.number("forces_angle_tolerance", ANGLE)),
+            int(context.number("grip_count_threshold", most // 2)),
+            int(most),
+            context.number("release_tolerance", RELEASE),
+        )
+        arms = context.plugin.element.findall("arm")
+        if not arms:
+            raise DescriptionError("<arm> is missing")
+        holds = []
+        for arm in arms:
+            palm = (arm.findtext("palm_link") or "").strip()
+            fingers = [(each.text or "").strip() for each in arm.findall("gripper_link")]
+            for link in (palm, *fingers):
+                if link not in context.model.link_names:
+                    raise DescriptionError(f"<arm>: the model has no link '{link}'")
+            holds.append(GraspHold(context.sim.world, context.model, palm, fingers, rule))
+        self._holds, self._sim, self._resets = holds, context.sim, context.sim.resets
+        context.on_move(self._moved)
+        for hold in holds:
+            context.clock(context.rate("update_rate", LOOKS), hold.look, at_once=False)
+
+    def _moved(self) -> None:
+        """Lets an episode grip as the first one did."""
+        if self._resets != self._sim.resets:
+            self._resets = self._sim.resets
+            for hold in self._holds:
+                hold.forget()
+
+
+class VacuumPlugin(SensorPlugin):
+    """Suction at `bodyName`: services `on` and `off`, and whether something is held on `topicName`."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self._context = context
+        namespace = namespace_of(context, absent="", empty="/")
+        self._suction = Suction(context.sim.world, context.model, context.link("bodyName"))
+        topic = context.text("topicName", "")
+        if not topic:
+            raise DescriptionError("<topicName> is missing")
+        SensorTopic(context, topic_in(namespace, topic), Bool, 0.0, self._held)
+        for name, act in (("on", self._turn_on), ("off", self._turn_off)):
+            service = rospy.Service(topic_in(namespace, name), Empty, act)
+            context.closing(service.shutdown)
+        context.on_update(self._suction.update)
+        context.closing(self._let_go)
+
+    def _held(self, now: int) -> Bool:
+        return Bool(self._suction.holds())
+
+    def _turn_on(self, request: EmptyRequest) -> EmptyResponse:
+        with self._context.sim.lock:
+            self._suction.on = True
+        return EmptyResponse()
+
+    def _turn_off(self, request: EmptyRequest) -> EmptyResponse:
+        self._let_go()
+        return EmptyResponse()
+
+    def _let_go(self) -> None:
+        with self._context.sim.lock:
+            self._suction.on = False
+            self._suction.update(self._context.sim.now)
+
+
+LIBRARIES = dict.fromkeys(MIMIC_LIBRARIES, MimicPlugin) | {
+    DISABLE_LINK_LIBRARY: _done,
+    "libgazebo_grasp_fix.so": GraspFixPlugin,
+    "libgazebo_ros_vacuum_gripper.so": VacuumPlugin,
+}
+WORLD_LIBRARIES = {"libgazebo_ros_link_attacher.so": LinkAttacher}
