@@ -131,7 +131,7 @@ def _topics() -> Any:
     return rospy.impl.registration.get_topic_manager()
 
 
-CONNECTING = 2.0  # [s of wall time]
+CONNECTING = 20.0  # [s of wall time] on a busy machine; AdvanceService waits as long for its ends
 CONNECTING_LOOK = 0.001  # [s]
 SILENT = ("/rosout", "/rosout_agg", "/clock", "/statistics")  # the simulator acts on none of these
 NOT_COMMANDS = ("/goal", "/cancel")  # of an action, whose client waits in other ways
@@ -149,6 +149,7 @@ class Topics:
         self._seen = -1  # the simulator's count of topic changes at the last `settle`
         # Topics that the script subscribes to and the simulator publishes
         self._heard: frozenset[str] = frozenset()
+        self._given_up: set[str] = set()  # topics that haven't connected in time
 
     def changed(self) -> None:
         """Notes that the script has a new publisher or subscriber."""
@@ -169,8 +170,10 @@ class Topics:
             return ()
         self._changed = False
         manager = rospy.impl.registration.get_topic_manager()
-        hears = [name for name in manager.subs if name not in SILENT]
-        tells = [name for name in manager.pubs if name not in SILENT]
+        left_out = {*SILENT, *self._given_up}
+        hears = [name for name in manager.subs if name not in left_out]
+        tells = [name for name in manager.pubs if name not in left_out]
+        deadline = originals.monotonic() + CONNECTING
         response = self._world.advance(0, connect=(hears, tells))
         self._seen = response.topics_changed
         self._heard = frozenset(response.subscriptions)
@@ -179,15 +182,26 @@ class Topics:
             for name in response.publications
             if not name.startswith(f"{NODE}/") and not name.endswith(NOT_COMMANDS)
         )
-        deadline = originals.monotonic() + CONNECTING
-        while originals.monotonic() < deadline:
-            ends = [_has(manager.subs, name, "callerid_pub") for name in response.subscriptions]
-            ends += [_has(manager.pubs, name, "endpoint_id") for name in response.publications]
-            if all(ends):
+        while missing := {
+            *_without_simulator(manager.subs, response.subscriptions, "callerid_pub"),
+            *_without_simulator(manager.pubs, response.publications, "endpoint_id"),
+        }:
+            if originals.monotonic() > deadline:
+                self._give_up(missing)
                 break
             originals.sleep(CONNECTING_LOOK)
         messages: Sequence[TopicMessage] = response.messages
         return messages
+
+    def _give_up(self, names: Collection[str]) -> None:
+        """Waits for these topics no more: they never connect if their types differ."""
+        self._given_up.update(names)
+        for name in sorted(names):
+            tell_once(
+                f"no connection {name}",
+                f"{name} hasn't connected to the simulator in {CONNECTING:g} s (is it of another type"
+                " there?): its messages come by the wall's time, if at all",
+            )
 
     def lets_in(self, topic: Any, connection: Any) -> bool:
         """Returns whether messages of a connection go to the script's callbacks."""
@@ -209,8 +223,11 @@ class Topics:
         return False
 
 
-def _has(topics: dict[str, Any], name: str, attribute: str) -> bool:
-    topic = topics.get(name)
-    return topic is None or any(
-        getattr(each, attribute, None) == NODE for each in topic.connections
-    )
+def _without_simulator(topics: dict[str, Any], names: Iterable[str], attribute: str) -> set[str]:
+    """Returns the topics of the script that aren't connected to the simulator."""
+    return {
+        name
+        for name in names
+        if name in topics
+        and all(getattr(each, attribute, None) != NODE for each in topics[name].connections)
+    }

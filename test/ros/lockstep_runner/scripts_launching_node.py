@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Scripts under lockstep.py that start their own simulator, or meet an unsuitable one."""
 
+import contextlib
 import os
 import re
 import signal
@@ -8,16 +9,21 @@ import subprocess
 import sys
 import tempfile
 import unittest
+from functools import partial
 from pathlib import Path
 
 import rospkg
 import rostest
 
+from ros_calls import master
+from ros_calls.waiting import wait_until
+from ros_utils import ros_gazebo
 from ros_utils.simulation import Simulation, reserved_port
 
 ROOT = Path(rospkg.RosPack().get_path("cartpole"))
 SCRIPTS = ROOT / "test" / "data" / "scripts"
 EXISTING = Path(__file__).resolve().parents[4] / "shared" / "pg_script" / "launch_robot_test.py"
+SCOUT = SCRIPTS / "scout.launch"
 EPISODES = 10
 BOUND = 300  # [s]
 
@@ -33,10 +39,34 @@ def environment():
 
 
 def start(*arguments, **options):
+    return piped("rosrun", "cartpole", "lockstep.py", *arguments, **options)
+
+
+def piped(*command, **options):
     return subprocess.Popen(
-        ["rosrun", "cartpole", "lockstep.py", *map(str, arguments)],
+        list(map(str, command)),
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, **options,
     )  # fmt: skip
+
+
+@contextlib.contextmanager
+def scouting(**variables):
+    """A scout in its arena, on a master of its own; yields the environment of scripts."""
+    here = environment()
+    port = here["ROS_MASTER_URI"].rpartition(":")[2]
+    launch = subprocess.Popen(
+        ["roslaunch", "-p", port, SCOUT],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env={**here, **variables},
+    )  # fmt: skip
+    try:
+        with master.using(here["ROS_MASTER_URI"]):
+            wait_until(master.is_up, BOUND, "the master")
+            names = partial(ros_gazebo.gazebo_get_model_names, timeout=BOUND)
+            wait_until(lambda: "scout" in names(), BOUND, "the scout")
+        yield here
+    finally:
+        launch.send_signal(signal.SIGINT)
+        launch.wait(BOUND)
 
 
 class LaunchingTest(unittest.TestCase):
@@ -73,6 +103,43 @@ class LaunchingTest(unittest.TestCase):
         self.assertGreater(len(lines), EPISODES, err)
         self.assertEqual(process.returncode, 0, err)  # as it ends without us
         return lines, Path(folder, "models", "policy_network_episode_0.pth").read_bytes()
+
+    def told(self, process):
+        """The lines that a script prints after each episode, and at its end."""
+        out, err = process.communicate(timeout=BOUND)
+        self.assertEqual(process.returncode, 0, err)
+        lines = [line for line in out.splitlines() if re.match(r"\d+ |learned ", line)]
+        self.assertIn("learned", lines[-1], out)
+        return lines
+
+    def test_scripts_of_robots_on_wheels_repeat_to_the_bit(self):
+        """Its model of a goal comes and goes; its callback keeps the newest cloud. Two worlds at once."""
+        for name, lengths in {"goal_model.py": (2, 10), "newest_cloud.py": (2, 5)}.items():
+            with contextlib.ExitStack() as stack:
+                arguments = "--seed", 3, SCRIPTS / name, *lengths
+                worlds = [
+                    stack.enter_context(scouting(GZSERVER_ARGS="--lockstep")) for _ in range(2)
+                ]
+                seen = [self.told(each) for each in [start(*arguments, env=e) for e in worlds]]
+            self.assertEqual(len(seen[0]), lengths[0] + 1)
+            self.assertEqual(*seen)
+
+    def test_a_script_that_starts_roscore_and_places_its_robot_by_a_topic_repeats_to_the_bit(self):
+        both = [
+            start(
+                "--seed", 3, SCRIPTS / "state_topic.py", reserved_port(), 2, 10, env=environment()
+            )
+            for _ in range(2)
+        ]
+        self.assertEqual(*map(self.told, both))
+
+    def test_scripts_of_robots_on_wheels_run_in_real_time(self):
+        own = piped(sys.executable, SCRIPTS / "state_topic.py", reserved_port(), 1, 3)
+        with scouting() as here:
+            for name in "goal_model.py", "newest_cloud.py":
+                process = piped(sys.executable, SCRIPTS / name, 1, 3, env=here)
+                self.assertEqual(len(self.told(process)), 2)
+        self.assertEqual(len(self.told(own)), 2)
 
     def test_a_world_in_real_time_is_refused(self):
         with Simulation() as simulation:
