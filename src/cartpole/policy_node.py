@@ -98,7 +98,7 @@ def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:
         help="checkpoint of a run folder: best by evaluation, or the newest (default best)")  # fmt: skip
     add("--late", type=_positive, metavar="S",
         help="the robot stops when joint states are older [s] (default 5 control periods, "
-        "at least 0.1)")  # fmt: skip
+        "at least 0.1, for a vehicle at most 0.3)")  # fmt: skip
     add("--max-speed", type=_positive_or_0, default=1.0, metavar="SHARE",
         help="how fast commanded positions may move, as a share of the joints' velocity limits "
         "(default 1; 0: no limit)")  # fmt: skip

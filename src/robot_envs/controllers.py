@@ -1,17 +1,21 @@
 """Controllers as a robot's parameters describe them: checked, loaded, and commanded."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from bullet_gazebo.control.controllers import find_type
 from bullet_gazebo.control.controllers.base import Controller
+from bullet_gazebo.control.controllers.vehicle import VehicleController
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
 from file_access.text import did_you_mean
 
-KINDS = ("Float64", "Float64MultiArray")  # of command topics that take numbers
+KINDS = ("Float64", "Float64MultiArray", "Twist")  # of command topics that take numbers
 QUANTITIES = ("position", "velocity", "effort")  # that they command
+TWIST = "twist"  # the quantity of a vehicle's command
+AXES = ("linear.x", "linear.y", "angular.z")  # of a Twist that count
 Loaded = dict[str, Controller]
 
 
@@ -19,9 +23,10 @@ class CommandPort(NamedTuple):
     """How a controller is commanded."""
 
     name: str  # of the controller
-    joints: tuple[str, ...]  # one number for each, in this order
+    joints: tuple[str, ...]  # one number for each, in this order; of a vehicle `AXES`
     single: bool  # whether it takes one number instead of a list
-    quantity: str  # what the numbers are: "position", "velocity" or "effort"
+    quantity: str  # what the numbers are: "position", "velocity", "effort"; of a vehicle "twist"
+    bounds: tuple[tuple[float, float], ...] = ()  # of a vehicle's command, by axis [m/s, rad/s]
 
     @property
     def holds(self) -> bool:
@@ -83,7 +88,7 @@ def ports(
         if not _takes_numbers(loaded[name]):
             raise ControlError(
                 f"controller '{name}' ({loaded[name].type_name}) takes no numbers; tasks command "
-                "controllers of single joints, or of groups"
+                "controllers of single joints, of groups, or of vehicles"
             )
     return [_port(loaded[name], parameters) for name in commanded]
 
@@ -93,6 +98,11 @@ def _takes_numbers(controller: Controller) -> bool:
 
 
 def _port(controller: Controller, parameters: Mapping[str, Any]) -> CommandPort:
+    if isinstance(controller, VehicleController):
+        options = controller.options
+        ranges = (options.linear.velocity, (0.0, 0.0), options.angular.velocity)
+        bounds = tuple(each or (-math.inf, math.inf) for each in ranges)
+        return CommandPort(controller.name, AXES, False, TWIST, bounds)
     described = parameters[controller.name]
     listed = described.get("joints") or [described.get("joint")]
     joints = tuple(listed) if set(listed) == set(controller.claimed) else controller.claimed

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -118,7 +119,10 @@ class RobotEnv(DrawnEnv):
     ) -> None:
         self._closed = True  # until there is something to close
         checks.check_task(task)
-        self.scene = scene = Scene(robot if isinstance(robot, Sequence) else [robot], task.objects)
+        robots = list(robot) if isinstance(robot, Sequence) else [robot]
+        if task.world is not None:
+            robots[:1] = [replace(each, world=task.world) for each in robots[:1]]
+        self.scene = scene = Scene(robots, task.objects)
         self.max_steps = checks.checked_steps(task.max_steps if max_steps is None else max_steps)
         self._adopt(task)
         self.control_period = period = _control_period(scene, control_period)

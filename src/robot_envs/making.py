@@ -96,11 +96,21 @@ def check_options(given: Iterable[str], known: Iterable[str] = ()) -> None:
 
 
 def option_names(make: Callable[..., Any]) -> list[str]:
-    """Returns the names of the keyword arguments of a class or function, without a robot and a task."""
-    parameters = inspect.signature(make).parameters.values()
-    return [
-        each.name for each in parameters if each.kind != each.VAR_KEYWORD and each.name not in NAMED
-    ]
+    """Returns the names of the keyword arguments of a class or function, without a robot and a task.
+
+    What a class takes as `**options` are those of its base that have defaults.
+    """
+    found: dict[str, None] = {}
+    for maker in inspect.getmro(make) if isinstance(make, type) else [make]:
+        parameters = inspect.signature(maker).parameters.values()
+        more = [each for each in parameters if each.kind == each.VAR_KEYWORD]
+        for each in parameters:
+            given = maker is not make and each.default is each.empty
+            if each not in more and each.name not in NAMED and not given:
+                found[each.name] = None
+        if not more:
+            break
+    return list(found)
 
 
 def named(name: str) -> Any:

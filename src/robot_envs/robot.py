@@ -59,6 +59,7 @@ class Robot:
         description: the parameter that holds the URDF over ROS, in the namespace.
         publisher: the controller that publishes its joint states over ROS.
         rviz: package and name of a launch file that shows it in RViz; None: there is none.
+        odometry: topic of a vehicle's odometry, which tells its pose and speed where it is deployed.
         sensor_topics: topics of sensors in real time, by the sensor's name, where plugins name others.
     """
 
@@ -77,6 +78,7 @@ class Robot:
     description: str = "robot_description"
     publisher: str = "joint_state_controller"
     rviz: tuple[str, str] | None = None
+    odometry: str | None = None
     sensor_topics: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
@@ -126,15 +128,16 @@ class Robot:
         return {name: joint.limits for name, joint in self.control.joints.items()}
 
     @property
-    def _pid_gains(self) -> Any:
+    def pid_gains(self) -> Mapping[str, Any]:
+        """The parameters `gazebo_ros_control/pid_gains`, by joint."""
         described = self.parameters.get("gazebo_ros_control")
-        return described.get("pid_gains") if isinstance(described, Mapping) else None
+        found = described.get("pid_gains") if isinstance(described, Mapping) else None
+        return found if isinstance(found, Mapping) else {}
 
     def hardware(self) -> RobotHardware:
         """Makes the joints as controllers see them; raises ControlError if something about them is wrong."""
-        pids = self._pid_gains
         description = read_description(self.xml).limited_by(self.parameters.get("joint_limits"))
-        return RobotHardware(description, pids if isinstance(pids, Mapping) else None)
+        return RobotHardware(description, self.pid_gains)
 
     @property
     def _named(self) -> str:
@@ -210,7 +213,7 @@ class Robot:
     def _warn_of_unknown_joints(self) -> None:
         """Warns only: a file of parameters may be for several robots."""
         limits = self.parameters.get("joint_limits")
-        for what, named in (("pid_gains", self._pid_gains), ("joint_limits", limits)):
+        for what, named in (("pid_gains", self.pid_gains), ("joint_limits", limits)):
             for name in named if isinstance(named, Mapping) else ():
                 if name not in self.control.joints:
                     near = did_you_mean(str(name), self.control.joints)

@@ -82,8 +82,8 @@ class Scene:
         positions = {name: state.position for name, state in joints.items()}
         found = {}
         for name, (robot, port) in self.ports.items():
-            own = {each: positions[self.joint(robot, each)] for each in port.joints}
-            found[name] = port.at_start(own)
+            held = port.joints if port.holds else ()
+            found[name] = port.at_start({each: positions[self.joint(robot, each)] for each in held})
         return found
 
     def commands(self, given: Commands) -> dict[str, float | tuple[float, ...]]:

@@ -41,6 +41,7 @@ class Task(ABC):
     | `query` | links, models and contacts that a `state` has besides joints; others cost nothing |
     | `reward_query` | further ones that only `reward`, `is_terminal` and `info` see |
     | `objects` | what is spawned besides the robots |
+    | `world` | a world file in place of the first robot's; None: that one |
 
     Names of joints in states and of controllers in commands are plain in a world with one robot; see
     `WorldState` for several. A world of joints alone, as a real robot's, can't tell what the `reward_query`
@@ -52,6 +53,7 @@ class Task(ABC):
     query: StateQuery = StateQuery()
     reward_query: StateQuery = StateQuery()
     objects: Sequence[Object] = ()
+    world: Source | None = None
 
     @abstractmethod
     def action_space(self) -> gymnasium.Space[Any]:
@@ -84,6 +86,13 @@ class Task(ABC):
     @abstractmethod
     def reward(self, state: WorldState, action: Any) -> float:
         """Returns the reward for reaching a state by an action."""
+
+    def aim(self, goal: Any) -> None:
+        """Takes another goal, for a policy that is deployed; raises ValueError if it isn't one.
+
+        By default there are none; a `GoalTask`'s are those of its `goals`.
+        """
+        raise ValueError(f"{type(self).__name__} has no goal")
 
     def is_terminal(self, state: WorldState) -> bool:
         """Returns whether the state terminates the episode; by default none does."""

@@ -11,6 +11,7 @@ from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.manager import STRICT
 from bullet_gazebo.control.pid import Gains
+from bullet_gazebo.grippers import pid_followers
 from bullet_gazebo.physics.description import DescriptionError, Inertia, is_control_plugin
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
@@ -27,11 +28,11 @@ from bullet_gazebo.physics.properties import (
 from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.robot import ControlledRobot, control_period_of
 from bullet_gazebo.sensors.sensing import Sensing
-from bullet_gazebo.sensors.sensor_readers import SensorReaders
+from bullet_gazebo.sensors.sensor_readers import SensorReaders, offer_sensors
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 from bullet_gazebo.state import NOTHING, StateReader, UnknownName, find_link, find_model
 from robot_envs.backends.backend import PHYSICS_STEP, RobotBackend, ticks_per_action
-from robot_envs.backends.world_files import fill, spawn
+from robot_envs.backends.world_files import fill, loose_joints, spawn
 from robot_envs.controllers import Loaded, load
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.files import resources
@@ -103,6 +104,7 @@ class InProcessWorld(RobotBackend):
             for name, (robot, port) in scene.ports.items()
         }
         self._apply = Applier(scene, InProcessChanges(self._sim))
+        self._loose = loose_joints(scene.robots[0].world, scene.objects)
         self._reader = StateReader(world, NOTHING)
         self._links: list[str] = []
         self._sensing: Sensing | None = None
@@ -117,12 +119,16 @@ class InProcessWorld(RobotBackend):
             description = parse_urdf(robot.xml, resources=resources())
             model = self._sim.world.spawn(robot.model, description, robot.pose)
             hardware = robot.hardware()
+            offer_sensors(hardware, self._sim, model, sensing=None)  # no topic reports them
             manager, loaded = load(robot.run, robot.parameters, hardware)
             drives = (each for each in description.plugins if is_control_plugin(each.filename))
             period = next(map(control_period_of, drives), 0.0)
             namespace = f"/{robot.namespace.strip('/')}"
             controlled = ControlledRobot(model, hardware, manager, period, namespace)
             self._sim.add_robot(controlled)
+            for follower in pid_followers(model, robot.pid_gains):
+                self._sim.listeners.append(follower.update)
+                self._sim.moved.append(follower.moved)
             manager.switch(loaded, [], STRICT)
         except (ControlError, DescriptionError) as error:
             raise RobotEnvError(f"the robot '{robot.model}': {error}") from error
@@ -168,6 +174,8 @@ class InProcessWorld(RobotBackend):
             for model, (pose, twist) in models:
                 upright = Pose(pose.position, normalized(pose.orientation))
                 self._sim.place_model(model, upright, twist)
+            for owner, joint in self._loose:
+                self._sim.set_joint_states(world.models[owner], {joint: 0.0}, {joint: 0.0})
             for robot in self.scene.robots:
                 own = [
                     (name, joints[key])

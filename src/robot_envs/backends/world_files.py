@@ -1,6 +1,7 @@
 """Models of a world in this process besides its robots: those of a world file, and a task's objects."""
 
 import logging
+from collections.abc import Sequence
 from dataclasses import replace
 
 from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
@@ -62,6 +63,20 @@ def _read(source: Source) -> WorldDescription:
 def world_models(source: Source | None) -> dict[str, ModelDescription]:
     """Returns the models of a world file; none for `EMPTY`. Raises RobotEnvError if it can't be read."""
     return {} if source is None or source == EMPTY else _read(source).models
+
+
+def loose_joints(source: Source | None, objects: Sequence[Object]) -> list[tuple[str, str]]:
+    """Returns model and name of all movable joints besides the robots', which a reset puts at 0, at rest.
+
+    Args:
+        source: the world file.
+        objects: of the task.
+
+    Raises:
+        RobotEnvError: if one of them can't be read.
+    """
+    models = {**world_models(source), **{each.name: object_model(each) for each in objects}}
+    return [(name, each.name) for name, model in models.items() for each in model.movable_joints]
 
 
 def object_model(thing: Object) -> ModelDescription:

@@ -75,7 +75,8 @@ def _twist(before: Pose, after: Pose) -> Twist:
 def _check(robot: Robot, query: StateQuery) -> None:
     unknown = {
         "contacts": query.contacts_of or query.all_contacts,
-        "models": query.models or query.all_models,
+        "models": query.all_models
+        or set(query.models) - ({robot.model} if robot.odometry else set()),
     }
     for what, asked in unknown.items():
         if asked:

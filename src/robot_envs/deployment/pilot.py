@@ -8,13 +8,21 @@ import numpy as np
 
 from bullet_gazebo.control.joint import JointLimits
 from robot_envs.checks import action_reader, checked_goal, observation_reader, set_goal, with_goals
-from robot_envs.controllers import CommandPort
+from robot_envs.controllers import TWIST, CommandPort
 from robot_envs.deployment.kinematics import LinkView
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.task import GoalTask, Task, Unjudged
-from robot_envs.world_state import Command, JointState, Sensors, StateQuery, WorldState
+from robot_envs.world_state import (
+    ODOMETRY,
+    Command,
+    JointState,
+    Models,
+    Sensors,
+    StateQuery,
+    WorldState,
+)
 
 
 class CommandLimits:
@@ -25,6 +33,7 @@ class CommandLimits:
     | position | `lower` and `upper`, also the soft ones; and moves no faster than `velocity` |
     | velocity | `velocity` either way |
     | effort | `effort` either way |
+    | speeds of a vehicle | the controller's own limits |
 
     Args:
         robot: with these limits.
@@ -36,12 +45,12 @@ class CommandLimits:
 
     def __init__(self, robot: Robot, port: CommandPort, way: float, period: float) -> None:
         self._port = port
-        limits = [robot.limits[joint] for joint in port.joints]
-        self._bounds = [_bounds(each, port.quantity) for each in limits]
+        limits = [] if port.quantity == TWIST else [robot.limits[joint] for joint in port.joints]
+        self._bounds = list(port.bounds) or [_bounds(each, port.quantity) for each in limits]
         moves = port.quantity == "position"
         self._ways = [
             each.velocity * way * period if moves and each.velocity else math.inf for each in limits
-        ]
+        ] or [math.inf for _ in self._bounds]
 
     def __call__(self, command: Command, held: Command) -> tuple[Command, list[str]]:
         """Returns the nearest command that is allowed after the present one, and the joints out of bounds."""
@@ -118,7 +127,7 @@ class Pilot:
         act: the policy: the action for an observation.
         period: from one step to the next [s].
         seed: of what the task draws, such as a goal.
-        goal: of a `GoalTask`; None: it draws one.
+        goal: of a task that has goals; None: it draws one.
         way: see `CommandLimits`.
         say: reports commands beyond their limits, once for each controller.
 
@@ -142,7 +151,7 @@ class Pilot:
         if not robot.ports:
             raise RobotEnvError(f"the robot '{robot.model}' has no controller that takes commands")
         self._judge = task if task.reward_query == StateQuery() else Unjudged()
-        self._links = LinkView(robot, task.query)
+        self._links, self._model = LinkView(robot, task.query), robot.model
         self._limits = {port.name: CommandLimits(robot, port, way, period) for port in robot.ports}
         self._read_action = action_reader(task.action_space())
         self._read = observation_reader(task.observation_space(), type(task).__name__)
@@ -150,7 +159,7 @@ class Pilot:
         self._reported: set[str] = set()
         self._held: dict[str, Command] = {}
         self._action: Any = None  # None: no step yet
-        self._goal: np.ndarray | None = None  # as given
+        self._goal: Any = None  # as given
         if goal is not None:
             self.aim(goal)
 
@@ -162,20 +171,28 @@ class Pilot:
         task = self._task
         if isinstance(task, GoalTask):
             set_goal(task, self._state(0.0, joints, sensors), self._generator, self._goal)
+        elif self._goal is not None:
+            task.aim(self._goal)
 
     def aim(self, goal: Any) -> None:
-        """Gives a `GoalTask` a goal for all episodes; raises ValueError if it isn't one of its goals."""
+        """Gives the task a goal for all episodes; raises ValueError if it isn't one of its goals."""
         task = self._task
-        if not isinstance(task, GoalTask):
-            raise ValueError(f"{type(task).__name__} has no goal; only a GoalTask does")
-        task.desired = self._goal = checked_goal(task, goal)
+        if isinstance(task, GoalTask):
+            task.desired = self._goal = checked_goal(task, goal)
+        else:
+            task.aim(goal)
+            self._goal = goal
 
     def go_on(self, joints: Joints) -> None:
         """Continues from the joints' positions, after they were stopped."""
         self._held = {name: limits.stop(joints) for name, limits in self._limits.items()}
 
     def _state(self, time: float, joints: Joints, sensors: Sensors) -> WorldState:
-        return WorldState(time, joints, dict(self._held), self._links(joints), sensors=sensors)
+        motion = sensors.get(ODOMETRY)
+        models = Models() if motion is None else Models({self._model: motion.values[ODOMETRY]})
+        return WorldState(
+            time, joints, dict(self._held), self._links(joints), models, sensors=sensors
+        )
 
     def step(
         self, time: float, joints: Joints, sensors: Sensors = NO_SENSORS

@@ -9,20 +9,22 @@ from typing import Any
 
 import rosgraph
 import rospy
-from std_msgs.msg import Float64, Float64MultiArray
+from std_msgs.msg import Float64MultiArray
 
 from robot_envs.backends.ros import node
-from robot_envs.backends.ros.bringup import full_name
+from robot_envs.backends.ros.bringup import command_message, command_publisher, full_name
 from robot_envs.backends.ros.running import lockstep_hint
 from robot_envs.backends.ros.sensor_listener import SensorListener
+from robot_envs.controllers import TWIST
 from robot_envs.deployment.pilot import Pilot
 from robot_envs.deployment.reports import OFF, ControllerWatch, JointListener
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.task import GoalTask, Task
-from robot_envs.world_state import Command, JointState
+from robot_envs.world_state import ODOMETRY, Command, JointState
 
 LATE_PERIODS, LATE_AT_LEAST = 5, 0.1  # control periods, and [s]
+LATE_AT_MOST = 0.3  # [s] of a vehicle, which drives on meanwhile
 POLL = 0.05  # [s] of wall time between two looks at what else might end a wait
 PATIENCE = 2.0  # [s] of wall time, until what is missing is logged
 REPORTING = 1.0  # [s] of wall time between two lines about why the robot stands still
@@ -45,7 +47,8 @@ class PolicyNode:
         act: the policy: the action for an observation.
         period: of control [s].
         late: how long the robot may be without a joint state before it is stopped [s], or without a reading,
-            but at least three of its sensor's periods; None: 5 control periods, and at least 0.1 s.
+            but at least three of its sensor's periods; None: 5 control periods, but at
+            least 0.1 s, and at most 0.3 s for a vehicle.
         seed: see `Pilot`.
         goal: see `Pilot`.
         way: see `CommandLimits`.
@@ -66,7 +69,7 @@ class PolicyNode:
         way: float = 1.0,
     ) -> None:
         self._period = period
-        self._late = max(LATE_PERIODS * period, LATE_AT_LEAST) if late is None else late
+        self._late = _late(robot, period) if late is None else late
         try:
             self._pilot = Pilot(robot, task, act, period, seed, goal, way, rospy.logwarn)
         except ValueError as error:
@@ -81,20 +84,15 @@ class PolicyNode:
         self._joints = JointListener(
             full_name(robot, "joint_states"), robot.model, robot.joints, robot.limits, self._late
         )
+        odometry = (ODOMETRY,) if task.query.models else ()
         self._sensors = SensorListener(
-            robot, task.query.sensors, rospy.get_time, max(self._late, OFF)
+            robot, (*task.query.sensors, *odometry), rospy.get_time, max(self._late, OFF)
         )
         self._controllers = ControllerWatch(robot, self._ended)
-        self._topics = {
-            port.name: rospy.Publisher(
-                f"{full_name(robot, port.name)}/command",
-                Float64 if port.single else Float64MultiArray,
-                queue_size=1,
-            )
-            for port in robot.ports
-        }
+        self._ports = {port.name: port for port in robot.ports}
+        self._topics = {port.name: command_publisher(robot, port) for port in robot.ports}
         self._pushing = {port.name for port in robot.ports if port.quantity != "position"}
-        if isinstance(task, GoalTask):
+        if isinstance(task, GoalTask) or type(task).aim is not Task.aim:
             rospy.Subscriber("~goal", Float64MultiArray, self._take_goal, queue_size=1)
 
     def _take_goal(self, message: Float64MultiArray) -> None:
@@ -245,9 +243,7 @@ class PolicyNode:
 
     def _publish(self, commands: Mapping[str, Command]) -> None:
         for name, command in commands.items():
-            topic = self._topics[name]
-            single = topic.data_class is Float64
-            topic.publish(Float64(command) if single else Float64MultiArray(data=list(command)))  # type: ignore[arg-type]
+            self._topics[name].publish(command_message(self._ports[name], command))
 
     def _end(self) -> None:
         """Stops the robot, if it has moved."""
@@ -278,6 +274,12 @@ class PolicyNode:
             if all(now[each] > count for each, count in before.items() if each in now):
                 return
             rospy.rostime.wallsleep(0.002)
+
+
+def _late(robot: Robot, period: float) -> float:
+    """Returns how long a robot may be without a joint state [s], for a control period [s]."""
+    drives = any(port.quantity == TWIST for port in robot.ports)
+    return max(min(LATE_PERIODS * period, LATE_AT_MOST if drives else math.inf), LATE_AT_LEAST)
 
 
 def run_node(

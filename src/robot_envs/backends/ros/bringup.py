@@ -8,9 +8,12 @@ from typing import Any
 
 import rospy
 from controller_manager_msgs.srv import ListControllers
+from geometry_msgs.msg import Twist, Vector3
+from std_msgs.msg import Float64, Float64MultiArray
 
 from robot_envs.backends.ros import node, running
 from robot_envs.backends.ros.running import WORLD_SERVICE, SimulatorService, Undo
+from robot_envs.controllers import TWIST, CommandPort
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
@@ -55,6 +58,22 @@ def bring_up(scene: Scene, say: Say) -> list[Undo]:
 def full_name(robot: Robot, name: str) -> str:
     """Returns the name of a controller, topic or parameter in the robot's namespace."""
     return str(rospy.names.ns_join(f"/{robot.namespace.strip('/')}", name))
+
+
+def command_publisher(robot: Robot, port: CommandPort) -> rospy.Publisher:
+    """Advertises the topic on which a controller takes commands."""
+    kind, topic = (Float64 if port.single else Float64MultiArray), "command"
+    if port.quantity == TWIST:
+        kind, topic = Twist, "cmd_vel"
+    return rospy.Publisher(f"{full_name(robot, port.name)}/{topic}", kind, queue_size=1)
+
+
+def command_message(port: CommandPort, command: Any) -> Float64 | Float64MultiArray | Twist:
+    """Returns the message of a command."""
+    if port.quantity == TWIST:
+        ahead, left, turn = command
+        return Twist(Vector3(ahead, left, 0.0), Vector3(0.0, 0.0, turn))
+    return Float64(command) if port.single else Float64MultiArray(data=list(command))
 
 
 def ready(scene: Scene) -> Ready:

@@ -23,6 +23,7 @@ from robot_envs.backends.ros.running import (
     SharedWorld,
     SimulatorService,
 )
+from robot_envs.backends.world_files import loose_joints
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
@@ -68,7 +69,10 @@ class LockstepWorld(RobotBackend):
             STEP_SERVICE, StepWorld, persistent=True, timeout=timeout + time_of(ticks)
         )
         self._steps = PreparedSteps(STEP_SERVICE, timeout, SimulatorService)
-        self._moved = [f"{robot.model}::{name}" for robot, name in scene.moved.values()]
+        moved = ((robot.model, name) for robot, name in scene.moved.values())
+        loose = loose_joints(scene.robots[0].world, scene.objects)
+        self._moved = [f"{model}::{name}" for model, name in (*moved, *loose)]
+        self._at_rest = [(0.0, 0.0)] * len(loose)
         self._full = {
             name: full_name(robot, port.name) for name, (robot, port) in scene.ports.items()
         }
@@ -94,7 +98,7 @@ class LockstepWorld(RobotBackend):
 
     def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         """See `RobotBackend.reset`; the state asked for is the state reached, exactly."""
-        joints = self.scene.placed_joints(initial).values()
+        joints = [*self.scene.placed_joints(initial).values(), *self._at_rest]
         self._drop()
         request = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=self._moved, seed=seed)
         request.positions = [position for position, _ in joints]

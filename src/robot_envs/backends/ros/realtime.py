@@ -13,12 +13,16 @@ from gazebo_msgs.srv import GetLinkState, SetModelConfiguration, SetModelState
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
 from sensor_msgs.msg import JointState as JointStateMsg
-from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Empty
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.backend import RobotBackend
-from robot_envs.backends.ros.bringup import full_name, ready
+from robot_envs.backends.ros.bringup import (
+    command_message,
+    command_publisher,
+    full_name,
+    ready,
+)
 from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.backends.ros.running import (
     JointStateReader,
@@ -28,7 +32,9 @@ from robot_envs.backends.ros.running import (
     check_success,
 )
 from robot_envs.backends.ros.sensor_listener import SensorListener
+from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError, SimulatorError
+from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.world_state import (
@@ -129,21 +135,17 @@ class CommandTopic:
 
     Args:
         scene: the robots.
-        controller: its full name.
-        single: whether it takes one number instead of a list.
+        robot: whose controller it is.
+        port: how that is commanded.
     """
 
-    def __init__(self, scene: Scene, controller: str, single: bool) -> None:
-        self._scene, self._controller, self._single = scene, controller, single
-        self._publisher = self._advertise()
-
-    def _advertise(self) -> rospy.Publisher:
-        kind = Float64 if self._single else Float64MultiArray
-        return rospy.Publisher(f"{self._controller}/command", kind, queue_size=1)
+    def __init__(self, scene: Scene, robot: Robot, port: CommandPort) -> None:
+        self._scene, self._robot, self._port = scene, robot, port
+        self._publisher = command_publisher(robot, port)
 
     def publish(self, value: Any) -> None:
         """Commands the controller."""
-        self._publisher.publish(Float64(value) if self._single else Float64MultiArray(data=value))
+        self._publisher.publish(command_message(self._port, value))
 
     def wait(self) -> None:
         """Waits until the controller listens; advertises the topic again halfway.
@@ -158,7 +160,7 @@ class CommandTopic:
         if wait_until(self._publisher.get_num_connections, STATE_TIMEOUT / 2, topic):
             return
         self._publisher.unregister()
-        self._publisher = self._advertise()
+        self._publisher = command_publisher(self._robot, self._port)
         if not wait_until(self._publisher.get_num_connections, STATE_TIMEOUT / 2, topic):
             raise SimulatorError(f"no node listens on {topic}: {ready(self._scene).missing()}")
 
@@ -204,8 +206,7 @@ class RealtimeWorld(RobotBackend):
         self._is_paused = False
         self._begin = 0.0  # [s] of the episode
         self._topics = {
-            name: CommandTopic(scene, full_name(robot, port.name), port.single)
-            for name, (robot, port) in scene.ports.items()
+            name: CommandTopic(scene, robot, port) for name, (robot, port) in scene.ports.items()
         }
         world.join(self)
         self._states = JointStates(scene)

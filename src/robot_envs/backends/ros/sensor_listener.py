@@ -1,5 +1,6 @@
 """Readings of a robot's sensors from their topics, in real time."""
 
+import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -7,10 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import rospy
 from gazebo_msgs.msg import ContactsState
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image, Imu, LaserScan, Range
 
 from bullet_gazebo.physics.description import DescriptionError, Plugin, library_of
 from bullet_gazebo.physics.files.sdf_parts import value
+from bullet_gazebo.physics.pose import normalized, rotate
 from bullet_gazebo.sensors.laser import KINDS as LASERS
 from bullet_gazebo.sensors.pinhole import DEPTH_KINDS
 from bullet_gazebo.sensors.sensing import slower
@@ -18,7 +21,7 @@ from file_access.text import did_you_mean
 from robot_envs.backends.ros.lockstep import contact_of
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
-from robot_envs.world_state import Reading, Sensors
+from robot_envs.world_state import ODOMETRY, Motion, Pose, Reading, Sensors, Twist
 
 Values = Mapping[str, Any]
 COLOURS = {  # by encoding: the type of a channel, and where red, green and blue are
@@ -75,6 +78,19 @@ def _rows(message: Image, kind: np.dtype[Any], channels: int) -> np.ndarray:
 
 def _contacts(message: ContactsState) -> Values:
     return {"contacts": [contact_of(each) for each in message.states]}
+
+
+def _motion(message: Odometry) -> Values:
+    """Reads a vehicle's pose and, turned into the axes in which that is given, its speed."""
+    at, speed = message.pose.pose, message.twist.twist
+    place, turn, line, spin = at.position, at.orientation, speed.linear, speed.angular
+    pose = Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
+    twist = Twist((line.x, line.y, line.z), (spin.x, spin.y, spin.z))
+    numbers = (*pose.position, *pose.orientation, *twist.linear, *twist.angular)
+    if not all(map(math.isfinite, numbers)) or not any(pose.orientation):
+        raise ValueError(f"pose and speed are {numbers}")
+    pose = Pose(pose.position, normalized(pose.orientation))
+    return {ODOMETRY: Motion(pose, Twist(*(rotate(pose.orientation, each) for each in twist)))}
 
 
 class _Driver(NamedTuple):
@@ -241,6 +257,9 @@ class SensorListener:
 
 def _source(robot: Robot, name: str) -> tuple[str, _Driver, float]:
     """Returns the topic of a sensor, how it is read, and the slower of its rate and the plugin's [Hz]."""
+    if name == ODOMETRY and robot.odometry:
+        topic = rospy.names.ns_join(f"/{robot.namespace.strip('/')}", robot.odometry)
+        return topic, _Driver("", "", None, Odometry, _motion), 0.0
     known = {
         each.name: (each.kind, next(iter(each.plugins), None), each.rate)
         for each in robot.links.sensors

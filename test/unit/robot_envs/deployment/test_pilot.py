@@ -13,6 +13,7 @@ from bullet_gazebo.control.joint import JointLimits
 from robot_envs import GoalTask, JointState, LinkQuery, Robot, RobotEnv, StateQuery
 from robot_envs.deployment.pilot import CommandLimits, Pilot, impossible
 from robot_envs.errors import RobotEnvError
+from robot_envs.robots.rover import ROBOT as TWO_WHEELED
 
 FILES = Path(__file__).resolve().parents[3] / "data" / "robots"
 PERIOD = 0.008  # [s] of the cart-pole's actions
@@ -124,6 +125,18 @@ def test_each_quantity_has_its_limits_and_its_stop(kind, wanted, given, stopped)
     assert limits((0.1, -0.1), (0.0, 0.0)) == ((0.1, -0.1), [])
     joints = {"shoulder": JointState(-0.2, 3.0, 1.0), "elbow": JointState(0.3, -3.0, 1.0)}
     assert limits.stop(joints) == stopped
+
+
+def test_a_vehicle_is_kept_within_its_controllers_limits_and_stops_at_once() -> None:
+    (port,) = TWO_WHEELED.ports
+    limits = CommandLimits(TWO_WHEELED, port, 1.0, 0.2)
+    held = limits.stop({})
+    assert held == (0.0, 0.0, 0.0)
+    assert limits((0.3, 0.0, -1.0), held) == ((0.3, 0.0, -1.0), [])
+    assert limits((3.0, 1.0, -9.0), held) == (
+        (0.8, 0.0, -2.0),
+        ["linear.x", "linear.y", "angular.z"],
+    )
 
 
 def test_positions_go_no_faster_than_their_joints_can() -> None:

@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import rospy
-from geometry_msgs.msg import Vector3
+from geometry_msgs.msg import Quaternion, Vector3
 from gymnasium.spaces import Box
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, LaserScan
 from std_msgs.msg import Header
 from support.ros.silent_topics import SilentPublisher, SilentSubscriber, silence
@@ -19,6 +20,8 @@ from robot_envs.deployment import policy_node
 from robot_envs.deployment.policy_node import PolicyNode
 from robot_envs.robots.furuta import ROBOT as FURUTA
 from robot_envs.robots.furuta import SwingUp
+from robot_envs.robots.rover import ROBOT as ROVER
+from robot_envs.robots.rover import Navigate
 from robot_envs.world_state import JointState
 
 
@@ -148,6 +151,78 @@ def test_a_policy_gets_its_sensors_from_topics_and_stops_when_they_are_silent(
     node._step(clock.now, 1.01)
     assert commanded(node)[-1] == [0.0, 0.0]
     assert clock.lines == ["no message on /imu for 1 s: the robot is stopped"]
+
+
+def drives(node: PolicyNode) -> list[tuple[float, float]]:
+    (topic,) = node._topics.values()
+    assert topic.name == "/drive_controller/cmd_vel"
+    return [(each.linear.x, each.angular.z) for each in SilentPublisher.messages[topic.name]]
+
+
+def tell(now: float, x: float, scan: bool = True) -> None:
+    """The rover is at (x, 0), looks along y, and drives at half its speed; something is 1 m away."""
+    header = Header(stamp=rospy.Time(now))
+    odometry = Odometry(header=header)
+    odometry.pose.pose.position.x = x
+    odometry.pose.pose.orientation = Quaternion(0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
+    odometry.twist.twist.linear.x = 0.4
+    SilentSubscriber.send("/odom", odometry)
+    if scan:
+        SilentSubscriber.send("/scan", LaserScan(header=header, ranges=[1.0] * 360))
+
+
+def test_a_vehicle_drives_to_its_goal_by_laser_and_odometry_and_stops_when_they_are_late(
+    clock: SimpleNamespace,
+) -> None:
+    seen: list[np.ndarray] = []
+    act = lambda observed: seen.append(observed) or [1.0, -1.0]  # noqa: E731
+    node = PolicyNode(ROVER, Navigate(), act, 0.2, late=1.0, goal=(3.0, 0.0))
+    know_joints(node, ROVER)
+    assert node._missing() == "a message on /scan, and a message on /odom"
+    tell(5.0, 1.0)
+    node._step(node._begin(), 0.0)
+    assert drives(node) == [(0.8, -2.0)]
+    assert seen[0][:24] == pytest.approx([0.3] * 24)
+    assert seen[0][24:] == pytest.approx([0.5, 0.0, -1.0, 0.5, 0.0], abs=1e-6)
+    node._take_goal(SimpleNamespace(data=(1.0, 4.0)))
+    node._step(clock.now, 0.2)
+    assert seen[1][24:] == pytest.approx([1.0, 1.0, 0.0, 0.5, 0.0], abs=1e-6), "ahead"
+    for late, topic in ((True, "/odom"), (False, "/scan")):
+        clock.now += 1.01
+        know_joints(node, ROVER, clock.now)
+        if late:
+            header = Header(stamp=rospy.Time(clock.now))
+            SilentSubscriber.send("/scan", LaserScan(header=header, ranges=[1.0] * 360))
+        else:
+            tell(clock.now, 1.0, scan=False)
+        node._step(clock.now, 1.0)
+        assert drives(node)[-1] == (0.0, 0.0)
+        assert clock.lines.pop() == f"no message on {topic} for 1 s: the robot is stopped"
+        node._next_report = 0.0
+    tell(clock.now + 0.01, 1.0)
+    node._aim_if_told()
+    node._take_goal(SimpleNamespace(data=(1.1, 0.0)))
+    node._step(clock.now, 1.0)
+    assert drives(node)[-1] == (0.0, 0.0), "it is there"
+
+
+@pytest.mark.parametrize(
+    ("robot", "task", "period", "late"),
+    [(ROVER, Navigate, 0.2, 0.3), (ROVER, Navigate, 0.01, 0.1), (FURUTA, SwingUp, 0.2, 1.0)],
+)
+def test_a_vehicle_drives_on_for_a_third_of_a_second_at_most(
+    clock: SimpleNamespace, robot: Robot, task: type[Task], period: float, late: float
+) -> None:
+    node = PolicyNode(robot, task(), lambda _: [0.0, 0.0], period)
+    know_joints(node, robot)
+    assert "no joint state" not in node._trouble(late)
+    assert "no joint state" in node._trouble(late + 0.01)
+
+
+def test_odometry_that_is_no_pose_is_a_fault(clock: SimpleNamespace) -> None:
+    node = PolicyNode(ROVER, Navigate(), lambda _: [0.0, 0.0], 0.2)
+    SilentSubscriber.send("/odom", Odometry(header=Header(stamp=rospy.Time(5))))
+    assert "the sensor 'odometry': pose and speed are (0.0, 0.0, 0.0, 0.0" in node._sensors.fault()
 
 
 def test_sensors_stamps_may_be_as_far_off_as_those_of_joints(furuta: PolicyNode) -> None:

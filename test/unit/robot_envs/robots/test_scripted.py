@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_envs.robots  # noqa: F401 - registers the environments
-from robot_envs.robots import six_joint_arm
+from robot_envs.robots import gripper_arm, six_joint_arm
 from robot_envs.world_state import InitialState, WorldState
 
 Policy = Callable[[WorldState], np.ndarray]
@@ -127,6 +127,93 @@ def rotation(axis: str, angle: float) -> np.ndarray:
             "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]],
         }[axis]
     )
+
+
+class TestGripperArm:
+    ABOVE = 0.06  # [m] from where the gripper goes straight down
+    CARRIED = 0.15  # [m]
+
+    def policy(self, goal: np.ndarray | None = None) -> Policy:
+        """Goes above the cube, down to it, closes, and takes it up or to a goal [m]."""
+        closed = 0  # steps
+
+        def act(state: WorldState) -> np.ndarray:
+            nonlocal closed
+            tip, cube = gripper_arm.places(state)
+            way = cube - tip
+            closed += closed > 0 or bool(np.linalg.norm(way) < 0.01)
+            if closed > 4:
+                way = (0.0, 0.0, self.CARRIED - cube[2]) if goal is None else goal - cube
+            elif np.linalg.norm(way[:2]) > 0.01:
+                way[2] += self.ABOVE
+            moves = np.divide(way, gripper_arm.STEP)
+            return np.append(moves / max(1.0, np.abs(moves).max()), 1.0 if closed else -1.0)
+
+        return act
+
+    def test_the_tip_is_where_the_angles_say(self) -> None:
+        env: Any = gymnasium.make("robot_envs/PickCube-v0").unwrapped
+        tip, cube = np.array([0.3, -0.1, 0.2]), np.array([0.4, 0.1, 0.02])
+        env.reset(options={"initial_state": gripper_arm.placed(tip, cube, 0.5)})
+        assert gripper_arm.aim(env.state) == pytest.approx(tip, abs=1e-9)
+        assert np.array(gripper_arm.places(env.state)) == pytest.approx(
+            np.array([tip, cube]), abs=1e-6
+        )
+        env.close()
+
+    @pytest.mark.parametrize(
+        "backend", ["bullet", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
+    )
+    def test_every_cube_is_picked_and_held_up(self, backend: str) -> None:
+        env = gymnasium.make("robot_envs/PickCube-v0", backend=backend)
+        for seed in range(10):
+            env.reset(seed=seed)
+            total, _, infos, _ = play(env, self.policy())
+            assert all(info["is_success"] for info in infos[40:])
+            assert total > 70.0
+        env.close()
+
+    def test_a_cube_is_taken_to_its_goal(self) -> None:
+        env: Any = gymnasium.make("robot_envs/PickCubeGoal-v0")
+        for seed in range(5):
+            seen, _ = env.reset(seed=seed)
+            goal = gripper_arm.UNIT * seen["desired_goal"][:3] + gripper_arm.MIDDLE
+            _, _, infos, _ = play(env, self.policy(goal))
+            assert all(info["is_success"] for info in infos[40:])
+        env.close()
+
+    def test_coming_from_above_pays_more_than_coming_from_beside(self) -> None:
+        env: Any = gymnasium.make("robot_envs/PickCube-v0")
+        cube, rewards = np.array([0.36, 0.0, gripper_arm.ON_TABLE]), []
+        for way in ([0.0, 0.0, 0.06], [0.06, 0.0, 0.06], [0.085, 0.0, 0.0]):  # the last two as far
+            begin = gripper_arm.placed(cube + way, cube, 0.0)
+            env.reset(options={"initial_state": begin})
+            rewards.append(env.step(np.zeros(4, np.float32))[1])
+        above, over, beside = rewards
+        assert above == pytest.approx(0.5 * math.exp(-0.6), abs=0.01)
+        assert over == pytest.approx(above, abs=0.01) and above > beside + 0.05
+        env.close()
+
+    def test_a_goal_is_reached_by_the_hand_that_holds_the_cube(self) -> None:
+        task = gripper_arm.PickCubeGoal()
+        goal, near, off = np.zeros(6), [0.3, 0.0, 0.0], [0.6, 0.0, 0.0]  # [0.1 m]
+        achieved = np.array([near + near, near + off, off + near])
+        assert task.is_success(achieved, goal).tolist() == [True, False, False]
+        assert task.is_success(achieved[0], goal)
+
+    def test_an_episode_may_begin_with_the_cube_in_the_hand(self) -> None:
+        env: Any = gymnasium.make("robot_envs/PickCubeGoal-v0", helped=1.0).unwrapped
+        held = 0
+        for seed in range(10):
+            env.reset(seed=seed)
+            in_hand = env.state.commands["gripper_controller"][0] == gripper_arm.SHUT
+            for _ in range(20):
+                env.step(np.zeros(4, np.float32))
+            tip, cube = gripper_arm.places(env.state)
+            assert cube == pytest.approx(tip if in_hand else [*tip[:2], 0.02], abs=0.003)
+            held += in_hand
+        assert 0 < held < 10
+        env.close()
 
 
 class TestFuruta:
