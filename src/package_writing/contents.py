@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape
 
+import yaml
+
 from bullet_gazebo.physics.description import ModelDescription
 from bullet_gazebo.physics.dynamics import (
     effective_inertias,
@@ -18,6 +20,9 @@ from bullet_gazebo.physics.dynamics import (
 from bullet_gazebo.physics.pose import rotate
 from package_writing import CannotWrite
 from package_writing.survey import EFFORT, POSITION, Motor, Survey, feet
+from package_writing.vehicle import DRIVE, Base, scan_topic
+from package_writing.vehicle import controller as drive_controller
+from robot_envs.files import PACKAGE
 
 # [rad/s], at least, of a joint on its p and d with all that it carries stretched out
 FREQUENCY = 12.0
@@ -119,6 +124,8 @@ PARTS = TEMPLATE.with_name("parts")  # of a xacro file that adds what the robot'
 QUOTE = {'"': "&quot;"}
 FILLED = ".in"  # suffix of template files with values to fill in
 PERIOD = 0.04  # [s] of an action
+STATES = "joint_state_controller"
+DRIVE_PERIOD = 0.2  # [s] of one of a base
 
 
 class Filled(string.Template):
@@ -127,16 +134,18 @@ class Filled(string.Template):
     delimiter = "%"
 
 
-def fill(folder: Path, package: str, values: Mapping[str, str]) -> None:
-    """Writes the template's files, except the default robot.
+def fill(folder: Path, package: str, values: Mapping[str, str], base: Base | None) -> None:
+    """Writes the template's files, except the default robot, and those of the task.
 
     Args:
         folder: the package's folder.
         package: the package's name.
         values: the values to fill in, by their names in the template.
+        base: what drives the robot.
     """
-    for source in sorted(TEMPLATE.rglob(f"*{FILLED}")):
-        place = source.relative_to(TEMPLATE).with_suffix("")
+    tops = (TEMPLATE, TEMPLATE.with_name("drive" if base else "reach"))
+    for top, source in ((each, file) for each in tops for file in sorted(each.rglob(f"*{FILLED}"))):
+        place = source.relative_to(top).with_suffix("")
         parts = [package if part == "package" else part for part in place.parts]
         target = folder.joinpath(*parts)
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -162,23 +171,33 @@ def controller(motor: Motor) -> str:
     return f"{name if name[:1].isalpha() else f'joint_{name}'}_controller"
 
 
-def check_controllers(motors: Sequence[Motor]) -> None:
-    """Raises CannotWrite if the controllers of two joints would have one name."""
+def check_controllers(motors: Sequence[Motor], base: Base | None) -> None:
+    """Raises CannotWrite if two controllers would have one name, those that every robot or a base has too."""
     joints: dict[str, str] = {}
     for motor in motors:
-        other = joints.setdefault(controller(motor), motor.joint)
+        name = controller(motor)
+        if name == STATES or (base and name == DRIVE):
+            raise CannotWrite(
+                f"the controller of the joint {literal(motor.joint)} would be called {name}, as another one "
+                "is; rename the joint"
+            )
+        other = joints.setdefault(name, motor.joint)
         if other != motor.joint:
             raise CannotWrite(
                 f"the joints {literal(other)} and {literal(motor.joint)} would share the controller "
-                f"{controller(motor)}; rename one of them"
+                f"{name}; rename one of them"
             )
 
 
-def controllers_text(survey: Survey) -> str:
-    """Returns the controllers as YAML."""
+def controllers_text(survey: Survey, base: Base | None) -> str:
+    """Returns the controllers as YAML; of wheels, that of the base."""
     by_joint, of_wheels = effort_gains(survey.model), wheel_gains(survey.model)
     lines = []
-    for motor in survey.motors:
+    if base:
+        described = {DRIVE: drive_controller(base)}
+        lines += ["# Lengths in m, speeds in m/s and rad/s."]
+        lines += [yaml.safe_dump(described, sort_keys=False, default_flow_style=None, width=120)]
+    for motor in held_motors(survey, base):
         kind = motor.interface.removesuffix("JointInterface").lower()
         lines += [
             f"{controller(motor)}:",
@@ -214,6 +233,37 @@ def _units(motor: Motor) -> str:
         return "[N m s/rad, N m/rad, N m s²/rad, N m]"
     effort, way = ("N", "m") if motor.linear else ("N m", "rad")
     return f"[{effort}/{way}, {effort}/({way} s), {effort} s/{way}, {effort}]"
+
+
+def held_motors(survey: Survey, base: Base | None) -> list[Motor]:
+    """Returns the motors that have controllers of their own: all but the wheels of a base."""
+    return [each for each in survey.motors if not (base and each.wheel)]
+
+
+def base_text(package: str, survey: Survey, base: Base | None) -> dict[str, str]:
+    """Returns the template's values about a base that drives."""
+    if base is None:
+        return {"task": "Reach", "run_python": "tuple(CONTROLLERS.values())", "base": "", "rviz": "",
+                "world": "worlds/empty.world"}  # fmt: skip
+    lines = [f'    odometry="{DRIVE}/odom",']
+    rviz, world = "", "worlds/empty.world"
+    if base.world:
+        lines.append(f'    world="{PACKAGE}cartpole/{base.world}",')
+        world = f"$(find cartpole)/{base.world}"
+        if any(each.interface == EFFORT for each in held_motors(survey, base)):
+            lines.append("    physics_step=0.001,  # [s]: the gains are for it")
+    if base.laser:
+        scan = escape(scan_topic(base.laser, survey.namespace, package), QUOTE)
+        rviz = f"""
+      <arg name="sensors" value="true"/>
+      <arg name="scan" value="{scan}"/>"""
+    return {
+        "task": "Drive", "run_python": f'("{DRIVE}", *CONTROLLERS.values())', "rviz": rviz, "world": world,
+        "base": "\n".join(["", f'    commanded=("{DRIVE}",),', *lines]),
+        "laser": literal(base.laser.name) if base.laser else "None",
+        "touch": str(base.touch), "clearance": str(base.clearance),
+        "seen": " that its laser sees" if base.laser else ": it has no laser, and sees nothing",
+    }  # fmt: skip
 
 
 def ranges_text(survey: Survey) -> str:

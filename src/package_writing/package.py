@@ -27,6 +27,7 @@ from package_writing.survey import (
     standing_height,
 )
 from package_writing.urdf_files import Copied, copy_urdf, expanded
+from package_writing.vehicle import DRIVE, Base, find_base
 from robot_envs import Robot, RobotEnvError, controllers, files
 
 TREE = Path(__file__).resolve().parents[2]  # the source tree
@@ -109,25 +110,28 @@ def write(request: PackageRequest, made: Path) -> list[str]:
     _check_packages(copied)
     loose = _loose_link(request, root_link(copied.xml), request.urdf or ARM)
     urdf, xml, survey, lacks = _completed(request, copied, made, loose)
-    contents.check_controllers(survey.motors)
+    base = find_base(survey)
+    held = contents.held_motors(survey, base)
+    contents.check_controllers(held, base)
     starts = stance(survey)
     stands = None if survey.model.fixed_base else standing_height(survey.model, starts)
     if request.height is None:
         request = replace(request, height=stands or 0.0)
-    contents.fill(made, request.name, _values(request, survey, urdf, copied, starts))
+    values = _values(request, survey, base, urdf, copied, starts)
+    contents.fill(made, request.name, values, base)
     parameters = yaml.safe_load((made / "config/controllers.yaml").read_text(encoding="utf-8"))
-    run = tuple(map(contents.controller, survey.motors))
+    run = tuple(values["run"].split())
     robot = Robot(urdf=xml, controllers=parameters, run=run)
     movable = [each.name for each in survey.model.movable_joints]
     wrong = list(controllers.faults(run, None, parameters, robot.hardware(), movable))
     if wrong:
         raise CannotWrite("; ".join(wrong))
-    _try_out(request.name, made)
+    _try_out(f"{request.name}.environment:{request.name}/{values['task']}-v0", made)
     more = f"urdf/{urdf}, which includes it, adds {' and '.join(lacks)}" if lacks else ""
-    return list(_report(request, copied, survey, more, stands))
+    return list(_report(request, copied, survey, base, more, stands))
 
 
-def _try_out(name: str, made: Path) -> None:
+def _try_out(env_id: str, made: Path) -> None:
     """Makes the package's environment and takes a step in it, in a process of its own; not without ROS.
 
     Raises:
@@ -143,7 +147,7 @@ def _try_out(name: str, made: Path) -> None:
     }
     try:
         ended = subprocess.run(
-            [sys.executable, "-B", "-c", TRIAL, f"{name}.environment:{name}/Reach-v0"],
+            [sys.executable, "-B", "-c", TRIAL, env_id],
             env=environment, timeout=TRIAL_LIMIT, capture_output=True, text=True, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired as error:
@@ -218,9 +222,15 @@ def _package(name: str) -> Path | None:
 
 
 def _values(
-    request: PackageRequest, survey: Survey, urdf: str, copied: Copied, starts: Mapping[str, float]
+    request: PackageRequest,
+    survey: Survey,
+    base: Base | None,
+    urdf: str,
+    copied: Copied,
+    starts: Mapping[str, float],
 ) -> dict[str, str]:
     needed = [each for each in copied.packages if each not in OURS]
+    held = contents.held_motors(survey, base)
     pairs = [f"{name}:={value}" for name, value in request.arguments.items()]
     units = {"rad/s" if each.wheel else "m" if each.linear else "rad" for each in survey.motors}
     namespace = f'\n    namespace="{survey.namespace}",' if survey.namespace else ""
@@ -232,15 +242,15 @@ def _values(
         "urdf": urdf,
         "dependencies": "".join(f"  <exec_depend>{each}</exec_depend>\n" for each in needed),
         "controllers": "".join(
-            f'    {contents.literal(each.joint)}: "{contents.controller(each)}",\n'
-            for each in survey.motors
+            f'    {contents.literal(each.joint)}: "{contents.controller(each)}",\n' for each in held
         ),
-        "controllers_yaml": contents.controllers_text(survey),
+        "controllers_yaml": contents.controllers_text(survey, base),
+        **contents.base_text(request.name, survey, base),
         "ranges": contents.ranges_text(survey),
         **contents.stance_text(request.name, survey, starts),
         "units": ", ".join(each for each in ("rad", "m", "rad/s") if each in units),
         **contents.wheels_text(survey),
-        "run": " ".join(map(contents.controller, survey.motors)),
+        "run": " ".join([DRIVE] * bool(base) + list(map(contents.controller, held))),
         "arguments": arguments,
         "launch_arguments": "".join(
             f" {escape(shlex.quote(each), contents.QUOTE)}" for each in pairs
@@ -248,9 +258,9 @@ def _values(
         "namespace": namespace,
         "ns": survey.namespace,
         "height": str(request.height),
-        "period": str(contents.PERIOD),
+        "period": str(contents.DRIVE_PERIOD if base else contents.PERIOD),
         "commands": "\n".join(
-            _commands(request.name, f"../{request.name}", ["FOLDER"] * bool(needed))
+            _commands(request.name, base, f"../{request.name}", ["FOLDER"] * bool(needed))
         ),
         "folder": contents.folder_text(needed),
     }
@@ -268,7 +278,12 @@ def _lacks(survey: Survey, loose: str) -> Iterator[str]:
 
 
 def _report(
-    request: PackageRequest, copied: Copied, survey: Survey, more: str, stands: float | None
+    request: PackageRequest,
+    copied: Copied,
+    survey: Survey,
+    base: Base | None,
+    more: str,
+    stands: float | None,
 ) -> Iterator[str]:
     yield f"written: {request.folder}"
     joints = ", ".join(each.joint for each in survey.motors)
@@ -277,8 +292,14 @@ def _report(
     hint = " (--passive JOINT leaves one without)" if survey.added else ""
     yield f"joints with a motor and a controller: {joints}{hint}"
     wheels = [each.joint for each in survey.motors if each.wheel]
-    if wheels:
+    if base:
+        yield from _of_base(base)
+    elif wheels:
         yield f"continuous joints of a free base get a velocity controller, as wheels: {', '.join(wheels)}"
+        yield (
+            "note: a diff_drive_controller takes velocity motors, as many on the left as on the right, "
+            "alike, and with axes to the left"
+        )
     if not survey.model.fixed_base:
         yield height_note(request.height or 0.0, stands)
         on = feet(survey.model)
@@ -287,7 +308,7 @@ def _report(
     if survey.passive:
         yield f"joints that move without a motor, and that tasks don't see: {', '.join(survey.passive)}"
     if survey.followers:
-        yield f"note: <mimic> isn't followed yet, so that these swing freely: {', '.join(survey.followers)}"
+        yield f"joints that follow another one by <mimic>: {', '.join(survey.followers)}"
     held = [each.joint for each in survey.motors if not each.limited]
     if held:
         yield (
@@ -307,22 +328,33 @@ def _report(
     yield f"in {TREE}, next:" if IS_CHECKOUT else "next:"
     near = request.folder.parent == PARENT
     here = os.path.relpath(request.folder, TREE) if near else str(request.folder)
-    commands = _commands(request.name, shlex.quote(here), list(_others(copied)))
+    commands = _commands(request.name, base, shlex.quote(here), list(_others(copied)))
     yield from (f"  {each}" for each in commands)
 
 
-def _commands(name: str, here: str, others: Sequence[str]) -> list[str]:
+def _of_base(base: Base) -> Iterator[str]:
+    yield (
+        f"{', '.join(base.left)} on the left and {', '.join(base.right)} on the right get a {DRIVE}: "
+        f"wheels of {base.radius:g} m, {base.separation:g} m apart"
+    )
+    if base.note:
+        yield f"note: the task uses no laser: {base.note}"
+    elif base.laser:
+        yield f"the task uses its laser '{base.laser.name}': what is nearer than {base.touch:g} m is touched"
+
+
+def _commands(name: str, base: Base | None, here: str, others: Sequence[str]) -> list[str]:
     """Returns commands for the next steps, to run in the checkout; `here` and `others` are for ws."""
     ws = f"./ws {''.join(f'--with {each} ' for each in others)}--with {here}"
     run = f"{ws} rosrun cartpole workbench.py"
-    runs = f"runs/{name}"
+    runs, (algo, task) = f"runs/{name}", ("sac", "Drive") if base else ("ppo", "Reach")
     return [
         f"{ws} roslaunch {name} simulation.launch    # look at it; Ctrl-C ends it",
         f"{ws} test {here}",
         f"{ws} rostest {name} simulation.test",
         "./ws extras true    # once: Stable-Baselines3",
-        f"{run} train --algo ppo --env-id {name}.environment:{name}/Reach-v0 "
-        f"--config {here}/config/ppo.yaml --run-dir {runs}",
+        f"{run} train --algo {algo} --env-id {name}.environment:{name}/{task}-v0 "
+        f"--config {here}/config/{algo}.yaml --run-dir {runs}",
         f"{run} eval {runs} --episodes 20",
         f"{run} record {runs} --out {name}.gif",
         f"{run} eval {runs} --episodes 5 --env-kwargs backend=ros    # the same over ROS",

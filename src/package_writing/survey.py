@@ -21,7 +21,7 @@ from bullet_gazebo.physics.description import (
 from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose, conjugate, rotate
+from bullet_gazebo.physics.pose import Pose, Vector, conjugate, rotate
 from file_access.content import FileError
 from file_access.text import did_you_mean
 from file_access.xml_text import parse
@@ -36,7 +36,9 @@ FARTHEST = 1e6  # [rad, m], of the range's middle
 FASTEST = 5.0  # [rad/s], of wheels
 # Of the height at which a robot stands: how much higher than its lowest link feet may be.
 FOOT = 0.05
+UPRIGHT = 0.99  # cosine of the tilt of a caster's swivel, at least
 NEAR = 1e-6  # [m], how exactly a foot is put below its leg
+DOWN = (0.0, 0.0, -1.0)
 TURNS = 50  # of a search for a leg's posture
 SMALL = 1e-4  # [rad, m], for slopes
 
@@ -52,6 +54,7 @@ class Motor:
     linear: bool
     limited: bool  # whether the URDF's limits of effort and velocity let it move
     wheel: bool  # a continuous joint of a robot whose base is free, which gets velocity commands
+    fastest: float  # the URDF's limit of its velocity [rad/s, m/s]; inf: none
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,8 @@ def look_at(
     wheels = endless if free and not model.fixed_base else set()
     mimics = {e.get("name") for e in robot.findall("joint") if e.find("mimic") is not None}
     if added:
-        names = [name for name in movable if name not in mimics and name not in passive]
+        still = {*mimics, *passive, *(_casters(model) if wheels else ())}
+        names = [name for name in movable if name not in still]
         driven = {name: interface or (VELOCITY if name in wheels else EFFORT) for name in names}
     motors = tuple(_motors(control, driven, movable, wheels))
     if not motors:
@@ -164,7 +168,22 @@ def _motors(
             linear=joint.kind == "prismatic",
             limited=limits.effort != 0.0 and limits.velocity != 0.0,
             wheel=wheel,
+            fastest=limits.velocity or math.inf,
         )
+
+
+def _casters(model: ModelDescription) -> set[str]:
+    """Returns the continuous joints of casters: what swivels on the ground, and what that carries."""
+    lows, poses = _lows(model, {}), link_poses(model, Pose(), {})
+    ground = min(lows.values(), default=0.0)
+    found = set()
+    for foot in (name for name, low in lows.items() if low <= (1.0 - FOOT) * ground):
+        above = [each for each in model.carriers(foot) if each.kind == "continuous"]
+        for place, joint in enumerate(above):
+            frame = poses[joint.child].compose(joint.anchor)
+            if abs(rotate(frame.orientation, joint.axis)[2]) > UPRIGHT:
+                found |= {each.name for each in above[place:]}
+    return found
 
 
 def _speeds(joint: JointHandle) -> tuple[float, float]:
@@ -277,7 +296,9 @@ def feet(model: ModelDescription) -> list[str]:
 def _lows(model: ModelDescription, positions: Mapping[str, float]) -> dict[str, float]:
     """Returns how low each link with a collision reaches, seen from the root [m]."""
     return {
-        name: min(_low(shape, pose.compose(shape.pose)) for shape in model.links[name].collisions)
+        name: -max(
+            reach(shape, pose.compose(shape.pose), DOWN) for shape in model.links[name].collisions
+        )
         for name, pose in link_poses(model, Pose(), positions).items()
         if model.links[name].collisions
     }
@@ -293,16 +314,16 @@ def height_note(height: float, stands: float | None) -> str:
     return f"{spawned}; its lowest collision touches the ground at {stands:g} m"
 
 
-def _low(shape: Shape, pose: Pose) -> float:
-    """Returns the height of a shape's lowest point [m]."""
-    up = np.array(rotate(conjugate(pose.orientation), (0.0, 0.0, 1.0)))  # in the shape's frame
+def reach(shape: Shape, pose: Pose, way: Vector) -> float:
+    """Returns how far a shape reaches along a direction of length 1, from the origin of its pose [m]."""
+    turned = np.array(rotate(conjugate(pose.orientation), way))  # in the shape's frame
     size = np.array(shape.size)
     if shape.kind == "sphere":
-        reach = float(size[0])
+        half = float(size[0])
     elif shape.kind == "cylinder":
-        reach = float(size[0] * math.hypot(up[0], up[1]) + size[1] / 2.0 * abs(up[2]))
+        half = float(size[0] * math.hypot(turned[0], turned[1]) + size[1] / 2.0 * abs(turned[2]))
     elif shape.solid is not None:
-        reach = -float(np.min(np.concatenate(shape.solid.hulls) * size @ up))
+        half = float(np.max(np.concatenate(shape.solid.hulls) * size @ turned))
     else:
-        reach = float(np.abs(up) @ size / 2.0)
-    return pose.position[2] - reach
+        half = float(np.abs(turned) @ size / 2.0)
+    return float(np.dot(pose.position, way)) + half

@@ -26,7 +26,9 @@ def new(tmp_path, monkeypatch, capsys):
         assert code == 0, told.err
         monkeypatch.syspath_prepend(target / name / "src")
         made = importlib.import_module(f"{name}.robot").ROBOT
-        return target / name, made, importlib.import_module(f"{name}.tasks").Reach, told.out
+        tasks = importlib.import_module(f"{name}.tasks")
+        task = tasks.Drive if hasattr(tasks, "Drive") else tasks.Reach
+        return target / name, made, task, told.out
 
     before = set(sys.modules)
     yield write

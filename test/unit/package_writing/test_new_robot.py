@@ -161,7 +161,7 @@ def test_a_joint_that_mimics_another_is_told(new):
     limit = '<limit lower="0" upper="1" effort="1" velocity="1"/><mimic joint="swing"/>'
     follower = JOINT.format("finger", "revolute", "rod", "tip", limit)
     *_, told = new("my_gripper", robot(*BARE, FIXED, LINK.format("tip", ""), follower))
-    assert "note: <mimic> isn't followed yet, so that these swing freely: finger\n" in told
+    assert "joints that follow another one by <mimic>: finger\n" in told
 
 
 def test_its_readme_and_report_name_no_place_by_detours(new, tmp_path):

@@ -19,8 +19,12 @@ from support.robots.new_robots import (
     SWING,
     robot,
 )
+from support.robots.vehicles import two_wheels
 
 from package_writing.cli import main
+
+MAST = "".join((LINK.format("mast", ""), JOINT.format("diff_drive", "revolute", "base", "mast", LIMIT),
+                MOTOR.format("diff_drive", "Effort"), "</robot>"))  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -50,6 +54,16 @@ from package_writing.cli import main
             .replace("swing", "a_b"),
             [],
             "would share the controller a_b_controller",
+        ),
+        (
+            robot(*BARE, FIXED).replace("swing", "joint_state"),
+            [],
+            'the controller of the joint "joint_state" would be called joint_state_controller',
+        ),
+        (
+            two_wheels().replace("</robot>", MAST),
+            ["--base", "free"],
+            "the joint \"diff_drive\" would be called diff_drive_controller, as another one is",
         ),
         (robot(*BARE, FIXED, PLUGIN.format("<robotNamespace>a b</robotNamespace>")), [], "'a b'"),
         (robot(*BARE, FIXED).replace('value="0.5"', 'value="1e30"'), [], "can't take a step"),

@@ -1,4 +1,4 @@
-"""Every command of docs/tutorial_robot.md in order, with shorter trainings: a user's own package.
+"""Every command of docs/tutorial_robot.md and docs/mobile.md in order, with shorter trainings: own packages.
 
 A block `sh skip` is another way to begin. One of Python that names a file is put at that file's end.
 Simulations are started, seen to be there, and ended; with RViz their launch files are read. The workbench's
@@ -24,12 +24,15 @@ import pytest
 from cartpole import workbench
 
 ROOT = Path(__file__).resolve().parents[3]
-ENGLISH, CHINESE = (ROOT / "docs" / name for name in ("tutorial_robot.md", "tutorial_robot.zh.md"))
+ENGLISH, CHINESE, VEHICLE = (
+    ROOT / "docs" / name for name in ("tutorial_robot.md", "tutorial_robot.zh.md", "mobile.md")
+)
 BLOCK = re.compile(r"^```(\S+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LIMIT = 300.0  # [s] for one command
 SHORT = "--total-timesteps 300 --eval-frequency 300 --eval-episodes 1 --confirm-episodes 1"
 SHORTER = {
-    "train": f"{SHORT} --n-steps 150 --n-epochs 1",
+    "ppo": f"{SHORT} --n-steps 150 --n-epochs 1",
+    "sac": f"{SHORT} --learning-starts 100",
     "eval": "--episodes 1",
     "record": "--max-steps 10 --size 160x120",
     "train.launch": f"'more:={SHORT} --learning-starts 100'",
@@ -63,10 +66,12 @@ class Reader:
     Args:
         folder: where commands run.
         environment: of theirs.
+        package: its name.
     """
 
-    def __init__(self, folder: Path, environment: dict[str, str]) -> None:
-        self.folder, self.environment = folder, environment
+    def __init__(self, folder: Path, environment: dict[str, str], package: str) -> None:
+        self.folder, self.environment, self.package = folder, environment, package
+        self.place = str(folder.parent / package)
         self.simulation: subprocess.Popen[str] | None = None
         self.done: set[str] = set()
 
@@ -86,16 +91,15 @@ class Reader:
             with (self.folder / block.mark).open("a", encoding="utf-8") as file:
                 file.write(f"\n\n{block.text}")
         else:
-            self.run(["--with", "../my_arm", "python3", "-c", block.text])
+            self.run(["--with", self.place, "python3", "-c", block.text])
 
     def do(self, words: list[str]) -> None:
         assert words[0] == "./ws", words
         if words[1] == "extras":  # a test installs nothing; `ws test` has done so
             return
-        words = [
-            each.replace("../my_arm", str(self.folder.parent / "my_arm")) for each in words[1:]
-        ]
+        words = [each.replace(f"../{self.package}", self.place) for each in words[1:]]
         if "new_robot.py" in words:
+            words = [each.replace("urdf/", f"{ROOT}/urdf/") for each in words]
             words += ["--to", str(self.folder.parent)]
         elif "roslaunch" in words:
             self.launch(words)
@@ -107,7 +111,9 @@ class Reader:
             return
         elif "workbench.py" in words:
             self.end_simulation()
-            words += SHORTER.get(words[words.index("workbench.py") + 1], "").split()
+            command = words[words.index("workbench.py") + 1]
+            kind = words[words.index("--algo") + 1] if command == "train" else command
+            words += SHORTER.get(kind, "").split()
             if "backend=ros" not in words:
                 self.work(words[words.index("workbench.py") + 1 :])
                 return
@@ -118,7 +124,7 @@ class Reader:
         try:
             assert workbench.main(arguments) == 0, arguments
         finally:  # the next command, and the next test, find what is written then
-            for name in [each for each in sys.modules if each.partition(".")[0] == "my_arm"]:
+            for name in [each for each in sys.modules if each.partition(".")[0] == self.package]:
                 del sys.modules[name]
 
     def launch(self, words: list[str]) -> None:
@@ -135,12 +141,12 @@ class Reader:
             )  # fmt: skip
             code = (
                 "from robot_envs.backends.ros.bringup import ready;"
-                "from robot_envs.scene import Scene; from my_arm.robot import ROBOT;"
+                f"from robot_envs.scene import Scene; from {self.package}.robot import ROBOT;"
                 "from ros_calls.waiting import wait_until;"
                 "import rosgraph; assert wait_until(rosgraph.is_master_online, 180, 'master');"
                 "ready(Scene([ROBOT])).wait(180)"
             )
-            self.run(["--with", str(self.folder.parent / "my_arm"), "python3", "-c", code])
+            self.run(["--with", self.place, "python3", "-c", code])
 
     def move(self, words: list[str]) -> None:
         """Has the policy move the simulated robot, and ends it with Ctrl-C."""
@@ -179,20 +185,36 @@ class Reader:
 
 @pytest.fixture
 def reader(
-    tmp_path: Path, environment: dict[str, str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    environment: dict[str, str],
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
 ) -> Iterator[Reader]:
+    package = request.param
     checkout = tmp_path / "checkout"
     checkout.mkdir()
     monkeypatch.chdir(checkout)
-    monkeypatch.syspath_prepend(tmp_path / "my_arm/src")
-    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}/my_arm:{os.environ['ROS_PACKAGE_PATH']}")
-    reader = Reader(checkout, environment)
+    monkeypatch.syspath_prepend(tmp_path / package / "src")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}/{package}:{os.environ['ROS_PACKAGE_PATH']}")
+    reader = Reader(checkout, environment, package)
     yield reader
     reader.end_simulation()
 
 
 @pytest.mark.slow
 @pytest.mark.extras("stable_baselines3")
+@pytest.mark.parametrize("reader", ["my_rover"], indirect=True)
+def test_every_command_of_the_vehicle_works(reader: Reader) -> None:
+    for block in blocks(VEHICLE):
+        if block.language == "sh":
+            reader.read(block)
+    for place in ("my_rover.gif", "runs/my_rover/best.pt"):
+        assert (reader.folder / place).is_file(), place
+
+
+@pytest.mark.slow
+@pytest.mark.extras("stable_baselines3")
+@pytest.mark.parametrize("reader", ["my_arm"], indirect=True)
 def test_every_command_works(reader: Reader) -> None:
     for block in blocks(ENGLISH):
         reader.read(block)
