@@ -51,6 +51,8 @@ def replace_topics(runner: ScriptRunner) -> None:
         runner.topics.changed()
 
     def subscriber(self: rospy.Subscriber, *args: Any, **kwds: Any) -> None:
+        # A sensor measures as soon as somebody listens: the simulator's seed must be set before that.
+        runner.is_connected()
         begin_subscriber(self, *args, **kwds)
         self.impl.set_queue_size(None)  # a limit would drop messages that arrive together
         runner.topics.changed()
