@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Makes a root of another Debian, clones this checkout into it, and runs the README's two commands there:
 #
-#     tools/try_on.sh [--base FOLDER] [--container] [--keep] SUITE [ARG...]     e.g. trixie --fast
+#     tools/try_on.sh [--base FOLDER] [--keep] SUITE [ARG...]     e.g. trixie --fast
 #
 # ARGs go to `ws test`. --base copies a root that debootstrap has made, with the packages in its cache;
-# --container runs the steps of Containerfile instead, and trains as its user; --keep leaves the root.
+# --keep leaves the root.
 # It needs root and debootstrap. What it mounts lies in the new root, and no other process sees it.
 set -euo pipefail
 CHECKOUT=$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")
@@ -71,26 +71,16 @@ as_readme() {
     return "$failed"
 }
 
-as_container() {
-    local step user
-    git clone --quiet -- "$CHECKOUT" "$PLACE/opt/cartpole"
-    while IFS= read -r step; do timed RUN "$step"; done < <(sed -n 's/^RUN //p' "$CHECKOUT/Containerfile")
-    user=$(sed -n 's/^USER //p' "$CHECKOUT/Containerfile")
-    timed train "cd / && setpriv --reuid $user --regid $user --clear-groups env HOME=/home/$user bash -c \
-        'cd && /opt/cartpole/ws rosrun cartpole pg_train.py --episodes $EPISODES --run-dir runs/try'"
-}
-
-BASE="" KEEP="" RUN=as_readme
+BASE="" KEEP=""
 while [[ ${1-} == --* ]]; do
     case $1 in
         --base) BASE=${2:?a folder}; shift ;;
-        --container) RUN=as_container ;;
         --keep) KEEP=yes ;;
         *) echo "try_on.sh: unknown option $1" >&2; exit 2 ;;
     esac
     shift
 done
-SUITE=${1:?"usage: try_on.sh [--base FOLDER] [--container] [--keep] SUITE [ARG...]"}
+SUITE=${1:?"usage: try_on.sh [--base FOLDER] [--keep] SUITE [ARG...]"}
 shift
 [[ $EUID -eq 0 ]] || { echo "try_on.sh: needs root" >&2; exit 1; }
 
@@ -104,4 +94,4 @@ trap take_away EXIT
 say "a root of $SUITE in $PLACE"
 make_root
 say "it has $(size) MB"
-"$RUN" "$@"
+as_readme "$@"

@@ -28,9 +28,8 @@ __all__ = [
 Entry = TypeVar("Entry")
 Command = float | Sequence[float]
 """For one controller [m, rad, m/s, rad/s, N, N m]: a number, or for a group one for each of its joints."""
-ODOMETRY = (
-    "odometry"  # where a policy is deployed, the name of a vehicle's odometry among its sensors
-)
+# Where a policy is deployed, the name of a vehicle's odometry among its sensors
+ODOMETRY = "odometry"
 Commands = Mapping[str, Command]
 """By the controller's name; "/namespace/name" in a world with several robots."""
 

@@ -81,6 +81,13 @@ class Mount:
         """Returns the text of the plugin's child element `tag`."""
         return (self.plugin.element.findtext(tag) or "").strip() or default
 
+    def required(self, tag: str) -> str:
+        """Returns the same of an element that must be there, or else raises DescriptionError."""
+        found = self.text(tag, "")
+        if not found:
+            raise DescriptionError(f"<{tag}> is missing")
+        return found
+
     def number(self, tag: str, default: float) -> float:
         """Returns the number in the plugin's child element `tag`; a faulty one is a DescriptionError."""
         found = value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)

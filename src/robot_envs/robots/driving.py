@@ -155,9 +155,8 @@ class DriveToGoal(Task):
 
     def _sectors(self, ranges: np.ndarray) -> list[float]:
         edges = np.arange(self.ranges) * len(ranges) // self.ranges
-        nearest = np.fmin.reduceat(
-            np.maximum(ranges, 0.1), edges
-        )  # -inf: too near; NaN: a faulty ray
+        # A range of -inf is too near, NaN a faulty ray.
+        nearest = np.fmin.reduceat(np.maximum(ranges, 0.1), edges)
         return (UNIT / nearest).tolist()
 
     def way(self, state: WorldState) -> list[float]:

@@ -64,7 +64,30 @@ OBJECTS = (
 )  # fmt: skip
 
 
-class PickCube(Task):
+class Picking(Task):
+    """What tasks of the gripper arm have in common: arm, cube and table, actions, and how episodes begin."""
+
+    max_steps = 60
+    query = StateQuery(links=(LinkQuery("tip"),), models=("cube",))
+    objects = OBJECTS
+
+    def __init__(self, helped: float = 0.0) -> None:
+        if not 0.0 <= helped <= 1.0:
+            raise TaskError(f"helped is a share from 0 to 1, not {helped}")
+        self.helped = helped
+
+    def action_space(self) -> gymnasium.spaces.Box:
+        return actions(4)
+
+    def initial_state(self, rng: np.random.Generator) -> InitialState:
+        """Draws the places of tip and cube."""
+        return begun(rng, self.helped)
+
+    def apply(self, action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
+        return moved(action, state)
+
+
+class PickCube(Picking):
     """The gripper grasps the cube and lifts it.
 
     ## Action space
@@ -104,25 +127,8 @@ class PickCube(Task):
             above it, each as likely: so a training soon meets what it is about.
     """
 
-    max_steps = 60
-    query = StateQuery(links=(LinkQuery("tip"),), models=("cube",))
-    objects = OBJECTS
-
-    def __init__(self, helped: float = 0.0) -> None:
-        self.helped = share(helped)
-
-    def action_space(self) -> gymnasium.spaces.Box:
-        return actions(4)
-
     def observation_space(self) -> gymnasium.spaces.Box:
         return numbers(12)
-
-    def initial_state(self, rng: np.random.Generator) -> InitialState:
-        """Draws the places of tip and cube."""
-        return begun(rng, self.helped)
-
-    def apply(self, action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
-        return moved(action, state)
 
     def observe(self, state: WorldState) -> np.ndarray:
         height = min(places(state)[1][2] - ON_TABLE, 1.0)
@@ -143,7 +149,7 @@ class PickCube(Task):
         return {"height": height, "is_success": height >= LIFTED}
 
 
-class PickCubeGoal(GoalTask):
+class PickCubeGoal(Picking, GoalTask):
     """The gripper takes the cube to a goal; the reward only says whether it is there. For hindsight replay.
 
     ## Action space
@@ -174,16 +180,6 @@ class PickCubeGoal(GoalTask):
         helped: as in `PickCube`; without it hindsight learns little, since most goals achieved are the same.
     """
 
-    max_steps = 60
-    query = PickCube.query
-    objects = OBJECTS
-
-    def __init__(self, helped: float = 0.0) -> None:
-        self.helped = share(helped)
-
-    def action_space(self) -> gymnasium.spaces.Box:
-        return actions(4)
-
     def observation_space(self) -> gymnasium.spaces.Box:
         return numbers(11)
 
@@ -191,17 +187,10 @@ class PickCubeGoal(GoalTask):
         """Returns points over the table for cube and tip (x, y, z each) [0.1 m]."""
         return gymnasium.spaces.Box(-10.0, 10.0, (6,), np.float32)
 
-    def initial_state(self, rng: np.random.Generator) -> InitialState:
-        """Draws the places of tip and cube."""
-        return begun(rng, self.helped)
-
     def goal(self, rng: np.random.Generator, state: WorldState) -> np.ndarray:
         """Draws a point over the table [0.1 m], and returns it for the cube and for the tip."""
         goal = draw_cube(rng) + (0.0, 0.0, rng.uniform(0.0, 0.2 - ON_TABLE))
         return np.tile((goal - MIDDLE) / UNIT, 2).astype(np.float32)
-
-    def apply(self, action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
-        return moved(action, state)
 
     def observe(self, state: WorldState) -> np.ndarray:
         return np.array(seen(state), np.float32)
@@ -215,13 +204,6 @@ class PickCubeGoal(GoalTask):
         off = np.subtract(achieved, desired)
         away = np.linalg.norm(off.reshape(*off.shape[:-1], 2, 3), axis=-1)
         return away.max(axis=-1) <= CLOSE / UNIT
-
-
-def share(helped: float) -> float:
-    """Returns a share; raises TaskError if it isn't from 0 to 1."""
-    if not 0.0 <= helped <= 1.0:
-        raise TaskError(f"helped is a share from 0 to 1, not {helped}")
-    return helped
 
 
 def begun(rng: np.random.Generator, helped: float) -> InitialState:

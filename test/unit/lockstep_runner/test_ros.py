@@ -1,5 +1,7 @@
 """Waits for messages that don't come."""
 
+from unittest.mock import Mock
+
 import pytest
 import rospy
 from sensor_msgs.msg import LaserScan
@@ -58,6 +60,29 @@ def test_silence_ends_with_a_late_message(runner, monkeypatch):
     for _ in range(2):
         wait("/turtle/scan", LaserScan, 25.0)
     assert spans == [ros.SILENCE, 25.0 - ros.SILENCE] * 2
+
+
+def test_the_simulator_is_seeded_before_a_sensor_has_a_listener(runner, monkeypatch):
+    """It measures as soon as somebody listens, and noise depends on the seed."""
+    calls = []
+
+    def subscribe(self, *_):
+        self.impl = Mock()
+        calls.append("subscribed")
+
+    for owner, name in (
+        (rospy.topics.Publisher, "__init__"), (rospy.topics.Publisher, "publish"),
+        (rospy, "wait_for_message"), (rospy.client, "wait_for_message"),
+        (rospy.topics._TopicImpl, "add_connection"),
+        (rospy.topics._SubscriberImpl, "receive_callback"),
+    ):  # fmt: skip
+        monkeypatch.setattr(owner, name, getattr(owner, name))
+    monkeypatch.setattr(rospy.topics.Subscriber, "__init__", subscribe)
+    monkeypatch.setattr(runner, "is_connected", lambda: calls.append("connected"))
+    runner.topics.changed = lambda: None
+    ros.replace_topics(runner)
+    rospy.Subscriber("/scan", LaserScan)
+    assert calls == ["connected", "subscribed"]
 
 
 def test_without_a_simulator_a_node_says_so_before_it_waits_for_the_master(monkeypatch, capsys):

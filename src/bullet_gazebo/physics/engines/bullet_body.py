@@ -353,9 +353,8 @@ class BulletBody(Body):
         index = self._links[name]
         if index == BASE:
             return self._base_state()
-        state = pybullet.getLinkState(
-            self.id, index, 1, 1, self._client
-        )  # speeds, and present places
+        # With speeds, and present places.
+        state = pybullet.getLinkState(self.id, index, 1, 1, self._client)
         pose = Pose(state[4], state[5])
         if name in self._offsets:
             pose = pose.compose(self._offsets[name])

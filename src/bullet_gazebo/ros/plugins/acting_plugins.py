@@ -21,7 +21,7 @@ from bullet_gazebo.ros.common.dynamic_server import DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import bad_number, from_transform, to_transform, to_vector
 from bullet_gazebo.ros.plugins.drive_topics import advertised
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, namespace_of, topic_in
+from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, namespace_of, subscribe, topic_in
 
 WORLDS = ("", "world", "map")
 SLIPS = [
@@ -30,22 +30,15 @@ SLIPS = [
 ]
 
 
-def _subscribe(context: PluginContext, name: str, kind: type, receive: object, queue: int) -> None:
-    subscriber = rospy.Subscriber(name, kind, receive, queue_size=queue, tcp_nodelay=True)
-    context.closing(subscriber.unregister)
-
-
 class PushPlugin(SensorPlugin):
     """Pushes a link by the newest wrench, in world axes, until the next one."""
 
     def __init__(self, context: PluginContext) -> None:
         self._context, self._link = context, context.link("bodyName")
-        topic = context.text("topicName", "")
-        if not topic:
-            raise DescriptionError("<topicName> is missing")
         self._wrench = ZERO, ZERO
+        topic = context.required("topicName")
         name = topic_in(namespace_of(context, absent="", empty="/"), topic)
-        _subscribe(context, name, Wrench, self._receive, 1)
+        subscribe(context, name, Wrench, self._receive, 1)
         context.on_update(self._push)
 
     def _receive(self, message: Wrench) -> None:
@@ -73,7 +66,7 @@ class HandOfGodPlugin(SensorPlugin):
         self._frames: dict[str, tuple[str, Pose]] = {}  # each with its parent
         self._tf = advertised(context, "/tf", TFMessage, 100)
         for name in ("/tf", "/tf_static"):
-            _subscribe(context, name, TFMessage, self._receive, 100)
+            subscribe(context, name, TFMessage, self._receive, 100)
         context.on_update(self._pull)
 
     def _receive(self, message: TFMessage) -> None:
@@ -131,7 +124,7 @@ class JointPoseTrajectoryPlugin(SensorPlugin):
         self._stop()
         topic = context.text("topicName", "set_joint_trajectory")
         name = topic_in(namespace_of(context, absent="", empty="/"), topic)
-        _subscribe(context, name, JointTrajectory, self._receive, 100)
+        subscribe(context, name, JointTrajectory, self._receive, 100)
         context.on_update(self._update)
         context.on_move(self._moved)
 

@@ -32,6 +32,7 @@ from bullet_gazebo.ros.plugins.sensor_topics import (
     Topic,
     frame_of,
     queue_of,
+    subscribe,
     topic_in,
 )
 
@@ -111,8 +112,7 @@ class DrivePlugin(SensorPlugin):
         if tf:
             self.tf = advertised(context, "/tf", TFMessage, 100)
         name = topic_in(self.namespace, text("commandTopic", command))
-        subscriber = rospy.Subscriber(name, Twist, self._receive, queue_size=1, tcp_nodelay=True)
-        context.closing(subscriber.unregister)
+        subscribe(context, name, Twist, self._receive, 1)
         with self.sim.lock:
             self.restart()
         context.on_update(self.update)

@@ -37,9 +37,7 @@ class ForcePlugin(SensorPlugin):
         self._context = context
         self._meter = meter
         self._deviation = context.deviation()
-        topic = context.text("topicName", "")
-        if not topic:
-            raise DescriptionError("<topicName> is missing")
+        topic = context.required("topicName")
         namespace = namespace_of(context, absent="", empty="/")
         self._frame = frame_of(namespace, frame)
         # Forces are those of one step, so the state of each is looked at, before the measurement.

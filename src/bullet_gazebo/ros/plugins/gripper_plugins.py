@@ -32,7 +32,7 @@ LOOKS, MOST_COUNT = 5.0, 10.0  # a second of simulated time
 ANGLE, RELEASE = 120.0, 0.005  # [°], [m]
 
 
-class MimicPlugin:
+class MimicPlugin(SensorPlugin):
     """Gives a joint that follows another one the PID that it asks for; without gains it keeps its gear."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -53,9 +53,6 @@ class MimicPlugin:
             follower = PidFollower(context.model, name, pid)
         context.on_update(follower.update)
         context.on_move(follower.moved)
-
-    def shutdown(self) -> None:
-        """Does nothing: the model goes."""
 
 
 def _done(context: PluginContext) -> None:
@@ -148,10 +145,8 @@ class VacuumPlugin(SensorPlugin):
         self._context = context
         namespace = namespace_of(context, absent="", empty="/")
         self._suction = Suction(context.sim.world, context.model, context.link("bodyName"))
-        topic = context.text("topicName", "")
-        if not topic:
-            raise DescriptionError("<topicName> is missing")
-        SensorTopic(context, topic_in(namespace, topic), Bool, 0.0, self._held)
+        topic = topic_in(namespace, context.required("topicName"))
+        SensorTopic(context, topic, Bool, 0.0, self._held)
         for name, act in (("on", self._turn_on), ("off", self._turn_off)):
             service = rospy.Service(topic_in(namespace, name), Empty, act)
             context.closing(service.shutdown)

@@ -6,7 +6,6 @@ of the two rates counts.
 
 from sensor_msgs.msg import Imu as ImuMsg
 
-from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.ros.common.messages import to_imu
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
@@ -24,9 +23,7 @@ class ImuSensorPlugin(SensorPlugin):
 
     def __init__(self, context: PluginContext) -> None:
         self._imu = imu = ImuSensor(context)
-        self._frame = context.text("frameName", "").lstrip("/")
-        if not self._frame:
-            raise DescriptionError("<frameName> is missing")
+        self._frame = context.required("frameName").lstrip("/")
         name = topic_in(
             namespace_of(context, absent=MODEL, empty="/"), context.text("topicName", "imu_data")
         )

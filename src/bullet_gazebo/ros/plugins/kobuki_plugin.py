@@ -31,6 +31,7 @@ from bullet_gazebo.ros.plugins.sensor_topics import (
     MODEL,
     SensorTopic,
     namespace_of,
+    subscribe,
     topic_in,
 )
 from bullet_gazebo.sensors.contact import ContactSensor
@@ -54,7 +55,7 @@ class KobukiPlugin(DrivePlugin):
         super().__init__(context, namespace, context.rate("update_rate"), late=False)
         prefix = rospy.get_param(topic_in(namespace, "base_prefix"), "mobile_base")
         below = partial(topic_in, topic_in(namespace, str(prefix)))
-        wheels = {tag: _required(context, tag) for tag in _tags("{}_wheel_joint_name", _EDGES)}
+        wheels = {tag: context.required(tag) for tag in _tags("{}_wheel_joint_name", _EDGES)}
         diameter, torque = length(context, "wheel_diameter", 0.0), context.number("torque", 0.0)
         self._wheels = Wheels(context, wheels, diameter, torque)
         self._separation = length(context, "wheel_separation", 0.0)
@@ -70,8 +71,7 @@ class KobukiPlugin(DrivePlugin):
         for name, kind, receive in (
             ("motor_power", MotorPower, self._switch), ("reset_odometry", Empty, self._reset),
         ):  # fmt: skip
-            topic = below(f"commands/{name}")
-            context.closing(rospy.Subscriber(topic, kind, receive, queue_size=10).unregister)
+            subscribe(context, below(f"commands/{name}"), kind, receive, 10)
         self.begin(tf=choice(context, "publish_tf", False), command=below("commands/velocity"))
 
     def take(self, command: Triple) -> None:
@@ -209,16 +209,9 @@ def _tags(pattern: str, sides: tuple[str, ...]) -> list[str]:
     return [pattern.format(side) for side in sides]
 
 
-def _required(context: PluginContext, tag: str) -> str:
-    found = context.text(tag, "")
-    if not found:
-        raise DescriptionError(f"<{tag}> is missing")
-    return found
-
-
 def _mount(context: PluginContext, tag: str, kind: str) -> Mount:
     """Returns the place of the model's sensor that an element names."""
-    name = _required(context, tag)
+    name = context.required(tag)
     for sensor in context.model.description.sensors:
         if sensor.name == name and sensor.kind == kind:
             return Mount(context.sim, context.model, WITHOUT, context.sensing, sensor)

@@ -40,9 +40,7 @@ class P3dPlugin(SensorPlugin):
     def __init__(self, context: PluginContext) -> None:
         self._context = context
         self._link, self._child = context.link("bodyName"), context.text("bodyName", "")
-        topic = context.text("topicName", "")
-        if not topic:
-            raise DescriptionError("<topicName> is missing")
+        topic = context.required("topicName")
         frame = context.text("frameName", "world")
         self._reference = None if frame in WORLDS else _link_of(context, frame)
         self._xyz = numbers(context.text("xyzOffset", "0 0 0"), "<xyzOffset>", 3)

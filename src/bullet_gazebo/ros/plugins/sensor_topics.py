@@ -69,6 +69,14 @@ def always_heard(context: PluginContext, name: str, kind: type, queue: int = 1) 
     return publisher
 
 
+def subscribe(
+    context: PluginContext, name: str, kind: type, receive: Callable[[Any], None], queue: int
+) -> None:
+    """Has `receive` get a topic's messages until the plugin ends."""
+    subscriber = rospy.Subscriber(name, kind, receive, queue_size=queue, tcp_nodelay=True)
+    context.closing(subscriber.unregister)
+
+
 class SensorPlugin:
     """A plugin whose topics, services and clocks are the context's, which closes them."""
 

@@ -25,9 +25,8 @@ from bullet_gazebo.ros.services.step_requests import MAX_TICKS, SLICE
 from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.simulator import Simulator
 
-CONNECTING = (
-    20.0  # [s of wall time] for a node to connect to its topics; clients wait 30 s for an answer
-)
+# [s of wall time] for a node to connect to its topics; clients wait 30 s for an answer
+CONNECTING = 20.0
 LOOK = 0.002  # [s]
 MOST_BYTES = 256 * 2**20  # [bytes] for one node; beyond it the node listens and never asks
 
