@@ -143,11 +143,12 @@ make_packages() {  # file
 
 # The place counts: a virtual environment has its path written into its scripts.
 key_place() { readlink -f -- "$SYSTEM_PYTHON"; echo "$ROOT${ROS_PREFIX:+ $ROS_PREFIX}"; }
-key_venv() { key_place; base_list; cat -- "$(lock_file)"; }
+key_venv() { key_place; list_of base.txt; cat -- "$(lock_file)"; }
 key_test_tools() { key_venv; cat -- "$ROOT/requirements/test.txt"; }
 key_extras() { key_venv; cat -- "$ROOT/requirements/extras.txt"; }
 
-base_list() { sed "$(! uses_debians_torch || echo '/^torch==/d')" -- "$ROOT/requirements/base.txt"; }
+# Stable-Baselines3 asks for a newer torch than Debian 13's, and works with it.
+list_of() { sed "$(! uses_debians_torch || echo '/^torch==/d; /^stable-baselines3==/d')" -- "$ROOT/requirements/$1"; }
 
 lock_file() { echo "$ROOT/requirements/lock-$(python_version).txt"; }
 
@@ -166,16 +167,21 @@ size_of() { sed -n 's/^# Size: //p' -- "$ROOT/requirements/$1"; }
 
 # With base.txt, so that nothing here moves what is pinned there.
 pip_install() {  # file...
-    local files=(--requirement "$WS/base.txt" --constraint "$(lock_file)")
+    local file files=(--constraint "$(lock_file)")
     if [[ ! -f $(lock_file) ]]; then
         echo "ERROR: requirements/ has no lock file for Python $(python_version), only $(cd -- "$ROOT/requirements" && echo lock-*)"
         return 1
     fi
-    base_list >"$WS/base.txt"
-    for file in "$@"; do files+=(--requirement "$ROOT/requirements/$file"); done
+    for file in base.txt "$@"; do
+        list_of "$file" >"$WS/$file"
+        files+=(--requirement "$WS/$file")
+    done
+    pip_in_venv "${files[@]}"
+}
+
+pip_in_venv() {  # argument of `pip install`...
     env -u PIP_USER -u PIP_TARGET -u PIP_PREFIX -u PYTHONPATH -u PYTHONHOME PYTHONNOUSERSITE=1 \
-        "$VENV/bin/python3" -m pip install --disable-pip-version-check --no-input --progress-bar off \
-        "${files[@]}"
+        "$VENV/bin/python3" -m pip install --disable-pip-version-check --no-input --progress-bar off "$@"
 }
 
 make_venv() {
@@ -191,7 +197,11 @@ make_venv() {
 }
 
 make_test_tools() { pip_install test.txt; }
-make_extras() { pip_install extras.txt; }
+make_extras() {
+    pip_install extras.txt
+    # What else it needs is in base.txt.
+    ! uses_debians_torch || pip_in_venv --no-deps "$(grep '^stable-baselines3==' "$ROOT/requirements/extras.txt")"
+}
 
 # --- catkin workspaces ---------------------------------------------------------------------
 

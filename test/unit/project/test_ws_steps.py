@@ -31,7 +31,7 @@ def steps(root, tmp_path):
 
 
 def test_debian_13_has_a_torch_of_its_own(steps):
-    code = "debian_list debian.txt; base_list"
+    code = "debian_list debian.txt; list_of base.txt; list_of extras.txt"
     debian_12, debian_13 = (steps(f"SYSTEM='debian {version}'; {code}") for version in (12, 13))
     assert "python3-torch" in debian_13 and "\ntorch==" not in debian_13
     assert "python3-torch" not in debian_12 and "\ntorch==" in debian_12
