@@ -50,6 +50,8 @@ source "$ROOT/tools/ws_environment.sh"
 source "$ROOT/tools/ws_with.sh"
 # shellcheck source=tools/ws_check.sh
 source "$ROOT/tools/ws_check.sh"
+# shellcheck source=tools/ws_docs.sh
+source "$ROOT/tools/ws_docs.sh"
 
 # The markers (pyproject.toml) that `ws test --fast` deselects.
 NOT_FAST="rostest or slow or long or stress or extras"
@@ -64,6 +66,7 @@ usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
                              run the quick tests (about a minute): none over ROS (test/ros), none
                              marked slow, long or stress, none that need requirements/extras.txt
        ws check [NAME...]    run all checks, or those named: ${CHECKS[*]}
+       ws docs [FOLDER]      build the documentation as a site and serve it, or write it to FOLDER
        ws shell              open an interactive bash in the workspace, with roscd and completion
        ws extras [CMD...]    install requirements/extras.txt too, then run CMD, if any
        ws rviz [CMD...]      install Debian's RViz too, then run CMD, if any
@@ -160,7 +163,8 @@ main() {
             steps=(debian venv test_tools companions build)
             [[ " $* " == *" --fast "* ]] || steps+=(extras)
             ;;
-        check) steps=(debian checkers venv test_tools companions build) ;;
+        check) steps=(debian checkers venv test_tools doc_tools companions build) ;;
+        docs) steps=(debian venv doc_tools companions build) ;;
         extras) steps=(debian venv extras companions build) ;;
         rviz | foreign) steps=(debian "$1" venv companions build) ;;
     esac
@@ -171,6 +175,7 @@ main() {
     case $1 in
         test) run_tests "${@:2}" ;;
         check) check "${@:2}" ;;
+        docs) docs "${@:2}" ;;
         shell) interactive_shell ;;
         extras | rviz | foreign) [[ $# -eq 1 ]] || exec -- "${@:2}" ;;
         *) run "$@" ;;

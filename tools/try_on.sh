@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Makes a root of another Debian, clones this checkout into it, and runs the README's two commands there:
 #
-#     tools/try_on.sh [--base FOLDER] [--keep] SUITE [ARG...]     e.g. trixie --fast
+#     tools/try_on.sh [--container] [--base FOLDER] [--keep] SUITE [ARG...]     e.g. trixie --fast
 #
-# ARGs go to `ws test`. --base copies a root that debootstrap has made, with the packages in its cache;
+# ARGs go to `ws test`. --container prepares the root as the Containerfile does, and runs the commands as its
+# user. --base copies a root that debootstrap has made, with the packages in its cache;
 # --keep leaves the root.
 # It needs root and debootstrap. What it mounts lies in the new root, and no other process sees it.
 set -euo pipefail
@@ -52,8 +53,8 @@ timed() {  # title, command
     return "$status"
 }
 
-fetched_by_pip() {
-    inside "cat /root/cartpole/.ws/log/*.log" | awk '
+fetched_by_pip() {  # checkout
+    inside "cat $1/.ws/log/*.log" | awk '
         /^ *Downloading .*\([0-9.]+ [kMG]?B\)/ {
             gsub(/[()]/, ""); factor = $NF == "GB" ? 1000 : $NF == "kB" ? 0.001 : 1; sum += $(NF - 1) * factor
         }
@@ -61,26 +62,31 @@ fetched_by_pip() {
 }
 
 as_readme() {
-    local failed=0
-    git clone --quiet -- "$CHECKOUT" "$PLACE/root/cartpole"
-    chown --recursive root:root "$PLACE/root/cartpole"
-    timed set-up "cd ~/cartpole && ./ws true"
-    say "pip has fetched $(fetched_by_pip) MB; ws has named what apt fetches"
-    timed train "cd ~/cartpole && ./ws rosrun cartpole pg_train.py --episodes $EPISODES --run-dir runs/try" || failed=1
-    timed test "cd ~/cartpole && ./ws test $(printf ' %q' "$@")" || failed=1
+    local failed=0 place=/root/cartpole set_up="./ws true" as_user=""
+    if [[ -n $CONTAINER ]]; then
+        place=/opt/cartpole set_up=tools/container.sh as_user="runuser --user cartpole -- env HOME=/home/cartpole"
+    fi
+    git clone --quiet -- "$CHECKOUT" "$PLACE$place"
+    chown --recursive root:root "$PLACE$place"
+    timed set-up "cd $place && $set_up"
+    say "pip has fetched $(fetched_by_pip "$place") MB; ws has named what apt fetches"
+    timed train "cd /tmp && $as_user $place/ws rosrun cartpole pg_train.py --episodes $EPISODES --run-dir /tmp/runs/try" ||
+        failed=1
+    timed test "cd $place && $as_user ./ws test ${*@Q}" || failed=1
     return "$failed"
 }
 
-BASE="" KEEP=""
+BASE="" KEEP="" CONTAINER=""
 while [[ ${1-} == --* ]]; do
     case $1 in
         --base) BASE=${2:?a folder}; shift ;;
+        --container) CONTAINER=yes ;;
         --keep) KEEP=yes ;;
         *) echo "try_on.sh: unknown option $1" >&2; exit 2 ;;
     esac
     shift
 done
-SUITE=${1:?"usage: try_on.sh [--base FOLDER] [--keep] SUITE [ARG...]"}
+SUITE=${1:?"usage: try_on.sh [--container] [--base FOLDER] [--keep] SUITE [ARG...]"}
 shift
 [[ $EUID -eq 0 ]] || { echo "try_on.sh: needs root" >&2; exit 1; }
 

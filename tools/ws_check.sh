@@ -3,7 +3,7 @@
 #
 # A check NAME has a function check_NAME and a title; all of them run, also after one that failed.
 
-CHECKS=(lint format types shell catkin dead_code links)
+CHECKS=(lint format types shell catkin dead_code links site)
 declare -A CHECK_TITLE=(
     [lint]="ruff check"
     [format]="ruff format --check"
@@ -12,6 +12,7 @@ declare -A CHECK_TITLE=(
     [catkin]="catkin_lint"
     [dead_code]="vulture"
     [links]="links and paths in the documentation"
+    [site]="mkdocs build --strict"
 )
 
 check_lint() { "$VENV/bin/ruff" check .; }
@@ -20,6 +21,7 @@ check_types() { "$VENV/bin/mypy"; }
 check_shell() { /usr/bin/shellcheck --external-sources ws .ci/run tools/*.sh; }
 check_catkin() { /usr/bin/catkin_lint --quiet --offline --ignore env_var --strict -W2 "$WS/src" "$COMPANIONS/src"; }
 check_dead_code() { "$VENV/bin/vulture"; }
+check_site() { mkdocs build --site-dir "$WS/docs/site"; }
 check_links() { "$VENV/bin/python3" tools/check_links.py; }
 
 check() {  # [check...]

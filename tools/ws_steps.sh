@@ -13,6 +13,7 @@ declare -A TITLE=(
     [foreign]="Debian packages that others build against"
     [venv]="Python packages"
     [test_tools]="tools for test and check"
+    [doc_tools]="tools for the documentation"
     [extras]="extra Python packages"
     [companions]="catkin workspace of the companions"
     [build]="catkin workspace"
@@ -22,7 +23,7 @@ COMPILER="mend what the compiler or CMake complains of; if that is nothing of yo
 # shellcheck disable=SC2034
 declare -A REMEDY=(
     [debian]="$NETWORK; on other systems than Debian 12 and 13 see docs/catkin.md"
-    [checkers]=$NETWORK [rviz]=$NETWORK [foreign]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [extras]=$NETWORK
+    [checkers]=$NETWORK [rviz]=$NETWORK [foreign]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [doc_tools]=$NETWORK [extras]=$NETWORK
     [companions]=$COMPILER [build]=$COMPILER
 )
 
@@ -145,6 +146,7 @@ make_packages() {  # file
 key_place() { readlink -f -- "$SYSTEM_PYTHON"; echo "$ROOT${ROS_PREFIX:+ $ROS_PREFIX}"; }
 key_venv() { key_place; list_of base.txt; cat -- "$(lock_file)"; }
 key_test_tools() { key_venv; cat -- "$ROOT/requirements/test.txt"; }
+key_doc_tools() { key_venv; cat -- "$ROOT/requirements/docs.txt"; }
 key_extras() { key_venv; cat -- "$ROOT/requirements/extras.txt"; }
 
 # Stable-Baselines3 asks for a newer torch than Debian 13's, and works with it.
@@ -156,14 +158,15 @@ plan_venv() {
     if compgen -G "$VENV/lib/*/site-packages/pybullet*" >/dev/null; then  # a large one, so most is there
         echo "what has changed in requirements/base.txt"
     else
-        size_of base.txt
+        size_of base.txt "$(! uses_debians_torch || echo " with Debian's torch")"
     fi
 }
 plan_test_tools() { size_of test.txt; }
+plan_doc_tools() { size_of docs.txt; }
 plan_extras() { size_of extras.txt; }
 
 # What was measured is written in the files.
-size_of() { sed -n 's/^# Size: //p' -- "$ROOT/requirements/$1"; }
+size_of() { sed -n "s/^# Size${2-}: //p" -- "$ROOT/requirements/$1"; }  # file, case
 
 # With base.txt, so that nothing here moves what is pinned there.
 pip_install() {  # file...
@@ -197,6 +200,7 @@ make_venv() {
 }
 
 make_test_tools() { pip_install test.txt; }
+make_doc_tools() { pip_install docs.txt; }
 make_extras() {
     pip_install extras.txt
     # What else it needs is in base.txt.
