@@ -1,23 +1,19 @@
-"""What is installed: read by catkin (CMakeLists.txt) and by pip, which need nothing of each other.
+"""What catkin installs (CMakeLists.txt); pip reads pyproject.toml alone.
 
-Name, commands and dependencies for pip are in pyproject.toml, all else of the package in package.xml.
+Data for the modules is in pyproject.toml's table, all else of the package in package.xml.
 """
 
 import shutil
+import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 from setuptools.command.build_py import build_py
 
-# Files that are needed at run time and lie outside of src, and the folders of a wheel for them.
-DATA = {
-    "config/*.yaml": "rl_workbench/share/config",
-    "urdf/*": "robot_envs/share/cartpole/urdf",
-    "worlds/*": "robot_envs/share/cartpole/worlds",
-    "config/robots/*": "robot_envs/share/cartpole/config/robots",
-    "companions/cartpole_controller/config/*": "robot_envs/share/cartpole_controller/config",
-}
+WHEEL = tomllib.loads(Path("pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"][
+    "wheel"
+]
 
 
 class BuildWithData(build_py):
@@ -25,13 +21,8 @@ class BuildWithData(build_py):
 
     def run(self) -> None:
         super().run()
-        if self.editable_mode:
-            return
-        for pattern, place in DATA.items():
-            folder = Path(self.build_lib, place)
-            folder.mkdir(parents=True, exist_ok=True)
-            for path in sorted(Path().glob(pattern)):
-                shutil.copy(path, folder)
+        for folder, place in WHEEL["force-include"].items():
+            shutil.copytree(folder, Path(self.build_lib, place), dirs_exist_ok=True)
 
 
 setup(

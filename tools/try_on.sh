@@ -28,10 +28,10 @@ make_root() {
 
 inside() {  # command
     local settings=(HOME=/root LANG=C.UTF-8 PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
-        DEBIAN_FRONTEND=noninteractive OMP_NUM_THREADS="${OMP_NUM_THREADS-}")
+        DEBIAN_FRONTEND=noninteractive)
     local name
     [[ -z ${PIP_CERT-} ]] || settings+=(PIP_CERT=/etc/pip.crt)
-    for name in PIP_INDEX_URL PIP_DEFAULT_TIMEOUT http_proxy https_proxy no_proxy CARTPOLE_TORCH; do
+    for name in PIP_INDEX_URL PIP_DEFAULT_TIMEOUT http_proxy https_proxy no_proxy CARTPOLE_TORCH OMP_NUM_THREADS; do
         [[ -z ${!name-} ]] || settings+=("$name=${!name}")
     done
     # The mounts end with the last process of this namespace.

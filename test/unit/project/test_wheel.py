@@ -8,10 +8,12 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tomllib
 import venv
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 pytestmark = pytest.mark.slow
 
@@ -49,6 +51,17 @@ def pip(python: Path, *arguments: str | Path, cwd: Path) -> None:
     run("env", *settings, sys.executable, "-m", "pip", *options, *arguments, cwd=cwd)
 
 
+def copy_sources(root: Path, sources: Path) -> None:
+    sources.mkdir()
+    for path in root.iterdir():
+        if path.is_file():
+            shutil.copy(path, sources)
+    for name in SOURCES:
+        shutil.copytree(
+            root / name, sources / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info")
+        )
+
+
 @pytest.fixture(scope="module")
 def python(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A plain virtual environment's Python, the wheel with all that it requires installed there.
@@ -58,14 +71,7 @@ def python(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """
     folder = tmp_path_factory.mktemp("wheel")
     sources = folder / "sources"  # a build leaves files behind
-    sources.mkdir()
-    for path in root.iterdir():
-        if path.is_file():
-            shutil.copy(path, sources)
-    for name in SOURCES:
-        shutil.copytree(
-            root / name, sources / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info")
-        )
+    copy_sources(root, sources)
     venv.create(folder / "venv")  # pip in it would take seconds
     python = folder / "venv/bin/python3"
     packages = sysconfig.get_path("purelib")
@@ -146,3 +152,30 @@ def test_cartpole_pg_trains(python: Path, tmp_path: Path) -> None:
     summary = json.loads((tmp_path / "run/summary.json").read_text())
     assert len(summary["lengths"]) == 5
     assert (tmp_path / "run/policy_network.pth").is_file()
+
+
+@pytest.mark.parametrize("name", ["base", "extras", "docs"])
+def test_what_is_pinned_lies_within_what_the_wheel_asks_for(root: Path, name: str) -> None:
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    texts = sum(extras.values(), project["dependencies"])
+    ranges = {each.name: each.specifier for each in map(Requirement, texts)}
+    lines = (root / f"requirements/{name}.txt").read_text().splitlines()
+    pins = [Requirement(line.split("#")[0]) for line in lines if line.split("#")[0]]
+    assert pins
+    for pin in pins:
+        (version,) = pin.specifier
+        assert version.version in ranges[pin.name]
+
+
+def test_a_wheel_is_the_same_bytes_each_time(root: Path, tmp_path: Path) -> None:
+    python, wheels = Path(sys.executable), []
+    for at in (1, 2):
+        sources = tmp_path / str(at)
+        copy_sources(root, sources)
+        for path in sources.rglob("*.py"):
+            os.utime(path, (at * 1e9, at * 1e9))
+        pip(python, "wheel", "--no-deps", "--wheel-dir", sources, sources, cwd=tmp_path)
+        (wheel,) = sources.glob("cartpole-*.whl")
+        wheels.append(wheel.read_bytes())
+    assert wheels[0] == wheels[1]

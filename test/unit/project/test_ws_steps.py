@@ -43,7 +43,8 @@ def test_debian_13_has_a_torch_of_its_own(steps):
 def test_a_lock_file_pins_all_that_the_lists_name(steps, root, version):
     lock = Path(steps("lock_file", version).strip()).read_text()
     lists = "".join(
-        (root / f"requirements/{name}.txt").read_text() for name in ("base", "test", "extras", "docs")
+        (root / f"requirements/{name}.txt").read_text()
+        for name in ("base", "test", "extras", "docs")
     )
     pins = {
         line.split()[0].rstrip(";") for line in lists.splitlines() if "==" in line.split("#")[0]
