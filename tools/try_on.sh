@@ -34,13 +34,14 @@ inside() {  # command
     for name in PIP_INDEX_URL PIP_DEFAULT_TIMEOUT http_proxy https_proxy no_proxy CARTPOLE_TORCH OMP_NUM_THREADS; do
         [[ -z ${!name-} ]] || settings+=("$name=${!name}")
     done
-    # The mounts end with the last process of this namespace.
+    # The mounts end with the last process of this namespace. Its first one has to reap orphans: bash does.
     # shellcheck disable=SC2016
     unshare --mount --pid --fork --kill-child --propagation private bash -euc '
         mount -t proc proc "$1/proc"
         mount -t tmpfs -o mode=1777 tmpfs "$1/dev/shm"
         mount -t devpts -o newinstance,ptmxmode=0666,mode=620 devpts "$1/dev/pts"
-        exec chroot "$@"' bash "$PLACE" /usr/bin/env -i "${settings[@]}" bash -euo pipefail -c "$1" </dev/null
+        chroot "$@"
+        exit' bash "$PLACE" /usr/bin/env -i "${settings[@]}" bash -euo pipefail -c "$1" </dev/null
 }
 
 size() { du --summarize --block-size=1MB --one-file-system -- "$PLACE" | cut -f 1; }
