@@ -3,14 +3,15 @@
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from bullet_gazebo.applied_forces import AppliedForces
-from bullet_gazebo.physics.engine import Twist
+from bullet_gazebo.held_state import HeldState
+from bullet_gazebo.physics.engine import SnapshotError, Twist
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.projection import place_link
-from bullet_gazebo.physics.world import World
+from bullet_gazebo.physics.world import World, WorldSnapshot
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.timing import FairLock, Holds, Pacer
 
@@ -27,6 +28,17 @@ class Outbox(Protocol):
 
     def deliver(self) -> None:
         """Sends it. The caller doesn't hold the lock."""
+
+
+class Snapshot(NamedTuple):
+    """What `Simulator.save_state` returns."""
+
+    of: "Simulator"
+    layout: tuple[object, ...]
+    now: int  # [ns]
+    resets: int
+    world: WorldSnapshot
+    held: HeldState
 
 
 class NotInLockstep(RuntimeError):
@@ -69,6 +81,7 @@ class Simulator:
         self.listeners: list[Callable[[int], None]] = []
         # Called under the lock after something other than time has moved bodies, or time was reset.
         self.moved: list[Callable[[], None]] = []
+        self.restored: list[Callable[[], None]] = []  # called under the lock after a restore
         # Called under the lock before each advance, and how many moves are still told of as one.
         self.before_advance: list[Callable[[], None]] = []
         self._moves_under_way = 0
@@ -282,6 +295,42 @@ class Simulator:
             for robot in self.robots:
                 robot.joints_moved(self.now, relatch=False)
             self._tell_of_move()
+
+    def save_state(self) -> Snapshot:
+        """Returns all that decides the future; the caller holds the lock, in lock-step.
+
+        Raises:
+            UnknownState: if the state of a user's controller or plugin can't be read.
+        """
+        parts = (self.applied, *self.robots, *self.listeners, *self.moved, *self.reseeded)
+        world = self.world.save_state()
+        return Snapshot(self, self._layout, self.now, self.resets, world, HeldState(parts))
+
+    def restore_state(self, snapshot: Snapshot) -> None:
+        """Returns to what `save_state` has returned: the same commands lead to the same bits.
+
+        The caller holds the lock.
+
+        Raises:
+            SnapshotError: if it is another simulator's, or models, robots, running controllers or properties
+                aren't those of the snapshot; nothing changes then.
+        """
+        if snapshot.of is not self:
+            raise SnapshotError("the snapshot is of another simulator")
+        if snapshot.layout != self._layout:
+            raise SnapshotError(
+                "models or controllers have come, gone or been switched since the snapshot"
+            )
+        self.world.restore_state(snapshot.world)
+        self.now, self.resets = snapshot.now, snapshot.resets
+        snapshot.held.recall()
+        for listener in self.restored:
+            listener()
+
+    @property
+    def _layout(self) -> tuple[object, ...]:
+        running = [each for robot in self.robots for each in robot.manager.running]
+        return self.version, running
 
     def reseed(self, seed: int) -> None:
         """Lets what draws random numbers start from `seed`; the caller holds the lock."""

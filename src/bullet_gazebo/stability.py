@@ -8,7 +8,7 @@ a loop that does is divided by 1 + (p dt² + d dt) / M or 1 + (p dt + 2 d) / M, 
 
 import logging
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -93,13 +93,13 @@ class StabilityWatch:
                 f"{driver}. Lower gains, a shorter step or heavier links help.",
             )
 
-    def report_stalls(self, now: int, contacts: Callable[[], list[Contact]]) -> None:
+    def report_stalls(self, now: int, contacts: Callable[[], Sequence[Contact]]) -> None:
         """Logs, once for each joint, that a contact has stalled its motor for a second; `now` [ns].
 
         A motor may well press on another model, as a gripper does, so that is no warning.
         """
         pushing = {}
-        touching: list[Contact] | None = None
+        touching: Sequence[Contact] | None = None
         for joint in self._hardware.at_their_limits():
             since, place = self._pushing.get(joint.name, (now, joint.position))
             if now < since or abs(joint.position - place) > STILL:
@@ -114,7 +114,7 @@ class StabilityWatch:
                 break
         self._pushing = pushing
 
-    def _stops(self, joint: str, contacts: list[Contact]) -> Iterator[tuple[bool, str]]:
+    def _stops(self, joint: str, contacts: Sequence[Contact]) -> Iterator[tuple[bool, str]]:
         """Yields for each contact that stops a joint whether it is of two links of the model, and a text."""
         model = self._model
         carried = {link for link in model.link_names if joint in model.carriers(link)}

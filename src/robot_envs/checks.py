@@ -9,11 +9,14 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from file_access.text import did_you_mean
 from robot_envs.errors import TaskError
+from robot_envs.robot import Robot
 from robot_envs.task import GoalTask, Task
-from robot_envs.world_state import LinkQuery, StateQuery, WorldState
+from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
 FLAGS = (bool, np.bool_)
+RESET_OPTIONS = ("initial_state", "goal")
 WANTED: dict[Any, str] = {
     FLAGS: "True or False",
     dict: "a dict",
@@ -21,6 +24,26 @@ WANTED: dict[Any, str] = {
     gymnasium.spaces.Box: "a gymnasium.spaces.Box",
 }
 FEW = 64  # numbers; fewer are checked faster one by one than by NumPy
+
+
+def checked_period(robot: Robot, given: Any) -> float:
+    """Returns a control period [s], by default the robot's; raises ValueError for anything but a number."""
+    period = robot.control_period if given is None else given
+    if not isinstance(period, (int, float)):
+        raise ValueError(f"control_period is a number [s], not {period!r}")
+    return period
+
+
+def reset_options(task: Task, options: dict[str, Any]) -> dict[str, Any]:
+    """Returns a reset's options; raises ValueError for one that the task doesn't have."""
+    for name in options:
+        if name not in RESET_OPTIONS:
+            raise ValueError(f"reset knows no option '{name}'{did_you_mean(name, RESET_OPTIONS)}")
+    if "goal" in options and not isinstance(task, GoalTask):
+        raise ValueError(f"{type(task).__name__} has no goal; only a GoalTask does")
+    if not isinstance(options.get("initial_state", InitialState()), InitialState):
+        raise ValueError(f"initial_state is an InitialState, not {options['initial_state']!r}")
+    return options
 
 
 def action_reader(space: gymnasium.Space[Any]) -> Callable[[Any], Any]:

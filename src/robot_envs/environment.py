@@ -9,8 +9,8 @@ import gymnasium
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import data_equivalence
 
+from bullet_gazebo.held_state import HeldState
 from bullet_gazebo.pictures.camera import CameraLike
-from file_access.text import did_you_mean
 from robot_envs import checks
 from robot_envs.backends import LOCKSTEP, OWN, REALTIME, make_backend
 from robot_envs.backends.backend import RobotBackend, side_by_side
@@ -18,13 +18,12 @@ from robot_envs.pictures.drawn import HEIGHT, WIDTH, DrawnEnv
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.task import GoalTask, Task, Unjudged
-from robot_envs.variation import Randomisation
+from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Noise, Sensor
 from robot_envs.variation.randomisation import UniformRandomisation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState, both, part_of
 
 MOST_SEED = 2**32  # of the sensors' noise
-RESET_OPTIONS = ("initial_state", "goal")
 
 
 class _Step(NamedTuple):
@@ -36,11 +35,14 @@ class _Step(NamedTuple):
     sent: Commands | None  # that the state reports, where fewer arrive; None: the same
 
 
-def _control_period(scene: Scene, given: Any) -> float:
-    period = scene.robots[0].control_period if given is None else given
-    if not isinstance(period, (int, float)):
-        raise ValueError(f"control_period is a number [s], not {period!r}")
-    return period
+class EnvSnapshot(NamedTuple):
+    """What `RobotEnv.save_state` returns."""
+
+    of: "RobotEnv"
+    variation: Variation
+    episode: tuple[WorldState, dict[str, Any], InitialState, int | None]
+    held: HeldState  # by the task, the imperfections and the generator
+    world: Any  # the backend's
 
 
 class RobotEnv(DrawnEnv):
@@ -125,7 +127,7 @@ class RobotEnv(DrawnEnv):
         self.scene = scene = Scene(robots, task.objects)
         self.max_steps = checks.checked_steps(task.max_steps if max_steps is None else max_steps)
         self._adopt(task)
-        self.control_period = period = _control_period(scene, control_period)
+        self.control_period = period = checks.checked_period(scene.robots[0], control_period)
         nominal = period if period > 0.0 else scene.robots[0].control_period  # [s]
         names = task.query.sensors
         sensor = Sensor(scene.joints, nominal, sensor_noise, sensor_delay, encoder_step, names)
@@ -140,6 +142,7 @@ class RobotEnv(DrawnEnv):
         self._state: WorldState | None = None
         self._first: dict[str, Any] = {}  # commands that go along with an episode's first action
         self._initial = InitialState()
+        self._variation = Variation()
         self._steps: int | None = None  # None: no episode is under way
         self._begun: _Step | None = None
         if backend is None or isinstance(backend, str):
@@ -230,16 +233,15 @@ class RobotEnv(DrawnEnv):
             SimulatorError: if the backend doesn't answer.
         """
         self._check_open()
-        options = self._checked_options(options or {})
+        options = checks.reset_options(self.task, options or {})
         super().reset(seed=seed)
         self._steps = self._begun = None
         info: dict[str, Any] = {}
         if self._randomisation is not None:
             variation, info["variation"] = self._randomisation.draw(self.np_random)
-            self.backend.vary(variation)
-        drawn = self.task.initial_state(
-            self.np_random
-        )  # even if it isn't used: streams stay the same
+            self._vary(variation)
+        # Drawn even if it isn't used: streams stay the same.
+        drawn = self.task.initial_state(self.np_random)
         self._initial = initial = options.get("initial_state", drawn)
         seed = int(self.np_random.integers(1, MOST_SEED)) if self._has_sensors else 0
         state = self.backend.reset(initial, seed)
@@ -260,18 +262,6 @@ class RobotEnv(DrawnEnv):
             **checks.checked(self.task, "info", self._judge.info(state), dict),
             **info,
         }
-
-    def _checked_options(self, options: dict[str, Any]) -> dict[str, Any]:
-        for name in options:
-            if name not in RESET_OPTIONS:
-                raise ValueError(
-                    f"reset knows no option '{name}'{did_you_mean(name, RESET_OPTIONS)}"
-                )
-        if "goal" in options and self._goal_task is None:
-            raise ValueError(f"{type(self.task).__name__} has no goal; only a GoalTask does")
-        if not isinstance(options.get("initial_state", self._initial), InitialState):
-            raise ValueError(f"initial_state is an InitialState, not {options['initial_state']!r}")
-        return options
 
     def _shown(self, state: WorldState) -> WorldState:
         """Returns what `apply` and `observe` see of a state: as much as where the policy is deployed."""
@@ -355,6 +345,45 @@ class RobotEnv(DrawnEnv):
         if type(info) is not dict:
             info = checks.checked(task, "info", info, dict)
         return observation, reward, terminated, truncated, info
+
+    def save_state(self) -> EnvSnapshot:
+        """Returns all that decides the future: of the world, the episode, the task, and the generators.
+
+        A task, controller or plugin may say what it remembers, see `bullet_gazebo.held_state`. Spaces keep
+        their generators.
+
+        Raises:
+            gymnasium.error.ResetNeeded: before the first episode.
+            SimulatorError: if something's state can't be saved, or the world runs in real time.
+        """
+        self._check_open()
+        if self._state is None or self._begun is not None:
+            raise gymnasium.error.ResetNeeded("a snapshot is taken after a reset() or a step()")
+        episode = self._state, self._first, self._initial, self._steps
+        held = HeldState((self.task, self._sensor, self._actuator, self.np_random))
+        return EnvSnapshot(self, self._variation, episode, held, self.backend.save_state())
+
+    def restore_state(self, snapshot: EnvSnapshot) -> None:
+        """Returns to a snapshot of this environment: the same actions lead to the same bits.
+
+        Raises:
+            ValueError: if it is of another environment.
+            SimulatorError: if the world isn't that of the snapshot any more; a reset comes next.
+        """
+        self._check_open()
+        if snapshot.of is not self:
+            raise ValueError("the snapshot is of another environment; only that one can restore it")
+        self._steps = self._begun = None
+        if snapshot.variation != self._variation:
+            self._vary(snapshot.variation)
+        self.backend.restore_state(snapshot.world)
+        snapshot.held.recall()
+        self._state, self._first, self._initial, self._steps = snapshot.episode
+        self._show()
+
+    def _vary(self, variation: Variation) -> None:
+        self._variation = variation
+        self.backend.vary(variation)
 
     def close(self) -> None:
         """Closes the backend and the page; may be called twice."""

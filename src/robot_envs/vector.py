@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -12,9 +12,16 @@ from gymnasium.vector.utils import iterate
 from robot_envs.backends import LOCKSTEP, OWN, REALTIME
 from robot_envs.backends.backend import side_by_side
 from robot_envs.checks import action_reader
-from robot_envs.environment import RobotEnv
+from robot_envs.environment import EnvSnapshot, RobotEnv
 
 Results = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
+
+
+class VectorSnapshot(NamedTuple):
+    """What `RobotVectorEnv.save_state` returns."""
+
+    states: list[EnvSnapshot]
+    ended: np.ndarray  # (num_envs,) of bool: whose episode begins anew with the next step
 
 
 class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
@@ -110,6 +117,29 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
         given = super().step(actions)
         self._interrupted = False
         return given
+
+    def save_state(self) -> VectorSnapshot:
+        """Returns all that decides the future of each; see `RobotEnv.save_state`.
+
+        Raises:
+            gymnasium.error.ResetNeeded: before the first episode.
+            SimulatorError: if something's state can't be saved.
+        """
+        self._check_ready()
+        states = [robot.save_state() for robot in self._robots]
+        return VectorSnapshot(states, self._autoreset_envs.copy())
+
+    def restore_state(self, snapshot: VectorSnapshot) -> None:
+        """Returns to a snapshot of this vector: the same actions lead to the same bits.
+
+        Raises:
+            ValueError: if it is of another one.
+            SimulatorError: if a world isn't that of the snapshot any more; a reset comes next.
+        """
+        for robot, state in zip(self._robots, snapshot.states, strict=True):
+            robot.restore_state(state)
+        self._autoreset_envs = snapshot.ended.copy()
+        self._interrupted = False
 
     def _check_ready(self) -> None:
         if self.closed:

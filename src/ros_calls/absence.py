@@ -5,7 +5,10 @@ from ros_calls.master import NoAnswer, Refused
 
 START = "roslaunch gazebo_ros empty_world.launch"
 WORLD = "get_world_properties"  # every simulator has it
-LOCKSTEP = ("step_world", "prepare_step", "prepared_step", "advance_world", "set_link_friction")
+LOCKSTEP = (
+    "step_world", "prepare_step", "prepared_step", "advance_world", "save_state", "restore_state",
+    "set_link_friction",
+)  # fmt: skip
 MANAGER = "controller_manager"
 
 

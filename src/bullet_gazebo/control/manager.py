@@ -61,6 +61,11 @@ class ControllerManager:
         """The loaded controllers, in load order."""
         return list(self._controllers.values())
 
+    @property
+    def running(self) -> tuple[Controller, ...]:
+        """The running controllers, in load order."""
+        return tuple(self._running)
+
     def get(self, name: str) -> Controller:
         """Returns controller `name`."""
         if name not in self._controllers:

@@ -3,7 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from bullet_gazebo.physics.description import Inertia, ModelDescription
 from bullet_gazebo.physics.pose import Pose, Vector
@@ -136,6 +136,10 @@ class Body(ABC):
         """Returns whether gravity acts on link `name`."""
 
 
+class SnapshotError(ValueError):
+    """A snapshot can't be restored; the text says why. Nothing has changed then."""
+
+
 LinkOf = tuple[Body, str]
 """A body and the name of a link of it."""
 
@@ -145,6 +149,9 @@ class Engine(ABC):
 
     Velocities are cut at FURTHEST in a step, or at FASTEST, before they are integrated.
     """
+
+    recalled: Sequence[Contact] | None = None
+    """The contacts of a restored state, until the next step; None: those of the last step."""
 
     @abstractmethod
     def load(self, description: ModelDescription, pose: Pose) -> Body:
@@ -206,9 +213,25 @@ class Engine(ABC):
         one step to the next has nothing to do.
         """
 
-    @abstractmethod
-    def contacts(self) -> list[Contact]:
+    def contacts(self) -> Sequence[Contact]:
         """Returns where bodies touched in the last step."""
+        return self.touching() if self.recalled is None else self.recalled
+
+    @abstractmethod
+    def touching(self) -> Sequence[Contact]:
+        """Returns the contacts of the last step, as the engine has them."""
+
+    @abstractmethod
+    def save_state(self) -> Any:
+        """Returns all from which the engine steps on, but properties of bodies and of the world."""
+
+    @abstractmethod
+    def restore_state(self, state: Any) -> None:
+        """Returns to what `save_state` has returned; the same efforts lead to the same bits.
+
+        Raises:
+            SnapshotError: if the bodies aren't those any more.
+        """
 
     @abstractmethod
     def close(self) -> None:

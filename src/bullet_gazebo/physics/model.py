@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from math import isfinite
+from typing import NamedTuple
 
 from bullet_gazebo.physics.description import ModelDescription, Shape
 from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero
@@ -13,6 +14,15 @@ NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit
 GENTLEST = 0.5  # of the damping that would stop a joint in one step
 SPINNING = 0.1  # [rad] in a step: no base of a robot turns that fast by itself
 AT_REST: Twist = (ZERO, ZERO)
+
+
+class ModelState(NamedTuple):
+    """What `Model.save_state` returns; `motors` are speeds [rad/s, m/s] and efforts [N m, N] by joint."""
+
+    body: Body
+    properties: tuple[object, ...]
+    motors: dict[str, tuple[float, float]]
+    placed: Pose
 
 
 class Model:
@@ -218,6 +228,30 @@ class Model:
             body.set_friction(link, factor)
         for name in self._limp:
             body.set_gear(name, 0.0)
+
+    def properties(self) -> tuple[object, ...]:
+        """Returns what services change of it: what a snapshot of the world doesn't bring back."""
+        links, joints = self.description.links, self.description.joints
+        return (
+            tuple([(link.inertia, link.gravity) for link in links.values()]),
+            tuple([(each.kind, each.lower, each.upper, each.damping) for each in joints.values()]),
+            dict(self.damping_added),
+            dict(self._grip),
+        )
+
+    def save_state(self) -> ModelState:
+        """Returns what its body in the engine doesn't hold."""
+        return ModelState(self.body, self.properties(), dict(self._motors), self.placed)
+
+    def restore_state(self, state: ModelState) -> None:
+        """Returns to what `save_state` has returned; the body and the properties are the same."""
+        self.placed = state.placed
+        for name in self._motors.keys() | state.motors.keys():
+            unset = (0.0, self.description.joints[name].friction)
+            motor = state.motors.get(name, unset)
+            if motor != self._motors.get(name, unset):
+                self.body.set_motor(self._joints[name], *motor)
+        self._motors = dict(state.motors)
 
     def joint_states(self) -> list[tuple[float, float]]:
         """Returns position [rad, m] and velocity [rad/s, m/s] of each movable joint."""

@@ -1,7 +1,7 @@
 """The physics world: models by name, Gazebo's name look-up, and the step that integrates them all."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from bullet_gazebo.physics.description import (
     DescriptionError,
@@ -11,8 +11,8 @@ from bullet_gazebo.physics.description import (
     ModelDescription,
     Shape,
 )
-from bullet_gazebo.physics.engine import Engine, Twist
-from bullet_gazebo.physics.model import AT_REST, Model
+from bullet_gazebo.physics.engine import Engine, SnapshotError, Twist
+from bullet_gazebo.physics.model import AT_REST, Model, ModelState
 from bullet_gazebo.physics.pose import Pose, Vector, conjugate, rotate, subtract
 
 GRAVITY: Vector = (0.0, 0.0, -9.8)  # [m/s²], Gazebo's default
@@ -50,6 +50,15 @@ class Attachment:
     def joins(self, model: Model) -> bool:
         """Returns whether one of the links is of that model."""
         return model in (self.first[0], self.second[0])
+
+
+class WorldSnapshot(NamedTuple):
+    """What `World.save_state` returns; `settings` are gravity, time step and solver."""
+
+    models: list[tuple[Model, ModelState]]
+    settings: tuple[object, ...]
+    attachments: list[Attachment]
+    engine: Any  # the engine's
 
 
 class NameTaken(ValueError):
@@ -232,6 +241,36 @@ class World:
         self.engine.forget_contacts()
         for model in self.models.values():
             model.reset(joints)
+
+    def save_state(self) -> WorldSnapshot:
+        """Returns all from which it steps on, but what services set once: properties and models."""
+        return WorldSnapshot(
+            [(model, model.save_state()) for model in self.models.values()],
+            (self.gravity, self.time_step, self.solver),
+            list(self.attachments),
+            self.engine.save_state(),
+        )
+
+    def restore_state(self, snapshot: WorldSnapshot) -> None:
+        """Returns to what `save_state` has returned.
+
+        Raises:
+            SnapshotError: if there are other models now, or with other properties; nothing changes then.
+        """
+        if [model for model, _ in snapshot.models] != list(self.models.values()):
+            raise SnapshotError("models have come or gone since the snapshot")
+        if (self.gravity, self.time_step, self.solver) != snapshot.settings:
+            raise SnapshotError("gravity, time step or solver have changed since the snapshot")
+        for model, state in snapshot.models:
+            if model.body is not state.body or model.properties() != state.properties:
+                raise SnapshotError(
+                    f"model '{model.name}' has got other properties since the snapshot (inertia, gravity, "
+                    "damping, stops or friction)"
+                )
+        self.engine.restore_state(snapshot.engine)
+        self.attachments = list(snapshot.attachments)
+        for model, state in snapshot.models:
+            model.restore_state(state)
 
     def close(self) -> None:
         self.models.clear()

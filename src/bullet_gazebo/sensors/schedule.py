@@ -18,6 +18,8 @@ LONG_AGO = -(10**18)  # [ns]
 class SensorClock:
     """The clock of one sensor. `Schedule.add` makes it."""
 
+    of_the_present = ("has_newcomer", "heard")
+
     def __init__(
         self,
         schedule: "Schedule",
@@ -62,6 +64,8 @@ class SensorClock:
 class Schedule:
     """The clocks of all sensors. Without listeners it costs a tick nothing."""
 
+    of_the_present = ("_clocks", "_is_looking")
+
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self._clocks: list[SensorClock] = []
@@ -75,6 +79,7 @@ class Schedule:
         sim.moved.append(self._moved)
         sim.before_advance.append(self._catch_up)
         sim.reseeded.append(self._reseeded)
+        sim.restored.append(self._restored)
 
     def add(
         self, rate: float, measure: Measure, listens: Callable[[], bool], at_once: bool = True
@@ -171,6 +176,14 @@ class Schedule:
 
     def _reseeded(self, seed: int) -> None:
         self.moves_before_seed, self._begins_anew = self.moves, True
+
+    def _restored(self) -> None:
+        """Goes on from a snapshot, for those who listen now."""
+        now = self._sim.now
+        for clock in self._clocks:
+            if clock.due > now + max(clock.period, 1):  # it is newer than the snapshot
+                clock.plan(now)
+        self._take_part()
 
     def _moved(self) -> None:
         """Measures afresh all that is heard, after a service has moved bodies or reset time."""

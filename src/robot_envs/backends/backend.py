@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.scene import Scene
@@ -54,6 +54,14 @@ class RobotBackend(Protocol):
 
     def vary(self, variation: Variation) -> None:
         """Changes properties of robots and world, see `Variation`; call it before a reset."""
+        ...
+
+    def save_state(self) -> Any:
+        """Returns all that decides the world's future."""
+        ...
+
+    def restore_state(self, state: Any) -> None:
+        """Returns to what `save_state` has returned; the same commands lead to the same bits."""
         ...
 
     def poses(self, links: Sequence[str]) -> list[Pose]:

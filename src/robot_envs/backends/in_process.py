@@ -12,7 +12,9 @@ from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.manager import STRICT
 from bullet_gazebo.control.pid import Gains
 from bullet_gazebo.grippers import pid_followers
+from bullet_gazebo.held_state import UnknownState
 from bullet_gazebo.physics.description import DescriptionError, Inertia, is_control_plugin
+from bullet_gazebo.physics.engine import SnapshotError
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.model import Model
@@ -234,6 +236,20 @@ class InProcessWorld(RobotBackend):
 
     def vary(self, variation: Variation) -> None:
         self._apply(variation)
+
+    def save_state(self) -> Any:
+        try:
+            return self._sim.save_state(), self._held, self._begin
+        except UnknownState as error:
+            raise SimulatorError(str(error)) from error
+
+    def restore_state(self, state: Any) -> None:
+        snapshot, held, begin = state
+        try:
+            self._sim.restore_state(snapshot)
+        except SnapshotError as error:
+            raise SimulatorError(str(error)) from error
+        self._held, self._begin = held, begin
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         try:

@@ -14,6 +14,7 @@ from bullet_gazebo.physics.engine import (
     Body,
     Twist,
 )
+from bullet_gazebo.physics.engines.bullet_files import is_plane
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
 
@@ -76,7 +77,7 @@ class BulletBody(Body):
         self._unused = unused
         self._gears: dict[str, tuple[int, float]] = {}  # constraint and effort [N m, N]
         self._add_gears()
-        self._base = pose.compose(self._com)  # where the centre of mass was put last
+        self.base = pose.compose(self._com)  # where the centre of mass was put last
         if not is_plane(description):
             self.reset_base(pose)
 
@@ -332,8 +333,13 @@ class BulletBody(Body):
             )
 
     def _put_base(self, com: Pose) -> None:
-        self._base, self.moved = com, True
+        self.base, self.moved = com, True
         pybullet.resetBasePositionAndOrientation(self.id, *com, physicsClientId=self._client)
+
+    def put_fixed(self, base: Pose) -> None:
+        """Puts a fixed base where `base` was at another time."""
+        if self._fixed and base != self.base:
+            self._put_base(base)
 
     def go_on_from(self, other: "BulletBody") -> None:
         """Copies the state of a body of the same description.
@@ -341,7 +347,7 @@ class BulletBody(Body):
         It is bit-identical but for the orientation of a free base, which PyBullet doesn't return exactly.
         """
         if self._fixed:
-            self._put_base(other._base)
+            self._put_base(other.base)
         else:
             self._put_base(Pose(*pybullet.getBasePositionAndOrientation(other.id, other._client)))
             twist = pybullet.getBaseVelocity(other.id, other._client)
@@ -388,9 +394,3 @@ def _moments(inertia: Inertia) -> Vector:
 
 def _is_diagonal(inertia: Inertia) -> bool:
     return inertia.ixy == inertia.ixz == inertia.iyz == 0.0
-
-
-def is_plane(description: ModelDescription) -> bool:
-    """Returns whether the model is just a plane, which needs no file."""
-    shapes = [shape for link in description.links.values() for shape in link.collisions]
-    return len(description.links) == len(shapes) == 1 and shapes[0].kind == "plane"

@@ -2,18 +2,28 @@
 
 import contextlib
 import locale
+import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from bullet_gazebo.heap import give_back
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
-from bullet_gazebo.physics.engine import STRONGEST, Body, Contact, Engine, LinkOf, Side
+from bullet_gazebo.physics.engine import (
+    STRONGEST,
+    Body,
+    Contact,
+    Engine,
+    LinkOf,
+    Side,
+    SnapshotError,
+)
 from bullet_gazebo.physics.engine_form import at_joints, parents_first
-from bullet_gazebo.physics.engines.bullet_body import BASE, BulletBody, is_plane
-from bullet_gazebo.physics.engines.bullet_files import write_urdf
+from bullet_gazebo.physics.engines.bullet_body import BASE, BulletBody
+from bullet_gazebo.physics.engines.bullet_files import is_plane, write_urdf
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, scale
 from file_access.locks import scratch_folder
@@ -31,6 +41,26 @@ class BulletSettings:
     gravity: Vector = ZERO
     time_step: float = 1.0 / 240.0
     iterations: int = 50
+
+
+class Fastening(NamedTuple):
+    """Two links that are fixed to each other: PyBullet's constraint, what it was made of, and the bodies and
+    links that don't meet meanwhile."""
+
+    constraint: int
+    made_of: Sequence[Any]
+    apart: Sequence[tuple[int, int, int, int]]
+
+
+@dataclass
+class BulletState:
+    """What `BulletEngine.save_state` returns; `number` is PyBullet's."""
+
+    client: "BulletClient"
+    number: int
+    bases: dict[int, Pose]  # by body
+    fastened: dict[int, Fastening]
+    contacts: Sequence[Contact]
 
 
 class BulletClient:
@@ -56,8 +86,9 @@ class BulletClient:
         self._sides: dict[tuple[int, int], Side] = {}  # by body and link
         self._weightless: set[tuple[int, int]] = set()  # body and link, where gravity doesn't act
         self._sizes: dict[int, int] = {}  # [bytes] by body
-        # By constraint the bodies and links that don't meet meanwhile.
-        self._fastened: dict[int, list[tuple[int, int, int, int]]] = {}
+        self._fastened: dict[int, Fastening] = {}
+        self._count = count()  # of what was fastened
+        self._dropped: list[int] = []  # saved states that nobody has any more
         self.waste = 0
         self.apply(settings)
 
@@ -147,10 +178,43 @@ class BulletClient:
             self._hold_up()
         self._step()
 
-    def contacts(self) -> list[Contact]:
+    def touching(self) -> list[Contact]:
         """Returns where bodies touched in the last step, without those that were only near."""
         found = pybullet.getContactPoints(physicsClientId=self._client)
         return [_contact(each, self._sides) for each in found if each[9] > 0.0]
+
+    def save_state(self, contacts: Sequence[Contact]) -> BulletState:
+        """See `Engine.save_state`; `contacts` are those of the last step.
+
+        PyBullet can't restore contacts: it mixes up those of links with several shapes, and finds none after
+        a reset. So they begin anew, now and after each restore: the next step finds them again, and the
+        solver starts without the forces of the last one.
+        """
+        while self._dropped:
+            pybullet.removeState(self._dropped.pop(), self._client)
+        self.forget_contacts()
+        number = pybullet.saveState(self._client)
+        bases = {body.id: body.base for body in self._bodies.values()}
+        state = BulletState(self, number, bases, dict(self._fastened), contacts)
+        # Not removed at once: the garbage collector may run within a call of PyBullet.
+        weakref.finalize(state, self._dropped.append, number).atexit = False
+        return state
+
+    def restore_state(self, state: BulletState) -> None:
+        """See `Engine.restore_state`."""
+        if state.client is not self or state.bases.keys() != self._bodies.keys():
+            raise SnapshotError(
+                "bodies were loaded into the physics engine again since the snapshot"
+            )
+        for body, base in state.bases.items():
+            self._bodies[body].put_fixed(base)
+        pybullet.restoreState(state.number, physicsClientId=self._client)
+        self.forget_contacts()
+        if state.fastened.keys() != self._fastened.keys():
+            for number in list(self._fastened):
+                self.unfasten(number)
+            for number, fastening in state.fastened.items():
+                self._fix(number, fastening.made_of, fastening.apart)
 
     def forget_contacts(self) -> None:
         """See `Engine.forget_contacts`."""
@@ -166,23 +230,29 @@ class BulletClient:
         wanted = one.link_state(link)[0].compose(pose).compose(centre)
         place = wanted.relative_to(one.centre_of_mass(link))
         pairs = [(a, b) for a in one.pieces(link) for b in other.pieces(its)]
-        number: int = pybullet.createConstraint(
+        made_of = (
             one.id, pairs[0][0], other.id, pairs[0][1], pybullet.JOINT_FIXED, [0, 0, 0],
-            place.position, [0, 0, 0], place.orientation, [0, 0, 0, 1], self._client,
+            place.position, [0, 0, 0], place.orientation, [0, 0, 0, 1],
         )  # fmt: skip
-        pybullet.changeConstraint(number, maxForce=STRONGEST, physicsClientId=self._client)
-        self._fastened[number] = [(one.id, other.id, a, b) for a, b in pairs]
-        self._let_meet(number, False)
+        number = next(self._count)
+        self._fix(number, made_of, [(one.id, other.id, a, b) for a, b in pairs])
         return number
+
+    def _fix(
+        self, number: int, made_of: Sequence[Any], apart: Sequence[tuple[int, int, int, int]]
+    ) -> None:
+        constraint = pybullet.createConstraint(*made_of, self._client)
+        pybullet.changeConstraint(constraint, maxForce=STRONGEST, physicsClientId=self._client)
+        self._fastened[number] = Fastening(constraint, made_of, apart)
+        self._let_meet(number, False)
 
     def unfasten(self, number: int) -> None:
         """See `Engine.unfasten`."""
         self._let_meet(number, True)
-        del self._fastened[number]
-        pybullet.removeConstraint(number, self._client)
+        pybullet.removeConstraint(self._fastened.pop(number).constraint, self._client)
 
     def _let_meet(self, number: int, on: bool) -> None:
-        for pair in self._fastened[number]:
+        for pair in self._fastened[number].apart:
             pybullet.setCollisionFilterPair(*pair, int(on), self._client)
 
     def _hold_up(self) -> None:
@@ -270,13 +340,23 @@ class BulletEngine(Engine):
         self._client.apply(self._settings)
 
     def step(self) -> None:
+        self.recalled = None
         self._client.step()
 
+    def save_state(self) -> BulletState:
+        self.recalled = self.contacts()
+        return self._client.save_state(self.recalled)
+
+    def restore_state(self, state: BulletState) -> None:
+        self._client.restore_state(state)
+        self.recalled = state.contacts
+
     def forget_contacts(self) -> None:
+        self.recalled = None
         self._client.forget_contacts()
 
-    def contacts(self) -> list[Contact]:
-        return self._client.contacts()
+    def touching(self) -> list[Contact]:
+        return self._client.touching()
 
     def close(self) -> None:
         self._client.close()

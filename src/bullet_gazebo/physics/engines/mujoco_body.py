@@ -26,6 +26,7 @@ from bullet_gazebo.physics.pose import ZERO, Pose, Quaternion, Vector, add, conj
 FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
 TENDON = mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON
+INTEGRATION = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
 FREE_POSITIONS, FREE_VELOCITIES = 7, 6  # of a free base
@@ -78,6 +79,17 @@ class MujocoState:
             self.data.qfrc_applied[:] = 0.0
             self.data.xfrc_applied[:] = 0.0
             self.loaded = False
+
+    def save_state(self) -> np.ndarray:
+        """Returns all that MuJoCo integrates from."""
+        numbers = np.empty(mujoco.mj_stateSize(self.model, INTEGRATION))
+        mujoco.mj_getState(self.model, self.data, numbers, INTEGRATION)
+        return numbers
+
+    def restore_state(self, numbers: np.ndarray) -> None:
+        """Returns to what `save_state` has returned."""
+        mujoco.mj_setState(self.model, self.data, numbers, INTEGRATION)
+        self.stale = self.loaded = True  # some of the forces may act in the next step
 
     def set_time_step(self, dt: float) -> None:
         """Sets the length of a step [s]."""
@@ -333,6 +345,11 @@ class MujocoBody(Body):
         self._qpos[self._q[index]] = position
         self._qvel[self._v[index]] = velocity
         self._state.stale = True
+
+    def put_fixed(self, pose: Pose) -> None:
+        """Puts a fixed root link where it was at another time."""
+        if self._free is None and pose != self.pose:
+            self.reset_base(pose)
 
     def reset_base(self, pose: Pose, twist: Twist = (ZERO, ZERO)) -> None:
         self._state.stale = self.moved = True

@@ -202,13 +202,20 @@ def advertise_states(
     sim: Simulator, thinner: Thinner, clock_frequency: float, network: bool
 ) -> None:
     """Publishes /clock and, with `network`, the state topics, on the simulation's ticks."""
-    sim.listeners.append(ClockTopic(sim, thinner, clock_frequency))
+    topics: list[Callable[[int], None]] = [ClockTopic(sim, thinner, clock_frequency)]
     if network:
         for name, kind, make in (
             ("~link_states", LinkStates, _link_states),
             ("~model_states", ModelStates, _model_states),
         ):
-            sim.listeners.append(StateTopic(name, kind, sim, thinner, partial(make, sim)))
+            topics.append(StateTopic(name, kind, sim, thinner, partial(make, sim)))
+    sim.listeners += topics
+
+    def restored() -> None:
+        for topic in topics:
+            topic(sim.now)
+
+    sim.restored.append(restored)
 
 
 def _model_states(sim: Simulator) -> ModelStates:

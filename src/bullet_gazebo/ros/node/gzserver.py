@@ -47,6 +47,7 @@ from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.ros.scene import SceneOffer
 from bullet_gazebo.ros.services.advance_service import AdvanceService
+from bullet_gazebo.ros.services.snapshot_services import SnapshotServices
 from bullet_gazebo.ros.services.spawn_services import (
     SpawnServices,
     fill_world,
@@ -166,8 +167,10 @@ class GazeboNode:
         stepping: list[object] = []
         if self.sim.lockstep:
             one_at_a_time = threading.Lock()
+            steps = StepService(self.sim, plugins.sensing, self._watchdog, one_at_a_time)
             stepping = [
-                StepService(self.sim, plugins.sensing, self._watchdog, one_at_a_time),
+                steps,
+                SnapshotServices(self.sim, steps, one_at_a_time),
                 AdvanceService(self.sim, plugins.sensing, self._watchdog, thinner, one_at_a_time),
             ]
         spawning = threading.Lock()

@@ -124,7 +124,7 @@ class StepService:
         self._is_reading = False  # whether the step under way asks for them
         sim.before_advance.append(self._end_unread)
         # Contacts are those of the last tick, until a reset or a placing makes them void.
-        self._knows_contacts = False
+        self.knows_contacts = False
         self._services = [
             rospy.Service("~prepare_step", PrepareStep, self._prepare),
             rospy.Service("~prepared_step", PreparedStep, self._step_prepared),
@@ -175,7 +175,7 @@ class StepService:
             try:
                 if request.ticks > SLICE:
                     self._check_layout(prepared)
-                numbers, contacts = prepared.read(self._knows_contacts)
+                numbers, contacts = prepared.read(self.knows_contacts)
             except UnknownName as error:
                 return self._refused(f"the ticks are done, but meanwhile {error}")
             sensors = self._sensed() if prepared.sensors else []
@@ -229,7 +229,7 @@ class StepService:
                 return self._answer(status_message=f"StepWorld: {error}")
             self._advance(request.ticks, plan.commanded, request.joint_commands)
             try:
-                state = self._reader.read(self._knows_contacts)
+                state = self._reader.read(self.knows_contacts)
             except UnknownName as error:
                 fault = f"StepWorld: the ticks are done, but meanwhile {error}"
                 return self._answer(status_message=fault)
@@ -253,7 +253,7 @@ class StepService:
     def _begin(self, request: StepWorldRequest, plan: StepPlan) -> None:
         sim = self._sim
         if request.reset != StepWorldRequest.NONE or plan.placed_models or plan.placed_joints:
-            self._knows_contacts = False
+            self.knows_contacts = False
             with sim.one_move():
                 self._place(request, plan)
         plan.commanded.send(list(request.commands))
@@ -282,7 +282,7 @@ class StepService:
                 self._sim.lock.yield_turn()
                 self._sim.await_holds()
             self._pass(ticks, commanded, of_joints)
-        self._knows_contacts = True
+        self.knows_contacts = True
 
     def _pass(self, ticks: int, commanded: Commanded, of_joints: Sequence[float]) -> None:
         if not of_joints:

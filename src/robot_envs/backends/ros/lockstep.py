@@ -1,12 +1,22 @@
 """Robots in a simulator over ROS that moves in lock-step."""
 
 import contextlib
+import secrets
+import weakref
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from bullet_gazebo_msgs.msg import SensorReading
-from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
+from bullet_gazebo_msgs.srv import (
+    RestoreState,
+    RestoreStateRequest,
+    SaveState,
+    SaveStateRequest,
+    StepWorld,
+    StepWorldRequest,
+)
 from gazebo_msgs.msg import ContactState
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
@@ -22,6 +32,7 @@ from robot_envs.backends.ros.running import (
     RunningSimulator,
     SharedWorld,
     SimulatorService,
+    check_success,
 )
 from robot_envs.backends.world_files import loose_joints
 from robot_envs.errors import SimulatorError
@@ -44,6 +55,16 @@ from robot_envs.world_state import (
 )
 from ros_calls.service import TIMEOUT
 from ros_utils.step_client import MOTION, PreparedSteps, StepAnswer, StepNames, StepRefused, time_of
+
+
+@dataclass(eq=False)
+class KeptSnapshot:
+    """A snapshot that the simulator keeps under a name."""
+
+    of: "LockstepWorld"
+    name: str
+    begun: int  # [ns], of the episode
+    held: dict[str, Any]
 
 
 class LockstepWorld(RobotBackend):
@@ -69,6 +90,9 @@ class LockstepWorld(RobotBackend):
             STEP_SERVICE, StepWorld, persistent=True, timeout=timeout + time_of(ticks)
         )
         self._steps = PreparedSteps(STEP_SERVICE, timeout, SimulatorService)
+        self._save = SimulatorService("/gazebo/save_state", SaveState, persistent=True)
+        self._restore = SimulatorService("/gazebo/restore_state", RestoreState, persistent=True)
+        self._dropped: list[str] = []  # names of snapshots that nobody has any more
         moved = ((robot.model, name) for robot, name in scene.moved.values())
         loose = loose_joints(scene.robots[0].world, scene.objects)
         self._moved = [f"{model}::{name}" for model, name in (*moved, *loose)]
@@ -188,9 +212,12 @@ class LockstepWorld(RobotBackend):
         except StepRefused as error:
             raise self._refusal(str(error)) from error
         except SimulatorError:
-            self._reset.close()  # both were to the same simulator
-            self._steps.close()
+            self._hang_up()  # all were to the same simulator
             raise
+
+    def _hang_up(self) -> None:
+        for each in (self._reset, self._steps, self._save, self._restore):
+            each.close()
 
     def _look(self, names: StepNames) -> StepAnswer:
         """Reads the world; no time passes."""
@@ -223,6 +250,24 @@ class LockstepWorld(RobotBackend):
         self._drop()  # before the next one's reset: the simulator takes requests as they come
         self._variation.undo()
 
+    def save_state(self) -> KeptSnapshot:
+        """See `RobotBackend.save_state`; the simulator keeps it until nobody has it any more."""
+        self._world.check_holder(self)
+        kept = KeptSnapshot(self, secrets.token_hex(8), self._begun, self._held)
+        request = SaveStateRequest(kept.name, [self._dropped.pop() for _ in self._dropped[:]])
+        self._succeed(self._save, request)
+        weakref.finalize(kept, self._dropped.append, kept.name).atexit = False
+        return kept
+
+    def restore_state(self, state: KeptSnapshot) -> None:
+        self._world.check_holder(self)
+        self._drop()
+        self._succeed(self._restore, RestoreStateRequest(state.name))
+        self._begun, self._held = state.begun, state.held
+
+    def _succeed(self, call: SimulatorService, request: Any) -> None:
+        check_success(self._call(call, request), call.name)
+
     def poses(self, links: Sequence[str]) -> list[Pose]:
         """See `RobotBackend.poses`; one call, however many there are."""
         self._take()
@@ -232,16 +277,14 @@ class LockstepWorld(RobotBackend):
     def close(self) -> None:
         """Closes the connection to the simulator; robots and objects are as they were found."""
         self._drop()
-        self._reset.close()
-        self._steps.close()
+        self._hang_up()
         self._variation.undo()
         with contextlib.suppress(SimulatorError):  # one that is gone has no objects any more
             self._world.leave(self)
 
     def disconnect(self) -> None:
         """Closes connections alone, where the simulator has ended, or will, with all that is in it."""
-        self._reset.close()
-        self._steps.close()
+        self._hang_up()
         self._variation.disconnect()
 
 

@@ -3,7 +3,7 @@
 import contextlib
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import rospy
@@ -13,7 +13,7 @@ from bullet_gazebo.simulator import NANOSECONDS
 from robot_envs.backends import backend
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.ros.bringup import bring_up
-from robot_envs.backends.ros.lockstep import LockstepWorld
+from robot_envs.backends.ros.lockstep import KeptSnapshot, LockstepWorld
 from robot_envs.backends.ros.own_simulator import OwnSimulator, check_memory
 from robot_envs.backends.ros.running import SharedWorld, physics_step
 from robot_envs.backends.world_files import world_models
@@ -46,6 +46,10 @@ class Journal:
     def forget_episode(self) -> None:
         """Forgets all but the variation."""
         self.initial, self.commands, self.last = None, [], None
+
+    def copied(self) -> "Journal":
+        """Returns a copy, to which later steps don't come."""
+        return replace(self, commands=list(self.commands))
 
     def replay(self, world: LockstepWorld, step: int) -> None:
         """Brings another simulator to the same state.
@@ -193,6 +197,22 @@ class OwnWorld(RobotBackend):
         journal.last = self._perform(lambda world: checked(world.act(commands), then))
         journal.commands.append(commands)
         return journal.last
+
+    def save_state(self) -> tuple[KeptSnapshot, Journal]:
+        self._need_episode()
+        return self._perform(lambda world: world.save_state()), self._journal.copied()
+
+    def restore_state(self, state: tuple[KeptSnapshot, Journal]) -> None:
+        kept, journal = state
+        self._journal = journal.copied()
+
+        def restore(world: LockstepWorld) -> None:
+            if world is kept.of:
+                world.restore_state(kept)
+            else:  # its simulator was replaced
+                journal.replay(world, self._step)
+
+        self._perform(restore)
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         return self._perform(lambda world: world.poses(links))

@@ -300,6 +300,12 @@ class RealtimeWorld(RobotBackend):
             self._world.claim(self)  # undoes what others have varied
         self._variation(variation)
 
+    def save_state(self) -> Any:
+        raise SimulatorError("a world in real time can't be saved; in lock-step it can")
+
+    def restore_state(self, state: Any) -> None:
+        raise SimulatorError("a world in real time can't be restored; in lock-step it can")
+
     def restore(self) -> None:
         """See `SharedBackend.restore`."""
         self._variation.undo()

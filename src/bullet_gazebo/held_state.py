@@ -1,0 +1,296 @@
+"""What objects hold, with all that they reach, and how it is put back into the same objects.
+
+Controllers, sensors, plugins and tasks keep their state in attributes. A `HeldState` copies these, and writes
+the copies back in place: whoever knows an object knows it still. It looks into containers, closures and bound
+methods, and at what OUTSIDE names it doesn't look. A class says itself what counts by
+
+    save_state()            returns it
+    restore_state(state)    takes it back
+
+or names attributes that a restore leaves alone: `of_the_present = ("_subscribers",)`.
+"""
+
+import pathlib
+import random
+import re
+import types
+import weakref
+from collections import deque
+from collections.abc import Callable, Iterable
+from enum import Enum
+from functools import partial
+from itertools import chain
+from operator import attrgetter, itemgetter
+from typing import Any
+
+import numpy as np
+
+# Names of classes begin with these: what threads and ROS own, what never changes while a world runs, and what
+# saves its own state.
+OUTSIDE = (
+    "_thread.", "concurrent.", "contextlib.", "logging.", "queue.", "socket.", "subprocess.", "threading.",
+    "xml.", "actionlib.", "dynamic_reconfigure.", "gymnasium.", "rospy.", "tf.", "tf2_ros.",
+    "bullet_gazebo.physics.", "bullet_gazebo.pictures.", "bullet_gazebo.ros.common.",
+    "bullet_gazebo.ros.control.", "bullet_gazebo.ros.scene.", "bullet_gazebo.ros.services.",
+    "bullet_gazebo.ros.plugins.plugin_loader.", "bullet_gazebo.ros.plugins.sensor_topics.Newcomers",
+    "bullet_gazebo.ros.plugins.sensor_topics.Topic", "bullet_gazebo.sensors.rays.",
+    "bullet_gazebo.sensors.sensing.Mount", "bullet_gazebo.simulator.Simulator",
+    "robot_envs.robot.", "robot_envs.scene.",
+)  # fmt: skip
+VALUES = (
+    type(None), bool, int, float, complex, str, bytes, range, slice, type, Enum, np.generic, np.dtype,
+    types.ModuleType, types.MappingProxyType, types.EllipsisType, re.Pattern, weakref.ref, pathlib.PurePath,
+    attrgetter, itemgetter,
+)  # fmt: skip
+
+Put = Callable[[Any, Any], object]
+Look = Callable[["HeldState", Any], Iterable[Any]]
+"""Notes what an object holds, and returns what it refers to."""
+
+
+class UnknownState(TypeError):
+    """An object's state can't be saved; the text names its type and what holds it."""
+
+
+class HeldState:
+    """What objects hold at present.
+
+    Args:
+        roots: the objects; what they refer to counts, too.
+
+    Raises:
+        UnknownState: if there is something whose state can't be read, such as an open file.
+    """
+
+    def __init__(self, roots: Iterable[Any]) -> None:
+        self._notes: list[tuple[Put, Any, Any]] = []  # what puts it back, where, and what
+        seen: dict[int, Any] = {}
+        waiting = list(roots)
+        while waiting:
+            each = waiting.pop()
+            kind = type(each)
+            look = _LOOKS.get(kind) or _look_of(kind)
+            if look is _nowhere or id(each) in seen:
+                continue
+            seen[id(each)] = each
+            try:
+                waiting.extend(look(self, each))
+            except UnknownState as error:
+                holder = next((type(one) for one in seen.values() if _refers(one, each)), kind)
+                raise UnknownState(f"{error}, which a {holder.__qualname__} holds") from None
+
+    def note(self, put: Put, target: Any, held: Any) -> None:
+        """Remembers to call `put(target, held)`."""
+        self._notes.append((put, target, held))
+
+    def recall(self) -> None:
+        """Puts everything back; may be called again and again."""
+        for put, target, held in self._notes:
+            put(target, held)
+
+
+def _nowhere(state: HeldState, each: Any) -> Iterable[Any]:
+    return ()
+
+
+def _into_tuple(state: HeldState, each: Iterable[Any]) -> Iterable[Any]:
+    return each
+
+
+def _into_list(state: HeldState, each: list[Any]) -> Iterable[Any]:
+    held = each.copy()
+    state.note(_put_list, each, held)
+    return held
+
+
+def _put_list(target: list[Any], held: list[Any]) -> None:
+    target[:] = held
+
+
+def _into_deque(state: HeldState, each: deque[Any]) -> Iterable[Any]:
+    held = tuple(each)
+    state.note(_put_deque, each, held)
+    return held
+
+
+def _put_deque(target: deque[Any], held: tuple[Any, ...]) -> None:
+    target.clear()
+    target.extend(held)
+
+
+def _into_set(state: HeldState, each: set[Any]) -> Iterable[Any]:
+    held = each.copy()
+    state.note(_put_mutable, each, held)
+    return held
+
+
+def _into_dict(state: HeldState, each: dict[Any, Any]) -> Iterable[Any]:
+    held = dict(each)
+    state.note(_put_mutable, each, held)
+    return held.values()
+
+
+def _put_mutable(target: Any, held: Any) -> None:
+    target.clear()  # the order of a dictionary counts
+    target.update(held)
+
+
+def _into_array(state: HeldState, each: np.ndarray) -> Iterable[Any]:
+    if each.flags.writeable:
+        state.note(np.copyto, each, each.copy())
+    return each.flat if each.dtype.hasobject else ()
+
+
+def _into_generator(state: HeldState, each: np.random.Generator) -> Iterable[Any]:
+    state.note(_put_generator, each, each.bit_generator.state)
+    return ()
+
+
+def _put_generator(target: np.random.Generator, held: Any) -> None:
+    target.bit_generator.state = held
+
+
+def _into_random(state: HeldState, each: random.Random) -> Iterable[Any]:
+    state.note(type(each).setstate, each, each.getstate())
+    return ()
+
+
+def _into_function(state: HeldState, each: types.FunctionType) -> Iterable[Any]:
+    return each.__closure__ or ()
+
+
+def _into_cell(state: HeldState, each: types.CellType) -> Iterable[Any]:
+    try:
+        held = each.cell_contents
+    except ValueError:  # nothing is assigned yet
+        return ()
+    state.note(_put_cell, each, held)
+    return (held,)
+
+
+def _put_cell(target: types.CellType, held: Any) -> None:
+    target.cell_contents = held
+
+
+def _into_method(state: HeldState, each: Any) -> Iterable[Any]:
+    return (each.__self__,)
+
+
+def _into_partial(state: HeldState, each: partial[Any]) -> Iterable[Any]:
+    return (each.func, *each.args, *each.keywords.values())
+
+
+def _into_own(state: HeldState, each: Any) -> Iterable[Any]:
+    state.note(type(each).restore_state, each, each.save_state())
+    return ()
+
+
+def _unreadable(state: HeldState, each: Any) -> Iterable[Any]:
+    kind = type(each)
+    raise UnknownState(
+        f"a snapshot can't save the state of a {kind.__module__}.{kind.__qualname__}"
+    )
+
+
+_LOOKS: dict[type, Look] = {
+    tuple: _into_tuple,
+    frozenset: _into_tuple,
+    list: _into_list,
+    dict: _into_dict,
+    set: _into_set,
+    deque: _into_deque,
+    np.ndarray: _into_array,
+    np.random.Generator: _into_generator,
+    random.Random: _into_random,
+    types.FunctionType: _into_function,
+    types.CellType: _into_cell,
+    types.MethodType: _into_method,
+    types.BuiltinMethodType: _into_method,
+    types.MethodWrapperType: _into_method,
+    partial: _into_partial,
+}
+_BASES = (tuple, list, dict, set, deque, np.ndarray, random.Random)
+
+
+def _look_of(kind: type) -> Look:
+    """Finds how to look into objects of a class, and remembers it."""
+    if issubclass(kind, VALUES) or f"{kind.__module__}.{kind.__qualname__}".startswith(OUTSIDE):
+        look: Look = _nowhere
+    elif hasattr(kind, "save_state") and hasattr(kind, "restore_state"):
+        look = _into_own
+    else:
+        look = _look_by_attributes(kind)
+    _LOOKS[kind] = look
+    return look
+
+
+def _look_by_attributes(kind: type) -> Look:
+    base = next((_LOOKS[each] for each in _BASES if issubclass(kind, each)), None)
+    slots = tuple(_slots(kind))
+    has_dict = kind.__dictoffset__ != 0
+    parts = [look for look in (base, _slots_look(slots) if slots else None) if look]
+    if has_dict:
+        parts.append(_dict_look(frozenset(getattr(kind, "of_the_present", ())), _is_frozen(kind)))
+    if not parts:
+        # A class of Python's without any attribute has an empty __slots__.
+        return _nowhere if "__slots__" in vars(kind) else _unreadable
+    if len(parts) == 1:
+        return parts[0]
+    return lambda state, each: list(chain.from_iterable(look(state, each) for look in parts))
+
+
+def _is_frozen(kind: type) -> bool:
+    return bool(getattr(getattr(kind, "__dataclass_params__", None), "frozen", False))
+
+
+def _slots(kind: type) -> Iterable[str]:
+    for each in kind.__mro__:
+        names = vars(each).get("__slots__", ())
+        for name in (names,) if isinstance(names, str) else names:
+            if name not in ("__dict__", "__weakref__"):
+                hidden = name.startswith("__") and not name.endswith("__")
+                yield f"_{each.__name__.lstrip('_')}{name}" if hidden else name
+
+
+def _dict_look(present: frozenset[str], frozen: bool) -> Look:
+    def look(state: HeldState, each: Any) -> Iterable[Any]:
+        own = each.__dict__
+        if frozen:
+            return list(own.values())
+        held = own.copy()
+        if present:
+            state.note(dict.update, own, {k: v for k, v in held.items() if k not in present})
+        else:
+            state.note(_put_attributes, own, held)
+        return held.values()
+
+    return look
+
+
+def _put_attributes(target: dict[str, Any], held: dict[str, Any]) -> None:
+    if target.keys() != held.keys():
+        target.clear()
+    target.update(held)
+
+
+def _slots_look(names: tuple[str, ...]) -> Look:
+    def look(state: HeldState, each: Any) -> Iterable[Any]:
+        held = [(name, getattr(each, name)) for name in names if hasattr(each, name)]
+        state.note(_put_slots, each, held)
+        return [value for _, value in held]
+
+    return look
+
+
+def _put_slots(target: Any, held: list[tuple[str, Any]]) -> None:
+    for name, value in held:
+        object.__setattr__(target, name, value)
+
+
+def _refers(one: Any, other: Any) -> bool:
+    """Returns whether an object has another one as an attribute or element."""
+    if isinstance(one, dict):
+        return any(each is other for each in one.values())
+    if isinstance(one, (list, tuple, deque)):
+        return any(each is other for each in one)
+    return any(each is other for each in getattr(one, "__dict__", {}).values())

@@ -1,0 +1,79 @@
+"""save_state and restore_state: snapshots of a world in lock-step, kept under names (SaveState.srv)."""
+
+import random
+import threading
+from typing import Any, NamedTuple
+
+import numpy as np
+from bullet_gazebo_msgs.srv import RestoreState, RestoreStateRequest, SaveState, SaveStateRequest
+
+from bullet_gazebo.held_state import UnknownState
+from bullet_gazebo.physics.engine import SnapshotError
+from bullet_gazebo.ros.services import ServiceRefused, offer
+from bullet_gazebo.ros.services.step_service import StepService
+from bullet_gazebo.simulator import Simulator, Snapshot
+
+MOST = 1000  # names
+
+
+class KeptState(NamedTuple):
+    """A snapshot, whether its contacts are those of a tick, and the random numbers of the process."""
+
+    snapshot: Snapshot
+    knows_contacts: bool
+    python: Any
+    numpy: Any
+
+
+class SnapshotServices:
+    """The services; in lock-step only.
+
+    Args:
+        sim: the simulator.
+        steps: whose answers report contacts.
+        one_at_a_time: see `StepService`.
+    """
+
+    def __init__(self, sim: Simulator, steps: StepService, one_at_a_time: threading.Lock) -> None:
+        self._sim, self._steps, self._one_at_a_time = sim, steps, one_at_a_time
+        self._kept: dict[str, KeptState] = {}
+        self._services = [
+            offer("~save_state", SaveState, self._save),
+            offer("~restore_state", RestoreState, self._restore),
+        ]
+
+    def _save(self, request: SaveStateRequest) -> str:
+        with self._one_at_a_time, self._sim.lock:
+            for name in request.forget:
+                self._kept.pop(name, None)
+            if len(self._kept) >= MOST and request.name not in self._kept:
+                raise ServiceRefused(
+                    f"{MOST} states are kept already: name some that are to be forgotten"
+                )
+            self._sim.await_holds()
+            try:
+                snapshot = self._sim.save_state()
+            except UnknownState as error:
+                raise ServiceRefused(str(error)) from error
+            self._kept[request.name] = KeptState(
+                snapshot,
+                self._steps.knows_contacts,
+                random.getstate(),
+                np.random.get_state(legacy=False),
+            )
+        return "SaveState: state saved"
+
+    def _restore(self, request: RestoreStateRequest) -> str:
+        with self._one_at_a_time, self._sim.lock:
+            kept = self._kept.get(request.name)
+            if kept is None:
+                raise ServiceRefused(f"no state is kept under the name '{request.name}'")
+            self._sim.await_holds()
+            try:
+                self._sim.restore_state(kept.snapshot)
+            except SnapshotError as error:
+                raise ServiceRefused(str(error)) from error
+            self._steps.knows_contacts = kept.knows_contacts
+            random.setstate(kept.python)
+            np.random.set_state(kept.numpy)
+        return "RestoreState: state restored"
