@@ -396,6 +396,4 @@ class RobotEnv(DrawnEnv):
 
     def _check_open(self) -> None:
         if self._closed:
-            raise gymnasium.error.ClosedEnvironmentError(
-                "this environment is closed; make another one"
-            )
+            raise gymnasium.error.ClosedEnvironmentError("this environment is closed; make another")

@@ -29,9 +29,9 @@ def check_robot_env(
     Over each backend: observations are in their space and finite; flags are plain bools; the same seed and
     actions are bit-identical (again, after other episodes, in another instance, from a snapshot, with
     `begin_step`, and over every backend but real time); wrong actions and options are refused and move
-    nothing; truncation isn't termination; reset knows its options; the spec can be copied and pickled; pictures show motion; a closed
-    environment says so; rewards of goals agree; and Gymnasium's own checker finds nothing. In this process
-    also: vectors are bit-identical to environments alone.
+    nothing; truncation isn't termination; reset knows its options; the spec can be copied and pickled;
+    pictures show motion; a closed environment says so; rewards of goals agree; and Gymnasium's own checker
+    finds nothing. In this process also: vectors are bit-identical to environments alone.
 
     Args:
         env: an id, "my_arm/Reach-v0" or "my_module:my_arm/Reach-v0"; or a function that makes an

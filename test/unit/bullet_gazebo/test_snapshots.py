@@ -9,8 +9,9 @@ from support.robots.worlds import add_robot, start
 from bullet_gazebo.applied_forces import ActingTime, AppliedEffort, AppliedWrench
 from bullet_gazebo.control.trajectory_goals import Trajectory, TrajectoryPoint
 from bullet_gazebo.physics.engine import SnapshotError
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.physics.properties import JointProperties, set_joint_properties
 from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.sensors.sensing import Sensing
@@ -88,6 +89,24 @@ def test_a_snapshot_changes_nothing_where_nothing_touches(sim):
                     sim.save_state()
         runs.append(run)
     assert runs[0] == runs[1]
+
+
+@pytest.mark.extras("mujoco")
+def test_in_mujoco_it_changes_nothing_where_bodies_tumble_either():
+    runs = []
+    for saves in (False, True):
+        sim = Simulator(World(make_engine("mujoco")), lockstep=True)
+        sim.world.spawn("ground_plane", ground_plane(), Pose())
+        sim.world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 0.06), from_rpy(0.4, 0.3, 0.2)))
+        run = []
+        for _ in range(30):
+            run += future(sim, 10)
+            if saves:
+                with sim.lock:
+                    sim.save_state()
+        runs.append(run)
+        sim.world.close()
+    assert runs[0] == runs[1] and any(contacts for _, _, contacts, _ in runs[0])
 
 
 def test_bodies_that_tumble_and_touch(sim):

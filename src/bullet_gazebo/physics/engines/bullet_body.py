@@ -6,15 +6,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Link, ModelDescription
-from bullet_gazebo.physics.engine import (
-    FASTEST,
-    FURTHEST,
-    GEAR,
-    OVERLAP,
-    STRONGEST,
-    Body,
-    Twist,
-)
+from bullet_gazebo.physics.engine import FASTEST, FURTHEST, GEAR, OVERLAP, STRONGEST, Body, Twist
 from bullet_gazebo.physics.engines.bullet_files import is_plane
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
