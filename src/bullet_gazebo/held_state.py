@@ -40,8 +40,9 @@ OUTSIDE = (
 VALUES = (
     type(None), bool, int, float, complex, str, bytes, range, slice, type, Enum, np.generic, np.dtype,
     types.ModuleType, types.MappingProxyType, types.EllipsisType, re.Pattern, weakref.ref, pathlib.PurePath,
-    attrgetter, itemgetter,
+    attrgetter, itemgetter, BaseException,
 )  # fmt: skip
+MADE_IN_PYTHON = 1 << 9  # of a class's __flags__
 
 Put = Callable[[Any, Any], object]
 Look = Callable[["HeldState", Any], Iterable[Any]]
@@ -151,12 +152,17 @@ def _put_generator(target: np.random.Generator, held: Any) -> None:
 
 
 def _into_random(state: HeldState, each: random.Random) -> Iterable[Any]:
-    state.note(type(each).setstate, each, each.getstate())
+    state.note(random.Random.setstate, each, each.getstate())
+    return ()
+
+
+def _into_old_generator(state: HeldState, each: np.random.RandomState) -> Iterable[Any]:
+    state.note(np.random.RandomState.set_state, each, each.get_state(legacy=False))
     return ()
 
 
 def _into_function(state: HeldState, each: types.FunctionType) -> Iterable[Any]:
-    return each.__closure__ or ()
+    return (*(each.__closure__ or ()), *(each.__defaults__ or ()))
 
 
 def _into_cell(state: HeldState, each: types.CellType) -> Iterable[Any]:
@@ -201,6 +207,7 @@ _LOOKS: dict[type, Look] = {
     deque: _into_deque,
     np.ndarray: _into_array,
     np.random.Generator: _into_generator,
+    np.random.RandomState: _into_old_generator,
     random.Random: _into_random,
     types.FunctionType: _into_function,
     types.CellType: _into_cell,
@@ -225,7 +232,12 @@ def _look_of(kind: type) -> Look:
 
 
 def _look_by_attributes(kind: type) -> Look:
-    base = next((_LOOKS[each] for each in _BASES if issubclass(kind, each)), None)
+    known = next((each for each in _BASES if issubclass(kind, each)), None)
+    for each in kind.__mro__[:-1]:
+        if each.__flags__ & MADE_IN_PYTHON or (known and issubclass(each, known)):
+            continue
+        return _unreadable  # what is compiled may hold more than attributes
+    base = _LOOKS[known] if known else None
     slots = tuple(_slots(kind))
     has_dict = kind.__dictoffset__ != 0
     parts = [look for look in (base, _slots_look(slots) if slots else None) if look]

@@ -1,9 +1,10 @@
 """What objects hold is put back into the same objects."""
 
+import array
 import io
 import random
 import threading
-from collections import deque
+from collections import Counter, OrderedDict, defaultdict, deque
 from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
@@ -120,7 +121,10 @@ def test_what_functions_refer_to_counts():
     assert (count, part.x, part.log) == (0, 0, [])
 
 
-@pytest.mark.parametrize("generator", [np.random.default_rng(1), random.Random(1)])
+GENERATORS = [np.random.default_rng(1), random.Random(1), np.random.RandomState(1)]
+
+
+@pytest.mark.parametrize("generator", GENERATORS, ids=lambda each: type(each).__name__)
 def test_random_numbers_come_again(generator):
     part = Part(generator=generator)
     state = HeldState([part])
@@ -171,5 +175,27 @@ def test_locks_and_circles_are_no_obstacle():
 
 
 def test_what_cannot_be_read_is_named_with_its_holder():
-    with pytest.raises(UnknownState, match="generator, which a Part holds"):
-        HeldState([Part(inner=Part(items=(each for each in "abc")))])
+    class Samples(array.array):
+        """Has attributes, and numbers that aren't among them."""
+
+    for odd, name in (
+        ((each for each in "abc"), "generator"), (io.StringIO(), "StringIO"),
+        (array.array("d"), "array"), (Samples("d"), "Samples"),
+    ):  # fmt: skip
+        with pytest.raises(UnknownState, match=f"{name}, which a Part holds"):
+            HeldState([Part(inner=Part(item=odd))])
+
+
+def test_subclasses_of_containers_count_wholly():
+    names = OrderedDict(a=1, b=2)
+    counts = Counter("aab")
+    names.extra, many = [1], defaultdict(list, x=[1])
+    state = HeldState([names, counts, many])
+    names.move_to_end("a")
+    names.extra.append(2)
+    counts.update("bbb")
+    many["y"].append(1)
+    many["x"].append(2)
+    state.recall()
+    assert list(names) == ["a", "b"] and names.extra == [1]
+    assert counts == Counter("aab") and many == {"x": [1]} and many["z"] == []
