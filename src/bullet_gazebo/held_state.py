@@ -15,7 +15,7 @@ import random
 import re
 import types
 import weakref
-from collections import deque
+from collections import OrderedDict, defaultdict, deque
 from collections.abc import Callable, Iterable
 from enum import Enum
 from functools import partial
@@ -42,7 +42,7 @@ VALUES = (
     types.ModuleType, types.MappingProxyType, types.EllipsisType, re.Pattern, weakref.ref, pathlib.PurePath,
     attrgetter, itemgetter, BaseException,
 )  # fmt: skip
-MADE_IN_PYTHON = 1 << 9  # of a class's __flags__
+POINTER = 8  # [bytes]; to an attribute in __slots__
 
 Put = Callable[[Any, Any], object]
 Look = Callable[["HeldState", Any], Iterable[Any]]
@@ -51,6 +51,10 @@ Look = Callable[["HeldState", Any], Iterable[Any]]
 
 class UnknownState(TypeError):
     """An object's state can't be saved; the text names its type and what holds it."""
+
+
+ROOM = UnknownState.__basicsize__ - TypeError.__basicsize__
+"""What a class takes for its __dict__ and weak references [bytes]."""
 
 
 class HeldState:
@@ -203,6 +207,8 @@ _LOOKS: dict[type, Look] = {
     frozenset: _into_tuple,
     list: _into_list,
     dict: _into_dict,
+    OrderedDict: _into_dict,
+    defaultdict: _into_dict,
     set: _into_set,
     deque: _into_deque,
     np.ndarray: _into_array,
@@ -216,7 +222,7 @@ _LOOKS: dict[type, Look] = {
     types.MethodWrapperType: _into_method,
     partial: _into_partial,
 }
-_BASES = (tuple, list, dict, set, deque, np.ndarray, random.Random)
+_BASES = (tuple, list, OrderedDict, defaultdict, dict, set, deque, np.ndarray, random.Random)
 
 
 def _look_of(kind: type) -> Look:
@@ -232,13 +238,11 @@ def _look_of(kind: type) -> Look:
 
 
 def _look_by_attributes(kind: type) -> Look:
-    known = next((each for each in _BASES if issubclass(kind, each)), None)
-    for each in kind.__mro__[:-1]:
-        if each.__flags__ & MADE_IN_PYTHON or (known and issubclass(each, known)):
-            continue
-        return _unreadable  # what is compiled may hold more than attributes
-    base = _LOOKS[known] if known else None
+    known = next((each for each in _BASES if issubclass(kind, each)), object)
     slots = tuple(_slots(kind))
+    if kind.__basicsize__ > known.__basicsize__ + ROOM + POINTER * len(slots):
+        return _unreadable  # it is compiled, and holds more than attributes
+    base = _LOOKS.get(known)
     has_dict = kind.__dictoffset__ != 0
     parts = [look for look in (base, _slots_look(slots) if slots else None) if look]
     if has_dict:
