@@ -15,7 +15,7 @@ import random
 import re
 import types
 import weakref
-from collections import deque
+from collections import OrderedDict, defaultdict, deque
 from collections.abc import Callable, Iterable
 from enum import Enum
 from functools import partial
@@ -40,8 +40,9 @@ OUTSIDE = (
 VALUES = (
     type(None), bool, int, float, complex, str, bytes, range, slice, type, Enum, np.generic, np.dtype,
     types.ModuleType, types.MappingProxyType, types.EllipsisType, re.Pattern, weakref.ref, pathlib.PurePath,
-    attrgetter, itemgetter,
+    attrgetter, itemgetter, BaseException,
 )  # fmt: skip
+POINTER = 8  # [bytes]; to an attribute in __slots__
 
 Put = Callable[[Any, Any], object]
 Look = Callable[["HeldState", Any], Iterable[Any]]
@@ -50,6 +51,10 @@ Look = Callable[["HeldState", Any], Iterable[Any]]
 
 class UnknownState(TypeError):
     """An object's state can't be saved; the text names its type and what holds it."""
+
+
+ROOM = UnknownState.__basicsize__ - TypeError.__basicsize__
+"""What a class takes for its __dict__ and weak references [bytes]."""
 
 
 class HeldState:
@@ -151,12 +156,17 @@ def _put_generator(target: np.random.Generator, held: Any) -> None:
 
 
 def _into_random(state: HeldState, each: random.Random) -> Iterable[Any]:
-    state.note(type(each).setstate, each, each.getstate())
+    state.note(random.Random.setstate, each, each.getstate())
+    return ()
+
+
+def _into_old_generator(state: HeldState, each: np.random.RandomState) -> Iterable[Any]:
+    state.note(np.random.RandomState.set_state, each, each.get_state(legacy=False))
     return ()
 
 
 def _into_function(state: HeldState, each: types.FunctionType) -> Iterable[Any]:
-    return each.__closure__ or ()
+    return (*(each.__closure__ or ()), *(each.__defaults__ or ()))
 
 
 def _into_cell(state: HeldState, each: types.CellType) -> Iterable[Any]:
@@ -197,10 +207,13 @@ _LOOKS: dict[type, Look] = {
     frozenset: _into_tuple,
     list: _into_list,
     dict: _into_dict,
+    OrderedDict: _into_dict,
+    defaultdict: _into_dict,
     set: _into_set,
     deque: _into_deque,
     np.ndarray: _into_array,
     np.random.Generator: _into_generator,
+    np.random.RandomState: _into_old_generator,
     random.Random: _into_random,
     types.FunctionType: _into_function,
     types.CellType: _into_cell,
@@ -209,7 +222,7 @@ _LOOKS: dict[type, Look] = {
     types.MethodWrapperType: _into_method,
     partial: _into_partial,
 }
-_BASES = (tuple, list, dict, set, deque, np.ndarray, random.Random)
+_BASES = (tuple, list, OrderedDict, defaultdict, dict, set, deque, np.ndarray, random.Random)
 
 
 def _look_of(kind: type) -> Look:
@@ -225,8 +238,11 @@ def _look_of(kind: type) -> Look:
 
 
 def _look_by_attributes(kind: type) -> Look:
-    base = next((_LOOKS[each] for each in _BASES if issubclass(kind, each)), None)
+    known = next((each for each in _BASES if issubclass(kind, each)), object)
     slots = tuple(_slots(kind))
+    if kind.__basicsize__ > known.__basicsize__ + ROOM + POINTER * len(slots):
+        return _unreadable  # it is compiled, and holds more than attributes
+    base = _LOOKS.get(known)
     has_dict = kind.__dictoffset__ != 0
     parts = [look for look in (base, _slots_look(slots) if slots else None) if look]
     if has_dict:

@@ -6,14 +6,16 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import gymnasium
+import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import data_equivalence
 
-from bullet_gazebo.held_state import HeldState
+from bullet_gazebo.held_state import HeldState, UnknownState
 from bullet_gazebo.pictures.camera import CameraLike
 from robot_envs import checks
 from robot_envs.backends import LOCKSTEP, OWN, REALTIME, make_backend
 from robot_envs.backends.backend import RobotBackend, side_by_side
+from robot_envs.errors import SimulatorError
 from robot_envs.pictures.drawn import HEIGHT, WIDTH, DrawnEnv
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
@@ -40,7 +42,7 @@ class EnvSnapshot(NamedTuple):
 
     of: "RobotEnv"
     variation: Variation
-    episode: tuple[WorldState, dict[str, Any], InitialState, int | None]
+    episode: tuple[WorldState, dict[str, Any], InitialState, int | None, np.random.Generator]
     held: HeldState  # by the task, the imperfections and the generator
     world: Any  # the backend's
 
@@ -347,20 +349,20 @@ class RobotEnv(DrawnEnv):
         return observation, reward, terminated, truncated, info
 
     def save_state(self) -> EnvSnapshot:
-        """Returns all that decides the future: of the world, the episode, the task, and the generators.
-
-        A task, controller or plugin may say what it remembers, see `bullet_gazebo.held_state`. Spaces keep
-        their generators.
+        """Returns all that decides the future: of world, episode, task and generators.
 
         Raises:
             gymnasium.error.ResetNeeded: before the first episode.
-            SimulatorError: if something's state can't be saved, or the world runs in real time.
+            SimulatorError: if the task holds something unreadable, or the world runs in real time.
         """
         self._check_open()
         if self._state is None or self._begun is not None:
             raise gymnasium.error.ResetNeeded("a snapshot is taken after a reset() or a step()")
-        episode = self._state, self._first, self._initial, self._steps
-        held = HeldState((self.task, self._sensor, self._actuator, self.np_random))
+        episode = self._state, self._first, self._initial, self._steps, self.np_random
+        try:
+            held = HeldState((self.task, self._sensor, self._actuator, self.np_random))
+        except UnknownState as error:
+            raise SimulatorError(str(error)) from error
         return EnvSnapshot(self, self._variation, episode, held, self.backend.save_state())
 
     def restore_state(self, snapshot: EnvSnapshot) -> None:
@@ -378,7 +380,7 @@ class RobotEnv(DrawnEnv):
             self._vary(snapshot.variation)
         self.backend.restore_state(snapshot.world)
         snapshot.held.recall()
-        self._state, self._first, self._initial, self._steps = snapshot.episode
+        self._state, self._first, self._initial, self._steps, self.np_random = snapshot.episode
         self._show()
 
     def _vary(self, variation: Variation) -> None:
@@ -394,6 +396,4 @@ class RobotEnv(DrawnEnv):
 
     def _check_open(self) -> None:
         if self._closed:
-            raise gymnasium.error.ClosedEnvironmentError(
-                "this environment is closed; make another one"
-            )
+            raise gymnasium.error.ClosedEnvironmentError("this environment is closed; make another")

@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 from bullet_gazebo.physics.description import Inertia, ModelDescription
@@ -108,6 +108,17 @@ class Body(ABC):
         """Multiplies the friction that the collisions of `link` were loaded with by `factor`."""
 
     @abstractmethod
+    def motion(self) -> Any:
+        """Returns where it is, how it moves, and what acts on it in the next step."""
+
+    @abstractmethod
+    def move(self, motion: Any) -> None:
+        """Takes a motion that a body of the same description has had.
+
+        An engine may round: the same motion always leads to the same bits, but not to those that led to it.
+        """
+
+    @abstractmethod
     def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
         """Puts joint `index` at `position` with `velocity`; the other joints stay."""
 
@@ -151,7 +162,7 @@ class Engine(ABC):
     """
 
     recalled: Sequence[Contact] | None = None
-    """The contacts of a restored state, until the next step; None: those of the last step."""
+    """Contacts that count until the next step, as of a restored state; None: those of the last step."""
 
     @abstractmethod
     def load(self, description: ModelDescription, pose: Pose) -> Body:
@@ -222,16 +233,12 @@ class Engine(ABC):
         """Returns the contacts of the last step, as the engine has them."""
 
     @abstractmethod
-    def save_state(self) -> Any:
-        """Returns all from which the engine steps on, but properties of bodies and of the world."""
+    def fastened(self) -> Mapping[int, Any]:
+        """Returns what `fasten` has fixed, by number."""
 
     @abstractmethod
-    def restore_state(self, state: Any) -> None:
-        """Returns to what `save_state` has returned; the same efforts lead to the same bits.
-
-        Raises:
-            SnapshotError: if the bodies aren't those any more.
-        """
+    def refasten(self, fastened: Mapping[int, Any]) -> None:
+        """Fixes what was `fastened` at another time, and nothing else."""
 
     @abstractmethod
     def close(self) -> None:

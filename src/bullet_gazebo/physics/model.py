@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from math import isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from bullet_gazebo.physics.description import ModelDescription, Shape
 from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero
@@ -19,7 +19,7 @@ AT_REST: Twist = (ZERO, ZERO)
 class ModelState(NamedTuple):
     """What `Model.save_state` returns; `motors` are speeds [rad/s, m/s] and efforts [N m, N] by joint."""
 
-    body: Body
+    motion: Any  # the engine's
     properties: tuple[object, ...]
     motors: dict[str, tuple[float, float]]
     placed: Pose
@@ -240,11 +240,14 @@ class Model:
         )
 
     def save_state(self) -> ModelState:
-        """Returns what its body in the engine doesn't hold."""
-        return ModelState(self.body, self.properties(), dict(self._motors), self.placed)
+        """Returns where it is, how it moves, and its motors; from now on it moves as after a restore."""
+        motion = self.body.motion()
+        self.body.move(motion)
+        return ModelState(motion, self.properties(), dict(self._motors), self.placed)
 
     def restore_state(self, state: ModelState) -> None:
-        """Returns to what `save_state` has returned; the body and the properties are the same."""
+        """Returns to what `save_state` has returned; the properties are the same."""
+        self.body.move(state.motion)
         self.placed = state.placed
         for name in self._motors.keys() | state.motors.keys():
             unset = (0.0, self.description.joints[name].friction)

@@ -1,5 +1,6 @@
 """The physics world: models by name, Gazebo's name look-up, and the step that integrates them all."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ from bullet_gazebo.physics.description import (
     ModelDescription,
     Shape,
 )
-from bullet_gazebo.physics.engine import Engine, SnapshotError, Twist
+from bullet_gazebo.physics.engine import Contact, Engine, SnapshotError, Twist
 from bullet_gazebo.physics.model import AT_REST, Model, ModelState
 from bullet_gazebo.physics.pose import Pose, Vector, conjugate, rotate, subtract
 
@@ -58,7 +59,8 @@ class WorldSnapshot(NamedTuple):
     models: list[tuple[Model, ModelState]]
     settings: tuple[object, ...]
     attachments: list[Attachment]
-    engine: Any  # the engine's
+    fastened: Mapping[int, Any]  # the engine's
+    contacts: Sequence[Contact]
 
 
 class NameTaken(ValueError):
@@ -243,13 +245,25 @@ class World:
             model.reset(joints)
 
     def save_state(self) -> WorldSnapshot:
-        """Returns all from which it steps on, but what services set once: properties and models."""
-        return WorldSnapshot(
+        """Returns all from which it steps on, but what services set once: properties and models.
+
+        Engines can't save contacts. So those begin anew, now and after each restore: the next step finds
+        them again, but the solver of PyBullet starts without the forces of the last one.
+        """
+        contacts = self.engine.contacts()
+        snapshot = WorldSnapshot(
             [(model, model.save_state()) for model in self.models.values()],
             (self.gravity, self.time_step, self.solver),
             list(self.attachments),
-            self.engine.save_state(),
+            self.engine.fastened(),
+            contacts,
         )
+        self._recall(contacts)
+        return snapshot
+
+    def _recall(self, contacts: Sequence[Contact]) -> None:
+        self.engine.forget_contacts()
+        self.engine.recalled = contacts
 
     def restore_state(self, snapshot: WorldSnapshot) -> None:
         """Returns to what `save_state` has returned.
@@ -262,15 +276,16 @@ class World:
         if (self.gravity, self.time_step, self.solver) != snapshot.settings:
             raise SnapshotError("gravity, time step or solver have changed since the snapshot")
         for model, state in snapshot.models:
-            if model.body is not state.body or model.properties() != state.properties:
+            if model.properties() != state.properties:
                 raise SnapshotError(
                     f"model '{model.name}' has got other properties since the snapshot (inertia, gravity, "
                     "damping, stops or friction)"
                 )
-        self.engine.restore_state(snapshot.engine)
+        self.engine.refasten(snapshot.fastened)
         self.attachments = list(snapshot.attachments)
         for model, state in snapshot.models:
             model.restore_state(state)
+        self._recall(snapshot.contacts)
 
     def close(self) -> None:
         self.models.clear()

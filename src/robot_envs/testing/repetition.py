@@ -8,6 +8,8 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import SyncVectorEnv, VectorEnv
 
+from robot_envs.environment import RobotEnv
+from robot_envs.errors import SimulatorError
 from robot_envs.testing.rollouts import (
     Given,
     Subject,
@@ -19,6 +21,7 @@ from robot_envs.testing.rollouts import (
 
 WORLDS, SEED = 3, 11
 TRIES = 20  # actions, to find another one
+ROUNDS = 3  # of snapshots
 
 
 def seeding(subject: Subject) -> None:
@@ -62,6 +65,36 @@ def two_phases(subject: Subject) -> None:
         env.begin_step(action)  # dropped by close()
         difference = differences(first, again) if env.backend.deterministic else ""
         assert not difference, f"steps that are begun first give other bits: {difference}"
+
+
+def snapshots(subject: Subject) -> None:
+    """After `restore_state` the same actions are bit-identical, also across the ends of episodes."""
+    with subject.made() as env:
+        env.reset(seed=SEED)
+        if not env.backend.deterministic:
+            expect_error(env.save_state, "save_state() in real time", SimulatorError)
+            return
+        for round_ in range(ROUNDS):
+            _go_on(env, round_, round_)
+            snapshot = env.save_state()
+            first = _go_on(env, subject.steps, SEED)
+            for when in ("at once", "after other actions", "after another episode"):
+                env.restore_state(snapshot)
+                _expect_same(first, _go_on(env, subject.steps, SEED), f"from a snapshot, {when}")
+                if when == "after other actions":
+                    env.reset(seed=round_)
+                _go_on(env, 5, round_)
+
+
+def _go_on(env: RobotEnv, steps: int, seed: int) -> Given:
+    """Returns the results of seeded random actions; an ended episode is followed by the next one."""
+    env.action_space.seed(seed)
+    given: Given = []
+    for _ in range(steps):
+        given.append(env.step(env.action_space.sample()))
+        if given[-1][2] or given[-1][3]:
+            given.append(env.reset())
+    return given
 
 
 def backends(subject: Subject, other: Subject) -> None:

@@ -27,11 +27,11 @@ def check_robot_env(
     """Checks that an environment does what environments of this library promise.
 
     Over each backend: observations are in their space and finite; flags are plain bools; the same seed and
-    actions are bit-identical (again, after other episodes, in another instance, with `begin_step`, and over
-    every backend but real time); wrong actions and options are refused and move nothing; truncation isn't
-    termination; reset knows its options; the spec can be copied and pickled; pictures show motion; a closed
-    environment says so; rewards of goals agree; and Gymnasium's own checker finds nothing. In this process
-    also: vectors are bit-identical to environments alone.
+    actions are bit-identical (again, after other episodes, in another instance, from a snapshot, with
+    `begin_step`, and over every backend but real time); wrong actions and options are refused and move
+    nothing; truncation isn't termination; reset knows its options; the spec can be copied and pickled;
+    pictures show motion; a closed environment says so; rewards of goals agree; and Gymnasium's own checker
+    finds nothing. In this process also: vectors are bit-identical to environments alone.
 
     Args:
         env: an id, "my_arm/Reach-v0" or "my_module:my_arm/Reach-v0"; or a function that makes an
@@ -106,6 +106,7 @@ CHECKS: tuple[Callable[[Subject], None], ...] = (
     episodes.goals,
     repetition.seeding,
     repetition.two_phases,
+    repetition.snapshots,
     repetition.specification,
     gymnasiums_checker,
 )

@@ -23,7 +23,7 @@ import genpy
 import pytest
 import rospkg
 import yaml
-from bullet_gazebo_msgs.srv import StepWorldRequest
+from bullet_gazebo_msgs.srv import RestoreStateRequest, SaveStateRequest, StepWorldRequest
 from gazebo_msgs.srv import GetWorldPropertiesRequest
 
 from bullet_gazebo.ros.clients import gzclient
@@ -53,6 +53,8 @@ SHORT = ["--episodes=2", "--eval-episodes=1"]
 REQUESTS = {
     "/gazebo/get_world_properties": GetWorldPropertiesRequest,
     "/gazebo/step_world": StepWorldRequest,
+    "/gazebo/save_state": SaveStateRequest,
+    "/gazebo/restore_state": RestoreStateRequest,
 }
 
 

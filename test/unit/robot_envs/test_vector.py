@@ -168,3 +168,23 @@ def test_where_one_cannot_be_made_the_others_are_closed():
     for env in made:
         with pytest.raises(gymnasium.error.ClosedEnvironmentError):
             env.reset()
+
+
+def test_all_go_on_from_a_snapshot_with_the_ends_of_their_episodes(many):
+    vector = many(num_envs=COUNT, max_steps=5).unwrapped
+    vector.reset(seed=1)
+    actions = np.random.default_rng(2).integers(0, 2, (12, COUNT))
+    for row in actions[:5]:
+        vector.step(row)  # all episodes end
+    snapshot = vector.save_state()
+    first = [vector.step(row) for row in actions]
+    vector.reset(seed=3)
+    vector.step(actions[0])
+    for _ in range(2):
+        vector.restore_state(snapshot)
+        again = [vector.step(row) for row in actions]
+        assert all(same(a, b, exact=True) for a, b in zip(first, again, strict=True))
+    other = many(num_envs=COUNT).unwrapped
+    other.reset(seed=1)
+    with pytest.raises(ValueError, match="of another environment"):
+        other.restore_state(snapshot)

@@ -3,17 +3,10 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import combinations
+from typing import NamedTuple
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Link, ModelDescription
-from bullet_gazebo.physics.engine import (
-    FASTEST,
-    FURTHEST,
-    GEAR,
-    OVERLAP,
-    STRONGEST,
-    Body,
-    Twist,
-)
+from bullet_gazebo.physics.engine import FASTEST, FURTHEST, GEAR, OVERLAP, STRONGEST, Body, Twist
 from bullet_gazebo.physics.engines.bullet_files import is_plane
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
@@ -22,6 +15,14 @@ BASE = -1
 # PyBullet's defaults for which links collide: bits of a link's group, and of the groups that it meets.
 DYNAMIC, STATIC, EVERYTHING = 1, 2, -1
 NO_STOP = 1e16  # [rad, m]
+
+
+class BulletMotion(NamedTuple):
+    """What `BulletBody.motion` returns."""
+
+    com: Pose  # of the base
+    twist: Twist
+    joints: list[tuple[float, float]]
 
 
 class BulletBody(Body):
@@ -77,7 +78,7 @@ class BulletBody(Body):
         self._unused = unused
         self._gears: dict[str, tuple[int, float]] = {}  # constraint and effort [N m, N]
         self._add_gears()
-        self.base = pose.compose(self._com)  # where the centre of mass was put last
+        self._base = pose.compose(self._com)  # where the centre of mass was put last
         if not is_plane(description):
             self.reset_base(pose)
 
@@ -333,27 +334,23 @@ class BulletBody(Body):
             )
 
     def _put_base(self, com: Pose) -> None:
-        self.base, self.moved = com, True
+        self._base, self.moved = com, True
         pybullet.resetBasePositionAndOrientation(self.id, *com, physicsClientId=self._client)
 
-    def put_fixed(self, base: Pose) -> None:
-        """Puts a fixed base where `base` was at another time."""
-        if self._fixed and base != self.base:
-            self._put_base(base)
-
-    def go_on_from(self, other: "BulletBody") -> None:
-        """Copies the state of a body of the same description.
-
-        It is bit-identical but for the orientation of a free base, which PyBullet doesn't return exactly.
-        """
+    def motion(self) -> BulletMotion:
+        joints = [(state[0], state[1]) for state in self._states()]
         if self._fixed:
-            self._put_base(other.base)
-        else:
-            self._put_base(Pose(*pybullet.getBasePositionAndOrientation(other.id, other._client)))
-            twist = pybullet.getBaseVelocity(other.id, other._client)
-            pybullet.resetBaseVelocity(self.id, *twist, physicsClientId=self._client)
-        for index, state in enumerate(other.joint_states()):
-            self.reset_joint(index, state[0], state[1])
+            return BulletMotion(self._base, (ZERO, ZERO), joints)
+        com = Pose(*pybullet.getBasePositionAndOrientation(self.id, self._client))
+        return BulletMotion(com, pybullet.getBaseVelocity(self.id, self._client), joints)
+
+    def move(self, motion: BulletMotion) -> None:
+        """See `Body.move`; only the orientation of a free base isn't what PyBullet has returned."""
+        if not self._fixed or motion.com != self._base:
+            self._put_base(motion.com)
+            pybullet.resetBaseVelocity(self.id, *motion.twist, physicsClientId=self._client)
+        for index, (position, velocity) in enumerate(motion.joints):
+            self.reset_joint(index, position, velocity)
 
     def link_state(self, name: str) -> tuple[Pose, Twist]:
         index = self._links[name]

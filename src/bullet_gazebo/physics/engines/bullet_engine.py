@@ -2,7 +2,6 @@
 
 import contextlib
 import locale
-import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,15 +11,7 @@ from typing import Any, NamedTuple
 
 from bullet_gazebo.heap import give_back
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
-from bullet_gazebo.physics.engine import (
-    STRONGEST,
-    Body,
-    Contact,
-    Engine,
-    LinkOf,
-    Side,
-    SnapshotError,
-)
+from bullet_gazebo.physics.engine import STRONGEST, Body, Contact, Engine, LinkOf, Side
 from bullet_gazebo.physics.engine_form import at_joints, parents_first
 from bullet_gazebo.physics.engines.bullet_body import BASE, BulletBody
 from bullet_gazebo.physics.engines.bullet_files import is_plane, write_urdf
@@ -52,17 +43,6 @@ class Fastening(NamedTuple):
     apart: Sequence[tuple[int, int, int, int]]
 
 
-@dataclass
-class BulletState:
-    """What `BulletEngine.save_state` returns; `number` is PyBullet's."""
-
-    client: "BulletClient"
-    number: int
-    bases: dict[int, Pose]  # by body
-    fastened: dict[int, Fastening]
-    contacts: Sequence[Contact]
-
-
 class BulletClient:
     """A PyBullet world in this process, without a window.
 
@@ -86,9 +66,8 @@ class BulletClient:
         self._sides: dict[tuple[int, int], Side] = {}  # by body and link
         self._weightless: set[tuple[int, int]] = set()  # body and link, where gravity doesn't act
         self._sizes: dict[int, int] = {}  # [bytes] by body
-        self._fastened: dict[int, Fastening] = {}
+        self.fastened: dict[int, Fastening] = {}
         self._count = count()  # of what was fastened
-        self._dropped: list[int] = []  # saved states that nobody has any more
         self.waste = 0
         self.apply(settings)
 
@@ -183,37 +162,12 @@ class BulletClient:
         found = pybullet.getContactPoints(physicsClientId=self._client)
         return [_contact(each, self._sides) for each in found if each[9] > 0.0]
 
-    def save_state(self, contacts: Sequence[Contact]) -> BulletState:
-        """See `Engine.save_state`; `contacts` are those of the last step.
-
-        PyBullet can't restore contacts: it mixes up those of links with several shapes, and finds none after
-        a reset. So they begin anew, now and after each restore: the next step finds them again, and the
-        solver starts without the forces of the last one.
-        """
-        while self._dropped:
-            pybullet.removeState(self._dropped.pop(), self._client)
-        self.forget_contacts()
-        number = pybullet.saveState(self._client)
-        bases = {body.id: body.base for body in self._bodies.values()}
-        state = BulletState(self, number, bases, dict(self._fastened), contacts)
-        # Not removed at once: the garbage collector may run within a call of PyBullet.
-        weakref.finalize(state, self._dropped.append, number).atexit = False
-        return state
-
-    def restore_state(self, state: BulletState) -> None:
-        """See `Engine.restore_state`."""
-        if state.client is not self or state.bases.keys() != self._bodies.keys():
-            raise SnapshotError(
-                "bodies were loaded into the physics engine again since the snapshot"
-            )
-        for body, base in state.bases.items():
-            self._bodies[body].put_fixed(base)
-        pybullet.restoreState(state.number, physicsClientId=self._client)
-        self.forget_contacts()
-        if state.fastened.keys() != self._fastened.keys():
-            for number in list(self._fastened):
+    def refasten(self, fastened: Mapping[int, Fastening]) -> None:
+        """See `Engine.refasten`."""
+        if list(fastened) != list(self.fastened):
+            for number in list(self.fastened):
                 self.unfasten(number)
-            for number, fastening in state.fastened.items():
+            for number, fastening in fastened.items():
                 self._fix(number, fastening.made_of, fastening.apart)
 
     def forget_contacts(self) -> None:
@@ -243,16 +197,16 @@ class BulletClient:
     ) -> None:
         constraint = pybullet.createConstraint(*made_of, self._client)
         pybullet.changeConstraint(constraint, maxForce=STRONGEST, physicsClientId=self._client)
-        self._fastened[number] = Fastening(constraint, made_of, apart)
+        self.fastened[number] = Fastening(constraint, made_of, apart)
         self._let_meet(number, False)
 
     def unfasten(self, number: int) -> None:
         """See `Engine.unfasten`."""
         self._let_meet(number, True)
-        pybullet.removeConstraint(self._fastened.pop(number).constraint, self._client)
+        pybullet.removeConstraint(self.fastened.pop(number).constraint, self._client)
 
     def _let_meet(self, number: int, on: bool) -> None:
-        for pair in self._fastened[number].apart:
+        for pair in self.fastened[number].apart:
             pybullet.setCollisionFilterPair(*pair, int(on), self._client)
 
     def _hold_up(self) -> None:
@@ -327,6 +281,12 @@ class BulletEngine(Engine):
     def unfasten(self, number: int) -> None:
         self._client.unfasten(number)
 
+    def fastened(self) -> dict[int, Fastening]:
+        return dict(self._client.fastened)
+
+    def refasten(self, fastened: Mapping[int, Fastening]) -> None:
+        self._client.refasten(fastened)
+
     def set_gravity(self, gravity: Vector) -> None:
         self._settings.gravity = gravity
         self._client.apply(self._settings)
@@ -343,14 +303,6 @@ class BulletEngine(Engine):
         self.recalled = None
         self._client.step()
 
-    def save_state(self) -> BulletState:
-        self.recalled = self.contacts()
-        return self._client.save_state(self.recalled)
-
-    def restore_state(self, state: BulletState) -> None:
-        self._client.restore_state(state)
-        self.recalled = state.contacts
-
     def forget_contacts(self) -> None:
         self.recalled = None
         self._client.forget_contacts()
@@ -366,7 +318,7 @@ def _moved(description: ModelDescription, body: Body, client: BulletClient) -> B
     """Returns `body` reloaded into another world, in the same state."""
     assert isinstance(body, BulletBody)
     fresh = client.load(description, body.link_state(description.root)[0])
-    fresh.go_on_from(body)
+    fresh.move(body.motion())
     return fresh
 
 

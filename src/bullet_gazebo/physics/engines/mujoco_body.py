@@ -26,19 +26,22 @@ from bullet_gazebo.physics.pose import ZERO, Pose, Quaternion, Vector, add, conj
 FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
 TENDON = mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON
-INTEGRATION = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
 FREE_POSITIONS, FREE_VELOCITIES = 7, 6  # of a free base
 
 
 class BodyArrays(NamedTuple):
-    """State of one body, and what acts on it during the next step, as arrays of MuJoCo."""
+    """State of one body, and what acts on it during the next step, as arrays of MuJoCo, with the base last.
+
+    `pose` is that of a fixed root link.
+    """
 
     positions: np.ndarray
     velocities: np.ndarray
     efforts: np.ndarray
     wrenches: np.ndarray
+    pose: Pose
 
 
 @dataclass
@@ -79,17 +82,6 @@ class MujocoState:
             self.data.qfrc_applied[:] = 0.0
             self.data.xfrc_applied[:] = 0.0
             self.loaded = False
-
-    def save_state(self) -> np.ndarray:
-        """Returns all that MuJoCo integrates from."""
-        numbers = np.empty(mujoco.mj_stateSize(self.model, INTEGRATION))
-        mujoco.mj_getState(self.model, self.data, numbers, INTEGRATION)
-        return numbers
-
-    def restore_state(self, numbers: np.ndarray) -> None:
-        """Returns to what `save_state` has returned."""
-        mujoco.mj_setState(self.model, self.data, numbers, INTEGRATION)
-        self.stale = self.loaded = True  # some of the forces may act in the next step
 
     def set_time_step(self, dt: float) -> None:
         """Sets the length of a step [s]."""
@@ -258,18 +250,18 @@ class MujocoBody(Body):
             self.set_gear(name, effort)
 
     def motion(self) -> BodyArrays:
-        """Returns a copy of its state, with the base last."""
         q, v = self._places()
         wrenches = self._state.data.xfrc_applied[list(self._ids.values())]
-        return BodyArrays(self._qpos[q], self._qvel[v], self._qfrc[v], wrenches)
+        return BodyArrays(self._qpos[q], self._qvel[v], self._qfrc[v], wrenches, self.pose)
 
     def move(self, motion: BodyArrays) -> None:
-        """Restores its state after the world was recompiled."""
+        if self._free is None and motion.pose != self.pose:
+            self.reset_base(motion.pose)
         q, v = self._places()
         self._qpos[q], self._qvel[v] = motion.positions, motion.velocities
         self._qfrc[v] = motion.efforts
         self._state.data.xfrc_applied[list(self._ids.values())] = motion.wrenches
-        self._state.loaded = self._state.stale = True
+        self._state.loaded = self._state.stale = self.moved = True
 
     def _places(self) -> tuple[list[int], list[int]]:
         if self._free is None:
@@ -345,11 +337,6 @@ class MujocoBody(Body):
         self._qpos[self._q[index]] = position
         self._qvel[self._v[index]] = velocity
         self._state.stale = True
-
-    def put_fixed(self, pose: Pose) -> None:
-        """Puts a fixed root link where it was at another time."""
-        if self._free is None and pose != self.pose:
-            self.reset_base(pose)
 
     def reset_base(self, pose: Pose, twist: Twist = (ZERO, ZERO)) -> None:
         self._state.stale = self.moved = True

@@ -1,15 +1,14 @@
 """MuJoCo as physics engine: one model of the whole world, which is recompiled when it changes."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping
 from itertools import count
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from bullet_gazebo.physics.description import ModelDescription
-from bullet_gazebo.physics.engine import Body, Contact, Engine, LinkOf, Side, SnapshotError
+from bullet_gazebo.physics.engine import Body, Contact, Engine, LinkOf, Side
 from bullet_gazebo.physics.engine_form import check_bounds
 from bullet_gazebo.physics.engines.mujoco_body import MujocoBody, MujocoState
 from bullet_gazebo.physics.engines.mujoco_model import (
@@ -28,16 +27,9 @@ GRIPPED = 2.0  # of critical damping: between fingers with a gear a light object
 IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 IMPRATIO = 10.0  # how much stiffer friction is than the contact, so that nothing at rest creeps
 
+Joined = tuple[LinkOf, LinkOf, Pose]
+
 logger = logging.getLogger(__name__)
-
-
-class MujocoSnapshot(NamedTuple):
-    """What `MujocoEngine.save_state` returns."""
-
-    bodies: dict[str, Pose]  # of the root links, where those are fixed
-    fastened: dict[int, tuple[LinkOf, LinkOf, Pose]]
-    numbers: np.ndarray
-    contacts: Sequence[Contact]
 
 
 class MujocoEngine(Engine):
@@ -57,7 +49,7 @@ class MujocoEngine(Engine):
         self._bodies: dict[str, MujocoBody] = {}
         self._sides: dict[int, Side] = {}  # by number of the geom
         self._keys = count()
-        self._fastened: dict[int, tuple[LinkOf, LinkOf, Pose]] = {}
+        self._fastened: dict[int, Joined] = {}
         model = compile_spec(mujoco.MjSpec())
         self._state = MujocoState(model, mujoco.MjData(model))
         self._configure()
@@ -113,21 +105,13 @@ class MujocoEngine(Engine):
     def touching(self) -> list[Contact]:
         return self._state.contacts(self._sides)
 
-    def save_state(self) -> MujocoSnapshot:
-        bodies = {key: body.pose for key, body in self._bodies.items()}
-        numbers = self._state.save_state()
-        return MujocoSnapshot(bodies, dict(self._fastened), numbers, self.contacts())
+    def fastened(self) -> dict[int, Joined]:
+        return dict(self._fastened)
 
-    def restore_state(self, state: MujocoSnapshot) -> None:
-        if state.bodies.keys() != self._bodies.keys():
-            raise SnapshotError("bodies have come or gone since the snapshot")
-        if state.fastened != self._fastened:
-            self._fastened = dict(state.fastened)
+    def refasten(self, fastened: Mapping[int, Joined]) -> None:
+        if fastened != self._fastened:
+            self._fastened = dict(fastened)
             self._compile()
-        for key, pose in state.bodies.items():
-            self._bodies[key].put_fixed(pose)
-        self._state.restore_state(state.numbers)
-        self.recalled = state.contacts
 
     def close(self) -> None:
         self._bodies.clear()

@@ -5,7 +5,7 @@ import unittest
 
 import rospy
 import rostest
-from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
+from bullet_gazebo_msgs.srv import RestoreState, SaveState, StepWorld, StepWorldRequest
 from dynamic_reconfigure.client import Client as DynamicClient
 from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
 from gazebo_msgs.srv import GetModelState, SpawnModel, SpawnModelRequest
@@ -103,6 +103,32 @@ class Drives(unittest.TestCase):
             self.assertEqual((place.x, place.y, place.z), (move.x, move.y, move.z))
             self.assertEqual(message.header.stamp, transform.header.stamp)
         self.assertEqual(transform.child_frame_id, "base_footprint")
+
+    def test_a_vehicle_and_its_odometry_go_on_from_a_snapshot(self):
+        by_wheels = {"odometrySource": "encoder"} | DIFF["libgazebo_ros_diff_drive.so"]
+        self.spawn(two_wheels(**{"libgazebo_ros_diff_drive.so": by_wheels}))
+        odometry = self.hear("/odom", Odometry)
+        command, publisher = Twist(), self.publisher("/cmd_vel")
+        command.linear.x, command.angular.z = 0.3, 0.5
+        self.assertTrue(self.follow(publisher, command, odometry))
+        self.step(200)
+        self.newest(odometry)
+        self.assertTrue(call("/gazebo/save_state", SaveState, "driving", []).success)
+        runs = []
+        for _ in range(2):
+            odometry.messages.clear()
+            self.step(400)
+            self.newest(odometry)
+            # Sequence numbers count on.
+            told = [(m.header.stamp, repr(m.pose), repr(m.twist)) for m in odometry.messages]
+            now = self.state()
+            runs.append((told, repr(now.pose), repr(now.twist)))
+            call("/gazebo/reset_world", Empty)
+            self.step(30)
+            self.newest(odometry)
+            self.assertTrue(call("/gazebo/restore_state", RestoreState, "driving").success)
+        self.assertEqual(runs[0], runs[1])
+        self.assertGreater(len(runs[0][0]), 30)
 
     def test_a_diff_drive_controller_drives_and_tells(self):
         params = COVARIANCES | {

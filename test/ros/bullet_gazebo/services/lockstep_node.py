@@ -9,11 +9,13 @@ import rostest
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from gazebo_msgs.srv import GetWorldProperties
 from rosgraph_msgs.msg import Clock
+from snapshots_cases import SnapshotsTest
 from std_srvs.srv import Empty
 from support.ros.calls import BOUND, spawn_model
 from support.ros.manager import Manager
 from support.ros.subscribed import wait_until_heard
 
+__all__ = ["LockstepTest", "SnapshotsTest"]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"
 
 
@@ -120,4 +122,4 @@ class LockstepTest(unittest.TestCase):
 
 if __name__ == "__main__":
     rospy.init_node("lockstep_test")
-    rostest.rosrun("cartpole", "lockstep", LockstepTest)
+    rostest.rosrun("cartpole", "lockstep", "__main__")

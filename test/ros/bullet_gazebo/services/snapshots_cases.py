@@ -1,0 +1,98 @@
+"""save_state and restore_state, case by case, in a world in lock-step with the cart-pole in it."""
+
+import unittest
+
+from bullet_gazebo_msgs.srv import RestoreState, SaveState, StepWorld, StepWorldRequest
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Empty
+from support.ros.calls import call, delete_model, spawn_model
+from support.ros.subscribed import Listener
+
+CART = "stand_cart_position_controller"
+MOST = 1000  # states
+MS = 1_000_000  # [ns]
+
+
+def save(name, forget=()):
+    return call("/gazebo/save_state", SaveState, name, list(forget))
+
+
+def restore(name):
+    return call("/gazebo/restore_state", RestoreState, name)
+
+
+def step(ticks, command=None):
+    request = StepWorldRequest(ticks=ticks)
+    if command is not None:
+        request.controllers, request.commands = [CART], [command]
+    answer = call("/gazebo/step_world", StepWorld, request)
+    joints = answer.joint_states
+    return answer.sim_time, joints.position, joints.velocity, joints.effort
+
+
+def future():
+    return [step(3, 0.05 * (index % 5)) for index in range(30)]
+
+
+class SnapshotsTest(unittest.TestCase):
+    def setUp(self):
+        call("/gazebo/reset_simulation", Empty)
+        step(50, 0.2)
+
+    def test_the_same_commands_lead_to_the_same_bits(self):
+        self.assertTrue(save("here").success)
+        first = future()
+        self.assertTrue(restore("here").success)
+        self.assertEqual(future(), first)
+        call("/gazebo/reset_world", Empty)
+        step(7, -0.3)
+        self.assertTrue(restore("here").success)
+        self.assertEqual(future(), first)
+
+    def test_a_name_stands_for_its_newest_state(self):
+        save("there")
+        step(10, 0.3)
+        save("there")
+        later = future()
+        restore("there")
+        self.assertEqual(future(), later)
+
+    def test_time_goes_back_and_the_clock_says_so(self):
+        clock = Listener("/clock", Clock)
+        self.addCleanup(clock.close)
+        save("early")
+        step(100)
+        self.assertTrue(clock.wait_for(lambda each: each[-1].clock.to_nsec() == 150 * MS))
+        restore("early")
+        self.assertTrue(clock.wait_for(lambda each: each[-1].clock.to_nsec() == 50 * MS))
+
+    def test_an_unknown_name_is_refused_and_nothing_moves(self):
+        before = step(1)
+        answer = restore("nowhere")
+        self.assertFalse(answer.success)
+        self.assertIn("nowhere", answer.status_message)
+        self.assertAlmostEqual(step(1)[0], before[0] + 0.001, places=9)
+
+    def test_a_state_of_another_world_is_refused(self):
+        save("alone")
+        ball = (
+            '<robot name="ball"><link name="l"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" '
+            'ixy="0" ixz="0" iyz="0"/></inertial></link></robot>'
+        )
+        self.assertTrue(spawn_model("ball", ball, y=3.0).success)
+        answer = restore("alone")
+        self.assertFalse(answer.success)
+        self.assertIn("models", answer.status_message)
+        delete_model("ball")
+
+    def test_states_are_bounded_and_can_be_forgotten(self):
+        kept = 0
+        while save(f"state_{kept}").success:
+            kept += 1
+        self.assertLessEqual(kept, MOST)
+        self.assertFalse(save("one more").success)
+        self.assertTrue(save("state_0").success)  # a new one in the place of the old one
+        names = [f"state_{number}" for number in range(kept)]
+        self.assertTrue(save("one more", forget=[*names, "never saved"]).success)
+        self.assertFalse(restore("state_1").success)
+        self.assertTrue(restore("one more").success)

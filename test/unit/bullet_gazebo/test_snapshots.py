@@ -1,0 +1,278 @@
+"""Snapshots of a simulator: the same commands lead to the same bits, or the snapshot is refused."""
+
+import numpy as np
+import pytest
+from support.robots.cartpole import CONTROLLERS, cartpole_urdf
+from support.robots.grippers import cube, gripper
+from support.robots.worlds import add_robot, start
+
+from bullet_gazebo.applied_forces import ActingTime, AppliedEffort, AppliedWrench
+from bullet_gazebo.control.trajectory_goals import Trajectory, TrajectoryPoint
+from bullet_gazebo.physics.engine import SnapshotError
+from bullet_gazebo.physics.engines import make_engine
+from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.pose import Pose, from_rpy
+from bullet_gazebo.physics.properties import JointProperties, set_joint_properties
+from bullet_gazebo.physics.world import World, ground_plane
+from bullet_gazebo.sensors.sensing import Sensing
+from bullet_gazebo.sensors.sensor_readers import SensorReaders
+from bullet_gazebo.simulator import Simulator
+
+S = 1_000_000_000  # [ns]
+
+
+@pytest.fixture
+def sim(new_engine):
+    """A world in lock-step with ground, on each engine."""
+    simulator = Simulator(World(new_engine()), lockstep=True)
+    simulator.world.spawn("ground_plane", ground_plane(), Pose())
+    yield simulator
+    simulator.world.close()
+
+
+def future(sim, ticks=150):
+    """What a number of ticks leads to, tick by tick."""
+    seen = []
+    for _ in range(ticks):
+        with sim.lock:
+            sim.advance(1)
+        models = sim.world.models.values()
+        states = [(m.joint_states(), [m.link_state(link) for link in m.link_names]) for m in models]
+        contacts = [each[:5] for each in sim.world.engine.contacts()]
+        efforts = [j.effort for r in sim.robots for j in r.hardware.joints.values()]
+        seen.append((sim.now, states, contacts, efforts))
+    return seen
+
+
+def check_branches(sim, between, act=lambda: None, ticks=150):
+    """Checks that the future is the same after `between`, in which anything happens."""
+    with sim.lock:
+        snapshot = sim.save_state()
+    act()
+    first = future(sim, ticks)
+    for _ in range(2):
+        between()
+        with sim.lock:
+            sim.restore_state(snapshot)
+        act()
+        assert future(sim, ticks) == first
+    return first
+
+
+def test_a_controlled_robot_goes_on_as_before(sim):
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    start(robot, CONTROLLERS)
+    robot.manager.get("cart").command(0.3)
+    future(sim, 37)
+
+    def between():
+        robot.manager.get("cart").command(-0.2)
+        sim.reset_simulation()
+        future(sim, 11)
+
+    first = check_branches(sim, between)
+    assert first[-1][3] != first[0][3]
+
+
+def test_a_snapshot_changes_nothing_where_nothing_touches(sim):
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    start(robot, CONTROLLERS)
+    runs = []
+    for saves in (False, True):
+        sim.reset_simulation()
+        robot.manager.get("cart").command(0.3)
+        run = []
+        for _ in range(10):
+            run += future(sim, 10)
+            if saves:
+                with sim.lock:
+                    sim.save_state()
+        runs.append(run)
+    assert runs[0] == runs[1]
+
+
+@pytest.mark.extras("mujoco")
+def test_in_mujoco_it_changes_nothing_where_bodies_tumble_either():
+    runs = []
+    for saves in (False, True):
+        sim = Simulator(World(make_engine("mujoco")), lockstep=True)
+        sim.world.spawn("ground_plane", ground_plane(), Pose())
+        sim.world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 0.06), from_rpy(0.4, 0.3, 0.2)))
+        run = []
+        for _ in range(30):
+            run += future(sim, 10)
+            if saves:
+                with sim.lock:
+                    sim.save_state()
+        runs.append(run)
+        sim.world.close()
+    assert runs[0] == runs[1] and any(contacts for _, _, contacts, _ in runs[0])
+
+
+def test_bodies_that_tumble_and_touch(sim):
+    for number in range(4):
+        pose = Pose((0.02 * number, 0.01 * number, 0.1 + 0.09 * number))
+        sim.world.spawn(f"cube_{number}", parse_urdf(cube()), pose)
+    while not sim.world.engine.contacts():
+        future(sim, 1)
+    first = check_branches(sim, lambda: sim.reset_world() or future(sim, 30))
+    assert any(contacts for _, _, contacts, _ in first)
+
+
+def test_contacts_are_those_of_the_saved_tick_until_the_next_one(sim):
+    sim.world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 0.05)))
+    while not sim.world.engine.contacts():
+        future(sim, 1)
+    before = sim.world.engine.contacts()
+    with sim.lock:
+        snapshot = sim.save_state()
+        assert sim.world.engine.contacts() == before != []
+        sim.place_model(sim.world.models["cube"], Pose((0.0, 0.0, 5.0)), ((0.0,) * 3, (0.0,) * 3))
+    future(sim, 2)
+    assert not sim.world.engine.contacts()
+    with sim.lock:
+        sim.restore_state(snapshot)
+    assert sim.world.engine.contacts() == before
+
+
+def test_what_is_attached_comes_back_and_what_was_not_goes(sim):
+    robot = sim.world.spawn("gripper", parse_urdf(gripper()), Pose((0.0, 0.0, 0.3)))
+    box = sim.world.spawn("cube", parse_urdf(cube()), Pose((0.15, 0.0, 0.6)))
+    ends = (robot, "lift_link"), (box, "cube_link")
+
+    def attach():
+        sim.world.attach(*ends)
+
+    def detach():
+        sim.world.detach(sim.world.attachments[0])
+
+    attach()
+    future(sim, 20)
+    check_branches(sim, detach)
+    check_branches(sim, lambda: [detach(), attach()])
+    detach()
+    check_branches(sim, attach)
+    assert not sim.world.attachments
+
+
+def test_motors_efforts_and_wrenches_that_act_for_a_time(sim):
+    robot = sim.world.spawn("gripper", parse_urdf(gripper()), Pose((0.0, 0.0, 0.5)))
+    robot.set_motor("lift", 0.1, 50.0)
+    box = sim.world.spawn("cube", parse_urdf(cube()), Pose((1.0, 0.0, 0.1)))
+    sim.applied.efforts.append(AppliedEffort(robot, "lift", 20.0, ActingTime(0, S // 20)))
+    push = ((0.5, 0.0, 0.0), (0.0, 0.0, 0.01))
+    sim.applied.wrenches.append(AppliedWrench(box, "cube_link", push, ActingTime(0, S // 10)))
+    future(sim, 20)
+
+    def between():
+        future(sim, 200)
+        assert not sim.applied.efforts and not sim.applied.wrenches
+        robot.set_motor("lift", -0.3, 10.0)
+
+    check_branches(sim, between)
+
+
+def test_a_trajectory_is_followed_from_where_it_was(sim):
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    joint = {"joints": ["stand_cart"], "gains": {"stand_cart": {"p": 500.0, "i": 10.0, "d": 20.0}}}
+    start(robot, {"arm": {"type": "effort_controllers/JointTrajectoryController", **joint}})
+    arm = robot.manager.get("arm")
+
+    def way(*places):
+        points = [TrajectoryPoint((k + 1) * S // 5, [x]) for k, x in enumerate(places)]
+        arm.follow(Trajectory(["stand_cart"], points))
+
+    way(0.1, -0.2, 0.2)
+    future(sim, 150)
+    first = check_branches(sim, lambda: way(-0.3) or future(sim, 50), ticks=300)
+    assert max(abs(states[1][0][0][0]) for _, states, *_ in first) > 0.1
+
+
+IMU = (
+    '<gazebo reference="cart"><sensor type="imu" name="feel"><always_on>1</always_on>'
+    "<update_rate>100</update_rate><imu><linear_acceleration><x><noise type='gaussian'>"
+    "<stddev>0.1</stddev></noise></x></linear_acceleration></imu></sensor></gazebo></robot>"
+)
+
+
+def test_sensors_measure_the_same_with_the_same_noise(sim):
+    robot = add_robot(sim, "cartpole", cartpole_urdf().replace("</robot>", IMU))
+    start(robot, CONTROLLERS)
+    sensing = Sensing(sim, seed=3)
+    with sim.lock:
+        readers = SensorReaders(sim, sensing, ["feel"])
+    robot.manager.get("cart").command(0.2)
+    future(sim, 25)
+    with sim.lock:
+        snapshot = sim.save_state()
+
+    def measured():
+        seen = []
+        for _ in range(30):
+            future(sim, 5)
+            (taken,) = readers.read()
+            seen.append((taken.now, {k: v.tolist() for k, v in taken.values.items()}))
+        return seen
+
+    first = measured()
+    assert len({str(values) for _, values in first}) > 10
+    for seed in (5, 6):
+        sim.reseed(seed)
+        sim.reset_simulation()
+        measured()
+        with sim.lock:
+            sim.restore_state(snapshot)
+        assert measured() == first
+
+
+def test_another_world_is_refused_and_stays_as_it_is(sim, new_engine):
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    start(robot, CONTROLLERS)
+    model = robot.model
+    with sim.lock:
+        snapshot = sim.save_state()
+
+    def refused(why):
+        future(sim, 3)
+        before = sim.now, model.joint_states()
+        with sim.lock, pytest.raises(SnapshotError, match=why):
+            sim.restore_state(snapshot)
+        assert (sim.now, model.joint_states()) == before
+
+    changed = JointProperties(damping=0.5)
+    set_joint_properties(model, "cart_pole", changed, sim.world.time_step)
+    refused("cartpole.*other properties")
+    set_joint_properties(model, "cart_pole", JointProperties(damping=0.0), sim.world.time_step)
+    with sim.lock:
+        sim.restore_state(snapshot)  # all is as it was
+    sim.world.set_gravity((0.0, 0.0, -3.0))
+    refused("gravity")
+    sim.world.set_gravity((0.0, 0.0, -9.8))
+    robot.manager.switch([], ["cart"])
+    refused("controllers")
+    robot.manager.switch(["cart"], [])
+    sim.world.spawn("cube", parse_urdf(cube()), Pose((1.0, 0.0, 1.0)))
+    refused("models")
+    other = Simulator(World(new_engine()), lockstep=True)
+    with other.lock, pytest.raises(SnapshotError, match="another simulator"):
+        other.restore_state(snapshot)
+    other.world.close()
+
+
+def test_thousands_of_snapshots_are_freed(sim):
+    sim.world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 0.1)))
+    kept = []
+    for number in range(3000):
+        with sim.lock:
+            snapshot = sim.save_state()
+            if number % 1000 == 0:
+                kept.append((snapshot, future_pose(sim)))
+            sim.advance(1)
+    for snapshot, pose in kept:
+        with sim.lock:
+            sim.restore_state(snapshot)
+        assert future_pose(sim) == pose
+
+
+def future_pose(sim):
+    return np.array(sim.world.models["cube"].state()[0].position).tolist()
