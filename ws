@@ -113,6 +113,7 @@ run_tests() {  # [--fast] [ARG...]
     [[ -z $fast ]] || arguments=(-m "not ($NOT_FAST)" "${arguments[@]}")
     cd -- "$ROOT"
     unset PYTHONDONTWRITEBYTECODE  # hundreds of processes import the same modules
+    export PYTHONUNBUFFERED=1      # tests wait for lines that rospy and roslaunch don't flush into a pipe
     exec "$VENV/bin/python3" -m pytest --override-ini "cache_dir=$STATE/pytest" "${arguments[@]}"
 }
 
@@ -163,7 +164,10 @@ main() {
             steps=(debian venv test_tools companions build)
             [[ " $* " == *" --fast "* ]] || steps+=(extras)
             ;;
-        check) steps=(debian checkers venv test_tools doc_tools companions build) ;;
+        check)
+            look_for_checks "${@:2}"
+            steps=(debian checkers venv test_tools doc_tools companions build)
+            ;;
         docs) steps=(debian venv doc_tools companions build) ;;
         extras) steps=(debian venv extras companions build) ;;
         rviz | foreign) steps=(debian "$1" venv companions build) ;;

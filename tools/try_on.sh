@@ -63,9 +63,9 @@ fetched_by_pip() {  # checkout
 }
 
 as_readme() {
-    local failed=0 place=/root/cartpole set_up="./ws true" as_user=""
+    local failed=0 place=/opt/cartpole set_up="./ws true" as_user=""
     if [[ -n $CONTAINER ]]; then
-        place=/opt/cartpole set_up=tools/container.sh as_user="runuser --user cartpole -- env HOME=/home/cartpole"
+        set_up=tools/container.sh as_user="runuser --user cartpole -- env HOME=/home/cartpole"
     fi
     git clone --quiet -- "$CHECKOUT" "$PLACE$place"
     chown --recursive root:root "$PLACE$place"

@@ -24,13 +24,17 @@ check_dead_code() { "$VENV/bin/vulture"; }
 check_site() { mkdocs build --site-dir "$WS/docs/site"; }
 check_links() { "$VENV/bin/python3" tools/check_links.py; }
 
-check() {  # [check...]
-    local name failed=()
-    [[ $# -gt 0 ]] || set -- "${CHECKS[@]}"
+look_for_checks() {  # [check...]
+    local name
     for name in "$@"; do
         [[ -n ${CHECK_TITLE[$name]-} ]] ||
             fail_usage "there is no check '$name', only ${CHECKS[*]}"
     done
+}
+
+check() {  # [check...]
+    local name failed=()
+    [[ $# -gt 0 ]] || set -- "${CHECKS[@]}"
     cd -- "$ROOT" || return
     for name in "$@"; do
         echo "== $name: ${CHECK_TITLE[$name]}"

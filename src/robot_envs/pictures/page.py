@@ -16,7 +16,7 @@ from bullet_gazebo.pictures.camera import ASPECT, CameraLike, overview
 from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.visuals import VisibleModel, visible_model
 from robot_envs.pictures.placement import Placement
-from web_viewer.address import LOOPBACK, find_address
+from web_viewer.address import LOOPBACK, PortInUse, find_address
 from web_viewer.server import serve, stop
 
 WORLD = "/world"  # node
@@ -151,10 +151,8 @@ class LivePage:
     def __init__(
         self, title: str, draw_on: Callable[[viser.ViserServer], RobotOnPage], period: float
     ) -> None:
-        address = find_address(LOOPBACK, None)
-        self._server = serve(address, title, (1.0, 1.0, 1.0), ZERO)
+        self._server = _serve(title)
         self._move, self._period, self._due = draw_on(self._server), period, time.monotonic()
-        print(f"the robot is shown on the page {address.url}", flush=True)
 
     def show(self) -> None:
         """Shows the robot as it is, once the state before has been shown long enough."""
@@ -165,6 +163,17 @@ class LivePage:
     def close(self) -> None:
         """Closes the page."""
         stop(self._server)
+
+
+def _serve(title: str) -> viser.ViserServer:
+    while True:
+        address = find_address(LOOPBACK, None)  # raises if no port is left
+        try:
+            server = serve(address, title, (1.0, 1.0, 1.0), ZERO)
+        except PortInUse:  # another process has looked for one at the same moment
+            continue
+        print(f"the robot is shown on the page {address.url}", flush=True)
+        return server
 
 
 def _draw_ground(server: viser.ViserServer) -> None:

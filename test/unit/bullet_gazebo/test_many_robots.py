@@ -99,24 +99,25 @@ def place_all(sim: Simulator) -> None:
 )
 def test_a_robot_costs_the_same_however_many_there_are(action):
     counts = []
-    for robots in (4, 8, 16):
+    for robots in (1, 4, 8, 16):
         sim, _ = add_robots(range(robots))
         with sim.lock:
             sim.advance(TICKS)
             counts.append(work(action, sim))
         sim.world.close()
-    few, more, most = counts
+    _, few, more, most = counts  # from Python 3.12 on, code that is traced anew counts less
     assert most - more == 2 * (more - few) > 0
 
 
 def test_one_more_robot_is_spawned_without_a_look_at_the_others():
     description = parse_urdf(cartpole_urdf())
     counts = []
-    for robots in (1, 16):
+    for robots in (1, 1, 16):
         sim, _ = add_robots(range(robots))
         counts.append(work(sim.world.spawn, "one more", description, Pose()))
         sim.world.close()
-    assert counts[1] < 1.1 * counts[0]
+    _, alone, among = counts
+    assert among < 1.1 * alone
 
 
 @pytest.fixture

@@ -258,10 +258,11 @@ def test_a_reader_that_goes_is_no_fault(root, tmp_path):
     command = [sys.executable, root / "scripts/new_robot.py", "my_arm", "--to", tmp_path]
     read, write = os.pipe()
     os.close(read)
-    for environment in ({}, {"PYTHONUNBUFFERED": "1"}):
+    for unbuffered in ("", "1"):
         done = subprocess.run(
-            command, stdout=write, stderr=subprocess.PIPE, check=False, env=os.environ | environment
-        )
+            command, stdout=write, stderr=subprocess.PIPE, check=False,
+            env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
+        )  # fmt: skip
         assert done.stderr == b"" and (tmp_path / "my_arm/package.xml").is_file()
         shutil.rmtree(tmp_path / "my_arm")
     os.close(write)

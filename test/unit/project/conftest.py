@@ -30,6 +30,17 @@ def ws(root):
 
 
 @pytest.fixture
+def open_root(root):
+    """Returns this checkout, if root can become another user who reaches it."""
+    if os.geteuid() != 0:
+        pytest.skip("only root can become a user without rights")
+    for folder in (root, *root.parents):
+        if not folder.stat().st_mode & 0o001:
+            pytest.skip(f"{folder} is closed to others")
+    return root
+
+
+@pytest.fixture
 def checkout(root, tmp_path, ws):
     """A second checkout, with a blank in its path, that holds just what the first steps need."""
     copy = tmp_path / "second checkout"

@@ -9,6 +9,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import sysconfig
 import time
 from pathlib import Path
@@ -21,6 +22,7 @@ ROOT = Path(__file__).resolve().parents[3]
 PAGE = ROOT / "docs/catkin.md"
 SERVICE = "/gazebo/get_world_properties"
 PACKAGES = sysconfig.get_path("purelib")
+INSTALLED = Path(sys.prefix).parent / "base.txt"  # requirements/base.txt without what Debian has
 MODULES = (
     "import bullet_gazebo_msgs.srv, cartpole.tasks, robot_envs.robot, rl_workbench.cli,"
     " gazebo_msgs.srv, ros_utils, bullet_gazebo.control,"
@@ -76,6 +78,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     shutil.copytree(
         ROOT, sources, ignore=shutil.ignore_patterns(".git", ".ws", "__pycache__", "runs")
     )
+    shutil.copy(INSTALLED, sources / "requirements")
     made = workspace.bash(
         f"cd {sources}; git init -q; git add -A; git -c user.name=a -c user.email=a@example.com commit -qm a"
     )

@@ -41,6 +41,11 @@ def test_the_command_line(ws, arguments, code, output):
     assert output in result.stdout + result.stderr
 
 
+def test_a_check_that_there_is_none_of_installs_nothing(ws, checkout):
+    result = ws("check", "lint", "nonsense", script=checkout / "ws")
+    assert result.returncode == 2 and not (checkout / ".ws").exists()
+
+
 def test_signal_reaches_the_command(ws, root):
     process = subprocess.Popen(
         [root / "ws", "python3", "-c", "import signal; print('up', flush=True); signal.pause()"],
@@ -179,20 +184,17 @@ def test_roscore_is_the_master_that_the_workspace_looks_for(ws, root, tmp_path):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         uri = f"http://127.0.0.1:{probe.getsockname()[1]}"
-    with (tmp_path / "log").open("w+") as log:
-        process = subprocess.Popen(
-            [root / "ws", "roscore"],
-            stdout=log, stderr=log,
-            env={**os.environ, "ROS_MASTER_URI": uri, "ROS_LOG_DIR": str(tmp_path)},
-        )  # fmt: skip
-        try:
-            while "started core service" not in (tmp_path / "log").read_text():
-                assert process.poll() is None
-                time.sleep(0.1)
-            assert ws("rosnode", "list", ROS_MASTER_URI=uri).stdout == "/rosout\n"
-        finally:
-            process.send_signal(signal.SIGINT)
-            assert process.wait(60) == 0
+    process = subprocess.Popen(
+        [root / "ws", "roscore"],
+        env={**os.environ, "ROS_MASTER_URI": uri, "ROS_LOG_DIR": str(tmp_path)},
+    )
+    try:
+        deadline = time.monotonic() + 120.0
+        while (nodes := ws("rosnode", "list", ROS_MASTER_URI=uri).stdout) != "/rosout\n":
+            assert process.poll() is None and time.monotonic() < deadline, nodes
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 0
 
 
 # --- tests -------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """A robot's environment on a page of viser's."""
 
 import math
+import socket
 import time
 import urllib.error
 import urllib.request
@@ -12,7 +13,9 @@ from support.robots.bodies import ROVER_ROBOT
 
 import cartpole  # noqa: F401 - registers its environments
 from bullet_gazebo.physics.pose import Pose
+from robot_envs.pictures import page
 from robot_envs.pictures.drawn import Camera, RobotPicture
+from web_viewer.address import LOOPBACK, Address
 
 
 def shapes(nodes, kind):
@@ -129,8 +132,21 @@ def test_the_render_mode_human_shows_the_robot_on_a_page_in_real_time(capsys):
     assert env.render() is None
     (line,) = capsys.readouterr().out.splitlines()
     address = line.removeprefix("the robot is shown on the page ")
-    with urllib.request.urlopen(address) as page:
-        assert page.status == 200
+    with urllib.request.urlopen(address) as opened:
+        assert opened.status == 200
     env.close()
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(address)
+
+
+def test_another_process_that_takes_the_port_at_the_same_moment_is_no_fault(monkeypatch, capsys):
+    with socket.create_server((LOOPBACK, 0)) as other:
+        found = iter([Address(LOOPBACK, other.getsockname()[1])])
+        look = page.find_address
+        monkeypatch.setattr(page, "find_address", lambda *where: next(found, None) or look(*where))
+        env = gymnasium.make("cartpole/Classic-v0", render_mode="human")
+        env.reset(seed=0)
+    address = capsys.readouterr().out.rpartition(" ")[2]
+    with urllib.request.urlopen(address) as opened:
+        assert opened.status == 200
+    env.close()

@@ -69,7 +69,10 @@ def test_every_algorithm_learns_from_goals_and_counts_its_successes(
 
 def test_successes_are_those_of_the_last_steps(tmp_path: Path) -> None:
     """Greedy ones, too: an episode that ends at its goal has more than the least return."""
-    told = summary(made(tmp_path, "dqn", total_timesteps=1500, end_e=0.3, eval_frequency=500))
+    often = {"joints": 1, "moves": 2}  # by chance alone it is near in a third of the episodes
+    told = summary(
+        made(tmp_path, "dqn", env_kwargs=often, total_timesteps=1500, end_e=0.3, eval_frequency=500)
+    )
     evaluation = told["evaluation"]
     assert 0 < told["success_rate_last_100"] < 1
     for success, total in zip(told["successes"], told["returns"], strict=True):
