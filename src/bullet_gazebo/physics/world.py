@@ -250,12 +250,13 @@ class World:
         Engines can't save contacts. So those begin anew, now and after each restore: the next step finds
         them again, but the solver of PyBullet starts without the forces of the last one.
         """
-        contacts = self.engine.contacts()
+        contacts, fastened = self.engine.contacts(), self.engine.fastened()
+        self.engine.refasten(fastened)  # in the order that a restore leads to
         snapshot = WorldSnapshot(
             [(model, model.save_state()) for model in self.models.values()],
             (self.gravity, self.time_step, self.solver),
             list(self.attachments),
-            self.engine.fastened(),
+            fastened,
             contacts,
         )
         self._recall(contacts)
@@ -280,6 +281,11 @@ class World:
                 raise SnapshotError(
                     f"model '{model.name}' has got other properties since the snapshot (inertia, gravity, "
                     "damping, stops or friction)"
+                )
+            attached = any(each.joins(model) for each in snapshot.attachments)
+            if attached and model.body is not state.body:
+                raise SnapshotError(
+                    f"model '{model.name}' was attached, and its links have been changed since the snapshot"
                 )
         self.engine.refasten(snapshot.fastened)
         self.attachments = list(snapshot.attachments)

@@ -163,12 +163,11 @@ class BulletClient:
         return [_contact(each, self._sides) for each in found if each[9] > 0.0]
 
     def refasten(self, fastened: Mapping[int, Fastening]) -> None:
-        """See `Engine.refasten`."""
-        if list(fastened) != list(self.fastened):
-            for number in list(self.fastened):
-                self.unfasten(number)
-            for number, fastening in fastened.items():
-                self._fix(number, fastening.made_of, fastening.apart)
+        """See `Engine.refasten`; the solver's result depends on the order of constraints."""
+        for number in list(self.fastened):
+            self.unfasten(number)
+        for number, fastening in fastened.items():
+            self._fix(number, fastening.made_of, fastening.apart)
 
     def forget_contacts(self) -> None:
         """See `Engine.forget_contacts`."""
