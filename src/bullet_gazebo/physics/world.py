@@ -57,6 +57,7 @@ class WorldSnapshot(NamedTuple):
     """What `World.save_state` returns; `settings` are gravity, time step and solver."""
 
     models: list[tuple[Model, ModelState]]
+    order: list[Model]  # in the engine
     settings: tuple[object, ...]
     attachments: list[Attachment]
     fastened: Mapping[int, Any]  # the engine's
@@ -254,6 +255,7 @@ class World:
         self.engine.refasten(fastened)  # in the order that a restore leads to
         snapshot = WorldSnapshot(
             [(model, model.save_state()) for model in self.models.values()],
+            self._order(),
             (self.gravity, self.time_step, self.solver),
             list(self.attachments),
             fastened,
@@ -261,6 +263,10 @@ class World:
         )
         self._recall(contacts)
         return snapshot
+
+    def _order(self) -> list[Model]:
+        models = {id(model.body): model for model in self.models.values()}
+        return [models[id(body)] for body in self.engine.order()]
 
     def _recall(self, contacts: Sequence[Contact]) -> None:
         self.engine.forget_contacts()
@@ -276,6 +282,10 @@ class World:
             raise SnapshotError("models have come or gone since the snapshot")
         if (self.gravity, self.time_step, self.solver) != snapshot.settings:
             raise SnapshotError("gravity, time step or solver have changed since the snapshot")
+        if self._order() != snapshot.order:
+            raise SnapshotError(
+                "links have been changed since the snapshot, and the engine takes the models in another order"
+            )
         for model, state in snapshot.models:
             if model.properties() != state.properties:
                 raise SnapshotError(

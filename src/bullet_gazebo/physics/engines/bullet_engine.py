@@ -72,6 +72,11 @@ class BulletClient:
         self.apply(settings)
 
     @property
+    def bodies(self) -> list[BulletBody]:
+        """In the order in which they were loaded."""
+        return list(self._bodies.values())
+
+    @property
     def live(self) -> int:
         return sum(self._sizes.values())
 
@@ -279,6 +284,9 @@ class BulletEngine(Engine):
 
     def unfasten(self, number: int) -> None:
         self._client.unfasten(number)
+
+    def order(self) -> list[BulletBody]:
+        return self._client.bodies
 
     def fastened(self) -> dict[int, Fastening]:
         return dict(self._client.fastened)
