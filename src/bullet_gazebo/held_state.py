@@ -16,7 +16,7 @@ import re
 import types
 import weakref
 from collections import OrderedDict, defaultdict, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
 from functools import partial
 from itertools import chain
@@ -28,14 +28,14 @@ import numpy as np
 # Names of classes begin with these: what threads and ROS own, what never changes while a world runs, and what
 # saves its own state.
 OUTSIDE = (
-    "_thread.", "concurrent.", "contextlib.", "logging.", "queue.", "socket.", "subprocess.", "threading.",
+    "_thread.", "concurrent.", "contextlib.", "logging.", "socket.", "subprocess.", "threading.",
     "xml.", "actionlib.", "dynamic_reconfigure.", "gymnasium.", "rospy.", "tf.", "tf2_ros.",
     "bullet_gazebo.physics.", "bullet_gazebo.pictures.", "bullet_gazebo.ros.common.",
     "bullet_gazebo.ros.control.", "bullet_gazebo.ros.scene.", "bullet_gazebo.ros.services.",
     "bullet_gazebo.ros.plugins.plugin_loader.", "bullet_gazebo.ros.plugins.sensor_topics.Newcomers",
     "bullet_gazebo.ros.plugins.sensor_topics.Topic", "bullet_gazebo.sensors.rays.",
     "bullet_gazebo.sensors.sensing.Mount", "bullet_gazebo.simulator.Simulator",
-    "robot_envs.robot.", "robot_envs.scene.",
+    "robot_envs.environment.", "robot_envs.robot.", "robot_envs.scene.", "robot_envs.vector.",
 )  # fmt: skip
 VALUES = (
     type(None), bool, int, float, complex, str, bytes, range, slice, type, Enum, np.generic, np.dtype,
@@ -125,6 +125,7 @@ def _put_deque(target: deque[Any], held: tuple[Any, ...]) -> None:
 
 def _into_set(state: HeldState, each: set[Any]) -> Iterable[Any]:
     held = each.copy()
+    _put_mutable(each, held)  # its order follows from how it was filled
     state.note(_put_mutable, each, held)
     return held
 
@@ -229,6 +230,8 @@ def _look_of(kind: type) -> Look:
     """Finds how to look into objects of a class, and remembers it."""
     if issubclass(kind, VALUES) or f"{kind.__module__}.{kind.__qualname__}".startswith(OUTSIDE):
         look: Look = _nowhere
+    elif issubclass(kind, random.SystemRandom):
+        look = _unreadable
     elif hasattr(kind, "save_state") and hasattr(kind, "restore_state"):
         look = _into_own
     else:
@@ -275,12 +278,17 @@ def _dict_look(present: frozenset[str], frozen: bool) -> Look:
             return list(own.values())
         held = own.copy()
         if present:
-            state.note(dict.update, own, {k: v for k, v in held.items() if k not in present})
+            state.note(partial(_put_others, present), own, held)
         else:
             state.note(_put_attributes, own, held)
         return held.values()
 
     return look
+
+
+def _put_others(present: frozenset[str], target: dict[str, Any], held: Mapping[str, Any]) -> None:
+    kept = {name: target[name] for name in present & target.keys()}
+    _put_attributes(target, {**held, **kept})
 
 
 def _put_attributes(target: dict[str, Any], held: dict[str, Any]) -> None:
@@ -291,16 +299,19 @@ def _put_attributes(target: dict[str, Any], held: dict[str, Any]) -> None:
 
 def _slots_look(names: tuple[str, ...]) -> Look:
     def look(state: HeldState, each: Any) -> Iterable[Any]:
-        held = [(name, getattr(each, name)) for name in names if hasattr(each, name)]
-        state.note(_put_slots, each, held)
-        return [value for _, value in held]
+        held = {name: getattr(each, name) for name in names if hasattr(each, name)}
+        state.note(partial(_put_slots, names), each, held)
+        return held.values()
 
     return look
 
 
-def _put_slots(target: Any, held: list[tuple[str, Any]]) -> None:
-    for name, value in held:
-        object.__setattr__(target, name, value)
+def _put_slots(names: tuple[str, ...], target: Any, held: Mapping[str, Any]) -> None:
+    for name in names:
+        if name in held:
+            object.__setattr__(target, name, held[name])
+        elif hasattr(target, name):
+            object.__delattr__(target, name)
 
 
 def _refers(one: Any, other: Any) -> bool:

@@ -43,7 +43,7 @@ class EnvSnapshot(NamedTuple):
     of: "RobotEnv"
     variation: Variation
     episode: tuple[WorldState, dict[str, Any], InitialState, int | None, np.random.Generator]
-    held: HeldState  # by the task, the imperfections and the generator
+    held: HeldState  # by the task, the imperfections, the randomisation and the generator
     world: Any  # the backend's
 
 
@@ -360,7 +360,8 @@ class RobotEnv(DrawnEnv):
             raise gymnasium.error.ResetNeeded("a snapshot is taken after a reset() or a step()")
         episode = self._state, self._first, self._initial, self._steps, self.np_random
         try:
-            held = HeldState((self.task, self._sensor, self._actuator, self.np_random))
+            parts = self.task, self._sensor, self._actuator, self._randomisation, self.np_random
+            held = HeldState(parts)
         except UnknownState as error:
             raise SimulatorError(str(error)) from error
         return EnvSnapshot(self, self._variation, episode, held, self.backend.save_state())

@@ -233,6 +233,10 @@ class Engine(ABC):
         """Returns the contacts of the last step, as the engine has them."""
 
     @abstractmethod
+    def order(self) -> Sequence[Body]:
+        """Returns the bodies in the order in which they were loaded: the solver's result may depend on it."""
+
+    @abstractmethod
     def fastened(self) -> Mapping[int, Any]:
         """Returns what `fasten` has fixed, by number."""
 

@@ -57,6 +57,7 @@ class WorldSnapshot(NamedTuple):
     """What `World.save_state` returns; `settings` are gravity, time step and solver."""
 
     models: list[tuple[Model, ModelState]]
+    order: list[Model]  # in the engine
     settings: tuple[object, ...]
     attachments: list[Attachment]
     fastened: Mapping[int, Any]  # the engine's
@@ -250,16 +251,22 @@ class World:
         Engines can't save contacts. So those begin anew, now and after each restore: the next step finds
         them again, but the solver of PyBullet starts without the forces of the last one.
         """
-        contacts = self.engine.contacts()
+        contacts, fastened = self.engine.contacts(), self.engine.fastened()
+        self.engine.refasten(fastened)  # in the order that a restore leads to
         snapshot = WorldSnapshot(
             [(model, model.save_state()) for model in self.models.values()],
+            self._order(),
             (self.gravity, self.time_step, self.solver),
             list(self.attachments),
-            self.engine.fastened(),
+            fastened,
             contacts,
         )
         self._recall(contacts)
         return snapshot
+
+    def _order(self) -> list[Model]:
+        models = {id(model.body): model for model in self.models.values()}
+        return [models[id(body)] for body in self.engine.order()]
 
     def _recall(self, contacts: Sequence[Contact]) -> None:
         self.engine.forget_contacts()
@@ -275,11 +282,20 @@ class World:
             raise SnapshotError("models have come or gone since the snapshot")
         if (self.gravity, self.time_step, self.solver) != snapshot.settings:
             raise SnapshotError("gravity, time step or solver have changed since the snapshot")
+        if self._order() != snapshot.order:
+            raise SnapshotError(
+                "links have been changed since the snapshot, and the engine takes the models in another order"
+            )
         for model, state in snapshot.models:
             if model.properties() != state.properties:
                 raise SnapshotError(
                     f"model '{model.name}' has got other properties since the snapshot (inertia, gravity, "
                     "damping, stops or friction)"
+                )
+            attached = any(each.joins(model) for each in snapshot.attachments)
+            if attached and model.body is not state.body:
+                raise SnapshotError(
+                    f"model '{model.name}' was attached, and its links have been changed since the snapshot"
                 )
         self.engine.refasten(snapshot.fastened)
         self.attachments = list(snapshot.attachments)

@@ -181,7 +181,8 @@ class Schedule:
         """Goes on from a snapshot, for those who listen now."""
         now = self._sim.now
         for clock in self._clocks:
-            if clock.due > now + max(clock.period, 1):  # it is newer than the snapshot
+            # One that is newer than the snapshot, or wasn't heard then.
+            if not now < clock.due <= now + max(clock.period, 1):
                 clock.plan(now)
         self._take_part()
 

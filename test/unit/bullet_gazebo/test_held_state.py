@@ -2,6 +2,7 @@
 
 import array
 import io
+import queue
 import random
 import threading
 from collections import Counter, OrderedDict, defaultdict, deque
@@ -198,3 +199,42 @@ def test_subclasses_of_containers_count_wholly():
     state.recall()
     assert list(names) == ["a", "b"]
     assert counts == Counter("aab") and many == {"x": [1]} and many["z"] == []
+
+
+def test_what_came_later_goes():
+    class Listening:
+        of_the_present = ("heard",)
+
+    slotted, listening = Slotted(1), Listening()
+    state = HeldState([slotted, listening])
+    slotted.unset, listening.later, listening.heard = 1, 1, True
+    state.recall()
+    assert not hasattr(slotted, "unset")
+    assert vars(listening) == {"heard": True}
+
+
+def test_a_set_is_gone_through_in_the_same_order():
+    draw = random.Random(0)
+    for _ in range(100):
+        numbers = set()
+        for number in draw.choices(range(60), k=40):
+            draw.choice((numbers.add, numbers.add, numbers.discard))(number)
+        state = HeldState([numbers])
+        order = list(numbers)
+        numbers.add(-1)
+        state.recall()
+        assert list(numbers) == order
+
+
+def test_a_queue_that_delays_counts():
+    late = queue.Queue()
+    late.put(1)
+    state = HeldState([late])
+    late.get()
+    state.recall()
+    assert late.get_nowait() == 1
+
+
+def test_random_numbers_without_a_state_are_refused():
+    with pytest.raises(UnknownState, match="SystemRandom"):
+        HeldState([random.SystemRandom()])

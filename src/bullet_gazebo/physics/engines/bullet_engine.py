@@ -72,6 +72,11 @@ class BulletClient:
         self.apply(settings)
 
     @property
+    def bodies(self) -> list[BulletBody]:
+        """In the order in which they were loaded."""
+        return list(self._bodies.values())
+
+    @property
     def live(self) -> int:
         return sum(self._sizes.values())
 
@@ -163,12 +168,11 @@ class BulletClient:
         return [_contact(each, self._sides) for each in found if each[9] > 0.0]
 
     def refasten(self, fastened: Mapping[int, Fastening]) -> None:
-        """See `Engine.refasten`."""
-        if list(fastened) != list(self.fastened):
-            for number in list(self.fastened):
-                self.unfasten(number)
-            for number, fastening in fastened.items():
-                self._fix(number, fastening.made_of, fastening.apart)
+        """See `Engine.refasten`; the solver's result depends on the order of constraints."""
+        for number in list(self.fastened):
+            self.unfasten(number)
+        for number, fastening in fastened.items():
+            self._fix(number, fastening.made_of, fastening.apart)
 
     def forget_contacts(self) -> None:
         """See `Engine.forget_contacts`."""
@@ -280,6 +284,9 @@ class BulletEngine(Engine):
 
     def unfasten(self, number: int) -> None:
         self._client.unfasten(number)
+
+    def order(self) -> list[BulletBody]:
+        return self._client.bodies
 
     def fastened(self) -> dict[int, Fastening]:
         return dict(self._client.fastened)

@@ -105,6 +105,9 @@ class MujocoEngine(Engine):
     def touching(self) -> list[Contact]:
         return self._state.contacts(self._sides)
 
+    def order(self) -> list[MujocoBody]:
+        return list(self._bodies.values())
+
     def fastened(self) -> dict[int, Joined]:
         return dict(self._fastened)
 
