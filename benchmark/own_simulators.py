@@ -3,9 +3,9 @@
 
     ./ws python3 benchmark/own_simulators.py [--out FOLDER] [--most 16] [--steps 500]
 
-Starts 1, 2, 4, ... up to `most`. Memory is each one's, master, simulator and their supervisor together, what processes
-share counted in parts (Pss). Replaced: one is killed after `steps` steps of an episode, and brought back to the
-same state. Prints a table and writes own_simulators.json.
+Starts 1, 2, 4, ... up to `most`. Memory is each one's: master, simulator and their
+supervisor together, what processes share counted in parts (Pss). Replaced: one is killed after `steps` steps
+of an episode, and brought back to the same state. Prints a table and writes own_simulators.json.
 """
 
 import os

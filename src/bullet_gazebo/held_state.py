@@ -7,7 +7,9 @@ methods, and at what OUTSIDE names it doesn't look. A class says itself what cou
     save_state()            returns it
     restore_state(state)    takes it back
 
-or names attributes that a restore leaves alone: `of_the_present = ("_subscribers",)`.
+or names attributes that belong to the present, which are neither saved nor put back:
+
+    of_the_present = ("_publisher",)
 """
 
 import pathlib
@@ -16,7 +18,9 @@ import re
 import types
 import weakref
 from collections import OrderedDict, defaultdict, deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from datetime import date, timedelta
+from decimal import Decimal
 from enum import Enum
 from functools import partial
 from itertools import chain
@@ -40,7 +44,8 @@ OUTSIDE = (
 VALUES = (
     type(None), bool, int, float, complex, str, bytes, range, slice, type, Enum, np.generic, np.dtype,
     types.ModuleType, types.MappingProxyType, types.EllipsisType, re.Pattern, weakref.ref, pathlib.PurePath,
-    attrgetter, itemgetter, BaseException,
+    attrgetter, itemgetter, BaseException, np.ufunc, type(np.clip), type(str.lower), date, timedelta,
+    Decimal,
 )  # fmt: skip
 POINTER = 8  # [bytes]; to an attribute in __slots__
 
@@ -69,6 +74,7 @@ class HeldState:
 
     def __init__(self, roots: Iterable[Any]) -> None:
         self._notes: list[tuple[Put, Any, Any]] = []  # what puts it back, where, and what
+        self._own: list[tuple[Any, Any]] = []  # objects that do it themselves
         seen: dict[int, Any] = {}
         waiting = list(roots)
         while waiting:
@@ -81,17 +87,53 @@ class HeldState:
             try:
                 waiting.extend(look(self, each))
             except UnknownState as error:
-                holder = next((type(one) for one in seen.values() if _refers(one, each)), kind)
-                raise UnknownState(f"{error}, which a {holder.__qualname__} holds") from None
+                raise UnknownState(f"{_place(each, seen.values())}: {error}") from None
+
+    def note_own(self, target: Any, held: Any) -> None:
+        """Remembers to call `target.restore_state(held)`."""
+        self._own.append((target, held))
 
     def note(self, put: Put, target: Any, held: Any) -> None:
         """Remembers to call `put(target, held)`."""
         self._notes.append((put, target, held))
 
     def recall(self) -> None:
-        """Puts everything back; may be called again and again."""
+        """Puts everything back; may be called again and again.
+
+        Raises:
+            UnknownState: if a class's own `restore_state` has raised; all else is put back then.
+        """
         for put, target, held in self._notes:
             put(target, held)
+        faults = []
+        for target, held in self._own:
+            try:
+                target.restore_state(held)
+            except Exception as error:  # noqa: BLE001 - a user's code
+                faults.append(f"restore_state() of {type(target).__qualname__} raised {error!r}")
+        if faults:
+            raise UnknownState("; ".join(faults))
+
+
+def _place(each: Any, seen: Collection[Any]) -> str:
+    """Returns where an object is: Class.attribute of the nearest object that has it, in containers or not."""
+    while True:
+        for holder in seen:
+            names = getattr(holder, "__dict__", {})
+            if name := next((name for name, value in names.items() if value is each), None):
+                return f"{type(holder).__qualname__}.{name}"
+        inner = each
+        each = next((one for one in seen if _contains(one, each)), None)
+        if each is None:
+            return type(inner).__qualname__
+
+
+def _contains(container: Any, each: Any) -> bool:
+    if isinstance(container, dict):
+        container = container.values()
+    elif not isinstance(container, (list, tuple, deque)):
+        return False
+    return any(one is each for one in container)
 
 
 def _nowhere(state: HeldState, each: Any) -> Iterable[Any]:
@@ -167,7 +209,8 @@ def _into_old_generator(state: HeldState, each: np.random.RandomState) -> Iterab
 
 
 def _into_function(state: HeldState, each: types.FunctionType) -> Iterable[Any]:
-    return (*(each.__closure__ or ()), *(each.__defaults__ or ()))
+    defaults = (*(each.__defaults__ or ()), *(each.__kwdefaults__ or {}).values())
+    return (*(each.__closure__ or ()), *defaults)
 
 
 def _into_cell(state: HeldState, each: types.CellType) -> Iterable[Any]:
@@ -192,15 +235,17 @@ def _into_partial(state: HeldState, each: partial[Any]) -> Iterable[Any]:
 
 
 def _into_own(state: HeldState, each: Any) -> Iterable[Any]:
-    state.note(type(each).restore_state, each, each.save_state())
+    try:
+        held = each.save_state()
+    except Exception as error:  # a user's code
+        raise UnknownState(f"save_state() raised {error!r}") from error
+    state.note_own(each, held)
     return ()
 
 
 def _unreadable(state: HeldState, each: Any) -> Iterable[Any]:
     kind = type(each)
-    raise UnknownState(
-        f"a snapshot can't save the state of a {kind.__module__}.{kind.__qualname__}"
-    )
+    raise UnknownState(f"a snapshot can't save a {kind.__module__}.{kind.__qualname__}")
 
 
 _LOOKS: dict[type, Look] = {
@@ -277,10 +322,9 @@ def _dict_look(present: frozenset[str], frozen: bool) -> Look:
         if frozen:
             return list(own.values())
         held = own.copy()
-        if present:
-            state.note(partial(_put_others, present), own, held)
-        else:
-            state.note(_put_attributes, own, held)
+        for name in present:
+            held.pop(name, None)
+        state.note(partial(_put_others, present) if present else _put_attributes, own, held)
         return held.values()
 
     return look
@@ -312,12 +356,3 @@ def _put_slots(names: tuple[str, ...], target: Any, held: Mapping[str, Any]) -> 
             object.__setattr__(target, name, held[name])
         elif hasattr(target, name):
             object.__delattr__(target, name)
-
-
-def _refers(one: Any, other: Any) -> bool:
-    """Returns whether an object has another one as an attribute or element."""
-    if isinstance(one, dict):
-        return any(each is other for each in one.values())
-    if isinstance(one, (list, tuple, deque)):
-        return any(each is other for each in one)
-    return any(each is other for each in getattr(one, "__dict__", {}).values())

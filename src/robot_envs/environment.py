@@ -374,14 +374,14 @@ class RobotEnv(DrawnEnv):
             SimulatorError: if the world isn't that of the snapshot any more; a reset comes next.
         """
         self._check_open()
-        if snapshot.of is not self:
+        if getattr(snapshot, "of", None) is not self:
             raise ValueError("the snapshot is of another environment; only that one can restore it")
         self._steps = self._begun = None
         if snapshot.variation != self._variation:
             self._vary(snapshot.variation)
         self.backend.restore_state(snapshot.world)
         snapshot.held.recall()
-        self._state, self._first, self._initial, self._steps, self.np_random = snapshot.episode
+        self._state, self._first, self._initial, self._steps, self._np_random = snapshot.episode
         self._show()
 
     def _vary(self, variation: Variation) -> None:

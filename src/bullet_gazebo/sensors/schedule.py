@@ -102,6 +102,7 @@ class Schedule:
         """As `add`; the caller holds the simulator's lock."""
         clock = SensorClock(self, rate, measure, listens, at_once, self._sim.now)
         self._clocks.append(clock)
+        self._sim.parts.append(clock)
         return clock
 
     def end(self, clock: SensorClock) -> None:
@@ -112,6 +113,7 @@ class Schedule:
         """Ends a clock, if it hasn't ended; the caller holds the simulator's lock."""
         if clock in self._clocks:
             self._clocks.remove(clock)
+            self._sim.parts.remove(clock)
             self._take_part()
 
     def look(self) -> None:

@@ -152,6 +152,28 @@ def test_an_object_may_say_itself_what_counts():
     assert own.x == 1 and own.file is None
 
 
+def test_an_objects_own_fault_is_named_and_the_rest_comes_back():
+    class Faulty:
+        def save_state(self):
+            return 1
+
+        def restore_state(self, state):
+            raise ValueError("no")
+
+    class Other(Faulty):
+        def save_state(self, path):
+            """Means something else by the name."""
+
+    part, after = Part(faulty=Faulty(), x=1), Part(x=1)
+    state = HeldState([part, after])
+    part.x = after.x = 2
+    with pytest.raises(UnknownState, match="restore_state.*Faulty.*no"):
+        state.recall()
+    assert part.x == after.x == 1
+    with pytest.raises(UnknownState, match="Part.inner.*save_state"):
+        HeldState([Part(inner=Other())])
+
+
 def test_attributes_of_the_present_stay():
     class Listening:
         of_the_present = ("heard",)
@@ -183,7 +205,7 @@ def test_what_cannot_be_read_is_named_with_its_holder():
         ((each for each in "abc"), "generator"), (io.StringIO(), "StringIO"),
         (array.array("d"), "array"), (Samples("d"), "Samples"),
     ):  # fmt: skip
-        with pytest.raises(UnknownState, match=f"{name}, which a Part holds"):
+        with pytest.raises(UnknownState, match=f"Part.item.*{name}"):
             HeldState([Part(inner=Part(item=odd))])
 
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from support.robots.cartpole import CONTROLLERS, cartpole_urdf
 from support.robots.grippers import cube, gripper
+from support.robots.trajectory_rig import Listener
 from support.robots.worlds import add_robot, start
 
 from bullet_gazebo.applied_forces import ActingTime, AppliedEffort, AppliedWrench
-from bullet_gazebo.control.trajectory_goals import Trajectory, TrajectoryPoint
-from bullet_gazebo.physics.engine import SnapshotError
+from bullet_gazebo.control.trajectory_goals import GoalRequest, Trajectory, TrajectoryPoint
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.physics.properties import JointProperties, at, set_joint_properties
-from bullet_gazebo.physics.world import World, ground_plane
+from bullet_gazebo.physics.world import SnapshotError, World, ground_plane
 from bullet_gazebo.sensors.schedule import Schedule
 from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.sensors.sensor_readers import SensorReaders
@@ -41,7 +41,7 @@ def future(sim, ticks=150):
             sim.advance(1)
         models = sim.world.models.values()
         states = [(m.joint_states(), [m.link_state(link) for link in m.link_names]) for m in models]
-        contacts = [each[:5] for each in sim.world.engine.contacts()]
+        contacts = [each[:5] for each in sim.world.contacts()]
         efforts = [j.effort for r in sim.robots for j in r.hardware.joints.values()]
         seen.append((sim.now, states, contacts, efforts))
     return seen
@@ -116,7 +116,7 @@ def test_bodies_that_tumble_and_touch(sim):
     for number in range(4):
         pose = Pose((0.02 * number, 0.01 * number, 0.1 + 0.09 * number))
         sim.world.spawn(f"cube_{number}", parse_urdf(cube()), pose)
-    while not sim.world.engine.contacts():
+    while not sim.world.contacts():
         future(sim, 1)
     first = check_branches(sim, lambda: sim.reset_world() or future(sim, 30))
     assert any(contacts for _, _, contacts, _ in first)
@@ -124,18 +124,18 @@ def test_bodies_that_tumble_and_touch(sim):
 
 def test_contacts_are_those_of_the_saved_tick_until_the_next_one(sim):
     sim.world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 0.05)))
-    while not sim.world.engine.contacts():
+    while not sim.world.contacts():
         future(sim, 1)
-    before = sim.world.engine.contacts()
+    before = sim.world.contacts()
     with sim.lock:
         snapshot = sim.save_state()
-        assert sim.world.engine.contacts() == before != []
+        assert sim.world.contacts() == before != []
         sim.place_model(sim.world.models["cube"], Pose((0.0, 0.0, 5.0)), ((0.0,) * 3, (0.0,) * 3))
     future(sim, 2)
-    assert not sim.world.engine.contacts()
+    assert not sim.world.contacts()
     with sim.lock:
         sim.restore_state(snapshot)
-    assert sim.world.engine.contacts() == before
+    assert sim.world.contacts() == before
 
 
 def test_what_is_attached_comes_back_and_what_was_not_goes(sim):
@@ -254,6 +254,33 @@ def test_a_trajectory_is_followed_from_where_it_was(sim):
     future(sim, 150)
     first = check_branches(sim, lambda: way(-0.3) or future(sim, 50), ticks=300)
     assert max(abs(states[1][0][0][0]) for _, states, *_ in first) > 0.1
+
+
+def test_goals_are_their_clients_who_are_told_that_they_end(sim):
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    joint = {"joints": ["stand_cart"], "gains": {"stand_cart": {"p": 500.0, "i": 10.0, "d": 20.0}}}
+    start(robot, {"arm": {"type": "effort_controllers/JointTrajectoryController", **joint}})
+    arm = robot.manager.get("arm")
+
+    def pursue(key, place):
+        told = Listener()
+        trajectory = Trajectory(["stand_cart"], [TrajectoryPoint(S // 5, [place])])
+        arm.pursue(key, GoalRequest(trajectory), told)
+        return told
+
+    first = pursue("first", 0.1)
+    future(sim, 50)
+    with sim.lock:
+        snapshot = sim.save_state()
+    after = future(sim, 400)
+    assert [each.kind for each in first.outcomes] == ["succeeded"]
+    second = pursue("second", -0.1)
+    future(sim, 20)
+    with sim.lock:
+        sim.restore_state(snapshot)
+    assert [each.kind for each in second.outcomes] == ["canceled"]
+    assert future(sim, 400) == after
+    assert len(first.outcomes) == len(second.outcomes) == 1
 
 
 IMU = (

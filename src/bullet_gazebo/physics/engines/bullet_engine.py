@@ -162,7 +162,7 @@ class BulletClient:
             self._hold_up()
         self._step()
 
-    def touching(self) -> list[Contact]:
+    def contacts(self) -> list[Contact]:
         """Returns where bodies touched in the last step, without those that were only near."""
         found = pybullet.getContactPoints(physicsClientId=self._client)
         return [_contact(each, self._sides) for each in found if each[9] > 0.0]
@@ -307,15 +307,13 @@ class BulletEngine(Engine):
         self._client.apply(self._settings)
 
     def step(self) -> None:
-        self.recalled = None
         self._client.step()
 
     def forget_contacts(self) -> None:
-        self.recalled = None
         self._client.forget_contacts()
 
-    def touching(self) -> list[Contact]:
-        return self._client.touching()
+    def contacts(self) -> list[Contact]:
+        return self._client.contacts()
 
     def close(self) -> None:
         self._client.close()
