@@ -183,6 +183,11 @@ pip_install() {  # file...
 }
 
 pip_in_venv() {  # argument of `pip install`...
+    local package
+    # What pip was killed at has no INSTALLER yet and may lack its scripts, but pip would take it for installed.
+    for package in "$VENV"/lib/*/site-packages/*.dist-info; do
+        [[ ! -d $package || -e $package/INSTALLER ]] || rm -rf -- "$package"
+    done
     env -u PIP_USER -u PIP_TARGET -u PIP_PREFIX -u PYTHONPATH -u PYTHONHOME PYTHONNOUSERSITE=1 \
         "$VENV/bin/python3" -m pip install --disable-pip-version-check --no-input --progress-bar off "$@"
 }

@@ -16,6 +16,7 @@ from support.stress.trainings import BOUND, forked, new, wait_for_newer_checkpoi
 from support.training.training_runs import assert_no_doubles, assert_same_run, summary
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)  # it saves, and ends
+ROSLAUNCHS = ENDING[:3]  # it ends its nodes
 FATAL = (signal.SIGQUIT, signal.SIGUSR1)  # nobody listens to them: it ends, as after kill -9
 HARMLESS = (signal.SIGPIPE, signal.SIGSTOP, signal.SIGWINCH)  # it goes on
 SIGNALS = [*ENDING, *FATAL, *HARMLESS]
@@ -101,7 +102,7 @@ def test_to_roslaunch(scenario: Scenario) -> None:
             launched = launch(here)
             launched.wait_for("SUMMARY", BOUND)
             time.sleep(dice.uniform(0.0, 6.0))
-            launched.send(ENDING[number % len(ENDING)])
+            launched.send(ROSLAUNCHS[number % len(ROSLAUNCHS)])
             launched.end(BOUND)
             left = here.left_after(30)
             assert not left, left

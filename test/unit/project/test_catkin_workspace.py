@@ -23,6 +23,8 @@ PAGE = ROOT / "docs/catkin.md"
 SERVICE = "/gazebo/get_world_properties"
 PACKAGES = sysconfig.get_path("purelib")
 INSTALLED = Path(sys.prefix).parent / "base.txt"  # requirements/base.txt without what Debian has
+# Debian 12's catkin doesn't look at it.
+UNUSED = r"CMake Warning:\s+Manually-specified variables.*\s+Python_EXECUTABLE\s"
 MODULES = (
     "import bullet_gazebo_msgs.srv, cartpole.tasks, robot_envs.robot, rl_workbench.cli,"
     " gazebo_msgs.srv, ros_utils, bullet_gazebo.control,"
@@ -89,7 +91,8 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     shown = f"echo {PACKAGES} > $(echo venv/lib/python3*/site-packages)/shown.pth\n"
     built = workspace.bash(script.replace(pip, f"{shown}{pip}"))
     assert built.returncode == 0, f"{built.stdout[-3000:]}\n{built.stderr[-3000:]}"
-    assert "CMake Warning" not in built.stderr, built.stderr
+    warnings = re.sub(UNUSED, "", built.stderr)
+    assert "CMake Warning" not in warnings, warnings
     fetched = re.findall(
         r"(\S+)-[0-9.]+", "".join(re.findall(r"(?m)^Successfully installed .*$", built.stdout))
     )
@@ -174,7 +177,7 @@ def bare(installed: Workspace):
     ("package", "program", "missing"),
     [
         ("gazebo_ros", "gzserver", "collada, pybullet, scipy, trimesh, xacro"),
-        ("cartpole", "pg_train.py", "gymnasium, matplotlib, pygame, tensorboard, torch"),
+        ("cartpole", "pg_train.py", "gymnasium, matplotlib, pygame, tensorboard"),
         ("xacro", "xacro", "xacro"),
     ],
 )
