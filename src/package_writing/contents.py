@@ -273,6 +273,21 @@ def ranges_text(survey: Survey) -> str:
     )
 
 
+def goals_text(survey: Survey, base: Base | None, starts: Mapping[str, float]) -> str:
+    """Returns where a test moves joints, and how near, as the inside of a Python dict.
+
+    It goes a quarter of the way up from where a joint starts; on a free base, which might fall, nowhere.
+    """
+    share = 0.25 if survey.model.fixed_base else 0.0
+    lines = []
+    for motor in held_motors(survey, base):
+        if not motor.wheel:
+            start = starts.get(motor.joint, 0.0)
+            goal, near = start + share * (motor.high - start), 0.025 * (motor.high - motor.low)
+            lines.append(f"    {literal(motor.joint)}: ({goal:.3g}, {near:.3g}),\n")
+    return "".join(lines)
+
+
 def stance_text(package: str, survey: Survey, starts: Mapping[str, float]) -> dict[str, str]:
     """Returns the template's values about where joints start, and a test that what has feet stands."""
     options = "".join(f" -J {shlex.quote(name)} {start}" for name, start in starts.items())

@@ -247,6 +247,7 @@ def _values(
         "controllers_yaml": contents.controllers_text(survey, base),
         **contents.base_text(request.name, survey, base),
         "ranges": contents.ranges_text(survey),
+        "goals": contents.goals_text(survey, base, starts),
         **contents.stance_text(request.name, survey, starts),
         "units": ", ".join(each for each in ("rad", "m", "rad/s") if each in units),
         **contents.wheels_text(survey),

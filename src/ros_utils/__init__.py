@@ -8,6 +8,7 @@ Use the modules: ``from ros_utils import ros_gazebo, ros_node``. Each is importe
 - `ros_gazebo`, `ros_controllers`, `ros_spawn`: the simulator, controllers, and a whole robot in one call.
 - `simulation`: a simulator with a master of its own.
 - `readiness`: waits until a world can be used.
+- `testing`: tests of a robot, for pytest, unittest and rostest.
 - `step_client`, `service_client`: step a world in lock-step, and call any service within a time limit.
 
 `ros_node.ros_kill_all_processes` ends the programs started here; they end at the latest when the
@@ -29,6 +30,7 @@ __all__ = [
     "service_client",
     "simulation",
     "step_client",
+    "testing",
 ]
 
 

@@ -13,6 +13,7 @@ from ros_utils._internal import log as _log
 from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import packages as _packages
 from ros_utils._internal import programs as _programs
+from ros_utils._internal import roslaunch as _roslaunch
 from ros_utils._internal.programs import CannotStart, Handle, Started, await_start
 from ros_utils.readiness import Ready
 
@@ -65,7 +66,7 @@ def ros_node_from_pkg(
     with _master.using(master_uri):
         try:
             command = [_executable(pkg_name, node_name), *_arguments(args), *_remappings(name, ns)]
-            if launch_master and not _start_master(launch_master_term, timeout):
+            if launch_master and not _roslaunch.start_master(launch_master_term, timeout):
                 return False
             _master.require()
             before = set(_nodes.node_uris().values())
@@ -191,19 +192,6 @@ def _remappings(name: str | None, ns: str | None) -> list[str]:
             f"name {name!r}: a node's name has letters, digits and underscores, and no slash"
         )
     return [*([f"__name:={name}"] if name else []), f"__ns:={_global(ns)}"]
-
-
-def _start_master(window: bool, timeout: float) -> Started | bool:
-    """Starts a master at ROS_MASTER_URI, unless there is one; returns whether there is one now."""
-    if _master.is_up_or_startable():
-        return True
-    port = str(_master.host_and_port()[1])
-    handle = _programs.start(["roscore", "-p", port], "master", "roscore", window=window)
-
-    def is_up() -> bool:
-        return _master.is_up() and "/rosout" in _nodes.node_names()
-
-    return await_start(handle, is_up, "not up", timeout, None, may_end=False)
 
 
 def _is_registered(handle: Handle, name: str | None, before: set[str]) -> bool:

@@ -9,33 +9,23 @@ import logging
 import os
 import pickle
 import queue
-import signal
 import subprocess
 import sys
 import threading
 from array import array
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
-
-import numpy as np
+from typing import Any, NamedTuple
 
 from bullet_gazebo.physics.description import Shape
 from bullet_gazebo.physics.model import Model
-from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, subtract
-from bullet_gazebo.pictures.camera import Camera, overview
-from bullet_gazebo.pictures.visuals import visible_shapes
+from bullet_gazebo.pictures.visuals import VisibleModel, visible_model, visible_shapes
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 
-if TYPE_CHECKING:  # only the other process draws
-    from bullet_gazebo.pictures.renderer import Renderer
-
-MAIN = "import sys; from bullet_gazebo.pictures.recording import main; sys.exit(main())"
+MAIN = "import sys; from bullet_gazebo.pictures.films import main; sys.exit(main())"
+SUFFIXES = (".mp4", ".html", ".png")
 MOST_WAITING = 100_000_000  # [bytes] for the other process; beyond it frames are dropped
 LEAST_SIZE, LARGEST_SIZE, FASTEST = 16, 4096, 240.0
-NUMBERS = 7  # of a pose
-ROOM = 1.25  # factor on the camera's distance: things move
 
 logger = logging.getLogger(__name__)
 
@@ -49,7 +39,8 @@ class RecordingOptions:
     """What is recorded.
 
     Args:
-        path: the file, whose name ends in .mp4; an older one is replaced.
+        path: the file, which replaces an older one: a video (.mp4), a page in 3-D (.html), or a picture of
+            the last moment (.png).
         rate: frames per second of simulated time [Hz].
         width: of the frames [pixels].
         height: of the frames [pixels].
@@ -64,8 +55,10 @@ class RecordingOptions:
 
     def check(self) -> None:
         """Raises RecordingError if one of the options is invalid."""
-        if self.path.suffix.lower() != ".mp4":
-            raise RecordingError(f"a recording's name ends in .mp4: not '{self.path}'")
+        if self.path.suffix.lower() not in SUFFIXES:
+            raise RecordingError(
+                f"a recording's name ends in {', '.join(SUFFIXES)}: not '{self.path}'"
+            )
         if self.path.is_dir() or not os.access(self.path.parent, os.W_OK):
             raise RecordingError(f"'{self.path}' can't be written")
         if not 0.0 < self.rate <= FASTEST:
@@ -77,12 +70,12 @@ class RecordingOptions:
 
 
 class RecordedModel(NamedTuple):
-    """What the drawing process needs to know about a model; `links` are in the order of their poses."""
+    """What the drawing process needs to know about a model.
 
-    name: str
-    root: str
-    static: bool
-    links: list[str]
+    `seen` has its links in the order of their poses, and is for pages; pictures are made of `shapes`.
+    """
+
+    seen: VisibleModel
     shapes: list[tuple[str, Shape]]
 
 
@@ -158,8 +151,8 @@ class SimulationRecorder:
 
 def _recorded(model: Model) -> RecordedModel:
     made = model.description
-    shapes = visible_shapes(made)
-    return RecordedModel(model.name, made.root, made.static, model.link_names, shapes)
+    seen = visible_model(made, model.number, model.name, model.link_names, [], collisions=False)
+    return RecordedModel(seen, visible_shapes(made))
 
 
 def _start() -> subprocess.Popen[bytes]:
@@ -168,103 +161,3 @@ def _start() -> subprocess.Popen[bytes]:
         [sys.executable, "-P", "-c", MAIN], stdin=subprocess.PIPE, env=environment,
         start_new_session=True,
     )  # fmt: skip
-
-
-class FrameDrawer:
-    """Draws the frames: the recorded models in a renderer, and a camera that looks at them."""
-
-    def __init__(self, options: RecordingOptions, renderer: "Renderer") -> None:
-        self._options = options
-        self._renderer = renderer
-        self._models: list[RecordedModel] = []
-        self._camera: Camera | None = None
-        self._followed, self._offset = "", ZERO
-
-    def change(self, models: list[RecordedModel]) -> None:
-        """Replaces the models; the next frame places the camera from scratch."""
-        for model in self._models:
-            self._renderer.remove(model.name)
-        for model in models:
-            self._renderer.add(model.name, model.shapes)
-        self._models, self._camera = models, None
-
-    def frame(self, poses: Sequence[float]) -> np.ndarray:
-        """Draws the models with their links at these poses, 7 numbers each."""
-        rows = iter(np.reshape(np.asarray(poses), (-1, NUMBERS)).tolist())
-        places: dict[str, Vector] = {}
-        for model in self._models:
-            found = {}
-            for link in model.links:
-                x, y, z, *turn = next(rows)
-                found[link] = Pose((x, y, z), (turn[0], turn[1], turn[2], turn[3]))
-            self._renderer.place(model.name, found)
-            places[model.name] = found[model.root].position if model.root in found else ZERO
-        width, height = self._options.width, self._options.height
-        if self._camera is None:
-            self._camera = self._aim(places, width / height)
-        if self._followed:
-            self._camera = self._camera.at(add(places[self._followed], self._offset))
-        return self._renderer.picture(self._camera, width, height)
-
-    def _aim(self, places: dict[str, Vector], aspect: float) -> Camera:
-        movable = [model.name for model in self._models if not model.static]
-        named = [self._options.model] if self._options.model in places else []
-        names = named or movable or list(places)
-        corners = [np.zeros((0, 3)), *(self._renderer.corners(name) for name in names)]
-        camera = overview(np.concatenate(corners), aspect)
-        self._followed = names[0] if len(names) == 1 else ""
-        if self._followed:
-            self._offset = subtract(camera.target, places[self._followed])
-        return Camera(camera.target, ROOM * camera.distance, camera.yaw, camera.pitch, camera.view)
-
-
-def main() -> int:
-    """Draws until standard input ends; SIGTERM drops the frames that aren't drawn yet."""
-    from web_viewer.video import EncoderFailed
-
-    logging.basicConfig(format="recording: %(message)s")
-    options: RecordingOptions = pickle.load(sys.stdin.buffer)
-    try:
-        count = _draw(options)
-    except EncoderFailed as error:
-        print(f"recording: {options.path}: {error}", file=sys.stderr, flush=True)
-        return 1
-    length = f"{count} frames, {count / options.rate:.1f} s" if count else "no time has passed"
-    print(f"recording: {options.path}: {length}", flush=True)
-    return 0
-
-
-def _draw(options: RecordingOptions) -> int:
-    """Draws what comes by standard input; returns the number of frames."""
-    from bullet_gazebo.pictures.renderer import Renderer
-    from web_viewer.video import Mp4Writer
-
-    inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    stopping = False
-
-    def stop(*_: object) -> None:
-        nonlocal stopping
-        stopping = True
-        inbox.put(None)
-
-    signal.signal(signal.SIGTERM, stop)
-    # In a thread, so that the simulator never waits for a frame.
-    threading.Thread(target=_read, args=(sys.stdin.buffer, inbox), daemon=True).start()
-    drawer, writer = FrameDrawer(options, Renderer()), Mp4Writer(options.path, options.rate)
-    count = 0
-    while (message := inbox.get()) is not None and not stopping:
-        models, poses = message
-        if models is not None:
-            drawer.change(models)
-        writer.add(drawer.frame(poses))
-        count += 1
-    writer.close()
-    return count
-
-
-def _read(stream: BinaryIO, inbox: "queue.SimpleQueue[Any]") -> None:
-    try:
-        while True:
-            inbox.put(pickle.load(stream))
-    except (EOFError, pickle.UnpicklingError):  # the end; a killed simulator leaves half a message
-        inbox.put(None)

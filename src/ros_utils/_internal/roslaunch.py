@@ -9,7 +9,7 @@ from ros_calls.waiting import POLL
 from ros_utils._internal import log as _log
 from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import programs as _programs
-from ros_utils._internal.programs import Handle
+from ros_utils._internal.programs import Handle, Started
 
 SETTLE = 5.0  # [s] limit for nodes to register once their processes run
 STABLE = 0.3  # [s] without a further process: roslaunch has started them all
@@ -42,6 +42,19 @@ def start(
         log_file=log_file,
         env=env,
     )
+
+
+def start_master(window: bool, timeout: float) -> Started | bool:
+    """Starts a master at ROS_MASTER_URI, unless there is one; returns whether there is one now."""
+    if _master.is_up_or_startable():
+        return True
+    port = str(_master.host_and_port()[1])
+    handle = _programs.start(["roscore", "-p", port], "master", "roscore", window=window)
+
+    def is_up() -> bool:
+        return _master.is_up() and "/rosout" in _nodes.node_names()
+
+    return _programs.await_start(handle, is_up, "not up", timeout, None, may_end=False)
 
 
 def list_processes(handle: Handle) -> tuple[list[str], list[str]] | None:

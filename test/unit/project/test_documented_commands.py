@@ -36,7 +36,7 @@ from rl_workbench.training.algorithms import ALGORITHMS
 ROOT = Path(__file__).resolve().parents[3]
 RUN_ELSEWHERE = (
     "docs/tutorial_dqn.md", "docs/tutorial_dqn.zh.md", "docs/tutorial_robot.md", "docs/tutorial_robot.zh.md",
-    "docs/catkin.md", "docs/mobile.md",
+    "docs/catkin.md", "docs/mobile.md", "docs/testing.md",
 )  # fmt: skip
 STARTS = re.compile(r"(\./ws|rosrun|roslaunch|rosservice|gz|spawn_model)\s")
 PLACEHOLDERS = {"your_script.py", "my_arm"}  # the reader's own

@@ -1,6 +1,6 @@
-"""Every command of docs/tutorial_robot.md and docs/mobile.md in order, with shorter trainings: own packages.
+"""Every command of docs/tutorial_robot.md, docs/mobile.md and docs/testing.md in order: own packages.
 
-A block `sh skip` is another way to begin. One of Python that names a file is put at that file's end.
+Trainings are shorter. A block `sh skip` is another way to begin. One that names a file is put at its end.
 Simulations are started, seen to be there, and ended; with RViz their launch files are read. The workbench's
 commands run in this process, but for those over ROS: to start each takes seconds.
 """
@@ -24,8 +24,9 @@ import pytest
 from cartpole import workbench
 
 ROOT = Path(__file__).resolve().parents[3]
-ENGLISH, CHINESE, VEHICLE = (
-    ROOT / "docs" / name for name in ("tutorial_robot.md", "tutorial_robot.zh.md", "mobile.md")
+ENGLISH, CHINESE, VEHICLE, TESTS = (
+    ROOT / "docs" / f"{name}.md"
+    for name in ("tutorial_robot", "tutorial_robot.zh", "mobile", "testing")
 )
 BLOCK = re.compile(r"^```(\S+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LIMIT = 300.0  # [s] for one command
@@ -78,7 +79,7 @@ class Reader:
     def read(self, block: Block) -> None:
         if block.mark == "skip" or block.language == "text":
             return
-        if block.language == "python":
+        if block.language == "python" or block.mark:
             self.write(block)
             return
         for line in block.text.splitlines():
@@ -88,16 +89,21 @@ class Reader:
 
     def write(self, block: Block) -> None:
         if block.mark:
-            with (self.folder / block.mark).open("a", encoding="utf-8") as file:
-                file.write(f"\n\n{block.text}")
+            path = self.folder / block.mark
+            path.parent.mkdir(exist_ok=True)
+            with path.open("a", encoding="utf-8") as file:
+                file.write(f"\n\n{block.text}" if file.tell() else block.text)
         else:
             self.run(["--with", self.place, "python3", "-c", block.text])
 
     def do(self, words: list[str]) -> None:
+        if words[0] == "chmod":
+            subprocess.run(words, cwd=self.folder, check=True)
+            return
         assert words[0] == "./ws", words
         if words[1] == "extras":  # a test installs nothing; `ws test` has done so
             return
-        words = [each.replace(f"../{self.package}", self.place) for each in words[1:]]
+        words = [each.replace("../", f"{self.folder.parent}/") for each in words[1:]]
         if "new_robot.py" in words:
             words = [each.replace("urdf/", f"{ROOT}/urdf/") for each in words]
             words += ["--to", str(self.folder.parent)]
@@ -220,6 +226,13 @@ def test_every_command_works(reader: Reader) -> None:
         reader.read(block)
     for place in ("my_arm.gif", "runs/my_arm/best.pt", "runs/tip/best.pt"):
         assert (reader.folder / place).is_file(), place
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("reader", ["my_arm"], indirect=True)
+def test_every_test_of_the_page_passes(reader: Reader) -> None:
+    for block in blocks(TESTS):
+        reader.read(block)
 
 
 def test_both_languages_have_the_same_commands() -> None:

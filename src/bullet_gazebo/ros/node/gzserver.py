@@ -106,7 +106,10 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     option("-o", "--profile", nargs="?", help="accepted, without effect")
     option("--lockstep", action="store_true", help="time moves only by ~step_world")
     option("--replace", action="store_true", help="end a running simulator that has this name")
-    option("--video", default="", help="record the simulation in this MP4 file")
+    option(
+        "--video", action="append", default=[], metavar="FILE",
+        help="record the simulation: .mp4 a video, .html a page in 3-D, .png the last moment; repeatable",
+    )  # fmt: skip
     option("--video-rate", type=float, default=30.0, help="frames per second of simulated time")
     option("--video-size", type=int, nargs=2, default=(640, 480), help="width, height [pixels]")
     option("--video-model", default="", help="keep this model in the middle; default: all movable")
@@ -134,13 +137,13 @@ class GazeboNode:
         world = World(engine)
         self.sim = Simulator(world, lockstep=args.lockstep, relatch=_flag("~relatch_on_reset"))
         self._watchdog = Watchdog(self.sim)
-        recording = _recording(args)
+        recordings = _recordings(args)
         found = read_world(args.world, interrupted)
         fill_world(self.sim, found, interrupted)
         if args.paused:
             self.sim.pause()
         self._advertise(_flag("~enable_ros_network"), args.seed or 0, found.plugins)
-        self._recorder = None if recording is None else SimulationRecorder(self.sim, recording)
+        self._recorders = [SimulationRecorder(self.sim, options) for options in recordings]
         MasterWatch().start()
 
     def _advertise(self, network: bool, seed: int, of_world: list[Plugin]) -> None:
@@ -192,8 +195,8 @@ class GazeboNode:
         signals.wait(self._watchdog.failed)
         failed = self._watchdog.failed()
         self._watchdog.stop()  # a shutdown that came before the hook was there doesn't call it
-        if self._recorder is not None:
-            self._recorder.close(RECORDING_TIMEOUT)
+        for recorder in self._recorders:
+            recorder.close(RECORDING_TIMEOUT)
         hanging = self._watchdog.left_hanging()
         if hanging is not None:
             print(f"gzserver: ends while the world's lock is kept by {hanging}", file=sys.stderr)
@@ -201,15 +204,16 @@ class GazeboNode:
         return 1 if failed or hanging is not None else 0
 
 
-def _recording(args: argparse.Namespace) -> RecordingOptions | None:
-    """Returns the recording that the command line asks for."""
-    if not args.video:
-        return None
+def _recordings(args: argparse.Namespace) -> list[RecordingOptions]:
+    """Returns the recordings that the command line asks for."""
     width, height = args.video_size
-    path = Path(args.video).absolute()
-    options = RecordingOptions(path, args.video_rate, width, height, args.video_model)
-    options.check()
-    return options
+    found = [
+        RecordingOptions(Path(name).absolute(), args.video_rate, width, height, args.video_model)
+        for name in args.video
+    ]
+    for options in found:
+        options.check()
+    return found
 
 
 def _flag(name: str) -> bool:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
+from support.pages.viser_recording import of_page
 from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.physics.engines import make_engine
@@ -14,6 +16,7 @@ from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.pictures import recording
+from bullet_gazebo.pictures.films import END
 from bullet_gazebo.pictures.recording import RecordingError, RecordingOptions, SimulationRecorder
 from bullet_gazebo.simulator import Simulator
 
@@ -137,7 +140,7 @@ def test_what_the_other_process_cannot_take_in_time_is_left_out(sim, tmp_path, m
 @pytest.mark.parametrize(
     ("changed", "text"),
     [
-        ({"path": Path("a.avi")}, r"ends in \.mp4"),
+        ({"path": Path("a.avi")}, r"ends in \.mp4, \.html, \.png"),
         ({"path": Path("/nowhere/a.mp4")}, "can't be written"),
         ({"rate": 0.0}, "frames a second"),
         ({"rate": float("nan")}, "frames a second"),
@@ -148,3 +151,21 @@ def test_what_the_other_process_cannot_take_in_time_is_left_out(sim, tmp_path, m
 def test_what_cannot_be_recorded_is_refused(tmp_path, changed, text):
     with pytest.raises(RecordingError, match=text):
         RecordingOptions(**{"path": tmp_path / "a.mp4", **changed}).check()
+
+
+@pytest.mark.slow
+def test_a_page_plays_what_happened_and_a_picture_shows_the_last_moment(sim, tmp_path):
+    paths = [tmp_path / "a.html", tmp_path / "a.png"]
+    recorders = [SimulationRecorder(sim, RecordingOptions(each, 20.0, 64, 48)) for each in paths]
+    sim.world.spawn("ball", parse_urdf(BALL), Pose((0.0, 0.0, 3.0)))
+    sim.advance(500)
+    for recorder in recorders:
+        recorder.close(LIMIT)
+        assert recorder._process.wait(LIMIT) == 0
+    played = of_page(paths[0].read_text())
+    assert played.duration == pytest.approx(0.5 + END, abs=0.1)
+    heights = [max(part["position"][2] for part in played.parts(at)) for at in (0.1, 0.3, 0.5)]
+    assert heights == sorted(heights, reverse=True) and 1.7 < heights[-1] < 2.2 < heights[0] <= 3.0
+    with Image.open(paths[1]) as picture:
+        assert picture.size == (64, 48)
+        assert red(np.asarray(picture).astype(int)) > 20

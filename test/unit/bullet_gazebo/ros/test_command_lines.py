@@ -28,7 +28,7 @@ def test_the_world_is_found(line):
 def test_a_video_has_its_options():
     line = "--video a.mp4 --video-size 320 240 w.world --video-rate 60"
     args = parse_args(line.split())
-    assert (args.video, args.video_size, args.video_rate) == ("a.mp4", [320, 240], 60.0)
+    assert (args.video, args.video_size, args.video_rate) == (["a.mp4"], [320, 240], 60.0)
     assert (args.video_model, args.world) == ("", "w.world")
 
 

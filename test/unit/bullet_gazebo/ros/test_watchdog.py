@@ -137,7 +137,7 @@ def test_it_may_be_stopped_before_it_was_started_and_from_its_own_thread() -> No
 def test_no_time_passes_once_a_signal_has_come(monkeypatch) -> None:
     monkeypatch.setattr(rospy, "on_shutdown", lambda hook: None)
     node, sim = object.__new__(GazeboNode), FakeSimulator()
-    node._watchdog, node._recorder = Watchdog(sim), None
+    node._watchdog, node._recorders = Watchdog(sim), []
     signals = SimpleNamespace(noted=lambda: True, wait=lambda over: over())
     assert node.run(signals) == 0
     assert sim.stopping.is_set() and not sim.running.is_set()

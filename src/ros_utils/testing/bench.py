@@ -1,0 +1,150 @@
+"""The simulator that all tests of a process share, and recordings of those that fail."""
+
+import contextlib
+import os
+import re
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from unittest import mock
+
+import rosgraph
+import rospkg
+
+from ros_calls import master
+from ros_calls.waiting import wait_until
+from ros_utils import ros_gazebo, ros_node
+from ros_utils._internal import roslaunch
+from ros_utils._internal.programs import Started
+from ros_utils.simulation import LOOPBACK, reserved_port
+from ros_utils.testing.ear import SIMULATOR
+from ros_utils.testing.robot_world import RobotWorld
+from ros_utils.testing.stepped_world import WorldError
+from ros_utils.testing.world_bag import WorldBag
+
+FAILURES = "ROS_TEST_FAILURES"  # environment variable: the folder of what failed tests leave
+STARTING = 120.0  # [s of wall time]
+DRAWING = 120.0  # [s of wall time] to complete a recording
+FILES = ("world.png", "world.html")
+
+
+def failure_folder(test: str) -> Path:
+    """Makes an empty folder for what a failed test leaves, and returns it."""
+    parent = Path(os.environ.get(FAILURES) or Path(rospkg.get_ros_home(), "test_failures"))
+    folder = parent.absolute() / re.sub(r"[^A-Za-z0-9_.-]+", "-", test).strip("-")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return folder
+
+
+def tell(folder: Path, seed: int, failure: str, message: str, again: str) -> str:
+    """Writes the failure and the seed beside the recording, and returns what to say about it.
+
+    Args:
+        folder: of the recording.
+        seed: of the world.
+        failure: the test's failure, with where it was.
+        message: the same in one line.
+        again: that of the second, recorded run; empty if it passed.
+    """
+    text = f"recorded in {folder}"
+    if again != message:
+        how = f"fails otherwise ({again})" if again else "passes"
+        text = f"it {how} when it runs once more: it isn't repeatable; that run is {text}"
+    (folder / "failure.txt").write_text(f"seed: {seed}\n{text}\n\n{failure}\n", encoding="utf-8")
+    return text
+
+
+class Bench:
+    """A master and a simulator in lock-step, which is emptied before each test.
+
+    A process that roslaunch has started, as rostest does, keeps its master; any other gets one of its own,
+    which ROS_MASTER_URI names from then on. So rospy, which knows one master a process, works in tests.
+    """
+
+    def __init__(self) -> None:
+        self._ending = contextlib.ExitStack()
+        self._simulator: Started | None = None
+        if "__name" not in rosgraph.names.load_mappings(sys.argv):
+            self._start_master()
+
+    def _start_master(self) -> None:
+        place = {"ROS_MASTER_URI": f"http://{LOOPBACK}:{reserved_port()}", "ROS_IP": LOOPBACK}
+        self._ending.enter_context(mock.patch.dict(os.environ, place))
+        started = roslaunch.start_master(window=False, timeout=STARTING)
+        if not isinstance(started, Started):
+            raise WorldError(f"no ROS master could be started at {master.uri()}; the log says why")
+        self._ending.callback(started.close)
+
+    @contextlib.contextmanager
+    def world(self, seed: int, recorded: Path | None = None) -> Iterator[RobotWorld]:
+        """Yields an empty world at time 0.
+
+        Args:
+            seed: of the sensors' noise; at least 1.
+            recorded: a folder for a picture, a page in 3-D and a bag; None for no recording.
+        """
+        if seed < 1:
+            raise WorldError(f"the seed is {seed}: 1 or more is needed")
+        with contextlib.ExitStack() as ending:
+            bag = None
+            if recorded is None:
+                if self._simulator is None or not self._simulator.running:
+                    self._simulator = self._launch()
+            else:
+                self._end_simulator()
+                ending.callback(self._end_simulator)
+                self._simulator = self._launch(recorded)
+                ending.callback(_await_recordings, recorded)
+                bag = ending.enter_context(contextlib.closing(WorldBag(recorded / "world.bag")))
+            before = _parameters()
+            ending.callback(_forget_parameters, before)
+            world = RobotWorld(seed, bag)
+            ending.callback(world.close)
+            yield world
+
+    def _launch(self, recorded: Path | None = None) -> Started:
+        films = [] if recorded is None else [recorded / name for name in FILES]
+        log = None if recorded is None else str(recorded / "simulator.log")
+        started = ros_gazebo.launch_Gazebo(
+            gui=False, launch_new_term=False, lockstep=True, server_required=True, timeout=STARTING,
+            output="screen" if log else "log", log_file=log,
+            extra_gazebo_args=" ".join(f"--video '{film}'" for film in films),
+        )  # fmt: skip
+        if not isinstance(started, Started):
+            raise WorldError(f"no simulator at {master.uri()}; the log says why")
+        return started
+
+    def _end_simulator(self) -> None:
+        if self._simulator is not None:
+            self._simulator.close()
+        self._simulator = None
+
+    def close(self) -> None:
+        """Ends simulator and master; what roslaunch has started stays."""
+        self._end_simulator()
+        self._ending.close()
+
+
+def _parameters() -> set[str]:
+    return set(master.call("getParamNames"))
+
+
+def _forget_parameters(before: set[str]) -> None:
+    """Deletes the parameters that a test has set."""
+    for name in _parameters() - before:
+        with contextlib.suppress(master.Refused):
+            master.call("deleteParam", name)
+
+
+def _await_recordings(folder: Path) -> None:
+    """Ends the simulator, and waits until the other processes have drawn what they have received."""
+    ros_node.ros_kill_node(SIMULATOR)
+    log, lines = folder / "simulator.log", [f"recording: {folder / name}:" for name in FILES]
+
+    def look() -> bool:
+        text = log.read_text(encoding="utf-8", errors="replace")
+        return all(line in text for line in lines)
+
+    wait_until(look, DRAWING, "recordings")

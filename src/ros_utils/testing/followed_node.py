@@ -1,0 +1,121 @@
+"""A node, in whatever language, whose commands have to arrive before time goes on."""
+
+import contextlib
+import queue
+from collections.abc import Sequence
+
+import roslib.message
+import rospy
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Float64, Float64MultiArray
+
+from ros_calls import master
+from ros_calls.waiting import wait_until
+from ros_utils import ros_node
+from ros_utils._internal import nodes
+from ros_utils._internal.programs import Started
+from ros_utils.testing.ear import PATIENCE, SIMULATOR, Ear
+
+CONNECTING = 30.0  # [s of wall time]
+
+
+class NodeFault(Exception):
+    """A node doesn't start, connect or answer; the text says which."""
+
+
+class FollowedNode:
+    """A node that answers each message of a topic of the simulator's with one command.
+
+    The simulator reports to this process what it sends to the node, and ends a step after that. The commands
+    come to this process, which gives them to the simulator with the next step. So it doesn't matter when a
+    message arrives anywhere.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        package: str,
+        executable: str,
+        args: Sequence[str],
+        hears: str,
+        commands: str,
+    ) -> None:
+        """Starts it.
+
+        Args:
+            name, package, executable, args: of the node.
+            hears: the topic that it answers.
+            commands: the topic of its answers, on which it commands a controller.
+
+        Raises:
+            NodeFault: see there.
+            NotPublished: the simulator doesn't publish `hears`.
+        """
+        self.controller = commands.rpartition("/")[0] or commands
+        self.name, self._hears, self._waiting = f"/{name}", hears, 0
+        self._answers: queue.SimpleQueue[rospy.AnyMsg] = queue.SimpleQueue()
+        if not rospy.core.is_initialized():
+            rospy.init_node("robot_test", anonymous=True, disable_signals=True)
+        topic = f"{self.name}/commands"
+        with contextlib.ExitStack() as ending:
+            self._ear = ending.enter_context(contextlib.closing(Ear(f"{self.name}_ear")))
+            self._ear.listen([hears])
+            started = ros_node.ros_node_from_pkg(
+                package, executable, launch_new_term=False, name=name,
+                args=[*args, f"{commands}:={topic}"], timeout=CONNECTING,
+            )  # fmt: skip
+            if not isinstance(started, Started):
+                raise NodeFault(f"{package}/{executable} doesn't run; the log says why")
+            ending.callback(started.close)
+            if not wait_until(self._is_connected, CONNECTING, hears):
+                raise NodeFault(f"{self.name} doesn't connect to {hears}")
+            ending.callback(self._subscribe(topic, commands).unregister)
+            self._ending = ending.pop_all()
+
+    def _is_connected(self) -> bool:
+        lines = master.call_node(nodes.node_uri(SIMULATOR) or "", "getBusInfo")
+        return any(line[1:5:3] == [self.name, self._hears] for line in lines)
+
+    def _subscribe(self, topic: str, commands: str) -> rospy.Subscriber:
+        subscriber = rospy.Subscriber(topic, rospy.AnyMsg, self._answers.put, tcp_nodelay=True)
+        if not wait_until(subscriber.get_num_connections, CONNECTING, topic):
+            subscriber.unregister()
+            raise NodeFault(f"{self.name} publishes nothing on {commands}")
+        return subscriber
+
+    def advance(self, ticks: int) -> int:
+        """Lets at most `ticks` pass, until a followed node has to answer; returns how many have."""
+        passed, heard = self._ear.advance(ticks, [self._hears])
+        self._waiting += len(heard)
+        return passed
+
+    def answer(self) -> list[float]:
+        """Waits for the answers to what the node has heard; returns the last command, or none."""
+        self.advance(0)
+        last: list[float] = []
+        while self._waiting:
+            try:
+                last = _numbers(self._answers.get(timeout=PATIENCE))
+            except queue.Empty:
+                raise NodeFault(
+                    f"{self.name} hasn't answered a message on {self._hears} for {PATIENCE:g} s"
+                ) from None
+            self._waiting -= 1
+        return last
+
+    def close(self) -> None:
+        """Ends it."""
+        self._ending.close()
+
+
+def _numbers(message: rospy.AnyMsg) -> list[float]:
+    """Returns a command's numbers, as a step takes them."""
+    kind = message._connection_header["type"]
+    command = roslib.message.get_message_class(kind)().deserialize(message._buff)
+    if isinstance(command, Twist):
+        return [command.linear.x, command.linear.y, command.angular.z]
+    if isinstance(command, Float64):
+        return [command.data]
+    if isinstance(command, Float64MultiArray):
+        return list(command.data)
+    raise NodeFault(f"a command is {kind}: Float64, Float64MultiArray and Twist can be followed")

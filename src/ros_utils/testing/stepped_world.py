@@ -1,0 +1,205 @@
+"""A world whose time passes on request: its commands and its readings."""
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from bullet_gazebo_msgs.srv import StepWorldRequest
+
+from ros_utils import ros_gazebo
+from ros_utils.step_client import PreparedSteps, StepAnswer, StepClient, StepNames
+from ros_utils.testing.followed_node import FollowedNode
+from ros_utils.testing.world_bag import WorldBag
+
+NANOSECONDS = 1_000_000_000
+MOTION = 13  # numbers per link: position, orientation, velocities
+Vector = tuple[float, float, float]
+
+
+class WorldError(Exception):
+    """The test asks for something that can't be done; the text says what."""
+
+
+@dataclass
+class RepeatedCommand:
+    """A command that is sent once in `ticks`, for the next time in `left`."""
+
+    values: Sequence[float]
+    ticks: int
+    left: int
+
+
+class SteppedWorld:
+    """A simulated world in lock-step, which is emptied when this object is made."""
+
+    def __init__(self, seed: int, bag: WorldBag | None = None) -> None:
+        """Empties the world, at time 0.
+
+        Args:
+            seed: of the sensors' noise; at least 1.
+            bag: records what is published.
+        """
+        self.seed, self._bag = seed, bag
+        self._steps, self._client = PreparedSteps(), StepClient()
+        self._commands: dict[str, Sequence[float]] = {}  # for the next step
+        self._repeated: dict[str, RepeatedCommand] = {}
+        self._nodes: list[FollowedNode] = []
+        self._links: dict[tuple[str, str], None] = {}
+        self._touched: dict[str, None] = {}
+        self._sensors: dict[str, None] = {}
+        for name in ros_gazebo.gazebo_get_model_names():
+            if name != "ground_plane":
+                ros_gazebo.gazebo_delete_model(name)
+        self._client.send(StepWorldRequest(reset=StepWorldRequest.SIMULATION, seed=seed))
+        if bag is not None:
+            bag.look()
+        self._period = round(ros_gazebo.gazebo_get_time_step() * NANOSECONDS)  # [ns]
+        self._state = self._step(0)
+
+    def close(self) -> None:
+        """Ends the nodes, and the connections to the simulator."""
+        for node in self._nodes:
+            node.close()
+        self._steps.close()
+        self._client.close()
+
+    def follow(
+        self, package: str, executable: str, *, hears: str, commands: str, args: Sequence[str] = ()
+    ) -> None:
+        """Starts a node, in whatever language, that commands a controller; it ends with the test.
+
+        From then on, time waits for it: it has to answer each message that it hears with one command.
+
+        Args:
+            package: of the node.
+            executable: as for rosrun.
+            hears: a topic of the simulator's, such as /joint_states.
+            commands: the topic of its commands, such as /elbow_controller/command; of the types Float64,
+                Float64MultiArray and Twist.
+            args: of the node.
+        """
+        name = f"{executable.partition('.')[0]}_under_test_{len(self._nodes)}"
+        self._nodes.append(FollowedNode(name, package, executable, args, hears, commands))
+
+    def command(self, controller: str, *values: float, every: float | None = None) -> None:
+        """Commands a running controller from the next step on.
+
+        Args:
+            controller: its name, or /namespace/name where several robots have one of that name.
+            values: as many as its command topic takes [rad, m, rad/s, m/s, N m, N]; of a vehicle ahead, to
+                the left and about.
+            every: period in which it is sent again, until the next command [s]: a vehicle that hears none
+                for a while stops. None: it is sent once.
+        """
+        self._repeated.pop(controller, None)
+        if every is not None:
+            ticks = self._ticks(every)
+            self._repeated[controller] = RepeatedCommand(values, ticks, ticks)
+        self._commands[controller] = values
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the test began [s]."""
+        return self._state.now / NANOSECONDS
+
+    def wait(self, duration: float) -> None:
+        """Lets simulated time pass [s]."""
+        self._state = self._step(self._ticks(duration))
+
+    def _ticks(self, duration: float) -> int:
+        ticks = round(duration * NANOSECONDS / self._period)
+        if ticks < 0 or abs(ticks * self._period - duration * NANOSECONDS) > 1.0:
+            raise WorldError(f"{duration} s isn't a number of steps of {self._period / 1e6:g} ms")
+        return ticks
+
+    def _step(self, ticks: int) -> StepAnswer:
+        """Lets time pass in parts, between which commands are repeated and followed nodes answer."""
+        answer = None
+        while ticks:
+            passed = min([ticks, *(each.left for each in self._repeated.values())])
+            passed = passed if self._bag is None else 1
+            if self._nodes and not self._commands:
+                answer, passed = None, self._nodes[0].advance(passed)
+            else:
+                passed = 1 if self._nodes else passed
+                answer = self._prepared_step(passed)
+            ticks -= passed
+            for controller, command in self._repeated.items():
+                command.left -= passed
+                if not command.left:
+                    command.left = command.ticks
+                    self._commands[controller] = command.values
+            for node in self._nodes:
+                if values := node.answer():
+                    self._commands[node.controller] = values
+            if self._bag is not None:
+                answer = answer or self._prepared_step(0)
+                self._bag.take(answer.now)
+        return answer or self._prepared_step(0)
+
+    def _prepared_step(self, ticks: int) -> StepAnswer:
+        commands = self._commands if ticks else {}
+        names = StepNames(
+            controllers=tuple(commands),
+            links=tuple(link for link, _ in self._links),
+            frames=tuple(frame for _, frame in self._links),
+            contacts_of=tuple(self._touched),
+            sensors=tuple(self._sensors),
+        )
+        numbers = [number for values in commands.values() for number in values]
+        self._steps.begin(names, ticks, numbers)
+        answer = self._steps.end()
+        if ticks:
+            self._commands.clear()
+        return answer
+
+    def joint(self, name: str) -> float:
+        """Returns the position of a joint with a transmission [rad, m]."""
+        joints = list(self._state.joints)
+        if name not in joints:
+            raise WorldError(f"there is no joint '{name}' with a transmission{_near(name, joints)}")
+        return float(self._state.numbers[joints.index(name)])
+
+    def link(self, name: str, frame: str = "") -> Vector:
+        """Returns the position of a link [m], or model::link, in the world or in another link's frame."""
+        if (name, frame) not in self._links:
+            self._links[name, frame] = None
+            self._state = self._step(0)
+        first = 3 * len(self._state.joints) + MOTION * list(self._links).index((name, frame))
+        x, y, z = self._state.numbers[first : first + 3]
+        return (x, y, z)
+
+    def contacts(self, link: str) -> list[str]:
+        """Returns the collisions that a link, or model::link, touches, as model::link::collision."""
+        if link not in self._touched:
+            self._touched[link] = None
+            self._state = self._step(0)
+        found: dict[str, None] = {}
+        for each in self._state.contacts:
+            pair = each.collision1_name, each.collision2_name
+            for mine, other in (pair, pair[::-1]):
+                if f"::{link}::" in f"::{mine}":
+                    found[other] = None
+        return list(found)
+
+    def sensor(self, name: str) -> dict[str, np.ndarray]:
+        """Returns the last measurement of a sensor, or model::sensor; empty before the first.
+
+        A laser has `ranges` [m]. It measures from the first call on.
+        """
+        if name not in self._sensors:
+            self._sensors[name] = None
+            self._state = self._step(0)
+        reading = self._state.sensors[list(self._sensors).index(name)]
+        return {
+            each.name: np.frombuffer(bytes(each.data), each.type).reshape(each.shape)
+            for each in reading.values
+        }
+
+
+def _near(name: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(name, known, 1)
+    return (
+        f" (did you mean '{near[0]}'?)" if near else f" (there are: {', '.join(known) or 'none'})"
+    )
