@@ -61,6 +61,7 @@ class Simulator:
         self.max_update_rate = max_update_rate
         self.relatch = relatch
         self.now = 0  # [ns] of simulated time
+        self.elapsed = 0  # [ns] of simulated time in all; no reset sets it back
         self.robots: list[ControlledRobot] = []
         self._robots_of: dict[Model, list[ControlledRobot]] = {}
         self._robots_version = 0
@@ -186,9 +187,11 @@ class Simulator:
         The lock is taken for each tick, so services are answered in between.
         """
         self.pause()
-        for _ in range(ticks):
+        for done in range(ticks):
             if self._stopping.is_set():
                 return
+            if done:
+                self.lock.between()
             with self.lock:
                 self.await_holds()
                 self._tick()
@@ -326,6 +329,7 @@ class Simulator:
     def _tick(self) -> None:
         """One physics step, in Gazebo's order: the state before the step carries the time after it."""
         self.now = now = self.now + self._period
+        self.elapsed += self._period
         dt = self.world.time_step
         applied = self.applied
         if applied.efforts or applied.wrenches:

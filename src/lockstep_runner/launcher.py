@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import os
+import shlex
 import sys
 import threading
 import types
@@ -33,16 +34,22 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.environ[HASHES] = str(args.seed % MOST_SEED)
         os.execv(sys.executable, [sys.executable, *sys.argv])
     # Imported late: it takes as long as Python's start, and execv would make it happen twice
+    from lockstep_runner.recording import recorded
     from lockstep_runner.world import RunsByItself, is_running
 
     try:
-        is_running()
+        if is_running() and args.record:
+            tell("--record: a simulator runs already; record it with: rosbag record /gazebo/journal")
+            return USAGE
     except RunsByItself as fault:
         tell(str(fault))
         return USAGE
     server = "--lockstep" if args.seed is None else f"--lockstep --seed {args.seed}"
+    if args.record:
+        server += f" --journal {shlex.quote(args.record)}"
     os.environ[SERVER_ARGUMENTS] = f"{os.environ.get(SERVER_ARGUMENTS, '')} {server}".strip()
-    return _run(args, code)
+    with recorded(args.record) if args.record else contextlib.nullcontext():
+        return _run(args, code)
 
 
 def _run(args: argparse.Namespace, code: types.CodeType) -> int:
@@ -114,6 +121,12 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         action="store_true",
         help="simulate time.time(), monotonic() and perf_counter(), too",
     )
+    parser.add_argument(
+        "--record",
+        type=os.path.abspath,
+        metavar="BAG",
+        help="record the run in this bag, which replay.py repeats",
+    )
     parser.add_argument("script", help="the Python file to run")
     parser.add_argument(
         "arguments", nargs=argparse.REMAINDER, help="arguments passed to the script"
@@ -131,7 +144,7 @@ def _one_by_one(argv: Sequence[str]) -> list[str]:
         argument = left.pop(0)
         if argument != STEP_ON:
             given.append(argument)
-            if not argument.startswith("-") and given[-2:-1] not in (["--seed"], ["--dt"]):
+            if not argument.startswith("-") and given[-2:-1] not in (["--seed"], ["--dt"], ["--record"]):
                 return given + left  # the script and its arguments
             continue
         names = []

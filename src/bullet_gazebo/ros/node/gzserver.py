@@ -42,6 +42,10 @@ from bullet_gazebo.ros.common.rospy_internals import (
     free_polls_at_once,
     registered_together,
 )
+from bullet_gazebo.ros.journal.interception import record
+from bullet_gazebo.ros.journal.journal import Journal
+from bullet_gazebo.ros.journal.journal_output import JournalOutput
+from bullet_gazebo.ros.node.start import facts_of
 from bullet_gazebo.ros.node.master_watch import MasterWatch, NameLoss, NodeNameTaken, refuse_twin
 from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
@@ -104,6 +108,7 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     option("-e", "--physics", default="ode", help="mujoco; all of Gazebo's names mean PyBullet")
     option("-o", "--profile", nargs="?", help="accepted, without effect")
     option("--lockstep", action="store_true", help="time moves only by ~step_world")
+    option("--journal", default="", help="in lock-step: record the run in this bag, for replay.py")
     option("--replace", action="store_true", help="end a running simulator that has this name")
     option("--video", default="", help="record the simulation in this MP4 file")
     option("--video-rate", type=float, default=30.0, help="frames per second of simulated time")
@@ -128,25 +133,32 @@ class GazeboNode:
     def __init__(
         self, args: argparse.Namespace, engine: Engine, interrupted: Callable[[], bool]
     ) -> None:
+        self.sim = Simulator(World(engine), lockstep=args.lockstep)
+        self.journal: Journal | None = None
+        self._output: JournalOutput | None = None
+        self.series = 0  # of the handles of prepared steps
+        if args.lockstep:
+            self.journal = Journal(self.sim)
+            record(self.journal)
         if not rospy.has_param("/use_sim_time"):
             rospy.set_param("/use_sim_time", True)
-        world = World(engine)
-        self.sim = Simulator(world, lockstep=args.lockstep, relatch=_flag("~relatch_on_reset"))
+        self.sim.relatch = _flag("~relatch_on_reset")
         self._watchdog = Watchdog(self.sim)
         recording = _recording(args)
         found = read_world(args.world, interrupted)
         fill_world(self.sim, found, interrupted)
         if args.paused:
             self.sim.pause()
-        self._advertise(_flag("~enable_ros_network"), args.seed or 0, found.plugins)
+        self._advertise(_flag("~enable_ros_network"), args, found.plugins)
         self._recorder = None if recording is None else SimulationRecorder(self.sim, recording)
         MasterWatch().start()
 
-    def _advertise(self, network: bool, seed: int, of_world: list[Plugin]) -> None:
+    def _advertise(self, network: bool, args: argparse.Namespace, of_world: list[Plugin]) -> None:
         sensors: list[SceneSensor] = []
         scene = SceneOffer(self.sim, sensors)
-        control = WorldControl(self.sim, self._watchdog, scene.show if network else None)
-        answer_xmlrpc(METHOD, control.answer)
+        shown = {"show": scene.show, "end_journal": self._end_journal} if network else {}
+        self.control = WorldControl(self.sim, self._watchdog, shown, self.journal)
+        answer_xmlrpc(METHOD, self.control.answer)
         free_polls_at_once()
         bound_messages()
         bound_calls()
@@ -154,22 +166,25 @@ class GazeboNode:
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
-        plugins = PluginRegistry(self.sim, thinner, seed, sensors)
+        plugins = PluginRegistry(self.sim, thinner, args.seed or 0, sensors)
         load_plugins(self.sim, plugins, of_world if network else ())
         if not network:
             return
         with registered_together():
-            self._offer_services(plugins, thinner)
+            self._offer_services(plugins, thinner, args)
 
-    def _offer_services(self, plugins: PluginRegistry, thinner: Thinner) -> None:
+    def _offer_services(
+        self, plugins: PluginRegistry, thinner: Thinner, args: argparse.Namespace
+    ) -> None:
         # Clients take the world for ready once it can be paused, so the step service comes first.
         stepping: list[object] = []
-        if self.sim.lockstep:
-            one_at_a_time = threading.Lock()
-            stepping = [
-                StepService(self.sim, plugins.sensing, self._watchdog, one_at_a_time),
-                AdvanceService(self.sim, plugins.sensing, self._watchdog, thinner, one_at_a_time),
-            ]
+        if self.journal is not None:
+            common = self.sim, plugins.sensing, self._watchdog, threading.Lock()
+            steps = StepService(*common)
+            stepping = [steps, AdvanceService(*common, thinner, self.journal)]
+            self._output = JournalOutput(self.journal, _journal_bag(args))
+            self.series = steps.series
+            self.journal.start(facts_of(args, steps.series))
         spawning = threading.Lock()
         with spawning:  # once a model is there, clients use all other services without a wait
             self._services = [
@@ -178,15 +193,20 @@ class GazeboNode:
                 *advertise_world_services(self.sim),
             ]
 
-    def run(self, signals: SignalHandler) -> int:
-        """Simulates until the node is shut down; returns the exit code."""
+    def _end_journal(self) -> None:
+        """Completes the journal's bag."""
+        if self._output is not None:
+            self._output.close()
+
+    def run(self, signals: SignalHandler, is_over: Callable[[], bool] = lambda: False) -> int:
+        """Simulates until the node is shut down, or `is_over` returns true; returns the exit code."""
         # Called before the topics close, so that no tick publishes to a closed one.
         rospy.on_shutdown(self._watchdog.stop)
         if signals.noted():  # they came during the start: no more time passes
             self._watchdog.stop()
         else:
             self._watchdog.start()
-        signals.wait(self._watchdog.failed)
+        signals.wait(lambda: self._watchdog.failed() or is_over())
         failed = self._watchdog.failed()
         self._watchdog.stop()  # a shutdown that came before the hook was there doesn't call it
         if self._recorder is not None:
@@ -196,6 +216,11 @@ class GazeboNode:
             print(f"gzserver: ends while the world's lock is kept by {hanging}", file=sys.stderr)
             end_within(HANGING_TIMEOUT, 1)
         return 1 if failed or hanging is not None else 0
+
+
+def _journal_bag(args: argparse.Namespace) -> Path | None:
+    """Returns the bag that the command line asks for."""
+    return Path(args.journal).absolute() if args.journal else None
 
 
 def _recording(args: argparse.Namespace) -> RecordingOptions | None:
@@ -230,10 +255,17 @@ def _clock_frequency() -> float:
     return 0.0
 
 
-def simulate(args: argparse.Namespace, engine: Engine, signals: SignalHandler) -> int:
+Begin = Callable[[GazeboNode], Callable[[], bool]]
+"""Is called with the node when it is ready; returns a function that says whether the node is to end."""
+
+
+def simulate(
+    args: argparse.Namespace, engine: Engine, signals: SignalHandler, begin: Begin | None
+) -> int:
     """Simulates until the end; returns the exit code."""
     try:
-        return GazeboNode(args, engine, signals.noted).run(signals)
+        node = GazeboNode(args, engine, signals.noted)
+        return node.run(signals, begin(node) if begin else lambda: False)
     except RecordingError as error:
         rospy.logfatal("%s", error)
         return 1
@@ -247,7 +279,7 @@ def simulate(args: argparse.Namespace, engine: Engine, signals: SignalHandler) -
         return 1
 
 
-def main(argv: list[str] | None = None) -> int:
+def main(argv: list[str] | None = None, begin: Begin | None = None) -> int:
     """Runs the node; returns its exit code."""
     use_one_arena()
     command_line = sys.argv if argv is None else argv
@@ -272,7 +304,7 @@ def main(argv: list[str] | None = None) -> int:
     except EngineError as error:
         rospy.logfatal("%s", error)
         return 1
-    code = simulate(args, engine, signals)
+    code = simulate(args, engine, signals, begin)
     if loss.happened:
         print(f"gzserver: {loss.text(name)}", file=sys.stderr)
         code = code or 1
@@ -296,14 +328,15 @@ def main_with_window(argv: Sequence[str] | None = None) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     try:
-        with _window(command_line[1:]):
+        with window(command_line[1:]):
             return main(command_line)
     except KeyboardInterrupt:
         return INTERRUPTED
 
 
 @contextlib.contextmanager
-def _window(arguments: Sequence[str]) -> Iterator[None]:
+def window(arguments: Sequence[str]) -> Iterator[None]:
+    """Opens the window in a process of its own for the time of a block."""
     # The launch file's name and log file are the server's.
     own = [a for a in arguments if ":=" in a and not a.startswith(("__name:=", "__log:="))]
     client = subprocess.Popen([sys.executable, "-P", "-c", WINDOW, *own, f"__name:={WINDOW_NAME}"])

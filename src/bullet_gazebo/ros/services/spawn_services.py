@@ -111,7 +111,7 @@ class SpawnServices:
         pose, name = from_pose_msg(request.initial_pose), request.model_name
         if not name:
             raise DescriptionError("the model needs a name")
-        with self._sim.lock:
+        with self._sim.lock.glance():
             frame = self._sim.world.frame(request.reference_frame)
             if frame is None:
                 raise LookupError(

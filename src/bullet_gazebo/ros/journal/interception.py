@@ -1,0 +1,143 @@
+"""What rospy does for the journal: it passes requests, messages and reads of parameters by it.
+
+- `record_services`, `record_messages`, `record_parameters`: plugins and controllers of users offer services,
+  subscribe and read parameters with rospy alone (replay.test)
+"""
+
+import io
+import zlib
+from collections.abc import Callable
+from typing import Any
+
+import genpy
+import rospy
+from bullet_gazebo_msgs.msg import JournalEntry
+from rospy.impl.tcpros_service import ServiceImpl, convert_return_to_response
+from rospy.msproxy import MasterProxy
+from rospy.topics import _SubscriberImpl
+
+from bullet_gazebo.ros.journal.journal import Entry, Journal
+
+# How the last part of the names of services begins that only look, one of each node, and the one of scripts in
+# lock-step, whose parts are commands and messages of their own.
+UNRECORDED = ("get_", "list_", "query_", "set_logger_level", "advance_world")
+UNREPEATED = "/prepare_step"  # in its answer is a handle, another one each time
+FAILED = 1  # in place of the CRC-32 of an answer, if the handler raised
+
+
+def record(journal: Journal) -> None:
+    """Records this process's requests, messages and reads; before it offers, subscribes or reads."""
+    record_services(journal)
+    record_messages(journal)
+    record_parameters(journal)
+
+
+def record_services(journal: Journal) -> None:
+    """Records the requests of the services that this process offers from now on."""
+    init = ServiceImpl.__init__
+
+    def init_recorded(
+        service: ServiceImpl, name: str, kind: Any, handler: Callable[[Any], Any], *args: Any, **more: Any
+    ) -> None:
+        init(service, name, kind, handler, *args, **more)
+        if not service.resolved_name.rpartition("/")[2].startswith(UNRECORDED):
+            # rospy makes a request of the class by which it receives.
+            service.protocol.recv_data_class = _keeping_bytes(kind._request_class)
+            service.handler = _recorded(journal, service, handler)
+
+    ServiceImpl.__init__ = init_recorded
+
+
+def _keeping_bytes(request_class: type[genpy.Message]) -> type[genpy.Message]:
+    """Returns the class whose messages keep the bytes that they were made from, which costs no time."""
+
+    class Request(request_class):  # type: ignore[valid-type, misc]
+        def deserialize(self, data: bytes) -> Any:
+            self.received = data
+            return super().deserialize(data)
+
+    Request.__name__ = request_class.__name__
+    return Request
+
+
+def _recorded(
+    journal: Journal, service: ServiceImpl, handler: Callable[[Any], Any]
+) -> Callable[[Any], Any]:
+    name, kind = service.resolved_name, service.service_class
+    repeats = not name.endswith(UNREPEATED)
+
+    def handle(request: Any) -> Any:
+        caller = request._connection_header["callerid"]
+        entry = Entry(
+            JournalEntry.SERVICE, name, kind._type, kind._md5sum, caller, request.received
+        )
+        if caller == rospy.get_name() or not journal.begin(entry):
+            return handler(request)
+        answer = FAILED
+        try:
+            response = convert_return_to_response(handler(request), service.response_class)
+            answer = _checksum(response) if repeats and journal.listened else 0
+            return response
+        finally:
+            journal.end(entry, answer)
+
+    return handle
+
+
+def _checksum(message: genpy.Message) -> int:
+    return zlib.crc32(_bytes(message))
+
+
+def _bytes(message: genpy.Message) -> bytes:
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
+
+
+def record_messages(journal: Journal) -> None:
+    """Records the messages that this process's subscribers receive from other nodes."""
+    receive = _SubscriberImpl.receive_callback
+
+    def receive_recorded(
+        subscription: _SubscriberImpl, messages: list[genpy.Message], connection: Any
+    ) -> None:
+        kind = subscription.data_class
+        for message in messages:
+            entry = Entry(
+                JournalEntry.MESSAGE, subscription.resolved_name, kind._type, kind._md5sum,
+                connection.callerid_pub, _bytes(message), subscription.get_num_connections(),
+            )  # fmt: skip
+            own = connection.callerid_pub == rospy.get_name()
+            if own or not journal.begin(entry):
+                receive(subscription, [message], connection)
+                continue
+            try:
+                receive(subscription, [message], connection)
+            finally:
+                journal.end(entry)
+
+    _SubscriberImpl.receive_callback = receive_recorded
+
+
+def record_parameters(journal: Journal) -> None:
+    """Records the parameters that this process reads."""
+    read = MasterProxy.__getitem__
+
+    def read_recorded(proxy: MasterProxy, key: str) -> Any:
+        name = rospy.resolve_name(key)
+        try:
+            value = read(proxy, key)
+        except KeyError:
+            journal.note_parameter(name, [])
+            raise
+        journal.note_parameter(name, [value])
+        return value
+
+    def contains(proxy: MasterProxy, key: str) -> bool:
+        try:
+            proxy[key]
+        except KeyError:
+            return False
+        return True
+
+    MasterProxy.__getitem__, MasterProxy.__contains__ = read_recorded, contains
