@@ -123,7 +123,7 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument(
         "--record",
-        type=os.path.abspath,
+        type=_writable,
         metavar="BAG",
         help="record the run in this bag, which replay.py repeats",
     )
@@ -162,6 +162,13 @@ def _seed(text: str) -> int:
     if not (text.isascii() and text.isdecimal() and int(text) <= MOST_SEED):
         raise argparse.ArgumentTypeError(f"{text}: a whole number, 0 to {MOST_SEED}, is needed")
     return int(text)
+
+
+def _writable(text: str) -> str:
+    path = os.path.abspath(text)
+    if not os.access(os.path.dirname(path), os.W_OK):
+        raise argparse.ArgumentTypeError(f"{text}: there is no such folder that can be written to")
+    return path
 
 
 def _period(text: str) -> float:

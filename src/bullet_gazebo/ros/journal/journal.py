@@ -10,7 +10,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from bullet_gazebo_msgs.msg import JournalEntry
@@ -20,6 +20,8 @@ from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.simulator import Simulator
 
 MOST_KEPT = 64 * 2**20  # [bytes]; without the beginning the rest can't be repeated
+WAIT = "wait"  # a command that stands where an entry's handler began to wait
+LOOK = "look"  # one that a new listener causes, for the state that it begins with
 OVERHEAD = 350  # [bytes] of an entry in memory, without its data
 
 
@@ -52,7 +54,7 @@ class Entry:
     elapsed: int = 0
     ended: int = 0
     now: int = 0
-    parameters: dict[str, list[object]] = field(default_factory=dict)
+    parameters: dict[str, list[object]] | None = None
     answer: int = 0
     state: MotionState | None = None
     is_done: bool = False
@@ -85,12 +87,14 @@ class Journal:
         # Called with finished entries, in order. Their states are known while there are some.
         self.listeners: list[Callable[[list[Entry]], None]] = []
         sim.lock.taken, sim.lock.leaving = self._taken, self._leaving
+        sim.lock.waiting = self._waiting
         self._first = self._current.entry = Entry(JournalEntry.START)
         with sim.lock:
             pass  # numbers it
 
     @property
     def listened(self) -> bool:
+        """Whether states and answers are asked for."""
         return bool(self.listeners)
 
     def start(self, facts: dict[str, object]) -> None:
@@ -125,7 +129,7 @@ class Journal:
 
     @contextmanager
     def command(self, name: str, count: int = 0) -> Iterator[Entry]:
-        """Records a command in whose block it is carried out; an advance by 0 ticks is none."""
+        """Records a command in whose block it is carried out."""
         entry = Entry(JournalEntry.COMMAND, name, data=b"%d" % count)
         is_first = self.begin(entry)
         try:
@@ -157,15 +161,18 @@ class Journal:
     def unlisten(self, listener: Callable[[list[Entry]], None]) -> None:
         """Ends what `listen` began."""
         with self._guard:
-            self.listeners.remove(listener)
+            if listener in self.listeners:
+                self.listeners.remove(listener)
 
     def note_parameter(self, name: str, value: list[object]) -> None:
         """Records that a parameter was read: its value in a list, which is empty if there was none."""
         entry = self._current.entry
-        if entry is None or name in entry.parameters:
+        if entry is None:
             return
+        if entry.parameters is None:
+            entry.parameters = {}
         text = json.dumps(value, default=str)
-        if self._parameters.get(name) != text:
+        if name not in entry.parameters and self._parameters.get(name) != text:
             self._parameters[name] = text
             entry.parameters[name] = value
 
@@ -180,10 +187,26 @@ class Journal:
 
     def _leaving(self) -> None:
         entry = self._current.entry
-        if entry is not None:
+        if entry is not None and entry.number >= 0:
             entry.ended, entry.now = self._sim.elapsed, self._sim.now
-            if self.listeners:
+            # While entries overlap, a replay has other states in between, but for those within long steps.
+            is_alone = entry.ended > entry.elapsed or self._count == entry.number + 1
+            if self.listeners and is_alone and self._order[0] is entry:
                 entry.state = self._state()
+            else:
+                entry.state = None
+
+    def _waiting(self) -> None:
+        """Lets the entry take effect after the wait, if it hasn't let time pass yet."""
+        entry = self._current.entry
+        if entry is not None and entry.elapsed == self._sim.elapsed:
+            with self._guard:
+                place = self._order.index(entry)
+                self._order[place] = Entry(
+                    JournalEntry.COMMAND, WAIT, data=b"0", number=entry.number,
+                    elapsed=entry.elapsed, ended=entry.elapsed, now=self._sim.now, is_done=True,
+                )  # fmt: skip
+            entry.number = -1
 
     def _keep(self, finished: list[Entry]) -> None:
         if self._kept is None:

@@ -15,9 +15,10 @@ from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
+from bullet_gazebo.pictures.recording import RecordingError
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.common.rospy_internals import wait_until_sent
-from bullet_gazebo.ros.journal.journal import Entry, Journal, MotionState, to_entries
+from bullet_gazebo.ros.journal.journal import LOOK, Entry, Journal, MotionState, to_entries
 
 # [s of wall time] between two messages. `rosbag record` keeps 100 of a topic while it is busy: it has 10 s.
 PERIOD = 0.1
@@ -56,7 +57,7 @@ class JournalOutput(rospy.SubscribeListener):
     def peer_subscribe(self, _name: str, _all: object, publish: Callable[[Any], None]) -> None:
         """Lets a new subscriber have what was before; what comes twice has the same number."""
         self._journal.listen(self._take)
-        with self._journal.command("look"):  # so that what was before can be compared by its outcome
+        with self._journal.command(LOOK):  # so that what was before can be compared by its outcome
             pass
         before = self._journal.listen(self._take)
         if before is None:
@@ -81,6 +82,7 @@ class JournalOutput(rospy.SubscribeListener):
 
     def close(self) -> None:
         """Sends what is left, and closes the bag."""
+        self._journal.unlisten(self._take)
         with self._news:
             self._ending = True
             self._news.notify_all()
@@ -101,10 +103,17 @@ class JournalOutput(rospy.SubscribeListener):
             if self._publisher.get_num_connections():
                 _send(fresh, self._publisher.publish)
             if self._bag:
-                self._bag.write(fresh)
+                self._write(self._bag, fresh)
         wait_until_sent(self._publisher)
         if self._bag:
             self._bag.close()
+
+    def _write(self, bag: "JournalBag", entries: list[Entry]) -> None:
+        try:
+            bag.write(entries)
+        except OSError as fault:
+            self._bag = None
+            rospy.logerr("The journal's bag ends here: %s", fault)
 
 
 def _send(entries: list[Entry], publish: Callable[[Any], None]) -> None:
@@ -119,7 +128,11 @@ class JournalBag:
     """
 
     def __init__(self, path: Path) -> None:
-        """An existing file stays: the name gets a number."""
+        """An existing file stays: the name gets a number.
+
+        Raises:
+            RecordingError: the file can't be written.
+        """
         import rosbag  # needed only here, and slow
 
         number = 2
@@ -128,7 +141,10 @@ class JournalBag:
             self._path = path.with_stem(f"{path.stem}_{number}")
             number += 1
         self._open = Path(f"{self._path}{ACTIVE}")
-        self._bag = rosbag.Bag(str(self._open), "w", compression="lz4")
+        try:
+            self._bag = rosbag.Bag(str(self._open), "w", compression="lz4")
+        except OSError as fault:
+            raise RecordingError(f"{self._open}: {fault.strerror}") from fault
         self._before: MotionState | None = None
 
     def write(self, entries: list[Entry]) -> None:

@@ -97,7 +97,7 @@ def _to_entry(message: JournalEntry, state: MotionState | None) -> Entry:
     return Entry(
         message.kind, message.name, message.type, message.md5sum, message.caller, message.data,
         message.publishers, message.number, message.elapsed, message.ended, message.now.to_nsec(),
-        json.loads(message.parameters or "{}"), message.answer, state,
+        json.loads(message.parameters or "null"), message.answer, state,
     )  # fmt: skip
 
 

@@ -298,6 +298,8 @@ def main(argv: list[str] | None = None, begin: Begin | None = None) -> int:
         rospy.logwarn("Physics engine '%s' is not known; PyBullet is used", args.physics)
     if args.ignored:
         rospy.logwarn("Arguments without effect here: %s", " ".join(args.ignored))
+    if args.journal and not args.lockstep:
+        rospy.logwarn("--journal has no effect: only a world in lock-step (--lockstep) has a journal")
     seed_random_numbers(args.seed)
     try:
         engine = make_engine(args.physics if args.physics in ENGINES else BULLET[0])

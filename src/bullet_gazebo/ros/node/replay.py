@@ -10,7 +10,7 @@ from bullet_gazebo_msgs.srv import PreparedStep
 from gazebo_msgs.srv import SpawnModel
 from rospy.impl.registration import get_service_manager, get_topic_manager
 
-from bullet_gazebo.ros.journal.journal import Entry
+from bullet_gazebo.ros.journal.journal import LOOK, WAIT, Entry
 from bullet_gazebo.ros.journal.recorded import RecordedJournal, first_difference
 from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.services.advance_service import reseed
@@ -38,7 +38,7 @@ class Changes:
     def set_parameters(self, entry: Entry, request: Any = None) -> None:
         """Sets the parameters that the entry's handler read, and then those that are to be otherwise."""
         spawned = isinstance(request, SpawnModel._request_class)
-        for name, value in entry.parameters.items():
+        for name, value in (entry.parameters or {}).items():
             if not value:
                 if rospy.has_param(name):
                     rospy.delete_param(name)
@@ -173,7 +173,7 @@ class Replay:
         elif name == "reseed":
             with self._journal.command(name, count):
                 reseed(self._sim, count)
-        elif name == "look":
+        elif name in (LOOK, WAIT):
             with self._journal.command(name):
                 pass
         else:
