@@ -39,7 +39,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     try:
         if is_running() and args.record:
-            tell("--record: a simulator runs already; record it with: rosbag record /gazebo/journal")
+            tell(
+                "--record: a simulator runs already; record it with: rosbag record /gazebo/journal"
+            )
             return USAGE
     except RunsByItself as fault:
         tell(str(fault))
@@ -144,7 +146,11 @@ def _one_by_one(argv: Sequence[str]) -> list[str]:
         argument = left.pop(0)
         if argument != STEP_ON:
             given.append(argument)
-            if not argument.startswith("-") and given[-2:-1] not in (["--seed"], ["--dt"], ["--record"]):
+            if not argument.startswith("-") and given[-2:-1] not in (
+                ["--seed"],
+                ["--dt"],
+                ["--record"],
+            ):
                 return given + left  # the script and its arguments
             continue
         names = []

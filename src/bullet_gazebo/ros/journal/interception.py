@@ -18,8 +18,8 @@ from rospy.topics import _SubscriberImpl
 
 from bullet_gazebo.ros.journal.journal import Entry, Journal
 
-# How the last part of the names of services begins that only look, one of each node, and the one of scripts in
-# lock-step, whose parts are commands and messages of their own.
+# How names of services begin, behind the last slash, that only look, one that each node has, and advance_world,
+# whose parts are recorded as commands and messages.
 UNRECORDED = ("get_", "list_", "query_", "set_logger_level", "advance_world")
 UNREPEATED = "/prepare_step"  # in its answer is a handle, another one each time
 FAILED = 1  # in place of the CRC-32 of an answer, if the handler raised
@@ -37,7 +37,12 @@ def record_services(journal: Journal) -> None:
     init = ServiceImpl.__init__
 
     def init_recorded(
-        service: ServiceImpl, name: str, kind: Any, handler: Callable[[Any], Any], *args: Any, **more: Any
+        service: ServiceImpl,
+        name: str,
+        kind: Any,
+        handler: Callable[[Any], Any],
+        *args: Any,
+        **more: Any,
     ) -> None:
         init(service, name, kind, handler, *args, **more)
         if not service.resolved_name.rpartition("/")[2].startswith(UNRECORDED):
@@ -51,7 +56,7 @@ def record_services(journal: Journal) -> None:
 def _keeping_bytes(request_class: type[genpy.Message]) -> type[genpy.Message]:
     """Returns the class whose messages keep the bytes that they were made from, which costs no time."""
 
-    class Request(request_class):  # type: ignore[valid-type, misc]
+    class Request(request_class):
         def deserialize(self, data: bytes) -> Any:
             self.received = data
             return super().deserialize(data)
@@ -140,4 +145,5 @@ def record_parameters(journal: Journal) -> None:
             return False
         return True
 
-    MasterProxy.__getitem__, MasterProxy.__contains__ = read_recorded, contains
+    for name, method in (("__getitem__", read_recorded), ("__contains__", contains)):
+        setattr(MasterProxy, name, method)

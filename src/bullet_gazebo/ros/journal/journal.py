@@ -242,20 +242,21 @@ def to_entries(entries: list[Entry]) -> list[JournalEntry]:
     before: MotionState | None = None
     converted = []
     for each in entries:
-        state, models, joints, numbers = JournalEntry.UNKNOWN, (), (), ()
+        state, names = JournalEntry.UNKNOWN, Layout()
+        numbers: tuple[float, ...] = ()
         if each.state is not None and each.state == before:
             state = JournalEntry.SAME
         elif each.state is not None:
             state, numbers = JournalEntry.CHANGED, each.state.numbers
             if before is None or before.layout != each.state.layout:
-                models, joints = each.state.layout
+                names = each.state.layout
         before = each.state or before
         converted.append(
             JournalEntry(
                 each.number, each.kind, each.name, each.type, each.md5sum, each.caller,
                 each.publishers, each.data, each.elapsed, each.ended, to_time(each.now),
                 json.dumps(each.parameters, default=str) if each.parameters else "",
-                each.answer, state, models, joints, numbers,
+                each.answer, state, *names, numbers,
             )
         )  # fmt: skip
     return converted

@@ -1,4 +1,4 @@
-"""Where the journal goes: the topic ~journal, for recorders, and a bag that the simulator writes by itself."""
+"""Where the journal goes: the topic ~journal, for recorders, and a bag that the simulator itself writes."""
 
 import os
 import threading
@@ -34,7 +34,7 @@ Entries = list[Entry] | None
 
 
 class JournalOutput(rospy.SubscribeListener):
-    """Sends entries from a thread of its own, many at a time; without subscribers and a bag it does nothing."""
+    """Sends entries from a thread of its own, many at a time, to subscribers and the bag, if there are any."""
 
     def __init__(self, journal: Journal, bag: Path | None) -> None:
         """The bag is written from the beginning on."""

@@ -11,6 +11,12 @@ from bullet_gazebo_msgs.msg import JournalEntry
 from bullet_gazebo.ros.journal.journal import Entry, Layout, MotionState
 
 KIND = JournalMessage._type
+PARTS = (
+    *(f"position {axis}" for axis in "xyz"),
+    *(f"orientation {axis}" for axis in "xyzw"),
+    *(f"velocity {axis}" for axis in "xyz"),
+    *(f"angular velocity {axis}" for axis in "xyz"),
+)
 
 
 class NoRecording(Exception):
@@ -126,9 +132,11 @@ def first_difference(recorded: Entry, now: Entry, refusal: str) -> str:
 
 
 def _moved(recorded: MotionState, now: MotionState) -> str:
-    for what, before, after in zip(("models", "joints"), recorded.layout, now.layout, strict=True):
-        if before != after:
-            more, less = sorted(set(after) - set(before)), sorted(set(before) - set(after))
+    for what, had, have in zip(("models", "joints"), recorded.layout, now.layout, strict=True):
+        if had != have:
+            more, less = sorted(set(have) - set(had)), sorted(set(had) - set(have))
+            if not (more or less):
+                return f"{what} come in another order"
             return f"{what}: {less or 'none'} are missing, {more or 'none'} are new"
     models = len(recorded.layout.models)
     joints = recorded.numbers[13 * models :], now.numbers[13 * models :]
@@ -144,11 +152,3 @@ def _moved(recorded: MotionState, now: MotionState) -> str:
             model = recorded.layout.models[index // 13]
             return f"{part} of model {model}: {before!r} recorded, {after!r} now"
     return ""
-
-
-PARTS = (
-    *(f"position {axis}" for axis in "xyz"),
-    *(f"orientation {axis}" for axis in "xyzw"),
-    *(f"velocity {axis}" for axis in "xyz"),
-    *(f"angular velocity {axis}" for axis in "xyz"),
-)

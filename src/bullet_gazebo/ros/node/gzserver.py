@@ -45,8 +45,8 @@ from bullet_gazebo.ros.common.rospy_internals import (
 from bullet_gazebo.ros.journal.interception import record
 from bullet_gazebo.ros.journal.journal import Journal
 from bullet_gazebo.ros.journal.journal_output import JournalOutput
-from bullet_gazebo.ros.node.start import facts_of
 from bullet_gazebo.ros.node.master_watch import MasterWatch, NameLoss, NodeNameTaken, refuse_twin
+from bullet_gazebo.ros.node.start import facts_of
 from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.ros.scene import SceneOffer
@@ -299,7 +299,9 @@ def main(argv: list[str] | None = None, begin: Begin | None = None) -> int:
     if args.ignored:
         rospy.logwarn("Arguments without effect here: %s", " ".join(args.ignored))
     if args.journal and not args.lockstep:
-        rospy.logwarn("--journal has no effect: only a world in lock-step (--lockstep) has a journal")
+        rospy.logwarn(
+            "--journal has no effect: only a world in lock-step (--lockstep) has a journal"
+        )
     seed_random_numbers(args.seed)
     try:
         engine = make_engine(args.physics if args.physics in ENGINES else BULLET[0])

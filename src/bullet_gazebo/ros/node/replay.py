@@ -11,16 +11,12 @@ from gazebo_msgs.srv import SpawnModel
 from rospy.impl.registration import get_service_manager, get_topic_manager
 
 from bullet_gazebo.ros.journal.journal import LOOK, WAIT, Entry
-from bullet_gazebo.ros.journal.recorded import RecordedJournal, first_difference
+from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal, first_difference
 from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.services.advance_service import reseed
 from bullet_gazebo.ros.services.step_requests import SLICE
 from bullet_gazebo.ros.services.step_service import COUNTED
 from bullet_gazebo.simulator import NANOSECONDS
-
-
-class Differs(Exception):
-    """The replay can't go on as recorded; the text says why."""
 
 
 class Changes:
@@ -72,9 +68,11 @@ class Replay:
         self._handles = recorded.facts["series"], node.series
         self._changes, self._until = changes, until
         self._entries: Iterator[Entry] = recorded.entries()
-        self._next = next(self._entries, None)
+        self._next: Entry | None = next(self._entries, None)
+        self._fault: NoRecording | None = None
         self._expected: dict[int, Entry] = {}  # by number
-        self._refusals: dict[int, str] = {}
+        self._refusals: dict[int, str] = {}  # texts of requests that failed, by number
+        self._done: list[Entry] = []  # what the journal has of them, not compared yet
         self.repeated = 0  # entries that were equal
         self.unknown = 0  # of them, those without a recorded state at the beginning
         self.difference = ""
@@ -87,16 +85,19 @@ class Replay:
         """
         start = self._take()
         self._expected[start.number] = start
-        self._compare(self._journal.listen(self._compare) or [])
+        done = self._done.extend
+        done(self._journal.listen(done) or [])
+        self._compare()
         self._sim.lock.between = self._between
         try:
             while not self._is_over():
                 self._repeat(self._take())
-        except Differs as difference:
-            self.difference = self.difference or str(difference)
+                self._compare()
         finally:
             self._sim.lock.between = lambda: None
-            self._journal.unlisten(self._compare)
+            self._journal.unlisten(done)
+        if self._fault is not None:
+            raise self._fault
 
     @property
     def seconds(self) -> float:
@@ -106,7 +107,10 @@ class Replay:
     def _take(self) -> Entry:
         entry = self._next
         assert entry is not None  # _is_over has looked
-        self._next = next(self._entries, None)
+        try:
+            self._next = next(self._entries, None)
+        except NoRecording as fault:  # raised at the end: this may be in the middle of a request
+            self._next, self._fault = None, fault
         return entry
 
     def _is_over(self) -> bool:
@@ -132,7 +136,8 @@ class Replay:
         service = get_service_manager().get_service(entry.name)
         kind = None if service is None else service.service_class
         if kind is None or kind._md5sum != entry.md5sum:
-            raise Differs(f"{_at(entry)} there is no service {entry.name} of type {entry.type}")
+            self._differ(entry, f"there is no service {entry.name} of type {entry.type}")
+            return
         request = service.protocol.recv_data_class().deserialize(entry.data)
         request._connection_header = {"callerid": entry.caller}
         self._changes.set_parameters(entry, request)
@@ -156,7 +161,8 @@ class Replay:
     def _deliver(self, entry: Entry) -> None:
         subscription: Any = get_topic_manager().get_subscriber_impl(entry.name)
         if subscription is None or subscription.data_class._md5sum != entry.md5sum:
-            raise Differs(f"{_at(entry)} nobody hears {entry.name}, of type {entry.type}")
+            self._differ(entry, f"nobody hears {entry.name}, of type {entry.type}")
+            return
         self._changes.set_parameters(entry)
         header = {"callerid": entry.caller, "topic": entry.name, "type": entry.type}
         publisher = SimpleNamespace(callerid_pub=entry.caller, header=header, stat_bytes=0)
@@ -165,6 +171,9 @@ class Replay:
         message._connection_header = header
         subscription.receive_callback([message], publisher)
         subscription.connections = []
+
+    def _differ(self, entry: Entry, text: str) -> None:
+        self.difference = self.difference or f"at {entry.elapsed / NANOSECONDS:g} s {text}"
 
     def _command(self, name: str, count: int) -> None:
         if name == "advance":
@@ -192,9 +201,10 @@ class Replay:
             if ticks:
                 self._between()
 
-    def _compare(self, entries: list[Entry]) -> None:
-        """Compares what has been done with what was recorded; a listener of the journal."""
-        for entry in entries:
+    def _compare(self) -> None:
+        """Compares what has been done with what was recorded."""
+        done, self._done[:] = list(self._done), []
+        for entry in done:
             recorded = self._expected.pop(entry.number, None)
             if recorded is None or self.difference:
                 continue
@@ -202,7 +212,3 @@ class Replay:
             self.difference = first_difference(recorded, entry, refusal)
             self.unknown += recorded.state is None and self.unknown == self.repeated
             self.repeated += not self.difference
-
-
-def _at(entry: Entry) -> str:
-    return f"at {entry.elapsed / NANOSECONDS:g} s"

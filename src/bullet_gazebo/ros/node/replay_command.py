@@ -63,8 +63,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def parse_args(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="replay.py",
-        description="Repeats a run that lockstep.py --record or rosbag has recorded, in a simulator of its own,"
-        " and names the first difference.",
+        description="Repeats a run that lockstep.py --record or rosbag has recorded, in a simulator of its"
+        " own, and names the first difference.",
     )
     parser.add_argument("bag", type=Path, help="the recorded run")
     parser.add_argument(
@@ -77,19 +77,18 @@ def parse_args(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "--gui", action="store_true", help="open the simulator's page where the replay stops"
     )
-    pair = {"action": "append", "default": [], "type": _pair}
-    parser.add_argument(
-        "--model",
-        metavar="NAME=FILE",
-        help="spawn this model from a URDF, xacro or SDF file; may be repeated",
-        **pair,
-    )
-    parser.add_argument(
-        "--params",
-        metavar="NAMESPACE=FILE",
-        help="put the parameters of a YAML file in place of those recorded; may be repeated",
-        **pair,
-    )
+    for flag, what, text in (
+        ("--model", "NAME=FILE", "spawn this model from a URDF, xacro or SDF file"),
+        ("--params", "NAMESPACE=FILE", "put parameters of a YAML file in place of those recorded"),
+    ):
+        parser.add_argument(
+            flag,
+            action="append",
+            default=[],
+            type=_pair,
+            metavar=what,
+            help=f"{text}; may be repeated",
+        )
     return parser.parse_args(argv)
 
 
@@ -116,13 +115,13 @@ def _replay(
     threads: list[threading.Thread] = []
 
     def begin(node: gzserver.GazeboNode) -> Callable[[], bool]:
-        # What the simulator logs has been seen when the run was recorded.
-        logging.getLogger("rosout").setLevel(logging.ERROR)
         rospy.on_shutdown(ended.set)
         threads.append(threading.Thread(target=work, args=(node,), name="replay", daemon=True))
         threads[0].start()
         return lambda: not threads[0].is_alive()
 
+    # Warnings have been seen when the run was recorded.
+    logging.getLogger("rosout").addFilter(lambda log: log.levelno >= logging.ERROR)
     code = gzserver.main(["gzserver", *arguments_of(recorded.facts, folder)], begin)
     ended.set()
     for thread in threads:
