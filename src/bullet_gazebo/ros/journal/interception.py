@@ -1,7 +1,6 @@
 """What rospy does for the journal: it passes requests, messages and reads of parameters by it.
 
-- `record_services`, `record_messages`, `record_parameters`: plugins and controllers of users offer services,
-  subscribe and read parameters with rospy alone (replay.test)
+Plugins and controllers of users offer services, subscribe and read parameters with rospy alone (replay.test).
 """
 
 import io
@@ -18,18 +17,11 @@ from rospy.topics import _SubscriberImpl
 
 from bullet_gazebo.ros.journal.journal import Entry, Journal
 
-# How names of services begin, behind the last slash, that only look, one that each node has, and advance_world,
-# whose parts are recorded as commands and messages.
+# How names of services begin, behind the last slash, that only look, one that each node has, and
+# advance_world, whose parts are recorded as commands and messages.
 UNRECORDED = ("get_", "list_", "query_", "set_logger_level", "advance_world")
 UNREPEATED = "/prepare_step"  # in its answer is a handle, another one each time
 FAILED = 1  # in place of the CRC-32 of an answer, if the handler raised
-
-
-def record(journal: Journal) -> None:
-    """Records this process's requests, messages and reads; before it offers, subscribes or reads."""
-    record_services(journal)
-    record_messages(journal)
-    record_parameters(journal)
 
 
 def record_services(journal: Journal) -> None:
@@ -37,23 +29,18 @@ def record_services(journal: Journal) -> None:
     init = ServiceImpl.__init__
 
     def init_recorded(
-        service: ServiceImpl,
-        name: str,
-        kind: Any,
-        handler: Callable[[Any], Any],
-        *args: Any,
-        **more: Any,
+        service: ServiceImpl, name: str, kind: Any, handler: Callable[[Any], Any], *args: Any
     ) -> None:
-        init(service, name, kind, handler, *args, **more)
+        init(service, name, kind, handler, *args)
         if not service.resolved_name.rpartition("/")[2].startswith(UNRECORDED):
             # rospy makes a request of the class by which it receives.
             service.protocol.recv_data_class = _keeping_bytes(kind._request_class)
-            service.handler = _recorded(journal, service, handler)
+            service.handler = recorded(journal, service, handler)
 
     ServiceImpl.__init__ = init_recorded
 
 
-def _keeping_bytes(request_class: type[genpy.Message]) -> type[genpy.Message]:
+def _keeping_bytes(request_class: Any) -> type[genpy.Message]:
     """Returns the class whose messages keep the bytes that they were made from, which costs no time."""
 
     class Request(request_class):
@@ -61,36 +48,30 @@ def _keeping_bytes(request_class: type[genpy.Message]) -> type[genpy.Message]:
             self.received = data
             return super().deserialize(data)
 
-    Request.__name__ = request_class.__name__
     return Request
 
 
-def _recorded(
+def recorded(
     journal: Journal, service: ServiceImpl, handler: Callable[[Any], Any]
 ) -> Callable[[Any], Any]:
+    """Returns a handler of a service that records its requests."""
     name, kind = service.resolved_name, service.service_class
-    repeats = not name.endswith(UNREPEATED)
 
     def handle(request: Any) -> Any:
         caller = request._connection_header["callerid"]
-        entry = Entry(
-            JournalEntry.SERVICE, name, kind._type, kind._md5sum, caller, request.received
-        )
+        entry = Entry(JournalEntry.SERVICE, name, request.received, caller)
         if caller == rospy.get_name() or not journal.begin(entry):
             return handler(request)
-        answer = FAILED
+        entry.type, entry.md5sum, entry.answer = kind._type, kind._md5sum, FAILED
         try:
             response = convert_return_to_response(handler(request), service.response_class)
-            answer = _checksum(response) if repeats and journal.listened else 0
+            checked = journal.listeners and not name.endswith(UNREPEATED)
+            entry.answer = zlib.crc32(_bytes(response)) if checked else 0
             return response
         finally:
-            journal.end(entry, answer)
+            journal.end(entry)
 
     return handle
-
-
-def _checksum(message: genpy.Message) -> int:
-    return zlib.crc32(_bytes(message))
 
 
 def _bytes(message: genpy.Message) -> bytes:
@@ -106,20 +87,17 @@ def record_messages(journal: Journal) -> None:
     def receive_recorded(
         subscription: _SubscriberImpl, messages: list[genpy.Message], connection: Any
     ) -> None:
-        kind = subscription.data_class
+        kind, caller = subscription.data_class, connection.callerid_pub
         for message in messages:
-            entry = Entry(
-                JournalEntry.MESSAGE, subscription.resolved_name, kind._type, kind._md5sum,
-                connection.callerid_pub, _bytes(message), subscription.get_num_connections(),
-            )  # fmt: skip
-            own = connection.callerid_pub == rospy.get_name()
-            if own or not journal.begin(entry):
-                receive(subscription, [message], connection)
-                continue
+            entry = Entry(JournalEntry.MESSAGE, subscription.resolved_name, _bytes(message), caller)
+            entry.type, entry.md5sum = kind._type, kind._md5sum
+            entry.publishers = subscription.get_num_connections()
+            is_first = caller != rospy.get_name() and journal.begin(entry)
             try:
                 receive(subscription, [message], connection)
             finally:
-                journal.end(entry)
+                if is_first:
+                    journal.end(entry)
 
     _SubscriberImpl.receive_callback = receive_recorded
 
@@ -129,13 +107,12 @@ def record_parameters(journal: Journal) -> None:
     read = MasterProxy.__getitem__
 
     def read_recorded(proxy: MasterProxy, key: str) -> Any:
-        name = rospy.resolve_name(key)
         try:
             value = read(proxy, key)
         except KeyError:
-            journal.note_parameter(name, [])
+            journal.note_parameter(rospy.resolve_name(key), [])
             raise
-        journal.note_parameter(name, [value])
+        journal.note_parameter(rospy.resolve_name(key), [value])
         return value
 
     def contains(proxy: MasterProxy, key: str) -> bool:

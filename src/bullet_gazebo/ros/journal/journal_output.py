@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import genpy
 import rospy
 from bullet_gazebo_msgs.msg import Journal as JournalMessage
 from bullet_gazebo_msgs.msg import JournalEntry
@@ -18,7 +17,7 @@ from std_msgs.msg import Header
 from bullet_gazebo.pictures.recording import RecordingError
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.common.rospy_internals import wait_until_sent
-from bullet_gazebo.ros.journal.journal import LOOK, Entry, Journal, MotionState, to_entries
+from bullet_gazebo.ros.journal.journal import LOOK, Journal
 
 # [s of wall time] between two messages. `rosbag record` keeps 100 of a topic while it is busy: it has 10 s.
 PERIOD = 0.1
@@ -30,11 +29,12 @@ MOTION = 13  # numbers of a model: JournalEntry.msg
 TOPIC = "/gazebo/journal"
 ACTIVE = ".active"  # the suffix of a bag that is being written, as rosbag's
 
-Entries = list[Entry] | None
+Publish = Callable[[Any], None]
+Entries = list[JournalEntry]
 
 
 class JournalOutput(rospy.SubscribeListener):
-    """Sends entries from a thread of its own, many at a time, to subscribers and the bag, if there are any."""
+    """Sends entries from a thread of its own, many at a time, to subscribers and the bag."""
 
     def __init__(self, journal: Journal, bag: Path | None) -> None:
         """The bag is written from the beginning on."""
@@ -42,8 +42,8 @@ class JournalOutput(rospy.SubscribeListener):
         self._journal = journal
         self._bag = JournalBag(bag) if bag else None
         self._news = threading.Condition()
-        self._fresh: list[Entry] = []
-        self._newcomers: list[tuple[Callable[[Any], None], Entries]] = []
+        self._fresh: Entries = []
+        self._newcomers: list[tuple[Publish, Entries]] = []
         self._ending = False
         if self._bag:
             journal.listen(self._take)
@@ -54,17 +54,17 @@ class JournalOutput(rospy.SubscribeListener):
         self._thread.start()
         rospy.on_shutdown(self.close)
 
-    def peer_subscribe(self, _name: str, _all: object, publish: Callable[[Any], None]) -> None:
+    def peer_subscribe(self, _name: str, _all: object, publish: Publish) -> None:
         """Lets a new subscriber have what was before; what comes twice has the same number."""
         self._journal.listen(self._take)
         with self._journal.command(LOOK):  # so that what was before can be compared by its outcome
             pass
         before = self._journal.listen(self._take)
         if before is None:
+            before = [JournalEntry(kind=JournalEntry.GONE)]
             rospy.logwarn(
-                "%s: its beginning is gone, because nobody recorded it; a replay needs a recorder from the"
-                " start on", TOPIC,
-            )  # fmt: skip
+                "The beginning of %s is gone, as nobody recorded it: it can't be repeated", TOPIC
+            )
         with self._news:
             self._newcomers.append((publish, before))
             self._news.notify_all()
@@ -74,14 +74,14 @@ class JournalOutput(rospy.SubscribeListener):
         if not left and not self._bag:
             self._journal.unlisten(self._take)
 
-    def _take(self, entries: list[Entry]) -> None:
+    def _take(self, entries: Entries) -> None:
         with self._news:
             if self._bag:
                 self._news.wait_for(lambda: len(self._fresh) < MOST_WAITING, STOP_TIMEOUT)
             self._fresh += entries
 
     def close(self) -> None:
-        """Sends what is left, and closes the bag."""
+        """Sends what is left, and completes the bag."""
         self._journal.unlisten(self._take)
         with self._news:
             self._ending = True
@@ -98,17 +98,15 @@ class JournalOutput(rospy.SubscribeListener):
                 fresh, self._fresh = self._fresh, []
                 self._news.notify_all()
             for publish, before in newcomers:
-                gone = [Entry(JournalEntry.GONE)]
-                _send(gone if before is None else before, publish)
-            if self._publisher.get_num_connections():
-                _send(fresh, self._publisher.publish)
+                _send(before, publish)
+            _send(fresh, self._publisher.publish)
             if self._bag:
                 self._write(self._bag, fresh)
         wait_until_sent(self._publisher)
         if self._bag:
             self._bag.close()
 
-    def _write(self, bag: "JournalBag", entries: list[Entry]) -> None:
+    def _write(self, bag: "JournalBag", entries: Entries) -> None:
         try:
             bag.write(entries)
         except OSError as fault:
@@ -116,9 +114,9 @@ class JournalOutput(rospy.SubscribeListener):
             rospy.logerr("The journal's bag ends here: %s", fault)
 
 
-def _send(entries: list[Entry], publish: Callable[[Any], None]) -> None:
+def _send(entries: Entries, publish: Publish) -> None:
     for begin in range(0, len(entries), BATCH):
-        publish(JournalMessage(to_entries(entries[begin : begin + BATCH])))
+        publish(JournalMessage(entries[begin : begin + BATCH]))
 
 
 class JournalBag:
@@ -128,15 +126,14 @@ class JournalBag:
     """
 
     def __init__(self, path: Path) -> None:
-        """An existing file stays: the name gets a number.
+        """Opens it; an existing file stays: the name gets a number.
 
         Raises:
             RecordingError: the file can't be written.
         """
         import rosbag  # needed only here, and slow
 
-        number = 2
-        self._path = path
+        self._path, number = path, 2
         while self._path.exists():
             self._path = path.with_stem(f"{path.stem}_{number}")
             number += 1
@@ -145,38 +142,30 @@ class JournalBag:
             self._bag = rosbag.Bag(str(self._open), "w", compression="lz4")
         except OSError as fault:
             raise RecordingError(f"{self._open}: {fault.strerror}") from fault
-        self._before: MotionState | None = None
+        self._before: list[float] = []
 
-    def write(self, entries: list[Entry]) -> None:
+    def write(self, entries: Entries) -> None:
         """Appends entries."""
-        for begin in range(0, len(entries), BATCH):
-            part = entries[begin : begin + BATCH]
-            self._bag.write(TOPIC, JournalMessage(to_entries(part)), _stamp(part[-1]))
-            for entry in part:
-                if entry.state is not None and entry.state != self._before:
-                    self._write_state(entry, entry.state)
+        _send(entries, lambda message: self._add(TOPIC, message, message.entries[-1]))
+        for entry in entries:
+            if entry.observed and entry.numbers != self._before:
+                self._before = entry.numbers
+                self._add_state(entry)
 
-    def _write_state(self, entry: Entry, state: MotionState) -> None:
-        self._before = state
-        (models, joints), numbers = state
-        at = MOTION * len(models)
-        header = Header(stamp=to_time(entry.now))
-        positions, velocities = numbers[at::2], numbers[at + 1 :: 2]
-        if joints:
-            message = JointState(header, joints, positions, velocities, ())
-            self._bag.write("/joint_states", message, _stamp(entry))
+    def _add(self, topic: str, message: Any, entry: JournalEntry) -> None:
+        self._bag.write(topic, message, to_time(entry.ended + 1))  # 0 is no time to ROS
+
+    def _add_state(self, entry: JournalEntry) -> None:
+        numbers, at = entry.numbers, MOTION * len(entry.models)
+        header, motions = Header(stamp=entry.now), numbers[at:]
+        joints = JointState(header, entry.joints, motions[::2], motions[1::2], ())
+        self._add("/joint_states", joints, entry)
         rows = [numbers[begin : begin + MOTION] for begin in range(0, at, MOTION)]
         poses = [Pose(Point(*row[:3]), Quaternion(*row[3:7])) for row in rows]
         twists = [Twist(Vector3(*row[7:10]), Vector3(*row[10:])) for row in rows]
-        if models:
-            states = ModelStates(models, poses, twists)
-            self._bag.write("/gazebo/model_states", states, _stamp(entry))
+        self._add("/gazebo/model_states", ModelStates(entry.models, poses, twists), entry)
 
     def close(self) -> None:
         """Completes the file, and gives it its name."""
         self._bag.close()
         os.replace(self._open, self._path)
-
-
-def _stamp(entry: Entry) -> genpy.Time:
-    return to_time(entry.ended + 1)  # 0 is no time to ROS

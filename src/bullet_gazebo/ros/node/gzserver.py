@@ -42,7 +42,11 @@ from bullet_gazebo.ros.common.rospy_internals import (
     free_polls_at_once,
     registered_together,
 )
-from bullet_gazebo.ros.journal.interception import record
+from bullet_gazebo.ros.journal.interception import (
+    record_messages,
+    record_parameters,
+    record_services,
+)
 from bullet_gazebo.ros.journal.journal import Journal
 from bullet_gazebo.ros.journal.journal_output import JournalOutput
 from bullet_gazebo.ros.node.master_watch import MasterWatch, NameLoss, NodeNameTaken, refuse_twin
@@ -139,7 +143,9 @@ class GazeboNode:
         self.series = 0  # of the handles of prepared steps
         if args.lockstep:
             self.journal = Journal(self.sim)
-            record(self.journal)
+            record_services(self.journal)
+            record_messages(self.journal)
+            record_parameters(self.journal)
         if not rospy.has_param("/use_sim_time"):
             rospy.set_param("/use_sim_time", True)
         self.sim.relatch = _flag("~relatch_on_reset")

@@ -1,5 +1,6 @@
 """Repeats a recorded run in this process's simulator, entry by entry, and compares (docs/replay.md)."""
 
+import json
 from collections.abc import Callable, Iterator, Mapping
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,7 @@ from bullet_gazebo_msgs.srv import PreparedStep
 from gazebo_msgs.srv import SpawnModel
 from rospy.impl.registration import get_service_manager, get_topic_manager
 
-from bullet_gazebo.ros.journal.journal import LOOK, WAIT, Entry
+from bullet_gazebo.ros.journal.journal import LOOK, WAIT
 from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal, first_difference
 from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.services.advance_service import reseed
@@ -31,10 +32,10 @@ class Changes:
         self.models = models
         self._set_parameters = set_parameters
 
-    def set_parameters(self, entry: Entry, request: Any = None) -> None:
+    def set_parameters(self, entry: JournalEntry, request: Any = None) -> None:
         """Sets the parameters that the entry's handler read, and then those that are to be otherwise."""
         spawned = isinstance(request, SpawnModel._request_class)
-        for name, value in (entry.parameters or {}).items():
+        for name, value in json.loads(entry.parameters or "{}").items():
             if not value:
                 if rospy.has_param(name):
                     rospy.delete_param(name)
@@ -67,12 +68,12 @@ class Replay:
         self._sim, self._journal, self._control = node.sim, node.journal, node.control
         self._handles = recorded.facts["series"], node.series
         self._changes, self._until = changes, until
-        self._entries: Iterator[Entry] = recorded.entries()
-        self._next: Entry | None = next(self._entries, None)
+        self._entries: Iterator[JournalEntry] = recorded.entries()
+        self._next: JournalEntry | None = next(self._entries, None)
         self._fault: NoRecording | None = None
-        self._expected: dict[int, Entry] = {}  # by number
+        self._expected: dict[int, JournalEntry] = {}  # by number
         self._refusals: dict[int, str] = {}  # texts of requests that failed, by number
-        self._done: list[Entry] = []  # what the journal has of them, not compared yet
+        self._done: list[JournalEntry] = []  # what the journal has of them, not compared yet
         self.repeated = 0  # entries that were equal
         self.unknown = 0  # of them, those without a recorded state at the beginning
         self.difference = ""
@@ -104,7 +105,7 @@ class Replay:
         """Simulated time that was repeated [s]."""
         return self._sim.elapsed / NANOSECONDS
 
-    def _take(self) -> Entry:
+    def _take(self) -> JournalEntry:
         entry = self._next
         assert entry is not None  # _is_over has looked
         try:
@@ -123,7 +124,7 @@ class Replay:
             while self._next is not None and self._next.elapsed <= self._sim.elapsed:
                 self._repeat(self._take())
 
-    def _repeat(self, entry: Entry) -> None:
+    def _repeat(self, entry: JournalEntry) -> None:
         self._expected[entry.number] = entry
         if entry.kind == JournalEntry.SERVICE:
             self._call(entry)
@@ -132,7 +133,7 @@ class Replay:
         else:
             self._command(entry.name, int(entry.data))
 
-    def _call(self, entry: Entry) -> None:
+    def _call(self, entry: JournalEntry) -> None:
         service = get_service_manager().get_service(entry.name)
         kind = None if service is None else service.service_class
         if kind is None or kind._md5sum != entry.md5sum:
@@ -158,7 +159,7 @@ class Replay:
         series, count = divmod(recorded, 2**COUNTED)
         return now << COUNTED | count if series == before else 0
 
-    def _deliver(self, entry: Entry) -> None:
+    def _deliver(self, entry: JournalEntry) -> None:
         subscription: Any = get_topic_manager().get_subscriber_impl(entry.name)
         if subscription is None or subscription.data_class._md5sum != entry.md5sum:
             self._differ(entry, f"nobody hears {entry.name}, of type {entry.type}")
@@ -172,7 +173,7 @@ class Replay:
         subscription.receive_callback([message], publisher)
         subscription.connections = []
 
-    def _differ(self, entry: Entry, text: str) -> None:
+    def _differ(self, entry: JournalEntry, text: str) -> None:
         self.difference = self.difference or f"at {entry.elapsed / NANOSECONDS:g} s {text}"
 
     def _command(self, name: str, count: int) -> None:
@@ -210,5 +211,5 @@ class Replay:
                 continue
             refusal = self._refusals.pop(entry.number, "")
             self.difference = first_difference(recorded, entry, refusal)
-            self.unknown += recorded.state is None and self.unknown == self.repeated
+            self.unknown += not recorded.observed and self.unknown == self.repeated
             self.repeated += not self.difference
