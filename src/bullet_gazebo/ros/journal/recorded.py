@@ -65,13 +65,12 @@ def _read(path: Path) -> list[bytes]:
 
     try:
         with rosbag.Bag(str(path)) as bag:
-            found = []
-            for _, (kind, data, md5sum, *_), _ in bag.read_messages(raw=True):
-                if kind == Journal._type and md5sum != Journal._md5sum:
-                    raise NoRecording(f"{path}: recorded by another version of cartpole")
-                if kind == Journal._type:
-                    found.append(data)
-            return found
+            types, topics = bag.get_type_and_topic_info()
+            if types.get(Journal._type, Journal._md5sum) != Journal._md5sum:
+                raise NoRecording(f"{path}: recorded by another version of cartpole")
+            ours = [name for name, topic in topics.items() if topic.msg_type == Journal._type]
+            found = bag.read_messages(ours, raw=True) if ours else ()
+            return [data for _, (_, data, *_), _ in found]
     except rosbag.ROSBagUnindexedException as fault:
         raise NoRecording(f"{path}: not closed properly; try: rosbag reindex {path}") from fault
     except rosbag.ROSBagException as fault:
