@@ -15,7 +15,7 @@ from rospy.impl.tcpros_service import ServiceImpl, convert_return_to_response
 from rospy.msproxy import MasterProxy
 from rospy.topics import _SubscriberImpl
 
-from bullet_gazebo.ros.journal.journal import Entry, Journal
+from bullet_gazebo.ros.journal.journal import Entry, WorldJournal
 
 # How names of services begin, behind the last slash, that only look, one that each node has, and
 # advance_world, whose parts are recorded as commands and messages.
@@ -24,7 +24,7 @@ UNREPEATED = "/prepare_step"  # in its answer is a handle, another one each time
 FAILED = 1  # in place of the CRC-32 of an answer, if the handler raised
 
 
-def record_services(journal: Journal) -> None:
+def record_services(journal: WorldJournal) -> None:
     """Records the requests of the services that this process offers from now on."""
     init = ServiceImpl.__init__
 
@@ -52,7 +52,7 @@ def _keeping_bytes(request_class: Any) -> type[genpy.Message]:
 
 
 def recorded(
-    journal: Journal, service: ServiceImpl, handler: Callable[[Any], Any]
+    journal: WorldJournal, service: ServiceImpl, handler: Callable[[Any], Any]
 ) -> Callable[[Any], Any]:
     """Returns a handler of a service that records its requests."""
     name, kind = service.resolved_name, service.service_class
@@ -80,7 +80,7 @@ def _bytes(message: genpy.Message) -> bytes:
     return buffer.getvalue()
 
 
-def record_messages(journal: Journal) -> None:
+def record_messages(journal: WorldJournal) -> None:
     """Records the messages that this process's subscribers receive from other nodes."""
     receive = _SubscriberImpl.receive_callback
 
@@ -102,7 +102,7 @@ def record_messages(journal: Journal) -> None:
     _SubscriberImpl.receive_callback = receive_recorded
 
 
-def record_parameters(journal: Journal) -> None:
+def record_parameters(journal: WorldJournal) -> None:
     """Records the parameters that this process reads."""
     read = MasterProxy.__getitem__
 

@@ -45,7 +45,7 @@ class _Current(threading.local):
     entry: Entry | None = None  # that this thread works on
 
 
-class Journal:
+class WorldJournal:
     """Collects entries, and keeps them for listeners that come late."""
 
     def __init__(self, sim: Simulator, most_kept: int = MOST_KEPT) -> None:

@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 from bullet_gazebo.pictures.recording import RecordingError
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.common.rospy_internals import wait_until_sent
-from bullet_gazebo.ros.journal.journal import LOOK, Journal
+from bullet_gazebo.ros.journal.journal import LOOK, WorldJournal
 
 # [s of wall time] between two messages. `rosbag record` keeps 100 of a topic while it is busy: it has 10 s.
 PERIOD = 0.1
@@ -36,7 +36,7 @@ Entries = list[JournalEntry]
 class JournalOutput(rospy.SubscribeListener):
     """Sends entries from a thread of its own, many at a time, to subscribers and the bag."""
 
-    def __init__(self, journal: Journal, bag: Path | None) -> None:
+    def __init__(self, journal: WorldJournal, bag: Path | None) -> None:
         """The bag is written from the beginning on."""
         super().__init__()
         self._journal = journal

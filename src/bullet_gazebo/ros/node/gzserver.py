@@ -47,7 +47,7 @@ from bullet_gazebo.ros.journal.interception import (
     record_parameters,
     record_services,
 )
-from bullet_gazebo.ros.journal.journal import Journal
+from bullet_gazebo.ros.journal.journal import WorldJournal
 from bullet_gazebo.ros.journal.journal_output import JournalOutput
 from bullet_gazebo.ros.node.master_watch import MasterWatch, NameLoss, NodeNameTaken, refuse_twin
 from bullet_gazebo.ros.node.start import facts_of
@@ -138,11 +138,11 @@ class GazeboNode:
         self, args: argparse.Namespace, engine: Engine, interrupted: Callable[[], bool]
     ) -> None:
         self.sim = Simulator(World(engine), lockstep=args.lockstep)
-        self.journal: Journal | None = None
+        self.journal: WorldJournal | None = None
         self._output: JournalOutput | None = None
         self.series = 0  # of the handles of prepared steps
         if args.lockstep:
-            self.journal = Journal(self.sim)
+            self.journal = WorldJournal(self.sim)
             record_services(self.journal)
             record_messages(self.journal)
             record_parameters(self.journal)
@@ -266,7 +266,7 @@ Begin = Callable[[GazeboNode], Callable[[], bool]]
 
 
 def simulate(
-    args: argparse.Namespace, engine: Engine, signals: SignalHandler, begin: Begin | None
+    args: argparse.Namespace, engine: Engine, signals: SignalHandler, begin: Begin | None = None
 ) -> int:
     """Simulates until the end; returns the exit code."""
     try:

@@ -21,7 +21,7 @@ from bullet_gazebo.ros.common.rospy_internals import (
     on_topics_changed,
     publish_without_yielding,
 )
-from bullet_gazebo.ros.journal.journal import Journal
+from bullet_gazebo.ros.journal.journal import WorldJournal
 from bullet_gazebo.ros.services.step_requests import MAX_TICKS, SLICE
 from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.simulator import Simulator
@@ -138,7 +138,7 @@ class AdvanceService:
         watchdog: AbstractContextManager[object],
         one_at_a_time: threading.Lock,
         thinner: Thinner,
-        journal: Journal,
+        journal: WorldJournal,
     ) -> None:
         """A fault in a block of `watchdog` ends the node; with `one_at_a_time`, no one else's ticks come
         within a request's.

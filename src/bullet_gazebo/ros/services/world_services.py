@@ -19,7 +19,7 @@ from bullet_gazebo.physics.world import SolverSettings
 from bullet_gazebo.ros.clients.gz import CHUNK
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import bad_number, from_pose_msg, to_vector
-from bullet_gazebo.ros.journal.journal import Journal
+from bullet_gazebo.ros.journal.journal import WorldJournal
 from bullet_gazebo.ros.services import ServiceRefused, check_message, offer
 from bullet_gazebo.ros.services.joint_services import ForceServices, JointServices
 from bullet_gazebo.ros.services.model_services import LinkServices, ModelServices
@@ -254,7 +254,7 @@ class WorldControl:
         sim: Simulator,
         watchdog: AbstractContextManager[object],
         more: Mapping[str, Callable[[], None]],
-        journal: Journal | None = None,
+        journal: WorldJournal | None = None,
     ) -> None:
         """A fault in a block of `watchdog` ends the node. `journal` records the commands, but for those of
         `more`, which don't touch the world.

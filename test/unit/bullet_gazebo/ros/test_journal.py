@@ -12,7 +12,7 @@ from genpy import Time
 from std_msgs.msg import Float64
 
 from bullet_gazebo.pictures.recording import RecordingError
-from bullet_gazebo.ros.journal.journal import Entry, Journal
+from bullet_gazebo.ros.journal.journal import Entry, WorldJournal
 from bullet_gazebo.ros.journal.journal_output import JournalBag
 from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal, first_difference
 from bullet_gazebo.ros.node import replay_command
@@ -32,7 +32,7 @@ def sim():
 
 @pytest.fixture
 def journal(sim):
-    made = Journal(sim)
+    made = WorldJournal(sim)
     made.start({"series": 1})
     return made
 
@@ -100,7 +100,7 @@ def test_parameters_are_recorded_where_they_have_changed(journal):
 
 
 def test_beyond_its_bound_nothing_is_kept(sim):
-    journal = Journal(sim, most_kept=10_000)
+    journal = WorldJournal(sim, most_kept=10_000)
     journal.start({})
     assert len(entries(journal)) == 1
     for _ in range(30):
