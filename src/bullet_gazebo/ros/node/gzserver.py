@@ -204,15 +204,19 @@ class GazeboNode:
         if self._output is not None:
             self._output.close()
 
-    def run(self, signals: SignalHandler, is_over: Callable[[], bool] = lambda: False) -> int:
-        """Simulates until the node is shut down, or `is_over` returns true; returns the exit code."""
+    def run(self, signals: SignalHandler, work: "Work | None") -> int:
+        """Simulates until the node is shut down, or the work is done; returns the exit code."""
         # Called before the topics close, so that no tick publishes to a closed one.
         rospy.on_shutdown(self._watchdog.stop)
         if signals.noted():  # they came during the start: no more time passes
             self._watchdog.stop()
         else:
             self._watchdog.start()
-        signals.wait(lambda: self._watchdog.failed() or is_over())
+        code = 0
+        if work is None:
+            signals.wait(self._watchdog.failed)
+        else:
+            code = signals.run(lambda: work(self), INTERRUPTED)
         failed = self._watchdog.failed()
         self._watchdog.stop()  # a shutdown that came before the hook was there doesn't call it
         if self._recorder is not None:
@@ -221,7 +225,11 @@ class GazeboNode:
         if hanging is not None:
             print(f"gzserver: ends while the world's lock is kept by {hanging}", file=sys.stderr)
             end_within(HANGING_TIMEOUT, 1)
-        return 1 if failed or hanging is not None else 0
+        return 1 if failed or hanging is not None else code
+
+
+Work = Callable[[GazeboNode], int]
+"""What is done with the simulator, in a thread of its own; returns the exit code."""
 
 
 def _journal_bag(args: argparse.Namespace) -> Path | None:
@@ -261,17 +269,12 @@ def _clock_frequency() -> float:
     return 0.0
 
 
-Begin = Callable[[GazeboNode], Callable[[], bool]]
-"""Is called with the node when it is ready; returns a function that says whether the node is to end."""
-
-
 def simulate(
-    args: argparse.Namespace, engine: Engine, signals: SignalHandler, begin: Begin | None = None
+    args: argparse.Namespace, engine: Engine, signals: SignalHandler, work: Work | None = None
 ) -> int:
     """Simulates until the end; returns the exit code."""
     try:
-        node = GazeboNode(args, engine, signals.noted)
-        return node.run(signals, begin(node) if begin else lambda: False)
+        return GazeboNode(args, engine, signals.noted).run(signals, work)
     except RecordingError as error:
         rospy.logfatal("%s", error)
         return 1
@@ -285,8 +288,8 @@ def simulate(
         return 1
 
 
-def main(argv: list[str] | None = None, begin: Begin | None = None) -> int:
-    """Runs the node; returns its exit code."""
+def main(argv: list[str] | None = None, work: Work | None = None) -> int:
+    """Runs the node, until the work is done if there is some; returns the exit code."""
     use_one_arena()
     command_line = sys.argv if argv is None else argv
     more = shlex.split(os.environ.get(MORE_ARGUMENTS, ""))
@@ -314,7 +317,7 @@ def main(argv: list[str] | None = None, begin: Begin | None = None) -> int:
     except EngineError as error:
         rospy.logfatal("%s", error)
         return 1
-    code = simulate(args, engine, signals, begin)
+    code = simulate(args, engine, signals, work)
     if loss.happened:
         print(f"gzserver: {loss.text(name)}", file=sys.stderr)
         code = code or 1

@@ -1,10 +1,11 @@
 """Repeats a recorded run in this process's simulator, entry by entry, and compares (docs/replay.md)."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
+import rosparam
 import rospy
 from bullet_gazebo_msgs.msg import JournalEntry
 from bullet_gazebo_msgs.srv import PreparedStep
@@ -23,14 +24,16 @@ from bullet_gazebo.simulator import NANOSECONDS
 class Changes:
     """What is to be otherwise than recorded: models' texts, and parameters."""
 
-    def __init__(self, models: Mapping[str, str], set_parameters: Callable[[], None]) -> None:
+    def __init__(
+        self, models: Mapping[str, str], parameters: Sequence[tuple[dict[str, Any], str]]
+    ) -> None:
         """
         Args:
             models: URDF or SDF texts by model.
-            set_parameters: sets the parameters that are to be otherwise.
+            parameters: values by name, and their namespace.
         """
         self.models = models
-        self._set_parameters = set_parameters
+        self._parameters = parameters
 
     def set_parameters(self, entry: JournalEntry, request: Any = None) -> None:
         """Sets the parameters that the entry's handler read, and then those that are to be otherwise."""
@@ -43,8 +46,8 @@ class Changes:
                 rospy.set_param(name, self.models.get(request.model_name, value[0]))
             else:
                 rospy.set_param(name, value[0])
-        if entry.parameters:
-            self._set_parameters()
+        for values, namespace in self._parameters if entry.parameters else ():
+            rosparam.upload_params(namespace, values)
 
 
 class Replay:
@@ -77,6 +80,7 @@ class Replay:
         self.repeated = 0  # entries that were equal
         self.unknown = 0  # of them, those without a recorded state at the beginning
         self.difference = ""
+        self.was_interrupted = False
 
     def run(self) -> None:
         """Repeats all; `difference` tells the first difference.
@@ -94,9 +98,12 @@ class Replay:
             while not self._is_over():
                 self._repeat(self._take())
                 self._compare()
+                for entry in self._expected.values():
+                    self._differ(entry, f"{entry.name} was recorded, and does nothing now")
         finally:
             self._sim.lock.between = lambda: None
             self._journal.unlisten(done)
+        self.was_interrupted = rospy.is_shutdown()
         if self._fault is not None:
             raise self._fault
 

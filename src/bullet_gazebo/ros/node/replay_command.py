@@ -8,7 +8,7 @@ import os
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import rosparam
@@ -22,9 +22,7 @@ from bullet_gazebo.ros.node.start import arguments_of, versions
 from file_access.expansion import CannotExpand, expand
 
 UNUSABLE = 2
-INTERRUPTED = 130
 LOOPBACK = "127.0.0.1"
-POLL = 0.1  # [s]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -48,11 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     master.start()
     os.environ["ROS_MASTER_URI"] = master.uri
 
-    def set_parameters() -> None:
-        for values, namespace in parameters:
-            rosparam.upload_params(namespace, values)
-
-    changes = Changes(models, set_parameters)
+    changes = Changes(models, parameters)
     try:
         with tempfile.TemporaryDirectory(prefix="replay-") as folder:
             return _replay(args, recorded, changes, Path(folder))
@@ -98,35 +92,24 @@ def _replay(
     """Runs the simulator in this thread and the replay in another one; returns the exit code."""
     changes.set_parameters(recorded.start)
     os.environ.pop(gzserver.MORE_ARGUMENTS, None)
-    verdict: list[int] = []
-    ended = threading.Event()
 
-    def work(node: gzserver.GazeboNode) -> None:
+    def work(node: gzserver.GazeboNode) -> int:
+        over = threading.Event()
+        rospy.on_shutdown(over.set)
         replay = Replay(recorded, node, changes, args.until)
         try:
             replay.run()
-            verdict.append(_judge(args.bag, recorded, replay))
         except NoRecording as fault:
-            verdict.append(_tell(str(fault), UNUSABLE))
-        if args.gui and not rospy.is_shutdown():
+            return _tell(str(fault), UNUSABLE)
+        code = _judge(args.bag, recorded, replay)
+        if args.gui and not over.is_set():
             with gzserver.window([]):
-                ended.wait()
-
-    threads: list[threading.Thread] = []
-
-    def begin(node: gzserver.GazeboNode) -> Callable[[], bool]:
-        rospy.on_shutdown(ended.set)
-        threads.append(threading.Thread(target=work, args=(node,), name="replay", daemon=True))
-        threads[0].start()
-        return lambda: not threads[0].is_alive()
+                over.wait()
+        return code
 
     # Warnings have been seen when the run was recorded.
     logging.getLogger("rosout").addFilter(lambda log: log.levelno >= logging.ERROR)
-    code = gzserver.main(["gzserver", *arguments_of(recorded.facts, folder)], begin)
-    ended.set()
-    for thread in threads:
-        thread.join(gzserver.WINDOW_TIMEOUT + POLL)
-    return verdict[0] if verdict else code or INTERRUPTED
+    return gzserver.main(["gzserver", *arguments_of(recorded.facts, folder)], work)
 
 
 def _judge(bag: Path, recorded: RecordedJournal, replay: Replay) -> int:
@@ -136,6 +119,8 @@ def _judge(bag: Path, recorded: RecordedJournal, replay: Replay) -> int:
         other = [f"{name} {before[name]}" for name in before if before[name] != now.get(name)]
         with_others = f" (recorded with {', '.join(other)})" if other else ""
         return _tell(f"{bag}: first difference: {replay.difference}{with_others}", 1)
+    if replay.was_interrupted:
+        return gzserver.INTERRUPTED
     text = f"{bag}: equal to the bit: {replay.repeated} entries, {replay.seconds:g} s"
     if replay.unknown:
         text += f"; no states were recorded with the first {replay.unknown} of them"
