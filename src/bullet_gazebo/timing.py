@@ -31,11 +31,10 @@ class FairLock:
         self._held = False
         self._holder: int | None = None  # the thread
         self.turns = 0  # how often it was acquired
-        # For the journal. The holder calls the first three, `waiting` before it waits with the lock free, and
-        # `between` is called in the middle of long work, while the lock is free.
+        # For the journal. The holder calls the first two, and `between` is called in the middle of long work,
+        # while the lock is free.
         self.taken: Callable[[], None] = _nothing
         self.leaving: Callable[[], None] = _nothing
-        self.waiting: Callable[[], None] = _nothing
         self.between: Callable[[], None] = _nothing
 
     @property
@@ -78,7 +77,6 @@ class FairLock:
 
     def wait(self, event: threading.Event, timeout: float) -> None:
         """Releases the lock until `event` is set, or for `timeout` [s]. Only the holder may call it."""
-        self.waiting()
         self.__exit__()
         event.wait(timeout)
         self.__enter__()

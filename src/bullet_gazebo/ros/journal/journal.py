@@ -1,8 +1,8 @@
 """The journal of a world in lock-step: all that comes from outside and decides its future (docs/replay.md).
 
 An entry is numbered when its handler first takes the simulator's lock, so numbers are in the order in which
-entries take effect. What the simulator and its plugins do by themselves follows from the entries and is not
-among them.
+entries take effect. While a model comes or goes, no other one does. What the simulator and its plugins do by
+themselves follows from the entries and is not among them.
 """
 
 import json
@@ -20,7 +20,6 @@ from bullet_gazebo.simulator import Simulator
 
 MOST_KEPT = 64 * 2**20  # [bytes]; without the beginning the rest can't be repeated
 OVERHEAD = 500  # [bytes] of an entry in memory, without what it holds
-WAIT = "wait"  # a command that stands where an entry's handler began to wait
 START = genpy.Time()
 LOOK = "look"  # one that a new listener causes, for the state that it begins with
 
@@ -68,7 +67,6 @@ class WorldJournal:
         # Called with finished entries, in order. States and answers are recorded while there are some.
         self.listeners: list[Callable[[list[JournalEntry]], None]] = []
         sim.lock.taken, sim.lock.leaving = self._taken, self._leaving
-        sim.lock.waiting = self._waiting
         self._first = self._current.entry = Entry(JournalEntry.START, "", b"")
         with sim.lock:
             pass  # numbers it
@@ -84,6 +82,9 @@ class WorldJournal:
         """Makes an entry this thread's; returns False within another one, which it follows from."""
         if self._current.entry is not None:
             return False
+        if self._sim.holds:  # also looked at in `_taken`; but here the handler has no locks of its own yet
+            with self._sim.lock.glance():
+                self._sim.await_holds()
         self._current.entry = entry
         return True
 
@@ -152,6 +153,9 @@ class WorldJournal:
     def _taken(self) -> None:
         entry = self._current.entry
         if entry is not None and not entry.is_numbered:
+            # Nothing takes effect between the parts of a spawning or a deletion.
+            self._sim.await_holds()
+        if entry is not None and not entry.is_numbered:  # the wait takes the lock again
             entry.number, entry.is_numbered = self._count, True
             self._count += 1
             entry.elapsed = self._sim.elapsed
@@ -168,17 +172,6 @@ class WorldJournal:
         entry.observed = bool(self.listeners) and is_alone and self._order[0] is entry
         if entry.observed:
             self._add_state(entry)
-
-    def _waiting(self) -> None:
-        """Lets the entry take effect after the wait, if it hasn't let time pass yet."""
-        entry = self._current.entry
-        if entry is not None and entry.elapsed == self._sim.elapsed:
-            stand_in = Entry(JournalEntry.COMMAND, WAIT, b"0")
-            stand_in.number, stand_in.is_done = entry.number, True
-            stand_in.elapsed = stand_in.ended = entry.elapsed
-            with self._guard:
-                self._order[self._order.index(entry)] = stand_in
-            entry.is_numbered = False
 
     def _keep(self, finished: list[JournalEntry]) -> None:
         if self._kept is None:

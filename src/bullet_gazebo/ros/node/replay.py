@@ -12,7 +12,7 @@ from bullet_gazebo_msgs.srv import PreparedStep
 from gazebo_msgs.srv import SpawnModel
 from rospy.impl.registration import get_service_manager, get_topic_manager
 
-from bullet_gazebo.ros.journal.journal import LOOK, WAIT
+from bullet_gazebo.ros.journal.journal import LOOK
 from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal, first_difference
 from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.services.advance_service import reseed
@@ -190,7 +190,7 @@ class Replay:
         elif name == "reseed":
             with self._journal.command(name, count):
                 reseed(self._sim, count)
-        elif name in (LOOK, WAIT):
+        elif name == LOOK:
             with self._journal.command(name):
                 pass
         else:

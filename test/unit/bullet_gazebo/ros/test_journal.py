@@ -17,7 +17,7 @@ from bullet_gazebo.ros.journal.journal_output import JournalBag
 from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal, first_difference
 from bullet_gazebo.ros.node import replay_command
 from bullet_gazebo.ros.node.start import arguments_of
-from bullet_gazebo.timing import FairLock
+from bullet_gazebo.timing import FairLock, Holds
 
 MS = 1_000_000  # [ns]
 MODEL = (0.0,) * 13
@@ -27,7 +27,10 @@ MODEL = (0.0,) * 13
 def sim():
     """A simulator's time and lock, and an empty world."""
     world = SimpleNamespace(version=0, models={})
-    return SimpleNamespace(lock=FairLock(), elapsed=0, now=0, world=world)
+    made = SimpleNamespace(lock=FairLock(), elapsed=0, now=0, world=world)
+    made.holds = Holds(made.lock, lambda: None)
+    made.await_holds = lambda: made.holds.await_end(threading.Event())
+    return made
 
 
 @pytest.fixture
@@ -74,21 +77,28 @@ def test_what_follows_from_an_entry_is_none_of_its_own(journal):
     assert names(journal) == ["", "outer"]
 
 
-def test_a_handler_that_waits_takes_effect_behind_what_came_meanwhile(sim, journal):
-    event = threading.Event()
+def test_nothing_takes_effect_while_a_model_comes(sim, journal):
+    held, over = threading.Event(), threading.Event()
 
-    def meanwhile():
-        with journal.command("meanwhile"):
+    def spawn():
+        with journal.command("spawn"), sim.holds.hold(30.0, over.set):
+            held.set()
+            meanwhile.start()
+            with sim.lock:
+                sim.elapsed += MS
+
+    def place():
+        with journal.command("place"), sim.lock:
             pass
-        event.set()
 
-    thread = threading.Thread(target=meanwhile)
-    with journal.command("waiting"), sim.lock:
-        thread.start()
-        sim.lock.wait(event, 30.0)
-        sim.elapsed += MS
-    thread.join(30.0)
-    assert names(journal) == ["", "wait", "meanwhile", "waiting"]
+    meanwhile = threading.Thread(target=place)
+    spawning = threading.Thread(target=spawn)
+    spawning.start()
+    assert held.wait(30.0)
+    spawning.join(30.0)
+    meanwhile.join(30.0)
+    found = [(each.name, each.elapsed) for each in entries(journal)]
+    assert found == [("", 0), ("spawn", 0), ("place", MS)] and not over.is_set()
 
 
 def test_parameters_are_recorded_where_they_have_changed(journal):
