@@ -19,6 +19,7 @@ HASHES = "PYTHONHASHSEED"
 MOST_SEED = 2**32 - 1
 LONGEST = 3600.0  # [s] longest period at a trigger
 NO_TRIGGERS = "none"
+WITH_VALUE = ("--seed", "--dt", "--record")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -146,11 +147,7 @@ def _one_by_one(argv: Sequence[str]) -> list[str]:
         argument = left.pop(0)
         if argument != STEP_ON:
             given.append(argument)
-            if not argument.startswith("-") and given[-2:-1] not in (
-                ["--seed"],
-                ["--dt"],
-                ["--record"],
-            ):
+            if not argument.startswith("-") and (not given[1:] or given[-2] not in WITH_VALUE):
                 return given + left  # the script and its arguments
             continue
         names = []

@@ -163,7 +163,8 @@ class GazeboNode:
         sensors: list[SceneSensor] = []
         scene = SceneOffer(self.sim, sensors)
         shown = {"show": scene.show, "end_journal": self._end_journal} if network else {}
-        self.control = WorldControl(self.sim, self._watchdog, shown, self.journal)
+        journal = self.journal if network else None  # without services there is nothing to record
+        self.control = WorldControl(self.sim, self._watchdog, shown, journal)
         answer_xmlrpc(METHOD, self.control.answer)
         free_polls_at_once()
         bound_messages()
@@ -274,7 +275,7 @@ def simulate(
 ) -> int:
     """Simulates until the end; returns the exit code."""
     try:
-        return GazeboNode(args, engine, signals.noted).run(signals, work)
+        node = GazeboNode(args, engine, signals.noted)
     except RecordingError as error:
         rospy.logfatal("%s", error)
         return 1
@@ -286,6 +287,7 @@ def simulate(
         text = f"the master at {master.uri()} went while the simulator started"
         print(f"gzserver: {text}", file=sys.stderr)
         return 1
+    return node.run(signals, work)
 
 
 def main(argv: list[str] | None = None, work: Work | None = None) -> int:
