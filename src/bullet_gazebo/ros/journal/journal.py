@@ -8,7 +8,7 @@ themselves follows from the entries and is not among them.
 import json
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import genpy
@@ -33,11 +33,11 @@ class Entry(JournalEntry):
         self.number = self.publishers = self.elapsed = self.ended = self.answer = 0
         self.type = self.md5sum = self.parameters = ""
         self.now = START
-        self.models: list[str] = []
-        self.joints: list[str] = []
-        self.numbers: list[float] = []
+        self.models: Sequence[str] = ()
+        self.joints: Sequence[str] = ()
+        self.numbers: Sequence[float] = ()
         self.observed = self.is_numbered = self.is_done = False
-        self.read: dict[str, list[object]] = {}  # parameters
+        self.read: dict[str, list[object]] | None = None  # parameters
 
 
 class _Current(threading.local):
@@ -148,9 +148,10 @@ class WorldJournal:
         """Records that a parameter was read: its value in a list, which is empty if there was none."""
         entry = self._current.entry
         text = json.dumps(value, default=str)
-        if entry is not None and name not in entry.read and self._parameters.get(name) != text:
-            self._parameters[name] = text
-            entry.read[name] = value
+        if entry is None or self._parameters.get(name) == text or name in (entry.read or ()):
+            return
+        self._parameters[name] = text
+        entry.read = {**(entry.read or {}), name: value}
 
     def _taken(self) -> None:
         entry = self._current.entry
