@@ -205,7 +205,7 @@ class GazeboNode:
         if self._output is not None:
             self._output.close()
 
-    def run(self, signals: SignalHandler, work: "Work | None") -> int:
+    def run(self, signals: SignalHandler, work: "Work | None" = None) -> int:
         """Simulates until the node is shut down, or the work is done; returns the exit code."""
         # Called before the topics close, so that no tick publishes to a closed one.
         rospy.on_shutdown(self._watchdog.stop)
