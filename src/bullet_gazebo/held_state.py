@@ -32,14 +32,15 @@ import numpy as np
 # Names of classes begin with these: what threads and ROS own, what never changes while a world runs, and what
 # saves its own state.
 OUTSIDE = (
-    "_thread.", "concurrent.", "contextlib.", "logging.", "socket.", "subprocess.", "threading.",
-    "xml.", "actionlib.", "dynamic_reconfigure.", "gymnasium.", "rospy.", "tf.", "tf2_ros.",
+    "_thread.", "concurrent.", "contextlib.", "logging.", "socket.", "subprocess.", "threading.", "xml.",
+    "actionlib.", "dynamic_reconfigure.", "gymnasium.", "rospy.", "tf.", "tf2_ros.",
     "bullet_gazebo.physics.", "bullet_gazebo.pictures.", "bullet_gazebo.ros.common.",
-    "bullet_gazebo.ros.control.", "bullet_gazebo.ros.scene.", "bullet_gazebo.ros.services.",
-    "bullet_gazebo.ros.plugins.plugin_loader.", "bullet_gazebo.ros.plugins.sensor_topics.Newcomers",
-    "bullet_gazebo.ros.plugins.sensor_topics.Topic", "bullet_gazebo.sensors.rays.",
-    "bullet_gazebo.sensors.sensing.Mount", "bullet_gazebo.simulator.Simulator",
-    "robot_envs.environment.", "robot_envs.robot.", "robot_envs.scene.", "robot_envs.vector.",
+    "bullet_gazebo.ros.control.", "bullet_gazebo.ros.journal.", "bullet_gazebo.ros.scene.",
+    "bullet_gazebo.ros.services.", "bullet_gazebo.ros.plugins.plugin_loader.",
+    "bullet_gazebo.ros.plugins.sensor_topics.Newcomers", "bullet_gazebo.ros.plugins.sensor_topics.Topic",
+    "bullet_gazebo.sensors.rays.", "bullet_gazebo.sensors.sensing.Mount",
+    "bullet_gazebo.simulator.Simulator", "robot_envs.environment.", "robot_envs.robot.",
+    "robot_envs.scene.", "robot_envs.vector.",
 )  # fmt: skip
 VALUES = (
     type(None), bool, int, float, complex, str, bytes, range, slice, type, Enum, np.generic, np.dtype,

@@ -73,6 +73,7 @@ class Simulator:
         self.max_update_rate = max_update_rate
         self.relatch = relatch
         self.now = 0  # [ns] of simulated time
+        self.elapsed = 0  # [ns] of simulated time in all; no reset sets it back
         self.robots: list[ControlledRobot] = []
         self._robots_of: dict[Model, list[ControlledRobot]] = {}
         self._robots_version = 0
@@ -202,9 +203,11 @@ class Simulator:
         The lock is taken for each tick, so services are answered in between.
         """
         self.pause()
-        for _ in range(ticks):
+        for done in range(ticks):
             if self._stopping.is_set():
                 return
+            if done:
+                self.lock.between()
             with self.lock:
                 self.await_holds()
                 self._tick()
@@ -323,9 +326,7 @@ class Simulator:
         if snapshot.of is not self:
             raise SnapshotError("the snapshot is of another simulator")
         if snapshot.layout != self._layout:
-            raise SnapshotError(
-                "models or controllers have come, gone or been switched since the snapshot"
-            )
+            raise SnapshotError("models or controllers have come or gone, or been switched")
         self.world.restore_state(snapshot.world)
         self.now, self.resets = snapshot.now, snapshot.resets
         snapshot.held.recall()
@@ -382,6 +383,7 @@ class Simulator:
     def _tick(self) -> None:
         """One physics step, in Gazebo's order: the state before the step carries the time after it."""
         self.now = now = self.now + self._period
+        self.elapsed += self._period
         dt = self.world.time_step
         applied = self.applied
         if applied.efforts or applied.wrenches:

@@ -11,6 +11,10 @@ POLL = 0.2  # [s]
 MAX_LAG = 0.1  # [s]; a host that falls behind further than this isn't made up for
 
 
+def _nothing() -> None:
+    pass
+
+
 class FairLock:
     """A lock that serves its waiters in the order in which they came.
 
@@ -27,6 +31,11 @@ class FairLock:
         self._held = False
         self._holder: int | None = None  # the thread
         self.turns = 0  # how often it was acquired
+        # For the journal. The holder calls the first two, and `between` is called in the middle of long work,
+        # while the lock is free.
+        self.taken: Callable[[], None] = _nothing
+        self.leaving: Callable[[], None] = _nothing
+        self.between: Callable[[], None] = _nothing
 
     @property
     def held(self) -> bool:
@@ -44,6 +53,17 @@ class FairLock:
         self._take()
         self._holder = thread
         self.turns += 1
+        self.taken()
+
+    @contextmanager
+    def glance(self) -> Iterator[None]:
+        """Holds the lock for a look that decides nothing: `taken` and `leaving` aren't called."""
+        self._take()
+        self._holder = threading.get_ident()
+        try:
+            yield
+        finally:
+            self._release()
 
     def _take(self) -> None:
         with self._guard:
@@ -57,17 +77,21 @@ class FairLock:
 
     def wait(self, event: threading.Event, timeout: float) -> None:
         """Releases the lock until `event` is set, or for `timeout` [s]. Only the holder may call it."""
-        self._release()
+        self.__exit__()
         event.wait(timeout)
         self.__enter__()
 
     def yield_turn(self) -> None:
         """Lets all waiters go first. The holder calls it in the middle of long work."""
-        self._release()
+        self.__exit__()
+        self.between()
         self.__enter__()
 
     def __exit__(self, *_: object) -> None:
-        self._release()
+        try:
+            self.leaving()
+        finally:
+            self._release()
 
     def _release(self) -> None:
         self._holder = None

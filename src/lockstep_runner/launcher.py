@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import os
+import shlex
 import sys
 import threading
 import types
@@ -18,6 +19,7 @@ HASHES = "PYTHONHASHSEED"
 MOST_SEED = 2**32 - 1
 LONGEST = 3600.0  # [s] longest period at a trigger
 NO_TRIGGERS = "none"
+WITH_VALUE = ("--seed", "--dt", "--record")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -33,16 +35,24 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.environ[HASHES] = str(args.seed % MOST_SEED)
         os.execv(sys.executable, [sys.executable, *sys.argv])
     # Imported late: it takes as long as Python's start, and execv would make it happen twice
+    from lockstep_runner.recording import recorded
     from lockstep_runner.world import RunsByItself, is_running
 
     try:
-        is_running()
+        if is_running() and args.record:
+            tell(
+                "--record: a simulator runs already; record it with: rosbag record /gazebo/journal"
+            )
+            return USAGE
     except RunsByItself as fault:
         tell(str(fault))
         return USAGE
     server = "--lockstep" if args.seed is None else f"--lockstep --seed {args.seed}"
+    if args.record:
+        server += f" --journal {shlex.quote(args.record)}"
     os.environ[SERVER_ARGUMENTS] = f"{os.environ.get(SERVER_ARGUMENTS, '')} {server}".strip()
-    return _run(args, code)
+    with recorded(args.record) if args.record else contextlib.nullcontext():
+        return _run(args, code)
 
 
 def _run(args: argparse.Namespace, code: types.CodeType) -> int:
@@ -114,6 +124,12 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         action="store_true",
         help="simulate time.time(), monotonic() and perf_counter(), too",
     )
+    parser.add_argument(
+        "--record",
+        type=_writable,
+        metavar="BAG",
+        help="record the run in this bag, which replay.py repeats",
+    )
     parser.add_argument("script", help="the Python file to run")
     parser.add_argument(
         "arguments", nargs=argparse.REMAINDER, help="arguments passed to the script"
@@ -131,7 +147,7 @@ def _one_by_one(argv: Sequence[str]) -> list[str]:
         argument = left.pop(0)
         if argument != STEP_ON:
             given.append(argument)
-            if not argument.startswith("-") and given[-2:-1] not in (["--seed"], ["--dt"]):
+            if not argument.startswith("-") and (not given[1:] or given[-2] not in WITH_VALUE):
                 return given + left  # the script and its arguments
             continue
         names = []
@@ -149,6 +165,13 @@ def _seed(text: str) -> int:
     if not (text.isascii() and text.isdecimal() and int(text) <= MOST_SEED):
         raise argparse.ArgumentTypeError(f"{text}: a whole number, 0 to {MOST_SEED}, is needed")
     return int(text)
+
+
+def _writable(text: str) -> str:
+    path = os.path.abspath(text)
+    if not os.access(os.path.dirname(path), os.W_OK):
+        raise argparse.ArgumentTypeError(f"{text}: there is no such folder that can be written to")
+    return path
 
 
 def _period(text: str) -> float:

@@ -20,6 +20,7 @@ from lockstep_runner.script import AfterImport, seed_everything
             ["--step-on", "x"],
         ),
         (["--step-on", "none", "--seed", "3", "a.py"], ["none"], "a.py", []),
+        (["--record", "run.bag", "--step-on", "/t", "a.py", "x"], ["/t"], "a.py", ["x"]),
         (["--step-on", "/t", "--step-on", "/s", "--dt", "0.002", "a.py"], ["/t", "/s"], "a.py", []),
         (["--step-on=/t", "a.py", "__name:=x"], ["/t"], "a.py", ["__name:=x"]),
         (["--", "a.py", "--dt"], None, "a.py", ["--dt"]),
@@ -34,6 +35,7 @@ def test_options_end_where_the_script_begins(given, triggers, script, arguments)
     "given",
     [[], ["--seed", "-1", "a.py"], ["--seed", "x", "a.py"], ["--dt", "0", "a.py"], ["--dt", "nan", "a.py"],
      ["--dt", "inf", "a.py"], ["--step-on", "--seed", "1", "a.py"], ["--nonsense", "a.py"],
+     ["--record", "/none/run.bag", "a.py"],
      ["--dt", "x", "a.py"], ["--dt", "1e9", "a.py"], ["--seed", "1.5", "a.py"],
      ["--step-on", "none", "/tick", "--seed", "1", "a.py"]],
 )  # fmt: skip

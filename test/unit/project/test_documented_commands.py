@@ -27,6 +27,8 @@ from bullet_gazebo_msgs.srv import RestoreStateRequest, SaveStateRequest, StepWo
 from gazebo_msgs.srv import GetWorldPropertiesRequest
 
 from bullet_gazebo.ros.clients import gzclient
+from bullet_gazebo.ros.journal import journal_output
+from bullet_gazebo.ros.node import replay_command
 from cartpole import dqn_train, pg_train, policy_node, workbench
 from lockstep_runner import launcher as lockstep_launcher
 from package_writing import cli as new_robot
@@ -121,6 +123,8 @@ GROUPS = {
     "tests": of("test", "rostest", "check", "shell", "tensorboard"),
     "window": of("rosrun gazebo_ros gzclient"),
     "lockstep": of("rosrun cartpole lockstep.py"),
+    "replays": of("rosrun cartpole replay.py"),
+    "bags": of("rosbag record"),
     "clusters": of("ray"),
     "gains": of("rosrun dynamic_reconfigure dynparam set"),
 }
@@ -174,6 +178,19 @@ def test_the_window_takes_it(command: Command) -> None:
 def test_lockstep_takes_it(command: Command, only_parsing: None) -> None:
     with pytest.raises(Parsed):
         lockstep_launcher.main(command.words[3:])
+
+
+@pytest.mark.parametrize("command", GROUPS["replays"], ids=str)
+def test_a_replay_takes_it(command: Command, only_parsing: None) -> None:
+    given = [word.partition("=")[2] for word in command.words if "=" in word]
+    assert all((ROOT / path).is_file() for path in given)
+    with pytest.raises(Parsed):
+        replay_command.main(command.words[3:])
+
+
+@pytest.mark.parametrize("command", GROUPS["bags"], ids=str)
+def test_a_topic_that_is_recorded_is_the_simulators(command: Command) -> None:
+    assert command.words[-1] == journal_output.TOPIC
 
 
 def with_extras(command: Command) -> object:

@@ -38,7 +38,7 @@ class RemoteWorld:
             ) from fault
 
     def command(self, name: str, count: int = 1) -> None:
-        """Runs one command: pause, unpause, step, reset, reset_models, reset_time or show."""
+        """Runs one command: pause, unpause, step, reset, reset_models, reset_time, show or end_journal."""
         try:
             master.call_node(self._address, METHOD, name, count, timeout=TIMEOUT)
         except master.Refused as fault:

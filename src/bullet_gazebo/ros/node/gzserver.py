@@ -42,7 +42,15 @@ from bullet_gazebo.ros.common.rospy_internals import (
     free_polls_at_once,
     registered_together,
 )
+from bullet_gazebo.ros.journal.interception import (
+    record_messages,
+    record_parameters,
+    record_services,
+)
+from bullet_gazebo.ros.journal.journal import WorldJournal
+from bullet_gazebo.ros.journal.journal_output import JournalOutput
 from bullet_gazebo.ros.node.master_watch import MasterWatch, NameLoss, NodeNameTaken, refuse_twin
+from bullet_gazebo.ros.node.start import facts_of
 from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.ros.scene import SceneOffer
@@ -105,6 +113,7 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     option("-e", "--physics", default="ode", help="mujoco; all of Gazebo's names mean PyBullet")
     option("-o", "--profile", nargs="?", help="accepted, without effect")
     option("--lockstep", action="store_true", help="time moves only by ~step_world")
+    option("--journal", default="", help="in lock-step: record the run in this bag, for replay.py")
     option("--replace", action="store_true", help="end a running simulator that has this name")
     option(
         "--video", action="append", default=[], metavar="FILE",
@@ -132,25 +141,35 @@ class GazeboNode:
     def __init__(
         self, args: argparse.Namespace, engine: Engine, interrupted: Callable[[], bool]
     ) -> None:
+        self.sim = Simulator(World(engine), lockstep=args.lockstep)
+        self.journal: WorldJournal | None = None
+        self._output: JournalOutput | None = None
+        self.series = 0  # of the handles of prepared steps
+        if args.lockstep:
+            self.journal = WorldJournal(self.sim)
+            record_services(self.journal)
+            record_messages(self.journal)
+            record_parameters(self.journal)
         if not rospy.has_param("/use_sim_time"):
             rospy.set_param("/use_sim_time", True)
-        world = World(engine)
-        self.sim = Simulator(world, lockstep=args.lockstep, relatch=_flag("~relatch_on_reset"))
+        self.sim.relatch = _flag("~relatch_on_reset")
         self._watchdog = Watchdog(self.sim)
         recordings = _recordings(args)
         found = read_world(args.world, interrupted)
         fill_world(self.sim, found, interrupted)
         if args.paused:
             self.sim.pause()
-        self._advertise(_flag("~enable_ros_network"), args.seed or 0, found.plugins)
+        self._advertise(_flag("~enable_ros_network"), args, found.plugins)
         self._recorders = [SimulationRecorder(self.sim, options) for options in recordings]
         MasterWatch().start()
 
-    def _advertise(self, network: bool, seed: int, of_world: list[Plugin]) -> None:
+    def _advertise(self, network: bool, args: argparse.Namespace, of_world: list[Plugin]) -> None:
         sensors: list[SceneSensor] = []
         scene = SceneOffer(self.sim, sensors)
-        control = WorldControl(self.sim, self._watchdog, scene.show if network else None)
-        answer_xmlrpc(METHOD, control.answer)
+        shown = {"show": scene.show, "end_journal": self._end_journal} if network else {}
+        journal = self.journal if network else None  # without services there is nothing to record
+        self.control = WorldControl(self.sim, self._watchdog, shown, journal)
+        answer_xmlrpc(METHOD, self.control.answer)
         free_polls_at_once()
         bound_messages()
         bound_calls()
@@ -158,24 +177,30 @@ class GazeboNode:
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
-        plugins = PluginRegistry(self.sim, thinner, seed, sensors)
+        plugins = PluginRegistry(self.sim, thinner, args.seed or 0, sensors)
         load_plugins(self.sim, plugins, of_world if network else ())
         if not network:
             return
         with registered_together():
-            self._offer_services(plugins, thinner)
+            self._offer_services(plugins, thinner, args)
 
-    def _offer_services(self, plugins: PluginRegistry, thinner: Thinner) -> None:
+    def _offer_services(
+        self, plugins: PluginRegistry, thinner: Thinner, args: argparse.Namespace
+    ) -> None:
         # Clients take the world for ready once it can be paused, so the step service comes first.
         stepping: list[object] = []
-        if self.sim.lockstep:
+        if self.journal is not None:
             one_at_a_time = threading.Lock()
-            steps = StepService(self.sim, plugins.sensing, self._watchdog, one_at_a_time)
+            common = self.sim, plugins.sensing, self._watchdog, one_at_a_time
+            steps = StepService(*common)
             stepping = [
                 steps,
                 SnapshotServices(self.sim, steps, one_at_a_time),
-                AdvanceService(self.sim, plugins.sensing, self._watchdog, thinner, one_at_a_time),
+                AdvanceService(*common, thinner, self.journal),
             ]
+            self._output = JournalOutput(self.journal, _journal_bag(args))
+            self.series = steps.series
+            self.journal.start(facts_of(args, steps.series))
         spawning = threading.Lock()
         with spawning:  # once a model is there, clients use all other services without a wait
             self._services = [
@@ -184,15 +209,24 @@ class GazeboNode:
                 *advertise_world_services(self.sim),
             ]
 
-    def run(self, signals: SignalHandler) -> int:
-        """Simulates until the node is shut down; returns the exit code."""
+    def _end_journal(self) -> None:
+        """Completes the journal's bag."""
+        if self._output is not None:
+            self._output.close()
+
+    def run(self, signals: SignalHandler, work: "Work | None" = None) -> int:
+        """Simulates until the node is shut down, or the work is done; returns the exit code."""
         # Called before the topics close, so that no tick publishes to a closed one.
         rospy.on_shutdown(self._watchdog.stop)
         if signals.noted():  # they came during the start: no more time passes
             self._watchdog.stop()
         else:
             self._watchdog.start()
-        signals.wait(self._watchdog.failed)
+        code = 0
+        if work is None:
+            signals.wait(self._watchdog.failed)
+        else:
+            code = signals.run(lambda: work(self), INTERRUPTED)
         failed = self._watchdog.failed()
         self._watchdog.stop()  # a shutdown that came before the hook was there doesn't call it
         for recorder in self._recorders:
@@ -201,7 +235,16 @@ class GazeboNode:
         if hanging is not None:
             print(f"gzserver: ends while the world's lock is kept by {hanging}", file=sys.stderr)
             end_within(HANGING_TIMEOUT, 1)
-        return 1 if failed or hanging is not None else 0
+        return 1 if failed or hanging is not None else code
+
+
+Work = Callable[[GazeboNode], int]
+"""What is done with the simulator, in a thread of its own; returns the exit code."""
+
+
+def _journal_bag(args: argparse.Namespace) -> Path | None:
+    """Returns the bag that the command line asks for."""
+    return Path(args.journal).absolute() if args.journal else None
 
 
 def _recordings(args: argparse.Namespace) -> list[RecordingOptions]:
@@ -237,10 +280,12 @@ def _clock_frequency() -> float:
     return 0.0
 
 
-def simulate(args: argparse.Namespace, engine: Engine, signals: SignalHandler) -> int:
+def simulate(
+    args: argparse.Namespace, engine: Engine, signals: SignalHandler, work: Work | None = None
+) -> int:
     """Simulates until the end; returns the exit code."""
     try:
-        return GazeboNode(args, engine, signals.noted).run(signals)
+        node = GazeboNode(args, engine, signals.noted)
     except RecordingError as error:
         rospy.logfatal("%s", error)
         return 1
@@ -252,10 +297,11 @@ def simulate(args: argparse.Namespace, engine: Engine, signals: SignalHandler) -
         text = f"the master at {master.uri()} went while the simulator started"
         print(f"gzserver: {text}", file=sys.stderr)
         return 1
+    return node.run(signals, work)
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Runs the node; returns its exit code."""
+def main(argv: list[str] | None = None, work: Work | None = None) -> int:
+    """Runs the node, until the work is done if there is some; returns the exit code."""
     use_one_arena()
     command_line = sys.argv if argv is None else argv
     more = shlex.split(os.environ.get(MORE_ARGUMENTS, ""))
@@ -273,13 +319,17 @@ def main(argv: list[str] | None = None) -> int:
         rospy.logwarn("Physics engine '%s' is not known; PyBullet is used", args.physics)
     if args.ignored:
         rospy.logwarn("Arguments without effect here: %s", " ".join(args.ignored))
+    if args.journal and not args.lockstep:
+        rospy.logwarn(
+            "--journal has no effect: only a world in lock-step (--lockstep) has a journal"
+        )
     seed_random_numbers(args.seed)
     try:
         engine = make_engine(args.physics if args.physics in ENGINES else BULLET[0])
     except EngineError as error:
         rospy.logfatal("%s", error)
         return 1
-    code = simulate(args, engine, signals)
+    code = simulate(args, engine, signals, work)
     if loss.happened:
         print(f"gzserver: {loss.text(name)}", file=sys.stderr)
         code = code or 1
@@ -303,14 +353,15 @@ def main_with_window(argv: Sequence[str] | None = None) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     try:
-        with _window(command_line[1:]):
+        with window(command_line[1:]):
             return main(command_line)
     except KeyboardInterrupt:
         return INTERRUPTED
 
 
 @contextlib.contextmanager
-def _window(arguments: Sequence[str]) -> Iterator[None]:
+def window(arguments: Sequence[str]) -> Iterator[None]:
+    """Opens the window in a process of its own for the time of a block."""
     # The launch file's name and log file are the server's.
     own = [a for a in arguments if ":=" in a and not a.startswith(("__name:=", "__log:="))]
     client = subprocess.Popen([sys.executable, "-P", "-c", WINDOW, *own, f"__name:={WINDOW_NAME}"])

@@ -209,7 +209,7 @@ class PluginRegistry:
 
     def time_held(self, models: str) -> AbstractContextManager[None]:
         """Holds time while a model comes and its plugins start: as in Gazebo, it has its drives before its
-        first step.
+        first step. And while it goes.
 
         If a plugin waits for time to pass, the hold ends after PATIENCE.
         """
@@ -313,7 +313,7 @@ def _tell_missing_control(model: Model) -> None:
 
 def _warn_late(models: str) -> None:
     rospy.logwarn(
-        "The plugins of %s have been loading for %g s; time passes without them from now on",
+        "The plugins of %s have been starting or ending for %g s; time passes from now on",
         models,
         PATIENCE,
     )

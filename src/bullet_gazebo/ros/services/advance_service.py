@@ -21,6 +21,7 @@ from bullet_gazebo.ros.common.rospy_internals import (
     on_topics_changed,
     publish_without_yielding,
 )
+from bullet_gazebo.ros.journal.journal import WorldJournal
 from bullet_gazebo.ros.services.step_requests import MAX_TICKS, SLICE
 from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.simulator import Simulator
@@ -135,12 +136,14 @@ class AdvanceService:
         sim: Simulator,
         sensing: Sensing,
         watchdog: AbstractContextManager[object],
-        thinner: Thinner,
         one_at_a_time: threading.Lock,
+        thinner: Thinner,
+        journal: WorldJournal,
     ) -> None:
         """A fault in a block of `watchdog` ends the node; with `one_at_a_time`, no one else's ticks come
         within a request's.
         """
+        self._journal = journal
         self._sim, self._schedule = sim, sensing.schedule
         self._watchdog = watchdog
         self._one_at_a_time = one_at_a_time
@@ -171,15 +174,16 @@ class AdvanceService:
         with self._one_at_a_time:
             self._sim.deliver_with_steps = True
             if request.reseed:
-                seed_random_numbers(request.seed, tell=False)
-                with self._sim.lock:
-                    self._sim.reseed(request.seed)
+                with self._journal.command("reseed", request.seed):
+                    reseed(self._sim, request.seed)
             faults = self._deliver(request)
             if request.physics == AdvanceWorldRequest.PAUSE_PHYSICS:
-                self._sim.pause()
+                with self._journal.command("pause"):
+                    self._sim.pause()
             elif request.physics == AdvanceWorldRequest.UNPAUSE_PHYSICS:
-                self._sim.unpause()
-            passed = self._advance(request.ticks)
+                with self._journal.command("unpause"):
+                    self._sim.unpause()
+            passed = self._advance_recorded(request.ticks) if request.ticks else self._advance(0)
             with self._sim.lock:
                 return AdvanceWorldResponse(
                     success=not faults,
@@ -202,6 +206,12 @@ class AdvanceService:
                 faults.append(f"AdvanceWorld: a message on {message.topic} can't be read: {fault}")
         return faults
 
+    def _advance_recorded(self, ticks: int) -> int:
+        with self._journal.command("advance") as entry:
+            passed = self._advance(ticks)
+            entry.data = b"%d" % passed  # repeated without the messages that ended it
+        return passed
+
     def _advance(self, ticks: int) -> int:
         """Returns how many ticks have passed; after each slice services that wait get their turn."""
         sim, mailboxes = self._sim, self._mailboxes
@@ -223,6 +233,14 @@ class AdvanceService:
                 outbox.deliver()
             if not goes_on or mailboxes.has_awaited:
                 return passed
+            sim.lock.between()
+
+
+def reseed(sim: Simulator, seed: int) -> None:
+    """Lets all random numbers start again."""
+    seed_random_numbers(seed, tell=False)
+    with sim.lock:
+        sim.reseed(seed)
 
 
 def _refused(fault: str) -> AdvanceWorldResponse:

@@ -111,7 +111,7 @@ class SpawnServices:
         pose, name = from_pose_msg(request.initial_pose), request.model_name
         if not name:
             raise DescriptionError("the model needs a name")
-        with self._sim.lock:
+        with self._sim.lock.glance():
             frame = self._sim.world.frame(request.reference_frame)
             if frame is None:
                 raise LookupError(
@@ -145,13 +145,14 @@ class SpawnServices:
 
     def _delete(self, request: srv.DeleteModelRequest) -> str:
         with self._one_at_a_time:
-            with self._sim.lock:
+            with self._sim.lock.glance():
                 model = self._sim.world.model(request.model_name)
             if model is None:
                 raise ServiceRefused("model does not exist")
-            self._plugins.unload(model)
-            with self._sim.lock:
-                self._sim.delete_model(model)
+            with self._plugins.time_held(f"model '{shown(model.name)}'"):
+                self._plugins.unload(model)
+                with self._sim.lock:
+                    self._sim.delete_model(model)
         return "DeleteModel: successfully deleted model"
 
 

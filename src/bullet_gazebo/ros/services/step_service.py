@@ -55,6 +55,7 @@ from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import NOTHING, StateReader, UnknownName
 
 MOST_HANDLES = 256  # a client whose handle was dropped prepares its step again
+COUNTED = 24  # [bits] of a handle that count; those above are the simulator's
 
 
 class _Prepared:
@@ -120,6 +121,10 @@ class StepService:
         self._reader = StateReader(sim.world, NOTHING)
         self._current = Addresses(sim)
         self._prepared: dict[int, _Prepared] = {}  # by handle
+        # Random, so that a handle from an earlier simulator means nothing here; and not drawn from the
+        # world's own random numbers, which stay bit-identical.
+        self.series = secrets.randbits(64 - COUNTED)
+        self._count = 0
         self._readers: SensorReaders | None = None  # that the last step asked for
         self._is_reading = False  # whether the step under way asks for them
         sim.before_advance.append(self._end_unread)
@@ -140,9 +145,8 @@ class StepService:
                 return PrepareStepResponse(status_message=f"PrepareStep: {error}")
             if len(self._prepared) >= MOST_HANDLES:
                 del self._prepared[next(iter(self._prepared))]
-            # Random rather than counted, so that a handle from an earlier simulator means nothing
-            # here; and not drawn from the world's own random numbers, which stay bit-identical.
-            handle = secrets.randbits(64)
+            self._count += 1
+            handle = self.series << COUNTED | self._count % 2**COUNTED
             self._prepared[handle] = prepared
             return PrepareStepResponse(
                 success=True,

@@ -3,8 +3,8 @@
 See docs/contract/gazebo.md 1.5, 2.1, 2.2, 2.6, 2.9, 2.20 and 2.21.
 """
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import rospy
@@ -19,6 +19,7 @@ from bullet_gazebo.physics.world import SolverSettings
 from bullet_gazebo.ros.clients.gz import CHUNK
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import bad_number, from_pose_msg, to_vector
+from bullet_gazebo.ros.journal.journal import WorldJournal
 from bullet_gazebo.ros.services import ServiceRefused, check_message, offer
 from bullet_gazebo.ros.services.joint_services import ForceServices, JointServices
 from bullet_gazebo.ros.services.model_services import LinkServices, ModelServices
@@ -252,9 +253,13 @@ class WorldControl:
         self,
         sim: Simulator,
         watchdog: AbstractContextManager[object],
-        show: Callable[[], None] | None = None,
+        more: Mapping[str, Callable[[], None]],
+        journal: WorldJournal | None = None,
     ) -> None:
-        """A fault in a block of `watchdog` ends the node. `show` opens the scene for a window."""
+        """A fault in a block of `watchdog` ends the node. `journal` records the commands, but for those of
+        `more`, which don't touch the world.
+        """
+        self._more, self._journal = more, journal
         self._sim = sim
         self._watchdog = watchdog
         self._commands = {
@@ -263,9 +268,8 @@ class WorldControl:
             "reset": sim.reset_simulation,
             "reset_models": sim.reset_world,
             "reset_time": sim.reset_time,
+            **more,
         }
-        if show is not None:
-            self._commands["show"] = show
 
     def answer(self, *arguments: object) -> Answer:
         """Runs a command; returns code (1 is success), text, ticks done.
@@ -286,14 +290,19 @@ class WorldControl:
         if command == "step":
             if not 1 <= count <= CHUNK:
                 return _refused(f"{count} steps: one call does 1 to {CHUNK}")
-            with self._watchdog:
+            with self._watchdog, self._recorded(command, count):
                 self._sim.step(count)
             return 1, "step", count
         if command not in self._commands:
             return _refused(f"unknown command {command[:LONGEST]!a}")
-        with self._watchdog:
+        with self._watchdog, self._recorded(command):
             self._commands[command]()
         return 1, command, 0
+
+    def _recorded(self, command: str, count: int = 0) -> AbstractContextManager[object]:
+        if self._journal is None or command in self._more:
+            return nullcontext()
+        return self._journal.command(command, count)
 
 
 def _refused(reason: str) -> Answer:

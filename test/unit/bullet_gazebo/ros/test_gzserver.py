@@ -43,8 +43,8 @@ def test_no_model_is_spawned_before_all_services_are_there(monkeypatch):
     monkeypatch.setattr(gzserver, "SpawnServices", lambda sim, plugins, gate: gates.append(gate))
     monkeypatch.setattr(gzserver, "advertise_world_services", others)
     node = gzserver.GazeboNode.__new__(gzserver.GazeboNode)
-    node.sim, node._watchdog = SimpleNamespace(lockstep=False), None
-    node._advertise(True, seed=0, of_world=[])
+    node.sim, node._watchdog, node.journal = SimpleNamespace(lockstep=False), None, None
+    node._advertise(True, argparse.Namespace(seed=0), of_world=[])
     assert node._services[-1] == "all others" and not gates[0].locked()
 
 

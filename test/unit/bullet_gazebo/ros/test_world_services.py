@@ -32,7 +32,7 @@ COUNTS = st.integers(-2, 3) | st.sampled_from(
 @pytest.fixture(scope="module")
 def control():
     sim = Simulator(World(make_engine()))
-    yield WorldControl(sim, contextlib.nullcontext())
+    yield WorldControl(sim, contextlib.nullcontext(), {})
     sim.world.close()
 
 

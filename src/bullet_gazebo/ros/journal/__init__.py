@@ -1,0 +1,1 @@
+"""The journal of a world in lock-step, and its replay (docs/replay.md)."""

@@ -1,0 +1,171 @@
+"""Where the journal goes: the topic ~journal, for recorders, and a bag that the simulator itself writes."""
+
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rospy
+from bullet_gazebo_msgs.msg import Journal as JournalMessage
+from bullet_gazebo_msgs.msg import JournalEntry
+from gazebo_msgs.msg import ModelStates
+from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from bullet_gazebo.pictures.recording import RecordingError
+from bullet_gazebo.ros.common.messages import to_time
+from bullet_gazebo.ros.common.rospy_internals import wait_until_sent
+from bullet_gazebo.ros.journal.journal import LOOK, WorldJournal
+
+# [s of wall time] between two messages. `rosbag record` keeps 100 of a topic while it is busy: it has 10 s.
+PERIOD = 0.1
+BATCH = 2000  # entries in a message at most
+QUEUE = 1000  # messages; the beginning for a subscriber that comes late has to fit in
+MOST_WAITING = 100_000  # entries that the bag is behind, before the world waits for the disk
+STOP_TIMEOUT = 10.0  # [s] to write what is left
+MOTION = 13  # numbers of a model: JournalEntry.msg
+TOPIC = "/gazebo/journal"
+ACTIVE = ".active"  # the suffix of a bag that is being written, as rosbag's
+
+Publish = Callable[[Any], None]
+Entries = list[JournalEntry]
+
+
+class JournalOutput(rospy.SubscribeListener):
+    """Sends entries from a thread of its own, many at a time, to subscribers and the bag."""
+
+    def __init__(self, journal: WorldJournal, bag: Path | None) -> None:
+        """The bag is written from the beginning on."""
+        super().__init__()
+        self._journal = journal
+        self._bag = JournalBag(bag) if bag else None
+        self._news = threading.Condition()
+        self._fresh: Entries = []
+        self._newcomers: list[tuple[Publish, Entries]] = []
+        self._ending = False
+        if self._bag:
+            journal.listen(self._take)
+        self._publisher = rospy.Publisher(
+            "~journal", JournalMessage, subscriber_listener=self, queue_size=QUEUE
+        )
+        self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
+        self._thread.start()
+        rospy.on_shutdown(self.close)
+
+    def peer_subscribe(self, _name: str, _all: object, publish: Publish) -> None:
+        """Lets a new subscriber have what was before; what comes twice has the same number."""
+        self._journal.listen(self._take)
+        with self._journal.command(LOOK):  # so that what was before can be compared by its outcome
+            pass
+        before = self._journal.listen(self._take)
+        if before is None:
+            before = [JournalEntry(kind=JournalEntry.GONE)]
+            rospy.logwarn(
+                "The beginning of %s is gone, as nobody recorded it: it can't be repeated", TOPIC
+            )
+        with self._news:
+            self._newcomers.append((publish, before))
+            self._news.notify_all()
+
+    def peer_unsubscribe(self, _name: str, left: int) -> None:
+        """Ends the work without subscribers."""
+        if not left and not self._bag:
+            self._journal.unlisten(self._take)
+
+    def _take(self, entries: Entries) -> None:
+        with self._news:
+            if self._bag:
+                self._news.wait_for(lambda: len(self._fresh) < MOST_WAITING, STOP_TIMEOUT)
+            self._fresh += entries
+
+    def close(self) -> None:
+        """Sends what is left, and completes the bag."""
+        self._journal.unlisten(self._take)
+        with self._news:
+            self._ending = True
+            self._news.notify_all()
+        self._thread.join(STOP_TIMEOUT)
+
+    def _run(self) -> None:
+        ending = False
+        while not ending:
+            with self._news:
+                self._news.wait_for(lambda: self._ending or self._newcomers, PERIOD)
+                ending = self._ending
+                newcomers, self._newcomers = self._newcomers, []
+                fresh, self._fresh = self._fresh, []
+                self._news.notify_all()
+            for publish, before in newcomers:
+                _send(before, publish)
+            _send(fresh, self._publisher.publish)
+            if self._bag:
+                self._write(self._bag, fresh)
+        wait_until_sent(self._publisher)
+        if self._bag:
+            self._bag.close()
+
+    def _write(self, bag: "JournalBag", entries: Entries) -> None:
+        try:
+            bag.write(entries)
+        except OSError as fault:
+            self._bag = None
+            rospy.logerr("The journal's bag ends here: %s", fault)
+
+
+def _send(entries: Entries, publish: Publish) -> None:
+    for begin in range(0, len(entries), BATCH):
+        publish(JournalMessage(entries[begin : begin + BATCH]))
+
+
+class JournalBag:
+    """A bag with the journal, and with states as other tools know them: joint states and models.
+
+    Its messages' times are those that have passed since the simulator's start, so they never go back.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Opens it; an existing file stays: the name gets a number.
+
+        Raises:
+            RecordingError: the file can't be written.
+        """
+        import rosbag  # needed only here, and slow
+
+        self._path, number = path, 2
+        while self._path.exists():
+            self._path = path.with_stem(f"{path.stem}_{number}")
+            number += 1
+        self._open = Path(f"{self._path}{ACTIVE}")
+        try:
+            self._bag = rosbag.Bag(str(self._open), "w", compression="lz4")
+        except OSError as fault:
+            raise RecordingError(f"{self._open}: {fault.strerror}") from fault
+        self._before: list[float] = []
+
+    def write(self, entries: Entries) -> None:
+        """Appends entries."""
+        _send(entries, lambda message: self._add(TOPIC, message, message.entries[-1]))
+        for entry in entries:
+            if entry.observed and entry.numbers != self._before:
+                self._before = entry.numbers
+                self._add_state(entry)
+
+    def _add(self, topic: str, message: Any, entry: JournalEntry) -> None:
+        self._bag.write(topic, message, to_time(entry.ended + 1))  # 0 is no time to ROS
+
+    def _add_state(self, entry: JournalEntry) -> None:
+        numbers, at = entry.numbers, MOTION * len(entry.models)
+        header, motions = Header(stamp=entry.now), numbers[at:]
+        joints = JointState(header, entry.joints, motions[::2], motions[1::2], ())
+        self._add("/joint_states", joints, entry)
+        rows = [numbers[begin : begin + MOTION] for begin in range(0, at, MOTION)]
+        poses = [Pose(Point(*row[:3]), Quaternion(*row[3:7])) for row in rows]
+        twists = [Twist(Vector3(*row[7:10]), Vector3(*row[10:])) for row in rows]
+        self._add("/gazebo/model_states", ModelStates(entry.models, poses, twists), entry)
+
+    def close(self) -> None:
+        """Completes the file, and gives it its name."""
+        self._bag.close()
+        os.replace(self._open, self._path)

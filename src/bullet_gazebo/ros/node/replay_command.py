@@ -1,0 +1,148 @@
+"""The command line of `replay.py`: a master, the simulator and the replay in one process (docs/replay.md)."""
+
+import argparse
+import contextlib
+import logging
+import math
+import os
+import sys
+import tempfile
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+import rosparam
+import rospy
+from rosmaster.master import Master
+
+from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal
+from bullet_gazebo.ros.node import gzserver
+from bullet_gazebo.ros.node.replay import Changes, Replay
+from bullet_gazebo.ros.node.start import arguments_of, versions
+from file_access.expansion import CannotExpand, expand
+
+UNUSABLE = 2
+LOOPBACK = "127.0.0.1"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Replays a bag.
+
+    Returns:
+        0 if all was equal, 1 if something differs, 2 if it can't be replayed.
+    """
+    args = parse_args(argv)
+    try:
+        recorded = RecordedJournal(args.bag)
+        models = {name: expand(path) for name, path in args.model}
+        parameters = [
+            each for name, path in args.params for each in rosparam.load_file(str(path), name)
+        ]
+    except (NoRecording, CannotExpand, rosparam.RosParamException, OSError) as fault:
+        return _tell(str(fault), UNUSABLE)
+    master = Master(0)
+    os.environ["ROS_IP"] = LOOPBACK
+    os.environ.pop("ROS_HOSTNAME", None)
+    master.start()
+    os.environ["ROS_MASTER_URI"] = master.uri
+
+    changes = Changes(models, parameters)
+    try:
+        with tempfile.TemporaryDirectory(prefix="replay-") as folder:
+            return _replay(args, recorded, changes, Path(folder))
+    finally:
+        master.stop()
+
+
+def parse_args(argv: Sequence[str] | None = None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="replay.py",
+        description="Repeats a run that lockstep.py --record or rosbag has recorded, in a simulator of its"
+        " own, and names the first difference.",
+    )
+    parser.add_argument("bag", type=Path, help="the recorded run")
+    parser.add_argument(
+        "--until",
+        type=_seconds,
+        default=math.inf,
+        metavar="SECONDS",
+        help="stop after the request with which that much simulated time has passed since the start",
+    )
+    parser.add_argument(
+        "--gui", action="store_true", help="open the simulator's page where the replay stops"
+    )
+    for flag, what, text in (
+        ("--model", "NAME=FILE", "spawn this model from a URDF, xacro or SDF file"),
+        ("--params", "NAMESPACE=FILE", "put parameters of a YAML file in place of those recorded"),
+    ):
+        parser.add_argument(
+            flag,
+            action="append",
+            default=[],
+            type=_pair,
+            metavar=what,
+            help=f"{text}; may be repeated",
+        )
+    return parser.parse_args(argv)
+
+
+def _replay(
+    args: argparse.Namespace, recorded: RecordedJournal, changes: Changes, folder: Path
+) -> int:
+    """Runs the simulator in this thread and the replay in another one; returns the exit code."""
+    changes.set_parameters(recorded.start)
+    os.environ.pop(gzserver.MORE_ARGUMENTS, None)
+
+    def work(node: gzserver.GazeboNode) -> int:
+        over = threading.Event()
+        rospy.on_shutdown(over.set)
+        replay = Replay(recorded, node, changes, args.until)
+        try:
+            replay.run()
+        except NoRecording as fault:
+            return _tell(str(fault), UNUSABLE)
+        code = _judge(args.bag, recorded, replay)
+        if args.gui and not over.is_set():
+            with gzserver.window([]):
+                over.wait()
+        return code
+
+    # Warnings have been seen when the run was recorded.
+    logging.getLogger("rosout").addFilter(lambda log: log.levelno >= logging.ERROR)
+    return gzserver.main(["gzserver", *arguments_of(recorded.facts, folder)], work)
+
+
+def _judge(bag: Path, recorded: RecordedJournal, replay: Replay) -> int:
+    """Says how the replay ended; returns the exit code."""
+    if replay.difference:
+        before, now = recorded.facts["versions"], versions()
+        other = [f"{name} {before[name]}" for name in before if before[name] != now.get(name)]
+        with_others = f" (recorded with {', '.join(other)})" if other else ""
+        return _tell(f"{bag}: first difference: {replay.difference}{with_others}", 1)
+    if replay.was_interrupted:
+        return gzserver.INTERRUPTED
+    text = f"{bag}: equal to the bit: {replay.repeated} entries, {replay.seconds:g} s"
+    if replay.unknown:
+        text += f"; no states were recorded with the first {replay.unknown} of them"
+    print(text, flush=True)
+    return 0
+
+
+def _tell(text: str, code: int) -> int:
+    print(f"replay.py: {text}", file=sys.stderr, flush=True)
+    return code
+
+
+def _pair(text: str) -> tuple[str, str]:
+    name, _, path = text.partition("=")
+    if not name or not path:
+        raise argparse.ArgumentTypeError(f"{text}: a name, = and a file are needed")
+    return name, path
+
+
+def _seconds(text: str) -> float:
+    with contextlib.suppress(ValueError):
+        value = float(text)
+        if 0.0 <= value < math.inf:
+            return value
+    raise argparse.ArgumentTypeError(f"{text}: a number of seconds is needed")

@@ -1,0 +1,42 @@
+"""The bag of `lockstep.py --record`, which the simulator writes: made room for, and complete at the end."""
+
+import contextlib
+import os
+from collections.abc import Iterator
+
+from lockstep_runner import originals
+from lockstep_runner.notices import tell
+from lockstep_runner.world import NODE
+from ros_calls import master
+
+METHOD, COMMAND = "gazeboWorld", "end_journal"  # of the simulator's node
+ACTIVE = ".active"  # the suffix of a bag that is being written
+CLOSING = 20.0  # [s] for a simulator to end, or to complete the bag
+LOOK = 0.05  # [s]
+
+
+@contextlib.contextmanager
+def recorded(path: str) -> Iterator[None]:
+    """Lets the simulator that starts within the block record in a bag; an older file is replaced."""
+    for old in (path, path + ACTIVE):
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(old)
+    try:
+        yield
+    finally:
+        _finish(path)
+
+
+def _finish(path: str) -> None:
+    with contextlib.suppress(master.NoAnswer, master.Refused):  # it has ended, or does
+        address = master.call("lookupNode", NODE)
+        master.call_node(address, METHOD, COMMAND, timeout=CLOSING)
+    deadline = originals.monotonic() + CLOSING
+    while os.path.exists(path + ACTIVE) and originals.monotonic() < deadline:
+        originals.sleep(LOOK)
+    if os.path.exists(path):
+        tell(f"recorded {path}; what repeats it: rosrun cartpole replay.py {path}")
+    elif os.path.exists(path + ACTIVE):
+        tell(f"the simulator was killed; what it recorded: rosbag reindex {path}{ACTIVE}")
+    else:
+        tell("--record: the script started no simulator in lock-step, so nothing is recorded")

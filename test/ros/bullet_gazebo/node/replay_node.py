@@ -1,0 +1,298 @@
+#!/usr/bin/env python3
+"""Runs in lock-step, recorded by rosbag or lockstep.py, and repeated by replay.py."""
+
+import importlib.util
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import rosbag
+import rospkg
+import rostest
+
+from ros_calls.waiting import wait_until
+from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
+from ros_utils.simulation import Simulation, reserved_port
+from ros_utils.step_client import PreparedSteps, StepClient, StepNames
+
+ROOT = Path(rospkg.RosPack().get_path("cartpole"))
+DATA = ROOT / "test" / "data"
+CART = "stand_cart_position_controller"
+STATES = "joint_state_controller"
+PUBLISHER = """
+import sys
+import rospy
+from std_msgs.msg import Float64
+rospy.init_node("another", disable_signals=True)
+publisher = rospy.Publisher(sys.argv[1], Float64, queue_size=1, tcp_nodelay=True)
+count = 0
+while not publisher.get_num_connections():
+    rospy.rostime.wallsleep(0.01)
+print("connected", flush=True)
+while not rospy.is_shutdown():
+    publisher.publish(0.001 * (count % 100))
+    count += 1
+    rospy.rostime.wallsleep(0.003)
+"""
+CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+TETRAHEDRON = "\n".join([
+    "solid part",
+    *(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join(f"vertex {x} {y} {z}\n" for x, y, z in (CORNERS[i] for i in face))
+        + "endloop\nendfacet"
+        for face in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
+    ),
+    "endsolid part",
+])  # fmt: skip
+BOUND = 300  # [s]
+
+
+def start(*command, **options):
+    return subprocess.Popen(
+        list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True, **options,
+    )  # fmt: skip
+
+
+def replay(*arguments, **options):
+    """Returns exit code, standard output and error of a replay."""
+    process = start("rosrun", "cartpole", "replay.py", *arguments, **options)
+    out, err = process.communicate(timeout=BOUND)
+    return process.returncode, out, err
+
+
+def add_cartpole(name="cartpole", pos_y=0.0):
+    assert ros_urdf.urdf_load_from_pkg(
+        "cartpole_gazebo", "cartpole_v1.urdf", "robot_description", folder="/robots", ns=f"/{name}"
+    )
+    assert ros_params.ros_load_yaml_from_pkg(
+        "cartpole_controller", "joint_position_control.yaml", ns=f"/{name}"
+    )
+    spawned, text = ros_gazebo.gazebo_spawn_urdf_param(
+        "robot_description", model_name=name, robot_namespace=f"/{name}", pos_y=pos_y
+    )
+    assert spawned, text
+
+
+class ReplayTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp(prefix="replay_test_"))
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.bag = self.folder / "run.bag"
+
+    def simulation(self, **options):
+        simulation = Simulation(lockstep=True, **options)
+        self.addCleanup(simulation.close)
+        active = simulation.active()
+        active.__enter__()
+        self.addCleanup(active.__exit__)
+        return simulation
+
+    def record(self, simulation, *topics):
+        """Starts `rosbag record`, and returns once it is connected.
+
+        It ends after the simulator, which sends the rest when it ends.
+        """
+        recorder = start(
+            "rosbag", "record", "-O", self.bag, "__name:=recorder", "/gazebo/journal", *topics,
+            env=simulation.environment(),
+        )  # fmt: skip
+        self.addCleanup(self.end, recorder)
+        info = f"{simulation.master_uri}"
+
+        def is_connected():
+            found = subprocess.run(
+                ["rosnode", "info", "/gazebo"], env={**os.environ, "ROS_MASTER_URI": info},
+                capture_output=True, text=True, check=False, timeout=BOUND,
+            )  # fmt: skip
+            return re.search(r"topic: /gazebo/journal\s+\* to: /recorder", found.stdout)
+
+        self.assertTrue(wait_until(is_connected, BOUND, "the recorder"))
+        return recorder
+
+    def end(self, recorder):
+        if recorder.poll() is None:
+            os.killpg(recorder.pid, signal.SIGINT)
+        recorder.communicate(timeout=BOUND)
+
+    def check_equal(self, *arguments, at_least):
+        code, out, err = replay(self.bag, *arguments)
+        self.assertEqual(code, 0, out + err)
+        found = re.search(r"equal to the bit: (\d+) entries, ([\d.]+) s", out)
+        self.assertGreaterEqual(int(found[1]), at_least)
+        return out
+
+    def check_difference(self, pattern, *arguments):
+        code, out, err = replay(self.bag, *arguments)
+        self.assertEqual(code, 1, out + err)
+        self.assertRegex(
+            err.strip().splitlines()[-1], pattern
+        )  # behind what the simulator complains of
+
+    def test_a_stepped_world_with_all_that_comes_and_goes(self):
+        """Robots come by services and a spawner and go again, another node commands, time is set back."""
+        with self.simulation(extra_gazebo_args="--seed 3") as simulation:
+            recorder = self.record(simulation, "/clock", "/cartpole/joint_states")
+            add_cartpole()
+            environment = simulation.environment()
+            spawner = start(
+                "rosrun", "controller_manager", "spawner", "--namespace=/cartpole", STATES, CART,
+                env=environment,
+            )  # fmt: skip
+            self.addCleanup(self.end, spawner)
+            client = StepClient()
+
+            def runs():
+                client.step(1)
+                return (ros_controllers.list_controllers_srv("/cartpole") or {}).get(
+                    CART
+                ) == "running"
+
+            wait_until(runs, BOUND, "the spawner")
+            another = start(
+                sys.executable, "-P", "-c", PUBLISHER, f"/cartpole/{CART}/command", env=environment
+            )
+            self.addCleanup(self.end, another)
+            self.assertEqual(another.stdout.readline(), "connected\n")
+            for index in range(300):
+                client.step(8 if index % 20 else 3000)  # a long one lets others in between
+            add_cartpole("second", pos_y=2.0)
+            ros_controllers.spawn_controllers_srv([STATES, CART], ns="/second")
+            for index in range(100):
+                client.step(8, {f"/second/{CART}": 0.001 * index}, links=["second::pole"])
+            ros_gazebo.gazebo_delete_model("second")
+            client.step(50)
+            client.reset({"cart_pole": 0.1}, everything=True, seed=5)
+            client.step(100)
+            self.end(another)
+        recorder.communicate(timeout=BOUND)
+        topics = rosbag.Bag(str(self.bag)).get_type_and_topic_info().topics
+        self.assertIn("/cartpole/joint_states", topics)
+        entries = [
+            each
+            for _, message, _ in rosbag.Bag(str(self.bag)).read_messages("/gazebo/journal")
+            for each in message.entries
+        ]
+        commands = [each for each in entries if each.name == f"/cartpole/{CART}/command"]
+        self.assertGreater(len(commands), 10)
+        self.assertTrue(
+            any(one.ended > other.elapsed > one.elapsed for one in entries for other in commands),
+            "no command came in the middle of a step",
+        )
+        self.check_equal(at_least=500)
+        gains = self.folder / "gains.yaml"
+        gains.write_text("pid: {p: 15.0, i: 0.0, d: 3.0}\n")
+        self.check_difference(
+            r"first difference: at [\d.]+ s joint \w+ of cartpole: -?[\d.e-]+ recorded, -?[\d.e-]+ now",
+            f"--params=/cartpole/{CART}={gains}",
+        )
+
+    def test_a_recorder_that_comes_late_gets_the_beginning(self):
+        with self.simulation() as simulation:
+            add_cartpole()
+            client = StepClient()
+            for _ in range(100):
+                client.step(8)
+            recorder = self.record(simulation)
+            client.step(8)
+        recorder.communicate(timeout=BOUND)
+        self.assertRegex(self.check_equal(at_least=103), "no states were recorded with the first")
+
+    def test_measurements_of_a_noisy_sensor(self):
+        with self.simulation(extra_gazebo_args="--seed 7") as simulation:
+            recorder = self.record(simulation)
+            text = (DATA / "sensors" / "bot.sdf").read_text()
+            self.assertTrue(ros_gazebo.gazebo_spawn_sdf_string(text, "bot"))
+            steps, names = PreparedSteps(), StepNames(sensors=("scanner",))
+            seen = []
+            for _ in range(30):
+                steps.begin(names, 50, [])
+                seen.append(steps.end().sensors)
+            self.assertGreater(len({str(each) for each in seen}), 2)
+        recorder.communicate(timeout=BOUND)
+        self.check_equal(at_least=30)
+
+    @unittest.skipIf(importlib.util.find_spec("mujoco") is None, "mujoco is not installed")
+    def test_mujoco(self):
+        with self.simulation(extra_gazebo_args="-e mujoco") as simulation:
+            recorder = self.record(simulation)
+            add_cartpole()
+            client = StepClient()
+            client.reset({"cart_pole": 0.3})
+            for _ in range(50):
+                client.step(8)
+        recorder.communicate(timeout=BOUND)
+        self.check_equal(at_least=50)
+
+    def test_a_script_that_drives_a_vehicle_until_a_time(self):
+        """state_topic.py draws poses, publishes them and commands, and waits for scans."""
+        code, _, err = self.run_script(DATA / "scripts" / "state_topic.py", reserved_port(), 2, 10)
+        self.assertEqual(code, 0, err)
+        self.check_equal(at_least=30)
+        out = self.check_equal("--until", "0.5", at_least=5)
+        self.assertLess(float(re.search(r"([\d.]+) s$", out.strip())[1]), 1.0)
+        topics = rosbag.Bag(str(self.bag)).get_type_and_topic_info().topics
+        self.assertEqual(topics["/joint_states"].msg_type, "sensor_msgs/JointState")
+
+    def run_script(self, script, *arguments):
+        environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{reserved_port()}"}
+        process = start(
+            "rosrun", "cartpole", "lockstep.py", "--seed=4", "--record", self.bag, script, *arguments,
+            env={**environment, "ROS_IP": "127.0.0.1"},
+        )  # fmt: skip
+        self.addCleanup(self.end, process)
+        out, err = process.communicate(timeout=BOUND)
+        return process.returncode, out, err
+
+    def test_a_script_that_fails_leaves_a_complete_bag(self):
+        script = self.folder / "fails.py"
+        script.write_text(
+            "import rospy\n"
+            "from ros_utils import ros_gazebo\n"
+            "ros_gazebo.launch_Gazebo(gui=False, output='log', launch_new_term=False)\n"
+            "rospy.init_node('fails')\n"
+            "rospy.sleep(0.3)\n"
+            "raise SystemExit(7)\n"
+        )
+        code, _, err = self.run_script(script)
+        self.assertEqual(code, 7, err)
+        self.assertIn(f"recorded {self.bag}", err)
+        self.check_equal(at_least=2)
+
+    def test_a_request_that_is_refused_now_is_the_first_difference(self):
+        """The recorded model is of a package that isn't there any more."""
+        package = self.folder / "their_robot"
+        (package / "meshes").mkdir(parents=True)
+        (package / "package.xml").write_text(
+            '<package format="2"><name>their_robot</name><version>0.0.1</version>'
+            "<description>d</description><maintainer email='a@b.de'>m</maintainer>"
+            "<license>BSD</license></package>"
+        )
+        (package / "meshes" / "part.stl").write_text(TETRAHEDRON)
+        robot = (
+            '<robot name="r"><link name="base"><inertial><mass value="1"/>'
+            '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial><collision><geometry>'
+            '<mesh filename="package://their_robot/meshes/part.stl"/></geometry></collision></link></robot>'
+        )
+        before = os.environ["ROS_PACKAGE_PATH"]
+        self.addCleanup(os.environ.__setitem__, "ROS_PACKAGE_PATH", before)
+        os.environ["ROS_PACKAGE_PATH"] = f"{self.folder}:{before}"
+        with self.simulation() as simulation:
+            recorder = self.record(simulation)
+            self.assertTrue(ros_gazebo.gazebo_spawn_urdf_string(robot, "r"))
+            StepClient().step(1)
+        recorder.communicate(timeout=BOUND)
+        self.check_equal(at_least=2)
+        os.environ["ROS_PACKAGE_PATH"] = before
+        self.check_difference("spawn_urdf_model answered otherwise than now: .*their_robot")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("cartpole", "replay", ReplayTest, sys.argv)

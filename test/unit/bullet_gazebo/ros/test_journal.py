@@ -1,0 +1,264 @@
+"""The journal's order, bound and contents, bags that can't be replayed, and how differences are told."""
+
+import json
+import threading
+from types import SimpleNamespace
+
+import pytest
+import rosbag
+from bullet_gazebo_msgs.msg import Journal as JournalMessage
+from bullet_gazebo_msgs.msg import JournalEntry
+from genpy import Time
+from std_msgs.msg import Float64
+
+from bullet_gazebo.pictures.recording import RecordingError
+from bullet_gazebo.ros.journal.journal import Entry, WorldJournal
+from bullet_gazebo.ros.journal.journal_output import JournalBag
+from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal, first_difference
+from bullet_gazebo.ros.node import replay_command
+from bullet_gazebo.ros.node.start import arguments_of
+from bullet_gazebo.timing import FairLock, Holds
+
+MS = 1_000_000  # [ns]
+MODEL = (0.0,) * 13
+
+
+@pytest.fixture
+def sim():
+    """A simulator's time and lock, and an empty world."""
+    world = SimpleNamespace(version=0, models={})
+    made = SimpleNamespace(lock=FairLock(), elapsed=0, now=0, world=world)
+    made.holds = Holds(made.lock, lambda: None)
+    made.await_holds = lambda: made.holds.await_end(threading.Event())
+    return made
+
+
+@pytest.fixture
+def journal(sim):
+    made = WorldJournal(sim)
+    made.start({"series": 1})
+    return made
+
+
+def entries(journal):
+    return journal.listen(lambda more: None)
+
+
+def names(journal):
+    return [entry.name for entry in entries(journal)]
+
+
+def test_entries_are_in_the_order_in_which_they_took_effect(sim, journal):
+    """Not in that in which they came, or were done."""
+    late = Entry(JournalEntry.SERVICE, "late", b"")
+    assert journal.begin(late)
+
+    def overtake():
+        early = Entry(JournalEntry.SERVICE, "early", b"")
+        assert journal.begin(early)
+        with sim.lock:
+            sim.elapsed += MS
+        journal.end(early)
+
+    thread = threading.Thread(target=overtake)
+    thread.start()
+    thread.join(30.0)
+    with sim.lock:
+        pass
+    journal.end(late)
+    assert names(journal) == ["", "early", "late"]
+    assert [each.number for each in entries(journal)] == [0, 1, 2]
+    assert [(each.elapsed, each.ended) for each in entries(journal)] == [(0, 0), (0, MS), (MS, MS)]
+
+
+def test_what_follows_from_an_entry_is_none_of_its_own(journal):
+    with journal.command("outer"), journal.command("inner"):
+        pass
+    assert names(journal) == ["", "outer"]
+
+
+def test_nothing_takes_effect_while_a_model_comes(sim, journal):
+    held, over = threading.Event(), threading.Event()
+
+    def spawn():
+        with journal.command("spawn"), sim.holds.hold(30.0, over.set):
+            held.set()
+            meanwhile.start()
+            with sim.lock:
+                sim.elapsed += MS
+
+    def place():
+        with journal.command("place"), sim.lock:
+            pass
+
+    meanwhile = threading.Thread(target=place)
+    spawning = threading.Thread(target=spawn)
+    spawning.start()
+    assert held.wait(30.0)
+    spawning.join(30.0)
+    meanwhile.join(30.0)
+    found = [(each.name, each.elapsed) for each in entries(journal)]
+    assert found == [("", 0), ("spawn", 0), ("place", MS)] and not over.is_set()
+
+
+def test_parameters_are_recorded_where_they_have_changed(journal):
+    for value in ([1], [1], [2], []):
+        with journal.command("read"):
+            journal.note_parameter("/p", value)
+    read = [each.parameters and json.loads(each.parameters) for each in entries(journal)[1:]]
+    assert read == [{"/p": [1]}, "", {"/p": [2]}, {"/p": []}]
+
+
+def test_beyond_its_bound_nothing_is_kept(sim):
+    journal = WorldJournal(sim, most_kept=10_000)
+    journal.start({})
+    assert len(entries(journal)) == 1
+    for _ in range(30):
+        with journal.command("step"):
+            pass
+    assert entries(journal) is None
+
+
+def written(path, *made):
+    """A bag with these entries, in two messages that are in the wrong order."""
+    with rosbag.Bag(str(path), "w") as bag:
+        for number, part in enumerate((made[1:], made[:2])):  # one of them comes twice
+            bag.write("/gazebo/journal", JournalMessage(list(part)), Time(1 + number))
+    return path
+
+
+def entry(number, **fields):
+    return JournalEntry(number=number, **fields)
+
+
+START = {"data": json.dumps({"series": 1}).encode()}
+
+
+def test_entries_are_read_in_their_order_and_once(tmp_path):
+    path = written(tmp_path / "run.bag", entry(0, **START), entry(1), entry(2))
+    assert [each.number for each in RecordedJournal(path).entries()] == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("made", "reason"),
+    [
+        ([entry(0, **START), entry(1), entry(3)], "entry 2 is missing"),
+        ([entry(1), entry(2)], "the beginning is missing"),
+        ([entry(0, kind=JournalEntry.GONE), entry(7)], "the beginning is missing"),
+    ],
+)
+def test_a_bag_with_gaps_is_refused(made, reason, tmp_path):
+    path = written(tmp_path / "run.bag", *made)
+    with pytest.raises(NoRecording, match=reason):
+        list(RecordedJournal(path).entries())
+
+
+def no_file(path):
+    path.unlink()
+
+
+def text(path):
+    path.write_text("no bag")
+
+
+def cut(path):
+    path.write_bytes(path.read_bytes()[:5000])
+
+
+def other_topics(path):
+    with rosbag.Bag(str(path), "w") as bag:
+        bag.write("/number", Float64(1.0), Time(1))
+
+
+def other_version(path):
+    with rosbag.Bag(str(path), "w") as bag:
+        kind = type(
+            "Journal", (), {"_md5sum": "0" * 32, "_full_text": "", "_type": JournalMessage._type}
+        )
+        raw = (JournalMessage._type, b"", "0" * 32, kind)
+        bag.write("/gazebo/journal", raw, Time(1), raw=True)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (no_file, "No such file"),
+        (text, "no bag, or damaged"),
+        (cut, "rosbag reindex"),
+        (other_topics, "no journal is in this bag"),
+        (other_version, "another version"),
+    ],
+)
+def test_a_bag_that_cannot_be_replayed_is_refused_in_one_line(spoil, reason, tmp_path, capsys):
+    path = written(tmp_path / "run.bag", entry(0, **START), entry(1, data=bytes(10_000)))
+    spoil(path)
+    assert replay_command.main([str(path)]) == 2
+    said = capsys.readouterr().err
+    assert reason in said and said.count("\n") == 1
+
+
+def moving(joint=0.0, velocity=0.0, model=MODEL, **fields):
+    numbers = (*model, joint, velocity)
+    return JournalEntry(
+        observed=True,
+        models=["arm"],
+        joints=["arm::elbow"],
+        numbers=numbers,
+        ended=1234 * MS,
+        **fields,
+    )
+
+
+@pytest.mark.parametrize(
+    ("now", "refusal", "said"),
+    [
+        (moving(), "", ""),
+        (moving(joint=0.5), "", "at 1.234 s joint elbow of arm: 0.0 recorded, 0.5 now"),
+        (moving(0.5, 0.5, (1.0,) * 13), "", "joint elbow of arm"),
+        (moving(velocity=0.5), "", "velocity of joint elbow of arm: 0.0 recorded, 0.5 now"),
+        (moving(model=(0.0, 0.1, *MODEL[2:])), "", "position y of model arm: 0.0 recorded, 0.1 now"),
+        (moving(joint=0.5, answer=4), "no such\nmodel", "answered otherwise than now: no such model"),
+        (moving(answer=4), "", "answered otherwise than recorded"),
+        (moving(name="/other"), "", "/other came"),
+        (JournalEntry(observed=True, ended=1234 * MS), "", "models arm were recorded"),
+        (JournalEntry(joints=["x"], ended=1234 * MS), "", ""),
+        (JournalEntry(ended=1235 * MS), "", "was done, now at 1.235 s"),
+    ],
+)  # fmt: skip
+def test_the_first_difference_is_named(now, refusal, said):
+    now.answer = now.answer or 3
+    found = first_difference(moving(answer=3), now, refusal)
+    assert said in found and bool(said) == bool(found)
+
+
+def test_a_bag_has_states_for_other_tools_and_time_never_goes_back(tmp_path):
+    path = tmp_path / "run.bag"
+    path.write_bytes(b"an older one")
+    bag = JournalBag(path)
+    first, second = moving(), moving(joint=0.5)
+    first.ended, second.ended, second.now = 5 * MS, 6 * MS, Time(0)
+    bag.write([first, first, second])
+    bag.close()
+    assert path.read_bytes() == b"an older one"
+    read = list(rosbag.Bag(str(tmp_path / "run_2.bag")).read_messages("/joint_states"))
+    assert [message.position[0] for _, message, _ in read] == [0.0, 0.5]
+    assert [time.to_nsec() for _, _, time in read] == [5 * MS + 1, 6 * MS + 1]
+
+
+def test_a_bag_in_no_folder_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match="No such file"):
+        JournalBag(tmp_path / "none" / "run.bag")
+
+
+def test_a_world_file_that_has_gone_is_written_again(tmp_path):
+    facts = {
+        "physics": "mujoco",
+        "paused": True,
+        "seed": 3,
+        "world": "/gone/small.world",
+        "world_text": "<sdf/>",
+    }
+    *options, path = arguments_of(facts, tmp_path)
+    assert options == ["--lockstep", "-e", "mujoco", "-u", "--seed", "3"]
+    assert path == str(tmp_path / "small.world")
+    assert (tmp_path / "small.world").read_text() == "<sdf/>"
