@@ -3,9 +3,9 @@
 
     ./ws python3 benchmark/own_simulators.py [--out FOLDER] [--most 16] [--steps 500]
 
-Starts 1, 2, 4, ... up to `most`. Memory is each one's, master and simulator together, what processes share
-counted in parts (Pss). Replaced: one is killed after `steps` steps of an episode, and brought back to the
-same state. Prints a table and writes own_simulators.json.
+Starts 1, 2, 4, ... up to `most`. Memory is each one's: master, simulator and their
+supervisor together, what processes share counted in parts (Pss). Replaced: one is killed after `steps` steps
+of an episode, and brought back to the same state. Prints a table and writes own_simulators.json.
 """
 
 import os
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium
+import psutil
 import reporting
 
 import cartpole  # noqa: F401 - registers the environments
@@ -30,6 +31,13 @@ def memory(pid: int) -> float:
     return size / MEGA
 
 
+def processes(pid: int) -> list[int]:
+    """The process ids of a simulator, its master and their supervisor."""
+    supervisor = psutil.Process(pid).parent()
+    assert supervisor is not None
+    return [supervisor.pid, *(each.pid for each in supervisor.children(recursive=True))]
+
+
 def measure(count: int, steps: int) -> dict[str, float]:
     """Seconds and megabytes with so many."""
     begin = time.monotonic()
@@ -40,7 +48,7 @@ def measure(count: int, steps: int) -> dict[str, float]:
         ]
     started = time.monotonic()
     worlds = [env.backend for env in envs]
-    taken = [sum(map(memory, world.simulator.processes)) for world in worlds]
+    taken = [sum(map(memory, processes(world.simulator.pid))) for world in worlds]
     world = worlds[0]
     envs[0].reset(seed=0)
     commands = dict.fromkeys(envs[0].scene.ports, 0.0)

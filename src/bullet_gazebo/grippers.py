@@ -161,7 +161,7 @@ class GraspHold:
         """Returns the normal force [N] of each finger on each link of another model that it touches."""
         models = {id(model.body): model for model in self._world.models.values()}
         found: dict[tuple[Model, str], dict[str, Vector]] = {}
-        for contact in self._world.engine.contacts():
+        for contact in self._world.contacts():
             first, second, sign = contact.first, contact.second, -1.0
             if second.body is self._model.body:
                 first, second, sign = second, first, 1.0

@@ -7,7 +7,9 @@ methods, and at what OUTSIDE names it doesn't look. A class says itself what cou
     save_state()            returns it
     restore_state(state)    takes it back
 
-or names attributes that a restore leaves alone: `of_the_present = ("_subscribers",)`.
+or names attributes that belong to the present, which are neither saved nor put back:
+
+    of_the_present = ("_publisher",)
 """
 
 import pathlib
@@ -15,8 +17,10 @@ import random
 import re
 import types
 import weakref
-from collections import deque
-from collections.abc import Callable, Iterable
+from collections import OrderedDict, defaultdict, deque
+from collections.abc import Callable, Collection, Iterable, Mapping
+from datetime import date, timedelta
+from decimal import Decimal
 from enum import Enum
 from functools import partial
 from itertools import chain
@@ -28,20 +32,22 @@ import numpy as np
 # Names of classes begin with these: what threads and ROS own, what never changes while a world runs, and what
 # saves its own state.
 OUTSIDE = (
-    "_thread.", "concurrent.", "contextlib.", "logging.", "queue.", "socket.", "subprocess.", "threading.",
+    "_thread.", "concurrent.", "contextlib.", "logging.", "socket.", "subprocess.", "threading.",
     "xml.", "actionlib.", "dynamic_reconfigure.", "gymnasium.", "rospy.", "tf.", "tf2_ros.",
     "bullet_gazebo.physics.", "bullet_gazebo.pictures.", "bullet_gazebo.ros.common.",
     "bullet_gazebo.ros.control.", "bullet_gazebo.ros.scene.", "bullet_gazebo.ros.services.",
     "bullet_gazebo.ros.plugins.plugin_loader.", "bullet_gazebo.ros.plugins.sensor_topics.Newcomers",
     "bullet_gazebo.ros.plugins.sensor_topics.Topic", "bullet_gazebo.sensors.rays.",
     "bullet_gazebo.sensors.sensing.Mount", "bullet_gazebo.simulator.Simulator",
-    "robot_envs.robot.", "robot_envs.scene.",
+    "robot_envs.environment.", "robot_envs.robot.", "robot_envs.scene.", "robot_envs.vector.",
 )  # fmt: skip
 VALUES = (
     type(None), bool, int, float, complex, str, bytes, range, slice, type, Enum, np.generic, np.dtype,
     types.ModuleType, types.MappingProxyType, types.EllipsisType, re.Pattern, weakref.ref, pathlib.PurePath,
-    attrgetter, itemgetter,
+    attrgetter, itemgetter, BaseException, np.ufunc, type(np.clip), type(str.lower), date, timedelta,
+    Decimal,
 )  # fmt: skip
+POINTER = 8  # [bytes]; to an attribute in __slots__
 
 Put = Callable[[Any, Any], object]
 Look = Callable[["HeldState", Any], Iterable[Any]]
@@ -50,6 +56,10 @@ Look = Callable[["HeldState", Any], Iterable[Any]]
 
 class UnknownState(TypeError):
     """An object's state can't be saved; the text names its type and what holds it."""
+
+
+ROOM = UnknownState.__basicsize__ - TypeError.__basicsize__
+"""What a class takes for its __dict__ and weak references [bytes]."""
 
 
 class HeldState:
@@ -64,6 +74,7 @@ class HeldState:
 
     def __init__(self, roots: Iterable[Any]) -> None:
         self._notes: list[tuple[Put, Any, Any]] = []  # what puts it back, where, and what
+        self._own: list[tuple[Any, Any]] = []  # objects that do it themselves
         seen: dict[int, Any] = {}
         waiting = list(roots)
         while waiting:
@@ -76,17 +87,53 @@ class HeldState:
             try:
                 waiting.extend(look(self, each))
             except UnknownState as error:
-                holder = next((type(one) for one in seen.values() if _refers(one, each)), kind)
-                raise UnknownState(f"{error}, which a {holder.__qualname__} holds") from None
+                raise UnknownState(f"{_place(each, seen.values())}: {error}") from None
+
+    def note_own(self, target: Any, held: Any) -> None:
+        """Remembers to call `target.restore_state(held)`."""
+        self._own.append((target, held))
 
     def note(self, put: Put, target: Any, held: Any) -> None:
         """Remembers to call `put(target, held)`."""
         self._notes.append((put, target, held))
 
     def recall(self) -> None:
-        """Puts everything back; may be called again and again."""
+        """Puts everything back; may be called again and again.
+
+        Raises:
+            UnknownState: if a class's own `restore_state` has raised; all else is put back then.
+        """
         for put, target, held in self._notes:
             put(target, held)
+        faults = []
+        for target, held in self._own:
+            try:
+                target.restore_state(held)
+            except Exception as error:  # noqa: BLE001 - a user's code
+                faults.append(f"restore_state() of {type(target).__qualname__} raised {error!r}")
+        if faults:
+            raise UnknownState("; ".join(faults))
+
+
+def _place(each: Any, seen: Collection[Any]) -> str:
+    """Returns where an object is: Class.attribute of the nearest object that has it, in containers or not."""
+    while True:
+        for holder in seen:
+            names = getattr(holder, "__dict__", {})
+            if name := next((name for name, value in names.items() if value is each), None):
+                return f"{type(holder).__qualname__}.{name}"
+        inner = each
+        each = next((one for one in seen if _contains(one, each)), None)
+        if each is None:
+            return type(inner).__qualname__
+
+
+def _contains(container: Any, each: Any) -> bool:
+    if isinstance(container, dict):
+        container = container.values()
+    elif not isinstance(container, (list, tuple, deque)):
+        return False
+    return any(one is each for one in container)
 
 
 def _nowhere(state: HeldState, each: Any) -> Iterable[Any]:
@@ -120,6 +167,7 @@ def _put_deque(target: deque[Any], held: tuple[Any, ...]) -> None:
 
 def _into_set(state: HeldState, each: set[Any]) -> Iterable[Any]:
     held = each.copy()
+    _put_mutable(each, held)  # its order follows from how it was filled
     state.note(_put_mutable, each, held)
     return held
 
@@ -151,12 +199,18 @@ def _put_generator(target: np.random.Generator, held: Any) -> None:
 
 
 def _into_random(state: HeldState, each: random.Random) -> Iterable[Any]:
-    state.note(type(each).setstate, each, each.getstate())
+    state.note(random.Random.setstate, each, each.getstate())
+    return ()
+
+
+def _into_old_generator(state: HeldState, each: np.random.RandomState) -> Iterable[Any]:
+    state.note(np.random.RandomState.set_state, each, each.get_state(legacy=False))
     return ()
 
 
 def _into_function(state: HeldState, each: types.FunctionType) -> Iterable[Any]:
-    return each.__closure__ or ()
+    defaults = (*(each.__defaults__ or ()), *(each.__kwdefaults__ or {}).values())
+    return (*(each.__closure__ or ()), *defaults)
 
 
 def _into_cell(state: HeldState, each: types.CellType) -> Iterable[Any]:
@@ -181,15 +235,17 @@ def _into_partial(state: HeldState, each: partial[Any]) -> Iterable[Any]:
 
 
 def _into_own(state: HeldState, each: Any) -> Iterable[Any]:
-    state.note(type(each).restore_state, each, each.save_state())
+    try:
+        held = each.save_state()
+    except Exception as error:  # a user's code
+        raise UnknownState(f"save_state() raised {error!r}") from error
+    state.note_own(each, held)
     return ()
 
 
 def _unreadable(state: HeldState, each: Any) -> Iterable[Any]:
     kind = type(each)
-    raise UnknownState(
-        f"a snapshot can't save the state of a {kind.__module__}.{kind.__qualname__}"
-    )
+    raise UnknownState(f"a snapshot can't save a {kind.__module__}.{kind.__qualname__}")
 
 
 _LOOKS: dict[type, Look] = {
@@ -197,10 +253,13 @@ _LOOKS: dict[type, Look] = {
     frozenset: _into_tuple,
     list: _into_list,
     dict: _into_dict,
+    OrderedDict: _into_dict,
+    defaultdict: _into_dict,
     set: _into_set,
     deque: _into_deque,
     np.ndarray: _into_array,
     np.random.Generator: _into_generator,
+    np.random.RandomState: _into_old_generator,
     random.Random: _into_random,
     types.FunctionType: _into_function,
     types.CellType: _into_cell,
@@ -209,13 +268,15 @@ _LOOKS: dict[type, Look] = {
     types.MethodWrapperType: _into_method,
     partial: _into_partial,
 }
-_BASES = (tuple, list, dict, set, deque, np.ndarray, random.Random)
+_BASES = (tuple, list, OrderedDict, defaultdict, dict, set, deque, np.ndarray, random.Random)
 
 
 def _look_of(kind: type) -> Look:
     """Finds how to look into objects of a class, and remembers it."""
     if issubclass(kind, VALUES) or f"{kind.__module__}.{kind.__qualname__}".startswith(OUTSIDE):
         look: Look = _nowhere
+    elif issubclass(kind, random.SystemRandom):
+        look = _unreadable
     elif hasattr(kind, "save_state") and hasattr(kind, "restore_state"):
         look = _into_own
     else:
@@ -225,8 +286,11 @@ def _look_of(kind: type) -> Look:
 
 
 def _look_by_attributes(kind: type) -> Look:
-    base = next((_LOOKS[each] for each in _BASES if issubclass(kind, each)), None)
+    known = next((each for each in _BASES if issubclass(kind, each)), object)
     slots = tuple(_slots(kind))
+    if kind.__basicsize__ > known.__basicsize__ + ROOM + POINTER * len(slots):
+        return _unreadable  # it is compiled, and holds more than attributes
+    base = _LOOKS.get(known)
     has_dict = kind.__dictoffset__ != 0
     parts = [look for look in (base, _slots_look(slots) if slots else None) if look]
     if has_dict:
@@ -258,13 +322,17 @@ def _dict_look(present: frozenset[str], frozen: bool) -> Look:
         if frozen:
             return list(own.values())
         held = own.copy()
-        if present:
-            state.note(dict.update, own, {k: v for k, v in held.items() if k not in present})
-        else:
-            state.note(_put_attributes, own, held)
+        for name in present:
+            held.pop(name, None)
+        state.note(partial(_put_others, present) if present else _put_attributes, own, held)
         return held.values()
 
     return look
+
+
+def _put_others(present: frozenset[str], target: dict[str, Any], held: Mapping[str, Any]) -> None:
+    kept = {name: target[name] for name in present & target.keys()}
+    _put_attributes(target, {**held, **kept})
 
 
 def _put_attributes(target: dict[str, Any], held: dict[str, Any]) -> None:
@@ -275,22 +343,16 @@ def _put_attributes(target: dict[str, Any], held: dict[str, Any]) -> None:
 
 def _slots_look(names: tuple[str, ...]) -> Look:
     def look(state: HeldState, each: Any) -> Iterable[Any]:
-        held = [(name, getattr(each, name)) for name in names if hasattr(each, name)]
-        state.note(_put_slots, each, held)
-        return [value for _, value in held]
+        held = {name: getattr(each, name) for name in names if hasattr(each, name)}
+        state.note(partial(_put_slots, names), each, held)
+        return held.values()
 
     return look
 
 
-def _put_slots(target: Any, held: list[tuple[str, Any]]) -> None:
-    for name, value in held:
-        object.__setattr__(target, name, value)
-
-
-def _refers(one: Any, other: Any) -> bool:
-    """Returns whether an object has another one as an attribute or element."""
-    if isinstance(one, dict):
-        return any(each is other for each in one.values())
-    if isinstance(one, (list, tuple, deque)):
-        return any(each is other for each in one)
-    return any(each is other for each in getattr(one, "__dict__", {}).values())
+def _put_slots(names: tuple[str, ...], target: Any, held: Mapping[str, Any]) -> None:
+    for name in names:
+        if name in held:
+            object.__setattr__(target, name, held[name])
+        elif hasattr(target, name):
+            object.__delattr__(target, name)

@@ -7,11 +7,11 @@ from typing import NamedTuple, Protocol
 
 from bullet_gazebo.applied_forces import AppliedForces
 from bullet_gazebo.held_state import HeldState
-from bullet_gazebo.physics.engine import SnapshotError, Twist
+from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.projection import place_link
-from bullet_gazebo.physics.world import World, WorldSnapshot
+from bullet_gazebo.physics.world import SnapshotError, World, WorldSnapshot
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.timing import FairLock, Holds, Pacer
 
@@ -81,6 +81,9 @@ class Simulator:
         self.listeners: list[Callable[[int], None]] = []
         # Called under the lock after something other than time has moved bodies, or time was reset.
         self.moved: list[Callable[[], None]] = []
+        self.parts: list[
+            object
+        ] = []  # whose state snapshots save, beside that of robots and callbacks
         self.restored: list[Callable[[], None]] = []  # called under the lock after a restore
         # Called under the lock before each advance, and how many moves are still told of as one.
         self.before_advance: list[Callable[[], None]] = []
@@ -297,14 +300,15 @@ class Simulator:
             self._tell_of_move()
 
     def save_state(self) -> Snapshot:
-        """Returns all that decides the future; the caller holds the lock, in lock-step.
+        """Returns all that decides the future; the caller holds the lock.
 
         Raises:
             UnknownState: if the state of a user's controller or plugin can't be read.
         """
-        parts = (self.applied, *self.robots, *self.listeners, *self.moved, *self.reseeded)
+        callbacks = (*self.listeners, *self.moved, *self.reseeded)
         world = self.world.save_state()
-        return Snapshot(self, self._layout, self.now, self.resets, world, HeldState(parts))
+        held = HeldState((self.applied, *self.robots, *self.parts, *callbacks))
+        return Snapshot(self, self._layout, self.now, self.resets, world, held)
 
     def restore_state(self, snapshot: Snapshot) -> None:
         """Returns to what `save_state` has returned: the same commands lead to the same bits.
@@ -314,6 +318,7 @@ class Simulator:
         Raises:
             SnapshotError: if it is another simulator's, or models, robots, running controllers or properties
                 aren't those of the snapshot; nothing changes then.
+            UnknownState: if a user's `restore_state` has raised; all else is restored then.
         """
         if snapshot.of is not self:
             raise SnapshotError("the snapshot is of another simulator")
@@ -324,6 +329,8 @@ class Simulator:
         self.world.restore_state(snapshot.world)
         self.now, self.resets = snapshot.now, snapshot.resets
         snapshot.held.recall()
+        for robot in self.robots:
+            robot.manager.restored()
         for listener in self.restored:
             listener()
 
@@ -383,7 +390,7 @@ class Simulator:
             robot.update(now, dt)
         if now % STALL_CHECK < self._period:
             for robot in self.robots:
-                robot.watch.report_stalls(now, self.world.engine.contacts)
+                robot.watch.report_stalls(now, self.world.contacts)
         for listener in self.listeners:
             listener(now)
         for robot in self.robots:

@@ -208,7 +208,7 @@ def contact_pairs(world: World, wanted: set[Collision] | None) -> list[ContactPa
     """
     models = {id(model.body): model for model in world.models.values()}
     pairs: dict[tuple[Collision, Collision], ContactPair] = {}
-    for contact in world.engine.contacts():
+    for contact in world.contacts():
         point, sign = contact.point, 1.0
         model, other = models[id(contact.first.body)], models[id(contact.second.body)]
         first = _collision(model, contact.first, point)

@@ -43,7 +43,7 @@ class EnvSnapshot(NamedTuple):
     of: "RobotEnv"
     variation: Variation
     episode: tuple[WorldState, dict[str, Any], InitialState, int | None, np.random.Generator]
-    held: HeldState  # by the task, the imperfections and the generator
+    held: HeldState  # by the task, the imperfections, the randomisation and the generator
     world: Any  # the backend's
 
 
@@ -360,7 +360,8 @@ class RobotEnv(DrawnEnv):
             raise gymnasium.error.ResetNeeded("a snapshot is taken after a reset() or a step()")
         episode = self._state, self._first, self._initial, self._steps, self.np_random
         try:
-            held = HeldState((self.task, self._sensor, self._actuator, self.np_random))
+            parts = self.task, self._sensor, self._actuator, self._randomisation, self.np_random
+            held = HeldState(parts)
         except UnknownState as error:
             raise SimulatorError(str(error)) from error
         return EnvSnapshot(self, self._variation, episode, held, self.backend.save_state())
@@ -373,14 +374,14 @@ class RobotEnv(DrawnEnv):
             SimulatorError: if the world isn't that of the snapshot any more; a reset comes next.
         """
         self._check_open()
-        if snapshot.of is not self:
+        if getattr(snapshot, "of", None) is not self:
             raise ValueError("the snapshot is of another environment; only that one can restore it")
         self._steps = self._begun = None
         if snapshot.variation != self._variation:
             self._vary(snapshot.variation)
         self.backend.restore_state(snapshot.world)
         snapshot.held.recall()
-        self._state, self._first, self._initial, self._steps, self.np_random = snapshot.episode
+        self._state, self._first, self._initial, self._steps, self._np_random = snapshot.episode
         self._show()
 
     def _vary(self, variation: Variation) -> None:

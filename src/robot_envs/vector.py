@@ -136,6 +136,8 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
             ValueError: if it is of another one.
             SimulatorError: if a world isn't that of the snapshot any more; a reset comes next.
         """
+        if not isinstance(snapshot, VectorSnapshot) or len(snapshot.states) != self.num_envs:
+            raise ValueError("the snapshot is of another vector; only that one can restore it")
         for robot, state in zip(self._robots, snapshot.states, strict=True):
             robot.restore_state(state)
         self._autoreset_envs = snapshot.ended.copy()

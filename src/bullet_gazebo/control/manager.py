@@ -178,6 +178,14 @@ class ControllerManager:
             except faults() as error:  # a user's code must not stop the world
                 self._fail(controller, error)
 
+    def restored(self) -> None:
+        """Tells the running controllers that the world has returned to a snapshot."""
+        for controller in self._running:
+            try:
+                controller.restored()
+            except faults() as error:  # a user's code must not stop the world
+                self._fail(controller, error)
+
     def _start(self, controller: Controller) -> bool:
         try:
             controller.starting(self._now)

@@ -147,10 +147,6 @@ class Body(ABC):
         """Returns whether gravity acts on link `name`."""
 
 
-class SnapshotError(ValueError):
-    """A snapshot can't be restored; the text says why. Nothing has changed then."""
-
-
 LinkOf = tuple[Body, str]
 """A body and the name of a link of it."""
 
@@ -160,9 +156,6 @@ class Engine(ABC):
 
     Velocities are cut at FURTHEST in a step, or at FASTEST, before they are integrated.
     """
-
-    recalled: Sequence[Contact] | None = None
-    """Contacts that count until the next step, as of a restored state; None: those of the last step."""
 
     @abstractmethod
     def load(self, description: ModelDescription, pose: Pose) -> Body:
@@ -224,13 +217,13 @@ class Engine(ABC):
         one step to the next has nothing to do.
         """
 
-    def contacts(self) -> Sequence[Contact]:
+    @abstractmethod
+    def contacts(self) -> list[Contact]:
         """Returns where bodies touched in the last step."""
-        return self.touching() if self.recalled is None else self.recalled
 
     @abstractmethod
-    def touching(self) -> Sequence[Contact]:
-        """Returns the contacts of the last step, as the engine has them."""
+    def order(self) -> Sequence[Body]:
+        """Returns the bodies in the order in which they were loaded: the solver's result may depend on it."""
 
     @abstractmethod
     def fastened(self) -> Mapping[int, Any]:

@@ -19,6 +19,7 @@ AT_REST: Twist = (ZERO, ZERO)
 class ModelState(NamedTuple):
     """What `Model.save_state` returns; `motors` are speeds [rad/s, m/s] and efforts [N m, N] by joint."""
 
+    body: Body
     motion: Any  # the engine's
     properties: tuple[object, ...]
     motors: dict[str, tuple[float, float]]
@@ -235,15 +236,15 @@ class Model:
         return (
             tuple([(link.inertia, link.gravity) for link in links.values()]),
             tuple([(each.kind, each.lower, each.upper, each.damping) for each in joints.values()]),
-            dict(self.damping_added),
-            dict(self._grip),
+            {name: added for name, added in self.damping_added.items() if added},
+            {link: factor for link, factor in self._grip.items() if factor != 1.0},
         )
 
     def save_state(self) -> ModelState:
         """Returns where it is, how it moves, and its motors; from now on it moves as after a restore."""
         motion = self.body.motion()
         self.body.move(motion)
-        return ModelState(motion, self.properties(), dict(self._motors), self.placed)
+        return ModelState(self.body, motion, self.properties(), dict(self._motors), self.placed)
 
     def restore_state(self, state: ModelState) -> None:
         """Returns to what `save_state` has returned; the properties are the same."""

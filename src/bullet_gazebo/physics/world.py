@@ -12,7 +12,7 @@ from bullet_gazebo.physics.description import (
     ModelDescription,
     Shape,
 )
-from bullet_gazebo.physics.engine import Contact, Engine, SnapshotError, Twist
+from bullet_gazebo.physics.engine import Contact, Engine, Twist
 from bullet_gazebo.physics.model import AT_REST, Model, ModelState
 from bullet_gazebo.physics.pose import Pose, Vector, conjugate, rotate, subtract
 
@@ -57,10 +57,15 @@ class WorldSnapshot(NamedTuple):
     """What `World.save_state` returns; `settings` are gravity, time step and solver."""
 
     models: list[tuple[Model, ModelState]]
+    order: list[Model]  # in the engine
     settings: tuple[object, ...]
     attachments: list[Attachment]
     fastened: Mapping[int, Any]  # the engine's
     contacts: Sequence[Contact]
+
+
+class SnapshotError(ValueError):
+    """A snapshot can't be restored; the text says why."""
 
 
 class NameTaken(ValueError):
@@ -92,6 +97,7 @@ class World:
         self.version = 0  # counts what changes the look of the world: models and lights
         self._entities: dict[str, Entity] = {}
         self._joints: dict[str, Entity] = {}
+        self._recalled: Sequence[Contact] | None = None  # until the next step
         self.time_step = time_step
         self.gravity = gravity
         self.solver = SolverSettings()
@@ -231,7 +237,12 @@ class World:
 
     def step(self) -> None:
         """Integrates all models by one time step."""
+        self._recalled = None
         self.engine.step()
+
+    def contacts(self) -> Sequence[Contact]:
+        """Returns where bodies touched in the last step; after a restore, in that before the snapshot."""
+        return self.engine.contacts() if self._recalled is None else self._recalled
 
     def reset(self, joints: bool) -> None:
         """Returns every model to where it was spawned, at rest; with `joints`, every joint to zero.
@@ -241,6 +252,7 @@ class World:
         for attachment in list(self.attachments):
             self.detach(attachment)
         self.engine.forget_contacts()
+        self._recalled = None
         for model in self.models.values():
             model.reset(joints)
 
@@ -250,36 +262,49 @@ class World:
         Engines can't save contacts. So those begin anew, now and after each restore: the next step finds
         them again, but the solver of PyBullet starts without the forces of the last one.
         """
-        contacts = self.engine.contacts()
+        contacts, fastened = self.contacts(), self.engine.fastened()
+        self.engine.refasten(fastened)  # in the order that a restore leads to
         snapshot = WorldSnapshot(
             [(model, model.save_state()) for model in self.models.values()],
+            self._order(),
             (self.gravity, self.time_step, self.solver),
             list(self.attachments),
-            self.engine.fastened(),
+            fastened,
             contacts,
         )
         self._recall(contacts)
         return snapshot
 
+    def _order(self) -> list[Model]:
+        models = {id(model.body): model for model in self.models.values()}
+        return [models[id(body)] for body in self.engine.order()]
+
     def _recall(self, contacts: Sequence[Contact]) -> None:
         self.engine.forget_contacts()
-        self.engine.recalled = contacts
+        self._recalled = contacts
 
     def restore_state(self, snapshot: WorldSnapshot) -> None:
-        """Returns to what `save_state` has returned.
+        """Returns to what `save_state` has returned; no model has come or gone since.
 
         Raises:
-            SnapshotError: if there are other models now, or with other properties; nothing changes then.
+            SnapshotError: if models have other properties now; nothing changes then.
         """
-        if [model for model, _ in snapshot.models] != list(self.models.values()):
-            raise SnapshotError("models have come or gone since the snapshot")
         if (self.gravity, self.time_step, self.solver) != snapshot.settings:
             raise SnapshotError("gravity, time step or solver have changed since the snapshot")
+        if self._order() != snapshot.order:
+            raise SnapshotError(
+                "links have been changed since the snapshot, and the engine takes the models in another order"
+            )
         for model, state in snapshot.models:
             if model.properties() != state.properties:
                 raise SnapshotError(
-                    f"model '{model.name}' has got other properties since the snapshot (inertia, gravity, "
-                    "damping, stops or friction)"
+                    f"model '{model.name}' has other properties than in the snapshot: inertia, "
+                    "gravity, damping, stops or friction"
+                )
+            attached = any(each.joins(model) for each in snapshot.attachments)
+            if attached and model.body is not state.body:
+                raise SnapshotError(
+                    f"model '{model.name}' was attached, and its links have been changed since the snapshot"
                 )
         self.engine.refasten(snapshot.fastened)
         self.attachments = list(snapshot.attachments)

@@ -133,7 +133,7 @@ class SceneServer:
         if self._poses[1].size:
             copies.append(self._copy_poses())
         if self._contacts[1].size:
-            contacts = self._sim.world.engine.contacts()
+            contacts = self._sim.world.contacts()
             points = _singles(each.point for each in contacts)
             forces = _singles(each.force for each in contacts)
             copies.append(partial(self._contacts[0].publish, SceneContacts(points, forces)))

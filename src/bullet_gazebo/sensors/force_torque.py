@@ -116,7 +116,7 @@ class LinkForces:
     def _contacts(self) -> list[Wrench]:
         return [
             _moved(contact.point, (scale(add(contact.force, contact.friction), sign), ZERO))
-            for contact in self._sim.world.engine.contacts()
+            for contact in self._sim.world.contacts()
             for side, sign in ((contact.first, 1.0), (contact.second, -1.0))
             if side.body is self._model.body and side.link in self._links
         ]

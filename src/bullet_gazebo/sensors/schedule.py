@@ -102,6 +102,7 @@ class Schedule:
         """As `add`; the caller holds the simulator's lock."""
         clock = SensorClock(self, rate, measure, listens, at_once, self._sim.now)
         self._clocks.append(clock)
+        self._sim.parts.append(clock)
         return clock
 
     def end(self, clock: SensorClock) -> None:
@@ -112,6 +113,7 @@ class Schedule:
         """Ends a clock, if it hasn't ended; the caller holds the simulator's lock."""
         if clock in self._clocks:
             self._clocks.remove(clock)
+            self._sim.parts.remove(clock)
             self._take_part()
 
     def look(self) -> None:
@@ -181,7 +183,8 @@ class Schedule:
         """Goes on from a snapshot, for those who listen now."""
         now = self._sim.now
         for clock in self._clocks:
-            if clock.due > now + max(clock.period, 1):  # it is newer than the snapshot
+            # One that is newer than the snapshot, or wasn't heard then.
+            if not now < clock.due <= now + max(clock.period, 1):
                 clock.plan(now)
         self._take_part()
 

@@ -14,7 +14,6 @@ from bullet_gazebo.control.pid import Gains
 from bullet_gazebo.grippers import pid_followers
 from bullet_gazebo.held_state import UnknownState
 from bullet_gazebo.physics.description import DescriptionError, Inertia, is_control_plugin
-from bullet_gazebo.physics.engine import SnapshotError
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.model import Model
@@ -27,7 +26,7 @@ from bullet_gazebo.physics.properties import (
     set_link_friction,
     set_link_properties,
 )
-from bullet_gazebo.physics.world import NameTaken, World
+from bullet_gazebo.physics.world import NameTaken, SnapshotError, World
 from bullet_gazebo.robot import ControlledRobot, control_period_of
 from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.sensors.sensor_readers import SensorReaders, offer_sensors
@@ -247,7 +246,7 @@ class InProcessWorld(RobotBackend):
         snapshot, held, begin = state
         try:
             self._sim.restore_state(snapshot)
-        except SnapshotError as error:
+        except (SnapshotError, UnknownState) as error:
             raise SimulatorError(str(error)) from error
         self._held, self._begin = held, begin
 

@@ -90,6 +90,16 @@ class Lockstep(unittest.TestCase):
         first.close()
         second.close()
 
+    def test_a_closed_environment_leaves_no_snapshots_in_the_simulator(self):
+        last = gymnasium.make("cartpole/Classic-v0", backend="ros")  # keeps the simulator
+        for _ in range(3):  # which keeps 1000 snapshots
+            env = gymnasium.make("cartpole/Classic-v0", backend="ros").unwrapped
+            env.reset(seed=1)
+            kept = [env.save_state() for _ in range(400)]
+            env.restore_state(kept[0])
+            env.close()
+        last.close()
+
     def test_the_control_period_counts_the_simulators_own_steps(self):
         env = gymnasium.make("cartpole/Balance-v0", backend="ros")
         ros_gazebo.gazebo_set_time_step(0.004)

@@ -1,9 +1,11 @@
 """What objects hold is put back into the same objects."""
 
+import array
 import io
+import queue
 import random
 import threading
-from collections import deque
+from collections import Counter, OrderedDict, defaultdict, deque
 from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
@@ -120,7 +122,10 @@ def test_what_functions_refer_to_counts():
     assert (count, part.x, part.log) == (0, 0, [])
 
 
-@pytest.mark.parametrize("generator", [np.random.default_rng(1), random.Random(1)])
+GENERATORS = [np.random.default_rng(1), random.Random(1), np.random.RandomState(1)]
+
+
+@pytest.mark.parametrize("generator", GENERATORS, ids=lambda each: type(each).__name__)
 def test_random_numbers_come_again(generator):
     part = Part(generator=generator)
     state = HeldState([part])
@@ -147,6 +152,28 @@ def test_an_object_may_say_itself_what_counts():
     assert own.x == 1 and own.file is None
 
 
+def test_an_objects_own_fault_is_named_and_the_rest_comes_back():
+    class Faulty:
+        def save_state(self):
+            return 1
+
+        def restore_state(self, state):
+            raise ValueError("no")
+
+    class Other(Faulty):
+        def save_state(self, path):
+            """Means something else by the name."""
+
+    part, after = Part(faulty=Faulty(), x=1), Part(x=1)
+    state = HeldState([part, after])
+    part.x = after.x = 2
+    with pytest.raises(UnknownState, match="restore_state.*Faulty.*no"):
+        state.recall()
+    assert part.x == after.x == 1
+    with pytest.raises(UnknownState, match="Part.inner.*save_state"):
+        HeldState([Part(inner=Other())])
+
+
 def test_attributes_of_the_present_stay():
     class Listening:
         of_the_present = ("heard",)
@@ -171,5 +198,65 @@ def test_locks_and_circles_are_no_obstacle():
 
 
 def test_what_cannot_be_read_is_named_with_its_holder():
-    with pytest.raises(UnknownState, match="generator, which a Part holds"):
-        HeldState([Part(inner=Part(items=(each for each in "abc")))])
+    class Samples(array.array):
+        """Has attributes, and numbers that aren't among them."""
+
+    for odd, name in (
+        ((each for each in "abc"), "generator"), (io.StringIO(), "StringIO"),
+        (array.array("d"), "array"), (Samples("d"), "Samples"),
+    ):  # fmt: skip
+        with pytest.raises(UnknownState, match=f"Part.item.*{name}"):
+            HeldState([Part(inner=Part(item=odd))])
+
+
+def test_subclasses_of_containers_count_wholly():
+    names = OrderedDict(a=1, b=2)
+    counts = Counter("aab")
+    many = defaultdict(list, x=[1])
+    state = HeldState([names, counts, many])
+    names.move_to_end("a")
+    counts.update("bbb")
+    many["y"].append(1)
+    many["x"].append(2)
+    state.recall()
+    assert list(names) == ["a", "b"]
+    assert counts == Counter("aab") and many == {"x": [1]} and many["z"] == []
+
+
+def test_what_came_later_goes():
+    class Listening:
+        of_the_present = ("heard",)
+
+    slotted, listening = Slotted(1), Listening()
+    state = HeldState([slotted, listening])
+    slotted.unset, listening.later, listening.heard = 1, 1, True
+    state.recall()
+    assert not hasattr(slotted, "unset")
+    assert vars(listening) == {"heard": True}
+
+
+def test_a_set_is_gone_through_in_the_same_order():
+    draw = random.Random(0)
+    for _ in range(100):
+        numbers = set()
+        for number in draw.choices(range(60), k=40):
+            draw.choice((numbers.add, numbers.add, numbers.discard))(number)
+        state = HeldState([numbers])
+        order = list(numbers)
+        numbers.add(-1)
+        state.recall()
+        assert list(numbers) == order
+
+
+def test_a_queue_that_delays_counts():
+    late = queue.Queue()
+    late.put(1)
+    state = HeldState([late])
+    late.get()
+    state.recall()
+    assert late.get_nowait() == 1
+
+
+def test_random_numbers_without_a_state_are_refused():
+    with pytest.raises(UnknownState, match="SystemRandom"):
+        HeldState([random.SystemRandom()])

@@ -1,19 +1,22 @@
 """Snapshots of a simulator: the same commands lead to the same bits, or the snapshot is refused."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from support.robots.cartpole import CONTROLLERS, cartpole_urdf
 from support.robots.grippers import cube, gripper
+from support.robots.trajectory_rig import Listener
 from support.robots.worlds import add_robot, start
 
 from bullet_gazebo.applied_forces import ActingTime, AppliedEffort, AppliedWrench
-from bullet_gazebo.control.trajectory_goals import Trajectory, TrajectoryPoint
-from bullet_gazebo.physics.engine import SnapshotError
+from bullet_gazebo.control.trajectory_goals import GoalRequest, Trajectory, TrajectoryPoint
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, from_rpy
-from bullet_gazebo.physics.properties import JointProperties, set_joint_properties
-from bullet_gazebo.physics.world import World, ground_plane
+from bullet_gazebo.physics.properties import JointProperties, at, set_joint_properties
+from bullet_gazebo.physics.world import SnapshotError, World, ground_plane
+from bullet_gazebo.sensors.schedule import Schedule
 from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.sensors.sensor_readers import SensorReaders
 from bullet_gazebo.simulator import Simulator
@@ -38,7 +41,7 @@ def future(sim, ticks=150):
             sim.advance(1)
         models = sim.world.models.values()
         states = [(m.joint_states(), [m.link_state(link) for link in m.link_names]) for m in models]
-        contacts = [each[:5] for each in sim.world.engine.contacts()]
+        contacts = [each[:5] for each in sim.world.contacts()]
         efforts = [j.effort for r in sim.robots for j in r.hardware.joints.values()]
         seen.append((sim.now, states, contacts, efforts))
     return seen
@@ -113,7 +116,7 @@ def test_bodies_that_tumble_and_touch(sim):
     for number in range(4):
         pose = Pose((0.02 * number, 0.01 * number, 0.1 + 0.09 * number))
         sim.world.spawn(f"cube_{number}", parse_urdf(cube()), pose)
-    while not sim.world.engine.contacts():
+    while not sim.world.contacts():
         future(sim, 1)
     first = check_branches(sim, lambda: sim.reset_world() or future(sim, 30))
     assert any(contacts for _, _, contacts, _ in first)
@@ -121,18 +124,18 @@ def test_bodies_that_tumble_and_touch(sim):
 
 def test_contacts_are_those_of_the_saved_tick_until_the_next_one(sim):
     sim.world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 0.05)))
-    while not sim.world.engine.contacts():
+    while not sim.world.contacts():
         future(sim, 1)
-    before = sim.world.engine.contacts()
+    before = sim.world.contacts()
     with sim.lock:
         snapshot = sim.save_state()
-        assert sim.world.engine.contacts() == before != []
+        assert sim.world.contacts() == before != []
         sim.place_model(sim.world.models["cube"], Pose((0.0, 0.0, 5.0)), ((0.0,) * 3, (0.0,) * 3))
     future(sim, 2)
-    assert not sim.world.engine.contacts()
+    assert not sim.world.contacts()
     with sim.lock:
         sim.restore_state(snapshot)
-    assert sim.world.engine.contacts() == before
+    assert sim.world.contacts() == before
 
 
 def test_what_is_attached_comes_back_and_what_was_not_goes(sim):
@@ -153,6 +156,71 @@ def test_what_is_attached_comes_back_and_what_was_not_goes(sim):
     detach()
     check_branches(sim, attach)
     assert not sim.world.attachments
+
+
+def chain_of_cubes(sim):
+    names = [f"cube_{number}" for number in range(5)]
+    cubes = [
+        sim.world.spawn(name, parse_urdf(cube()), Pose((0.06 * k, 0.01 * k, 0.06 + 0.02 * k)))
+        for k, name in enumerate(names)
+    ]
+    ends = [(each, "cube_link") for each in cubes]
+    for first, second in pairwise(ends):
+        sim.world.attach(first, second)
+    return ends
+
+
+def test_attachments_of_which_one_was_released_before(sim):
+    chain_of_cubes(sim)
+    future(sim, 20)
+    sim.world.detach(sim.world.attachments[0])
+    future(sim, 30)
+    check_branches(sim, lambda: sim.world.detach(sim.world.attachments[0]) or future(sim, 10))
+
+
+def test_a_link_that_is_another_one_to_the_engine_since_is_refused_while_attached(sim):
+    *_, (model, link) = chain_of_cubes(sim)  # the engine takes it last then, too
+    with sim.lock:
+        snapshot = sim.save_state()
+    inertia = model.description.links[link].inertia
+    sim.world.set_inertia(model, link, at(inertia, (0.01, 0.0, 0.0)))
+    sim.world.set_inertia(model, link, inertia)
+    is_loaded_again = model.body is not snapshot.world.models[-1][1].body
+    sim.reset_world()
+    with sim.lock:
+        if is_loaded_again:
+            with pytest.raises(SnapshotError, match="attached"):
+                sim.restore_state(snapshot)
+            assert not sim.world.attachments
+        else:
+            sim.restore_state(snapshot)
+            assert len(sim.world.attachments) == 4
+    for each in list(sim.world.attachments):
+        sim.world.detach(each)
+
+
+def test_models_in_another_order_of_the_engine_are_refused(sim):
+    """A link with another centre of mass is loaded anew, and meets the others in another order."""
+    lower, upper = (
+        sim.world.spawn(name, parse_urdf(cube()), Pose((0.01, 0.0, height)))
+        for name, height in (("lower", 0.03), ("upper", 0.085))
+    )
+    future(sim, 40)
+
+    def change(model):
+        body, inertia = model.body, model.description.links["cube_link"].inertia
+        sim.world.set_inertia(model, "cube_link", at(inertia, (0.01, 0.0, 0.0)))
+        sim.world.set_inertia(model, "cube_link", inertia)
+        return model.body is not body
+
+    check_branches(sim, lambda: change(upper))
+    with sim.lock:
+        snapshot = sim.save_state()
+        if change(lower):
+            with pytest.raises(SnapshotError, match="order"):
+                sim.restore_state(snapshot)
+            change(upper)
+        sim.restore_state(snapshot)
 
 
 def test_motors_efforts_and_wrenches_that_act_for_a_time(sim):
@@ -186,6 +254,33 @@ def test_a_trajectory_is_followed_from_where_it_was(sim):
     future(sim, 150)
     first = check_branches(sim, lambda: way(-0.3) or future(sim, 50), ticks=300)
     assert max(abs(states[1][0][0][0]) for _, states, *_ in first) > 0.1
+
+
+def test_goals_are_their_clients_who_are_told_that_they_end(sim):
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    joint = {"joints": ["stand_cart"], "gains": {"stand_cart": {"p": 500.0, "i": 10.0, "d": 20.0}}}
+    start(robot, {"arm": {"type": "effort_controllers/JointTrajectoryController", **joint}})
+    arm = robot.manager.get("arm")
+
+    def pursue(key, place):
+        told = Listener()
+        trajectory = Trajectory(["stand_cart"], [TrajectoryPoint(S // 5, [place])])
+        arm.pursue(key, GoalRequest(trajectory), told)
+        return told
+
+    first = pursue("first", 0.1)
+    future(sim, 50)
+    with sim.lock:
+        snapshot = sim.save_state()
+    after = future(sim, 400)
+    assert [each.kind for each in first.outcomes] == ["succeeded"]
+    second = pursue("second", -0.1)
+    future(sim, 20)
+    with sim.lock:
+        sim.restore_state(snapshot)
+    assert [each.kind for each in second.outcomes] == ["canceled"]
+    assert future(sim, 400) == after
+    assert len(first.outcomes) == len(second.outcomes) == 1
 
 
 IMU = (
@@ -225,6 +320,26 @@ def test_sensors_measure_the_same_with_the_same_noise(sim):
         assert measured() == first
 
 
+def test_a_sensor_that_is_heard_only_since_measures_at_its_times(sim):
+    schedule, seen, heard = Schedule(sim), [], False
+    with sim.lock:
+        schedule.begin(10.0, seen.append, lambda: heard, at_once=False)
+    future(sim, 250)
+    with sim.lock:
+        snapshot = sim.save_state()
+        heard = True
+        schedule.review()
+    future(sim, 300)
+    first = seen.copy()
+    seen.clear()
+    with sim.lock:
+        sim.restore_state(snapshot)
+        heard = True
+        schedule.review()
+    future(sim, 300)
+    assert seen == first == [3 * S // 10, 4 * S // 10, 5 * S // 10]
+
+
 def test_another_world_is_refused_and_stays_as_it_is(sim, new_engine):
     robot = add_robot(sim, "cartpole", cartpole_urdf())
     start(robot, CONTROLLERS)
@@ -243,6 +358,7 @@ def test_another_world_is_refused_and_stays_as_it_is(sim, new_engine):
     set_joint_properties(model, "cart_pole", changed, sim.world.time_step)
     refused("cartpole.*other properties")
     set_joint_properties(model, "cart_pole", JointProperties(damping=0.0), sim.world.time_step)
+    model.set_friction("cart", 1.0)
     with sim.lock:
         sim.restore_state(snapshot)  # all is as it was
     sim.world.set_gravity((0.0, 0.0, -3.0))

@@ -7,6 +7,7 @@ import cartpole  # noqa: F401 - registers the environments
 from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
 from robot_envs import RobotEnv, SimulatorError
+from robot_envs.variation import Variation
 
 
 class Remembering(BalanceTask):
@@ -20,6 +21,27 @@ class Remembering(BalanceTask):
         self.seen.append(state.time)
         self.by_sign[state.joints["cart_pole"].position > 0.0] += 1
         return float(len(self.seen) + self.by_sign[True])
+
+
+class Planning(BalanceTask):
+    """Knows its environment and keeps snapshots of it."""
+
+    env = None
+
+    def __init__(self):
+        super().__init__()
+        self.kept = []
+
+
+class Curriculum:
+    """Varies nothing, but counts its levels."""
+
+    def __init__(self):
+        self.level = 0
+
+    def draw(self, rng):
+        self.level += 1
+        return Variation(), {"level": self.level}
 
 
 class Reading(BalanceTask):
@@ -56,6 +78,28 @@ def test_what_a_task_remembers_comes_back(made):
     first = returns(env)
     env.restore_state(snapshot)
     assert len(env.task.seen) == 7 and returns(env) == first
+
+
+def test_a_task_may_know_its_environment_and_keep_snapshots(made):
+    env = made(Planning)
+    env.task.env = env
+    env.reset(seed=1)
+    env.task.kept += [env.save_state(), env.save_state()]
+    snapshot = env.save_state()
+    first = returns(env)
+    env.restore_state(snapshot)
+    assert returns(env) == first
+
+
+def test_a_randomisation_goes_on_from_where_it_was(made):
+    env = made(randomisation=Curriculum())
+    env.reset(seed=1)
+    snapshot = env.save_state()
+    levels = []
+    for _ in range(2):
+        env.restore_state(snapshot)
+        levels.append(env.reset()[1]["variation"])
+    assert levels == [{"level": 2}, {"level": 2}]
 
 
 def test_actions_that_a_space_samples_do_not_come_again(made):
@@ -123,5 +167,5 @@ def test_refusals_name_the_reason(made):
             call()
     unreadable = made(Reading)
     unreadable.reset(seed=1)
-    with pytest.raises(SimulatorError, match="generator, which a Reading holds"):
+    with pytest.raises(SimulatorError, match="Reading.lines.*generator"):
         unreadable.save_state()

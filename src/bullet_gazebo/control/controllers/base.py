@@ -110,6 +110,9 @@ class Controller(ABC):
     def joints_moved(self, now: int) -> None:
         """Called when something other than time has changed the joints' state."""
 
+    def restored(self) -> None:
+        """Called when the world has returned to a snapshot, with the attributes that it had then."""
+
 
 def number_param(params: Mapping[str, object], key: str, place: str) -> float:
     """Returns the numeric parameter `key`.

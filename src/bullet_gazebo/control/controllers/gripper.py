@@ -57,6 +57,8 @@ class GripperActionController(Controller):
     Its time is uptime [ns], the sum of its periods since it was started: the clock may jump.
     """
 
+    of_the_present = ("_goal",)  # its client knows nothing of snapshots
+
     def __init__(
         self, name: str, joint: JointHandle, settings: GripperSettings, pid: Pid | None = None
     ) -> None:
@@ -94,6 +96,9 @@ class GripperActionController(Controller):
 
     def stopping(self) -> None:
         self._end(CANCELED, "the controller was stopped")
+
+    def restored(self) -> None:
+        self._end(CANCELED, "the world has returned to a snapshot")
 
     def update(self, now: int, dt: float) -> None:
         self._uptime += round(dt * NANOSECONDS)

@@ -111,6 +111,8 @@ class JointTrajectoryController(Controller):
     Its time is uptime [ns], the sum of its periods since it was started: the clock may jump.
     """
 
+    of_the_present = ("_goal",)  # its client knows nothing of snapshots
+
     def __init__(self, name: str, axes: list[Axis], settings: Settings) -> None:
         super().__init__(name)
         self.joint_names = tuple(axis.joint.name for axis in axes)
@@ -147,6 +149,9 @@ class JointTrajectoryController(Controller):
 
     def joints_moved(self, now: int) -> None:
         self._now = now  # stamps count from here, also after the clock was set back
+
+    def restored(self) -> None:
+        self._end_goal("the world has returned to a snapshot")
 
     def update(self, now: int, dt: float) -> None:
         self._now = now

@@ -72,6 +72,11 @@ class BulletClient:
         self.apply(settings)
 
     @property
+    def bodies(self) -> list[BulletBody]:
+        """In the order in which they were loaded."""
+        return list(self._bodies.values())
+
+    @property
     def live(self) -> int:
         return sum(self._sizes.values())
 
@@ -157,18 +162,17 @@ class BulletClient:
             self._hold_up()
         self._step()
 
-    def touching(self) -> list[Contact]:
+    def contacts(self) -> list[Contact]:
         """Returns where bodies touched in the last step, without those that were only near."""
         found = pybullet.getContactPoints(physicsClientId=self._client)
         return [_contact(each, self._sides) for each in found if each[9] > 0.0]
 
     def refasten(self, fastened: Mapping[int, Fastening]) -> None:
-        """See `Engine.refasten`."""
-        if list(fastened) != list(self.fastened):
-            for number in list(self.fastened):
-                self.unfasten(number)
-            for number, fastening in fastened.items():
-                self._fix(number, fastening.made_of, fastening.apart)
+        """See `Engine.refasten`; the solver's result depends on the order of constraints."""
+        for number in list(self.fastened):
+            self.unfasten(number)
+        for number, fastening in fastened.items():
+            self._fix(number, fastening.made_of, fastening.apart)
 
     def forget_contacts(self) -> None:
         """See `Engine.forget_contacts`."""
@@ -281,6 +285,9 @@ class BulletEngine(Engine):
     def unfasten(self, number: int) -> None:
         self._client.unfasten(number)
 
+    def order(self) -> list[BulletBody]:
+        return self._client.bodies
+
     def fastened(self) -> dict[int, Fastening]:
         return dict(self._client.fastened)
 
@@ -300,15 +307,13 @@ class BulletEngine(Engine):
         self._client.apply(self._settings)
 
     def step(self) -> None:
-        self.recalled = None
         self._client.step()
 
     def forget_contacts(self) -> None:
-        self.recalled = None
         self._client.forget_contacts()
 
-    def touching(self) -> list[Contact]:
-        return self._client.touching()
+    def contacts(self) -> list[Contact]:
+        return self._client.contacts()
 
     def close(self) -> None:
         self._client.close()

@@ -31,7 +31,7 @@ TENDON = mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON
 FREE_POSITIONS, FREE_VELOCITIES = 7, 6  # of a free base
 
 
-class BodyArrays(NamedTuple):
+class MujocoMotion(NamedTuple):
     """State of one body, and what acts on it during the next step, as arrays of MuJoCo, with the base last.
 
     `pose` is that of a fixed root link.
@@ -249,12 +249,12 @@ class MujocoBody(Body):
         for name, effort in self._gears.items():
             self.set_gear(name, effort)
 
-    def motion(self) -> BodyArrays:
+    def motion(self) -> MujocoMotion:
         q, v = self._places()
         wrenches = self._state.data.xfrc_applied[list(self._ids.values())]
-        return BodyArrays(self._qpos[q], self._qvel[v], self._qfrc[v], wrenches, self.pose)
+        return MujocoMotion(self._qpos[q], self._qvel[v], self._qfrc[v], wrenches, self.pose)
 
-    def move(self, motion: BodyArrays) -> None:
+    def move(self, motion: MujocoMotion) -> None:
         if self._free is None and motion.pose != self.pose:
             self.reset_base(motion.pose)
         q, v = self._places()

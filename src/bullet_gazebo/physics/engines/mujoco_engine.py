@@ -96,14 +96,13 @@ class MujocoEngine(Engine):
         self._state.model.opt.iterations = self._iterations
 
     def step(self) -> None:
-        self.recalled = None
         self._state.step()
 
-    def forget_contacts(self) -> None:
-        self.recalled = None
-
-    def touching(self) -> list[Contact]:
+    def contacts(self) -> list[Contact]:
         return self._state.contacts(self._sides)
+
+    def order(self) -> list[MujocoBody]:
+        return list(self._bodies.values())
 
     def fastened(self) -> dict[int, Joined]:
         return dict(self._fastened)

@@ -8,7 +8,7 @@ import numpy as np
 from bullet_gazebo_msgs.srv import RestoreState, RestoreStateRequest, SaveState, SaveStateRequest
 
 from bullet_gazebo.held_state import UnknownState
-from bullet_gazebo.physics.engine import SnapshotError
+from bullet_gazebo.physics.world import SnapshotError
 from bullet_gazebo.ros.services import ServiceRefused, offer
 from bullet_gazebo.ros.services.step_service import StepService
 from bullet_gazebo.simulator import Simulator, Snapshot
@@ -46,6 +46,8 @@ class SnapshotServices:
         with self._one_at_a_time, self._sim.lock:
             for name in request.forget:
                 self._kept.pop(name, None)
+            if not request.name:
+                return "SaveState: nothing saved, without a name"
             if len(self._kept) >= MOST and request.name not in self._kept:
                 raise ServiceRefused(
                     f"{MOST} states are kept already: name some that are to be forgotten"
@@ -67,11 +69,13 @@ class SnapshotServices:
         with self._one_at_a_time, self._sim.lock:
             kept = self._kept.get(request.name)
             if kept is None:
-                raise ServiceRefused(f"no state is kept under the name '{request.name}'")
+                raise ServiceRefused(
+                    f"no state '{request.name}' is kept: it was forgotten, or this simulator never saved it"
+                )
             self._sim.await_holds()
             try:
                 self._sim.restore_state(kept.snapshot)
-            except SnapshotError as error:
+            except (SnapshotError, UnknownState) as error:
                 raise ServiceRefused(str(error)) from error
             self._steps.knows_contacts = kept.knows_contacts
             random.setstate(kept.python)

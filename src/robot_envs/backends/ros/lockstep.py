@@ -92,7 +92,8 @@ class LockstepWorld(RobotBackend):
         self._steps = PreparedSteps(STEP_SERVICE, timeout, SimulatorService)
         self._save = SimulatorService("/gazebo/save_state", SaveState, persistent=True)
         self._restore = SimulatorService("/gazebo/restore_state", RestoreState, persistent=True)
-        self._dropped: list[str] = []  # names of snapshots that nobody has any more
+        self._kept: set[str] = set()  # names of snapshots that the simulator keeps
+        self._dropped: list[str] = []  # of them, those that nobody has any more
         moved = ((robot.model, name) for robot, name in scene.moved.values())
         loose = loose_joints(scene.robots[0].world, scene.objects)
         self._moved = [f"{model}::{name}" for model, name in (*moved, *loose)]
@@ -254,10 +255,15 @@ class LockstepWorld(RobotBackend):
         """See `RobotBackend.save_state`; the simulator keeps it until nobody has it any more."""
         self._world.check_holder(self)
         kept = KeptSnapshot(self, secrets.token_hex(8), self._begun, self._held)
-        request = SaveStateRequest(kept.name, [self._dropped.pop() for _ in self._dropped[:]])
-        self._succeed(self._save, request)
+        self._save_and_forget(kept.name, list(self._dropped))
+        self._kept.add(kept.name)
         weakref.finalize(kept, self._dropped.append, kept.name).atexit = False
         return kept
+
+    def _save_and_forget(self, name: str, forgotten: Sequence[str]) -> None:
+        self._succeed(self._save, SaveStateRequest(name, forgotten))
+        self._kept.difference_update(forgotten)
+        del self._dropped[: len(forgotten)]
 
     def restore_state(self, state: KeptSnapshot) -> None:
         self._world.check_holder(self)
@@ -277,6 +283,9 @@ class LockstepWorld(RobotBackend):
     def close(self) -> None:
         """Closes the connection to the simulator; robots and objects are as they were found."""
         self._drop()
+        with contextlib.suppress(SimulatorError):  # one that is gone keeps none
+            if self._kept:
+                self._save_and_forget("", list(self._kept))
         self._hang_up()
         self._variation.undo()
         with contextlib.suppress(SimulatorError):  # one that is gone has no objects any more

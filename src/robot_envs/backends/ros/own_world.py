@@ -40,16 +40,17 @@ class Journal:
     variation: Variation = field(default_factory=Variation)  # all that were applied, merged
     initial: InitialState | None = None  # None: no episode has begun
     commands: list[Commands] = field(default_factory=list)  # of each step
+    saves: list[int] = field(default_factory=list)  # steps before each snapshot: it changes bits
     last: WorldState | None = None  # the state after them
     seed: int = 0  # of the sensors' noise
 
     def forget_episode(self) -> None:
         """Forgets all but the variation."""
-        self.initial, self.commands, self.last = None, [], None
+        self.initial, self.commands, self.saves, self.last = None, [], [], None
 
     def copied(self) -> "Journal":
         """Returns a copy, to which later steps don't come."""
-        return replace(self, commands=list(self.commands))
+        return replace(self, commands=list(self.commands), saves=list(self.saves))
 
     def replay(self, world: LockstepWorld, step: int) -> None:
         """Brings another simulator to the same state.
@@ -66,14 +67,20 @@ class Journal:
         if self.initial is None or self.last is None:
             return
         state = checked(world.reset(self.initial, self.seed), 0)
+        self._save(world, 0)
         for count, commands in enumerate(self.commands, 1):
             state = checked(world.act(commands), count * step)
+            self._save(world, count)
         if repr(state) == repr(self.last):  # shows all bits of a number, and tells -0.0 from 0.0
             return
         raise SimulatorFault(
             f"the same reset and {len(self.commands)} steps lead to another state, as where a plugin draws "
             f"random numbers: {_difference(state, self.last)}"
         )
+
+    def _save(self, world: LockstepWorld, count: int) -> None:
+        for _ in range(self.saves.count(count)):
+            world.save_state()
 
 
 def _difference(state: WorldState, last: WorldState) -> str:
@@ -200,7 +207,9 @@ class OwnWorld(RobotBackend):
 
     def save_state(self) -> tuple[KeptSnapshot, Journal]:
         self._need_episode()
-        return self._perform(lambda world: world.save_state()), self._journal.copied()
+        kept = self._perform(lambda world: world.save_state())
+        self._journal.saves.append(len(self._journal.commands))
+        return kept, self._journal.copied()
 
     def restore_state(self, state: tuple[KeptSnapshot, Journal]) -> None:
         kept, journal = state

@@ -98,6 +98,29 @@ def test_a_coarser_physics_step_gives_the_same_bits_as_in_process() -> None:
         assert differences(rollout(found, 40, seed=8), rollout(wanted, 40, seed=8)) == ""
 
 
+def test_snapshots_of_bodies_that_touch_survive_the_simulator() -> None:
+    def told(dies: bool) -> list:
+        env = gymnasium.make(
+            "robot_envs.robots:robot_envs/PickCube-v0", backend="ros-own"
+        ).unwrapped
+        with env:
+            env.reset(seed=1)
+            snapshot = env.save_state()
+            seen = []
+            for _ in range(2):
+                env.action_space.seed(2)
+                if dies:
+                    end(env, signal.SIGKILL)
+                seen.append([env.step(env.action_space.sample()) for _ in range(10)])
+                env.restore_state(snapshot)
+            assert env.backend.restarts == 2 * dies
+        return seen
+
+    wanted = told(dies=False)
+    assert repr(wanted[0]) == repr(wanted[1])
+    assert repr(told(dies=True)) == repr(wanted)
+
+
 def test_side_by_side_each_has_the_bits_that_it_has_alone(truth, monkeypatch) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1/")  # nobody asks there
     monkeypatch.setenv("ROS_NAMESPACE", "elsewhere")

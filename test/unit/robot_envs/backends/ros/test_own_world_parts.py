@@ -35,6 +35,9 @@ class Replayed:
         self.seed = seed
         return state(self._drift, 0.0, 0.0)
 
+    def save_state(self) -> None:
+        self.asked.append("save")
+
     def act(self, commands: dict) -> WorldState:
         self.asked.append(commands)
         return state(
@@ -45,7 +48,8 @@ class Replayed:
 def test_a_journal_brings_another_simulator_to_the_same_state_or_says_where_it_differs() -> None:
     varied, begun = Variation(gravity=0.5), InitialState()
     commands = [{"a": 0.1}, {"a": -0.0}, {}, {"b": (1e-300, 2.0), "a": 3.0}]
-    journal = Journal(varied, begun, commands, state(4.0, 0.0, 0.0, time=0.032), seed=7)
+    last = state(4.0, 0.0, 0.0, time=0.032)
+    journal = Journal(varied, begun, commands, last=last, seed=7)
     world = Replayed()
     journal.replay(world, 8_000_000)
     assert world.asked == [varied, begun, *commands] and world.seed == 7
@@ -58,6 +62,19 @@ def test_a_journal_brings_another_simulator_to_the_same_state_or_says_where_it_d
     world.asked.clear()
     journal.replay(world, 8_000_000)
     assert world.asked == [varied]
+
+
+def test_a_journal_takes_snapshots_again_where_they_were_taken() -> None:
+    commands = [{"a": 0.1}, {"a": 0.2}]
+    journal = Journal(
+        Variation(), InitialState(), commands, [0, 2, 2], state(2.0, 0.0, 0.0, time=0.016)
+    )
+    world = Replayed()
+    journal.replay(world, 8_000_000)
+    assert world.asked[1:] == ["save", *commands, "save", "save"]
+    later = journal.copied()
+    later.saves.append(2)
+    assert journal.saves == [0, 2, 2]
 
 
 def test_a_variation_leaves_what_it_does_not_name() -> None:

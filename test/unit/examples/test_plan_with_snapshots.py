@@ -1,0 +1,60 @@
+"""examples/plan_with_snapshots.py does what it plans for, and the same over ROS."""
+
+import importlib
+import itertools
+import sys
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+LONGEST = 120  # [lines]
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def example(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.syspath_prepend(EXAMPLES)
+    return importlib.import_module("plan_with_snapshots")
+
+
+def test_it_is_short() -> None:
+    text = (EXAMPLES / "plan_with_snapshots.py").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= LONGEST
+
+
+@pytest.mark.parametrize("name", ["cart-pole", "rover"])
+def test_it_gets_there(
+    example: Any, name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["plan_with_snapshots.py", name])
+    example.main()
+    assert capsys.readouterr().out.startswith("done after ")
+
+
+def test_straight_ahead_the_rover_meets_the_box(example: Any) -> None:
+    env: Any = gymnasium.make(example.PROBLEMS["rover"].env_id).unwrapped
+    example.face_the_box(env, 0)
+    ahead = itertools.repeat(np.array([1.0, 0.0], np.float32))
+    assert list(example.rewards(env, ahead))[-1] < -4.0
+    assert env.task.info(env.state)["touched"]
+    env.close()
+
+
+@pytest.mark.parametrize("name", ["cart-pole", "rover"])
+def test_over_ros_it_gets_the_same_bits(example: Any, name: str) -> None:
+    problem = example.PROBLEMS[name]._replace(plans=3, horizon=4)
+
+    def first_steps(**options: Any) -> tuple[list[float], Any]:
+        env: Any = gymnasium.make(problem.env_id, **options).unwrapped
+        problem.begin(env, 5)
+        actions = example.planned(env, problem, 5)
+        found = list(itertools.islice(example.rewards(env, actions), 4 * problem.repeat)), env.state
+        env.close()
+        return found
+
+    assert first_steps() == first_steps(backend="ros-own")
