@@ -31,6 +31,7 @@ from ros_calls import master
 from ros_calls.service import ServiceClient
 
 SILENCE = 10.0  # [s] of waiting for a topic before its silence is reported
+LOOK = 0.5  # [s] between two looks for a simulator
 
 
 def replace_topics(runner: ScriptRunner) -> None:
@@ -96,8 +97,20 @@ class _Waiting:
         self._last: dict[tuple[str, type], _Last] = {}
 
     def __call__(self, topic: str, topic_type: type, timeout: Any = None) -> Any:
-        if not (self._runner.is_connected() and self._runner.clock.covers_this_thread()):
-            return self._original(topic, topic_type, timeout)
+        seconds = timeout.to_sec() if isinstance(timeout, rospy.Duration) else timeout
+        limit = math.inf if seconds is None else seconds
+        while not self._runner.is_connected():  # the script's own simulator may still be starting
+            span = min(limit, LOOK)
+            try:
+                return self._original(topic, topic_type, span)
+            except rospy.exceptions.ROSInterruptException:
+                raise
+            except rospy.ROSException:
+                limit -= span
+                if limit <= 0.0:
+                    raise
+        if not self._runner.clock.covers_this_thread():
+            return self._original(topic, topic_type, None if limit == math.inf else limit)
         name = rospy.resolve_name(topic)
         last = self._last.get((name, topic_type))
         if last is None:
@@ -106,8 +119,6 @@ class _Waiting:
             self._runner.topics.changed()
         else:
             before = 0 if last.latched() else last.count
-        seconds = timeout.to_sec() if isinstance(timeout, rospy.Duration) else timeout
-        limit = math.inf if seconds is None else seconds
 
         def wait(span: float) -> bool:
             return self._runner.wait(

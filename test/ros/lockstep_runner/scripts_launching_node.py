@@ -82,6 +82,12 @@ class LaunchingTest(unittest.TestCase):
             self.assertGreater(len(seen[-1]), 190, out)
         self.assertEqual(*seen)
 
+    def test_a_script_may_wait_for_a_message_before_its_simulator_is_up(self):
+        process = start(SCRIPTS / "launch_and_wait.py", env=environment())
+        out, err = process.communicate(timeout=BOUND)
+        self.assertEqual(process.returncode, 0, err)
+        self.assertIn("ground_plane", out)
+
     @unittest.skipUnless(EXISTING.is_file(), "the existing script isn't here")
     def test_the_existing_script_is_repeatable_also_on_a_busy_machine(self):
         folders = [tempfile.mkdtemp(prefix="lockstep_test_") for _ in range(2)]
