@@ -26,6 +26,7 @@ from ros_utils.testing.world_bag import WorldBag
 FAILURES = "ROS_TEST_FAILURES"  # environment variable: the folder of what failed tests leave
 STARTING = 120.0  # [s of wall time]
 DRAWING = 120.0  # [s of wall time] to complete a recording
+_ADDRESS = re.compile(r" at 0x[0-9a-f]+")  # of an object
 FILES = ("world.png", "world.html")
 
 
@@ -49,7 +50,7 @@ def tell(folder: Path, seed: int, failure: str, message: str, again: str) -> str
         again: that of the second, recorded run; empty if it passed.
     """
     text = f"recorded in {folder}"
-    if again != message:
+    if _ADDRESS.sub("", again) != _ADDRESS.sub("", message):
         how = f"fails otherwise ({again})" if again else "passes"
         text = f"it {how} when it runs once more: it isn't repeatable; that run is {text}"
     (folder / "failure.txt").write_text(f"seed: {seed}\n{text}\n\n{failure}\n", encoding="utf-8")

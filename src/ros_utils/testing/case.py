@@ -28,7 +28,10 @@ class RobotTestCase(unittest.TestCase):
             raise
         except Exception as fault:
             if self._recorded is None:
-                fault.args = (f"{fault}\n{self._record(fault)}",)  # rostest leaves notes out
+                text = self._record(fault)
+                fault.args = (f"{fault}\n{text}",)  # rostest leaves notes out
+                if text not in str(fault):  # an OSError's text is made of more
+                    fault.add_note(text)
             raise
 
     def _record(self, fault: Exception) -> str:

@@ -43,6 +43,9 @@ def test_wavers(world):
     world.wait(0.1)
     runs.append(None)
     assert len(runs) == 2
+
+def test_names_an_object(world):
+    assert world is None
 """
 PASSING = f"""
 {ROBOT}
@@ -68,11 +71,14 @@ class Cart(RobotTestCase):
         self.world.follow("cartpole", "half_way.py", hears="/joint_states", commands=f"/{{CART}}/command")
         self.world.assert_joint("stand_cart", 0.2, within=0.02, by=1.0, stays=1.0)
 
+    def test_a_file_is_there(self):
+        open("/nowhere")
+
     def tearDown(self):
         print("torn down")
 
 class OtherCart(Cart):
-    pass
+    test_a_file_is_there = None
 
 unittest.main()
 """
@@ -99,7 +105,8 @@ def test_a_failure_leaves_its_recording_and_seed(tmp_path):
     (tmp_path / "test_cart.py").write_text(FAILING)
     place = tmp_path / "failures"
     done = run(tmp_path, "-m", "pytest", "test_cart.py", ROS_TEST_FAILURES=str(place))
-    assert "2 failed" in done.stdout
+    assert "3 failed" in done.stdout
+    assert done.stdout.count("isn't repeatable") == 1
     assert "rad after" not in done.stdout and "m after" in done.stdout
     folder = place / "test_cart.py-test_it_gets_there"
     assert f"recorded in {folder}" in done.stdout
@@ -151,8 +158,8 @@ def test_with_unittest_a_failure_says_where_its_recording_is(tmp_path):
     done = run(tmp_path, "cart.py")
     folder = tmp_path / "test_failures/__main__.Cart.test_it_gets_there"
     assert done.returncode == 1 and f"recorded in {folder}" in done.stdout, done.stdout
-    assert done.stdout.count("\nrecorded in ") == 2  # the second run fails alike
-    assert done.stdout.count("torn down") == 4
+    assert done.stdout.count("\nrecorded in ") == 3  # the second run fails alike
+    assert done.stdout.count("torn down") == 6
     assert {path.name for path in folder.iterdir()} == {
         "failure.txt", "simulator.log", "world.bag", "world.html", "world.png"
     }  # fmt: skip
