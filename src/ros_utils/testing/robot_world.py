@@ -202,7 +202,7 @@ class RobotWorld(SteppedWorld):
         after = f" after {passed * self._period / NANOSECONDS:g} s" if passed else ""
         text = f"{fault}{after}; {wanted} was wanted"
         if stays:
-            text += f", for {stays:g} s from {f'within {by:g} s' if by else 'the beginning'} on"
+            text += (f" within {by:g} s," if by else "") + f" for {stays:g} s"
         raise AssertionError(text)
 
 
