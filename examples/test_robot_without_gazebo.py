@@ -1,6 +1,6 @@
 """Tests of a robot without Gazebo, in simulated time: nothing here depends on the machine's speed.
 
-    ./ws python3 -m pytest examples/test_robot_without_gazebo.py
+    ./ws test examples/test_robot_without_gazebo.py
 
 A robot of one's own takes the place of the cart-pole in `spawn`; docs/testing.md says the rest.
 """

@@ -172,7 +172,7 @@ def main() -> int:
     options: RecordingOptions = pickle.load(sys.stdin.buffer)
     try:
         count = _draw(FILMS[options.path.suffix.lower()](options))
-    except EncoderFailed as error:
+    except (EncoderFailed, OSError) as error:
         print(f"recording: {options.path}: {error}", file=sys.stderr, flush=True)
         return 1
     length = f"{count} frames, {count / options.rate:.1f} s" if count else "no time has passed"

@@ -1,13 +1,14 @@
 """The simulator that all tests of a process share, and recordings of those that fail."""
 
 import contextlib
+import functools
 import os
 import re
 import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from unittest import mock
+from typing import Any
 
 import rosgraph
 import rospkg
@@ -18,14 +19,14 @@ from ros_utils import ros_gazebo, ros_node
 from ros_utils._internal import roslaunch
 from ros_utils._internal.programs import Started
 from ros_utils.simulation import LOOPBACK, reserved_port
-from ros_utils.testing.ear import SIMULATOR
+from ros_utils.testing.ear import SIMULATOR, WorldError
 from ros_utils.testing.robot_world import RobotWorld
-from ros_utils.testing.stepped_world import WorldError
 from ros_utils.testing.world_bag import WorldBag
 
 FAILURES = "ROS_TEST_FAILURES"  # environment variable: the folder of what failed tests leave
 STARTING = 120.0  # [s of wall time]
 DRAWING = 120.0  # [s of wall time] to complete a recording
+_ADDRESS = re.compile(r" at 0x[0-9a-f]+")  # of an object
 FILES = ("world.png", "world.html")
 
 
@@ -49,7 +50,7 @@ def tell(folder: Path, seed: int, failure: str, message: str, again: str) -> str
         again: that of the second, recorded run; empty if it passed.
     """
     text = f"recorded in {folder}"
-    if again != message:
+    if _ADDRESS.sub("", again) != _ADDRESS.sub("", message):
         how = f"fails otherwise ({again})" if again else "passes"
         text = f"it {how} when it runs once more: it isn't repeatable; that run is {text}"
     (folder / "failure.txt").write_text(f"seed: {seed}\n{text}\n\n{failure}\n", encoding="utf-8")
@@ -64,18 +65,17 @@ class Bench:
     """
 
     def __init__(self) -> None:
-        self._ending = contextlib.ExitStack()
         self._simulator: Started | None = None
+        self._physics: Any = (
+            None  # gazebo_msgs/GetPhysicsProperties, of a simulator that has just started
+        )
         if "__name" not in rosgraph.names.load_mappings(sys.argv):
-            self._start_master()
-
-    def _start_master(self) -> None:
-        place = {"ROS_MASTER_URI": f"http://{LOOPBACK}:{reserved_port()}", "ROS_IP": LOOPBACK}
-        self._ending.enter_context(mock.patch.dict(os.environ, place))
-        started = roslaunch.start_master(window=False, timeout=STARTING)
-        if not isinstance(started, Started):
-            raise WorldError(f"no ROS master could be started at {master.uri()}; the log says why")
-        self._ending.callback(started.close)
+            os.environ["ROS_MASTER_URI"] = f"http://{LOOPBACK}:{reserved_port()}"
+            os.environ["ROS_IP"] = LOOPBACK
+            if not roslaunch.start_master(window=False, timeout=STARTING):
+                raise WorldError(
+                    f"no ROS master could be started at {master.uri()}; the log says why"
+                )
 
     @contextlib.contextmanager
     def world(self, seed: int, recorded: Path | None = None) -> Iterator[RobotWorld]:
@@ -100,6 +100,7 @@ class Bench:
                 bag = ending.enter_context(contextlib.closing(WorldBag(recorded / "world.bag")))
             before = _parameters()
             ending.callback(_forget_parameters, before)
+            _set_physics(self._physics)
             world = RobotWorld(seed, bag)
             ending.callback(world.close)
             yield world
@@ -114,6 +115,7 @@ class Bench:
         )  # fmt: skip
         if not isinstance(started, Started):
             raise WorldError(f"no simulator at {master.uri()}; the log says why")
+        self._physics = ros_gazebo.gazebo_get_physics_properties()
         return started
 
     def _end_simulator(self) -> None:
@@ -121,10 +123,19 @@ class Bench:
             self._simulator.close()
         self._simulator = None
 
-    def close(self) -> None:
-        """Ends simulator and master; what roslaunch has started stays."""
-        self._end_simulator()
-        self._ending.close()
+
+@functools.cache
+def process_bench() -> Bench:
+    """Returns the bench of this process; its programs end with the process."""
+    return Bench()
+
+
+def _set_physics(wanted: Any) -> None:
+    """Gives back a world its gravity, its step and its solver, and lets its time pass."""
+    gravity = wanted.gravity.x, wanted.gravity.y, wanted.gravity.z
+    properties = wanted.time_step, wanted.max_update_rate, gravity, wanted.ode_config
+    ros_gazebo.gazebo_set_physics_properties(*properties)
+    ros_gazebo.gazebo_unpause_physics()
 
 
 def _parameters() -> set[str]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ros_utils.testing.bench import Bench, failure_folder, tell
+from ros_utils.testing.bench import failure_folder, process_bench, tell
 from ros_utils.testing.robot_world import RobotWorld
 
 
@@ -15,18 +15,11 @@ class RobotTestCase(unittest.TestCase):
 
     seed = 1  # of the sensors' noise
     world: RobotWorld
-    _bench: Bench
     _recorded: Path | None = None
-
-    @classmethod
-    def setUpClass(cls) -> None:
-        super().setUpClass()
-        cls._bench = Bench()
-        cls.addClassCleanup(cls._bench.close)
 
     def setUp(self) -> None:
         super().setUp()
-        self.world = self.enterContext(self._bench.world(self.seed, self._recorded))
+        self.world = self.enterContext(process_bench().world(self.seed, self._recorded))
 
     def _callTestMethod(self, method: Callable[[], Any]) -> None:
         try:
@@ -35,17 +28,24 @@ class RobotTestCase(unittest.TestCase):
             raise
         except Exception as fault:
             if self._recorded is None:
-                fault.args = (f"{fault}\n{self._record(fault)}",)  # rostest leaves notes out
+                text = self._record(fault)
+                fault.args = (f"{fault}\n{text}",)  # rostest leaves notes out
+                if text not in str(fault):  # an OSError's text is made of more
+                    fault.add_note(text)
             raise
 
     def _record(self, fault: Exception) -> str:
         """Runs the test once more, recorded; returns what to say about it."""
         self.world.close()
-        again = type(self)(self._testMethodName)
-        again._recorded = folder = failure_folder(self.id())
-        message, other = str(fault), ""
+        again, result = type(self)(self._testMethodName), unittest.TestResult()
+        message = "".join(traceback.format_exception_only(fault)).strip()
         try:
-            again.debug()
-        except Exception as second:  # noqa: BLE001 - whatever a user's test raises
-            other = str(second)
-        return tell(folder, self.seed, "".join(traceback.format_exception(fault)), message, other)
+            again._recorded = folder = failure_folder(self.id())
+            again.run(result)
+            other = "".join(text for _, text in (*result.errors, *result.failures)[:1]).strip()
+            other = message if other.endswith(message) else other.rpartition("\n")[2]
+            return tell(
+                folder, self.seed, "".join(traceback.format_exception(fault)), message, other
+            )
+        except OSError as refused:
+            return f"not recorded: {refused}"

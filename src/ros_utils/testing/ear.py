@@ -17,8 +17,8 @@ PATIENCE = 30.0  # [s of wall time] for an answer
 LONGEST = 500  # ticks in one call
 
 
-class NotPublished(Exception):
-    """The simulator doesn't publish a topic; the text says which."""
+class WorldError(Exception):
+    """The test asks for something that can't be done; the text says what."""
 
 
 class Ear:
@@ -38,7 +38,7 @@ class Ear:
         """Subscribes to topics, as far as it hasn't yet.
 
         Raises:
-            NotPublished: see there.
+            WorldError: the simulator doesn't publish one.
         """
         new = [topic for topic in topics if topic not in self._connections]
         for topic in new:
@@ -52,7 +52,7 @@ class Ear:
         try:
             _, host, port = master.call_node(address, "requestTopic", topic, [["TCPROS"]])
         except (NoAnswer, Refused, ValueError) as fault:
-            raise NotPublished(f"the simulator doesn't publish {topic}") from fault
+            raise WorldError(f"the simulator doesn't publish {topic}") from fault
         connection = socket.create_connection((host, port), PATIENCE)
         header = {"callerid": self._name, "topic": topic, "md5sum": "*", "type": "*"}
         write_ros_handshake_header(connection, header)
@@ -63,9 +63,14 @@ class Ear:
 
         Returns:
             How many have passed, and the messages since the last call.
+
+        Raises:
+            WorldError: the world is paused, so that no time would ever pass.
         """
         request = AdvanceWorldRequest(node=self._name, ticks=min(ticks, LONGEST), until=until)
         answer = self._call(request)
+        if ticks and answer.paused:
+            raise WorldError("the world is paused: no time passes")
         heard, self._heard = [*self._heard, *answer.messages], []
         return int(answer.ticks), heard
 

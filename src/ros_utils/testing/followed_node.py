@@ -14,13 +14,9 @@ from ros_calls.waiting import wait_until
 from ros_utils import ros_node
 from ros_utils._internal import nodes
 from ros_utils._internal.programs import Started
-from ros_utils.testing.ear import PATIENCE, SIMULATOR, Ear
+from ros_utils.testing.ear import PATIENCE, SIMULATOR, Ear, WorldError
 
 CONNECTING = 30.0  # [s of wall time]
-
-
-class NodeFault(Exception):
-    """A node doesn't start, connect or answer; the text says which."""
 
 
 class FollowedNode:
@@ -48,8 +44,7 @@ class FollowedNode:
             commands: the topic of its answers, on which it commands a controller.
 
         Raises:
-            NodeFault: see there.
-            NotPublished: the simulator doesn't publish `hears`.
+            WorldError: it doesn't start or connect, or the simulator doesn't publish `hears`.
         """
         self.controller = commands.rpartition("/")[0] or commands
         self.name, self._hears, self._waiting = f"/{name}", hears, 0
@@ -65,10 +60,10 @@ class FollowedNode:
                 args=[*args, f"{commands}:={topic}"], timeout=CONNECTING,
             )  # fmt: skip
             if not isinstance(started, Started):
-                raise NodeFault(f"{package}/{executable} doesn't run; the log says why")
+                raise WorldError(f"{package}/{executable} doesn't run; the log says why")
             ending.callback(started.close)
             if not wait_until(self._is_connected, CONNECTING, hears):
-                raise NodeFault(f"{self.name} doesn't connect to {hears}")
+                raise WorldError(f"{self.name} doesn't connect to {hears}")
             ending.callback(self._subscribe(topic, commands).unregister)
             self._ending = ending.pop_all()
 
@@ -80,7 +75,7 @@ class FollowedNode:
         subscriber = rospy.Subscriber(topic, rospy.AnyMsg, self._answers.put, tcp_nodelay=True)
         if not wait_until(subscriber.get_num_connections, CONNECTING, topic):
             subscriber.unregister()
-            raise NodeFault(f"{self.name} publishes nothing on {commands}")
+            raise WorldError(f"{self.name} publishes nothing on {commands}")
         return subscriber
 
     def advance(self, ticks: int) -> int:
@@ -97,7 +92,7 @@ class FollowedNode:
             try:
                 last = _numbers(self._answers.get(timeout=PATIENCE))
             except queue.Empty:
-                raise NodeFault(
+                raise WorldError(
                     f"{self.name} hasn't answered a message on {self._hears} for {PATIENCE:g} s"
                 ) from None
             self._waiting -= 1
@@ -118,4 +113,4 @@ def _numbers(message: rospy.AnyMsg) -> list[float]:
         return [command.data]
     if isinstance(command, Float64MultiArray):
         return list(command.data)
-    raise NodeFault(f"a command is {kind}: Float64, Float64MultiArray and Twist can be followed")
+    raise WorldError(f"a command is {kind}: Float64, Float64MultiArray and Twist can be followed")

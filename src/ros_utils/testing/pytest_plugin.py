@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from _pytest.runner import runtestprotocol
 
-from ros_utils.testing.bench import Bench, failure_folder, tell
+from ros_utils.testing.bench import failure_folder, process_bench, tell
 from ros_utils.testing.robot_world import RobotWorld
 
 RECORDED, SEED = pytest.StashKey[Path](), pytest.StashKey[int]()
@@ -18,14 +18,6 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("filterwarnings", "ignore:notifyAll:DeprecationWarning")
 
 
-@pytest.fixture(scope="session")
-def bench() -> Iterator[Bench]:
-    """The simulator that this process's tests share."""
-    made = Bench()
-    yield made
-    made.close()
-
-
 @pytest.fixture
 def world_seed() -> int:
     """The seed of the sensors' noise; a fixture of this name in your tests replaces it."""
@@ -33,11 +25,11 @@ def world_seed() -> int:
 
 
 @pytest.fixture
-def world(bench: Bench, world_seed: int, request: pytest.FixtureRequest) -> Iterator[RobotWorld]:
+def world(world_seed: int, request: pytest.FixtureRequest) -> Iterator[RobotWorld]:
     """An empty world at time 0 for each test."""
     stash = request.node.stash
     stash[SEED] = world_seed
-    with bench.world(world_seed, stash.get(RECORDED, None)) as made:
+    with process_bench().world(world_seed, stash.get(RECORDED, None)) as made:
         yield made
 
 
@@ -58,13 +50,22 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
     item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
     reports = runtestprotocol(item, log=False, nextitem=nextitem)
     failed = _failure(reports)
-    if failed is not None and SEED in item.stash:
+    try:
+        if failed is not None and SEED in item.stash:
+            failed.sections.append(("recording", _record(item, nextitem, failed)))
+    finally:  # a Ctrl-C ends the recording, and the failure is told
+        for report in reports:
+            item.ihook.pytest_runtest_logreport(report=report)
+        item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
+
+
+def _record(item: pytest.Item, nextitem: pytest.Item | None, failed: pytest.TestReport) -> str:
+    """Runs a test once more, recorded; returns what to say about it."""
+    try:
         item.stash[RECORDED] = folder = failure_folder(item.nodeid)
         again = _failure(runtestprotocol(item, log=False, nextitem=nextitem))
         other = "" if again is None else _message(again)
-        text = tell(folder, item.stash[SEED], failed.longreprtext, _message(failed), other)
-        failed.sections.append(("recording", text))
-    for report in reports:
-        item.ihook.pytest_runtest_logreport(report=report)
-    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
-    return True
+        return tell(folder, item.stash[SEED], failed.longreprtext, _message(failed), other)
+    except OSError as fault:
+        return f"not recorded: {fault}"

@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils._internal import packages, params
-from ros_utils.testing.stepped_world import NANOSECONDS, SteppedWorld, Vector, WorldError
+from ros_utils.testing.ear import WorldError
+from ros_utils.testing.stepped_world import NANOSECONDS, SteppedWorld, Vector
 from ros_utils.testing.world_bag import WorldBag
 
 PACKAGE = "package://"
@@ -201,7 +202,7 @@ class RobotWorld(SteppedWorld):
         after = f" after {passed * self._period / NANOSECONDS:g} s" if passed else ""
         text = f"{fault}{after}; {wanted} was wanted"
         if stays:
-            text += f", for {stays:g} s from {f'within {by:g} s' if by else 'the beginning'} on"
+            text += (f" within {by:g} s," if by else "") + f" for {stays:g} s"
         raise AssertionError(text)
 
 

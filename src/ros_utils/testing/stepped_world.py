@@ -9,16 +9,13 @@ from bullet_gazebo_msgs.srv import StepWorldRequest
 
 from ros_utils import ros_gazebo
 from ros_utils.step_client import PreparedSteps, StepAnswer, StepClient, StepNames
+from ros_utils.testing.ear import WorldError
 from ros_utils.testing.followed_node import FollowedNode
 from ros_utils.testing.world_bag import WorldBag
 
 NANOSECONDS = 1_000_000_000
 MOTION = 13  # numbers per link: position, orientation, velocities
 Vector = tuple[float, float, float]
-
-
-class WorldError(Exception):
-    """The test asks for something that can't be done; the text says what."""
 
 
 @dataclass
@@ -95,6 +92,10 @@ class SteppedWorld:
         self._repeated.pop(controller, None)
         if every is not None:
             ticks = self._ticks(every)
+            if not ticks:
+                raise WorldError(
+                    "a command can't be sent every 0 s: a physics step or more is needed"
+                )
             self._repeated[controller] = RepeatedCommand(values, ticks, ticks)
         self._commands[controller] = values
 

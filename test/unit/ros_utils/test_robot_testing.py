@@ -43,6 +43,9 @@ def test_wavers(world):
     world.wait(0.1)
     runs.append(None)
     assert len(runs) == 2
+
+def test_names_an_object(world):
+    assert world is None
 """
 PASSING = f"""
 {ROBOT}
@@ -65,9 +68,28 @@ from ros_utils.testing import RobotTestCase
 class Cart(RobotTestCase):
     def test_it_gets_there(self):
         spawn(self.world)
+        self.world.follow("cartpole", "half_way.py", hears="/joint_states", commands=f"/{{CART}}/command")
         self.world.assert_joint("stand_cart", 0.2, within=0.02, by=1.0, stays=1.0)
 
+    def test_a_file_is_there(self):
+        open("/nowhere")
+
+    def tearDown(self):
+        print("torn down")
+
+class OtherCart(Cart):
+    test_a_file_is_there = None
+
 unittest.main()
+"""
+FOLLOWING = f"""
+{ROBOT}
+pytest_plugins = ["ros_utils.testing.pytest_plugin"]
+
+def test_it_follows(world):
+    spawn(world)
+    world.follow("cartpole", "half_way.py", hears="/joint_states", commands=f"/{{CART}}/command")
+    world.assert_joint("stand_cart", 0.1, within=0.001, by=0.5, stays=1.0)
 """
 
 
@@ -83,7 +105,8 @@ def test_a_failure_leaves_its_recording_and_seed(tmp_path):
     (tmp_path / "test_cart.py").write_text(FAILING)
     place = tmp_path / "failures"
     done = run(tmp_path, "-m", "pytest", "test_cart.py", ROS_TEST_FAILURES=str(place))
-    assert "2 failed" in done.stdout
+    assert "3 failed" in done.stdout
+    assert done.stdout.count("isn't repeatable") == 1
     assert "rad after" not in done.stdout and "m after" in done.stdout
     folder = place / "test_cart.py-test_it_gets_there"
     assert f"recorded in {folder}" in done.stdout
@@ -99,6 +122,24 @@ def test_a_failure_leaves_its_recording_and_seed(tmp_path):
         assert min(seen) != max(seen) and 0.9 < bag.get_end_time() < 2.1
     wavers = place / "test_cart.py-test_wavers"
     assert f"it isn't repeatable; that run is recorded in {wavers}" in done.stdout
+
+
+def test_the_last_test_of_a_session_is_recorded_with_its_nodes(tmp_path):
+    (tmp_path / "test_cart.py").write_text(FOLLOWING)
+    done = run(tmp_path, "-m", "pytest", "test_cart.py")
+    folder = tmp_path / "test_failures/test_cart.py-test_it_follows"
+    assert f"\nrecorded in {folder}\n" in done.stdout, done.stdout  # the second run fails alike
+
+
+def test_a_failure_is_told_though_it_cant_be_recorded(tmp_path):
+    (tmp_path / "test_cart.py").write_text(FAILING)
+    (tmp_path / "file").touch()
+    place = str(tmp_path / "file/failures")
+    done = run(
+        tmp_path, "-m", "pytest", "-k", "gets_there", "test_cart.py", ROS_TEST_FAILURES=place
+    )
+    assert "0.2 ± 0.02 m was wanted" in done.stdout and "1 failed" in done.stdout, done.stdout
+    assert f"not recorded: [Errno 20] Not a directory: '{place}" in done.stdout
 
 
 def test_files_in_parallel_have_simulators_of_their_own_and_the_same_bits(tmp_path):
@@ -117,6 +158,8 @@ def test_with_unittest_a_failure_says_where_its_recording_is(tmp_path):
     done = run(tmp_path, "cart.py")
     folder = tmp_path / "test_failures/__main__.Cart.test_it_gets_there"
     assert done.returncode == 1 and f"recorded in {folder}" in done.stdout, done.stdout
+    assert done.stdout.count("\nrecorded in ") == 3  # the second run fails alike
+    assert done.stdout.count("torn down") == 6
     assert {path.name for path in folder.iterdir()} == {
         "failure.txt", "simulator.log", "world.bag", "world.html", "world.png"
     }  # fmt: skip

@@ -153,6 +153,17 @@ def test_what_cannot_be_recorded_is_refused(tmp_path, changed, text):
         RecordingOptions(**{"path": tmp_path / "a.mp4", **changed}).check()
 
 
+def test_a_folder_that_goes_is_said_in_one_line(sim, tmp_path, capfd):
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    recorder = SimulationRecorder(sim, RecordingOptions(folder / "a.png", 20.0, 64, 48))
+    sim.advance(10)
+    folder.rmdir()
+    recorder.close(LIMIT)
+    assert recorder._process.wait(LIMIT) == 1
+    assert f"recording: {folder}/a.png: [Errno 2]" in capfd.readouterr().err
+
+
 @pytest.mark.slow
 def test_a_page_plays_what_happened_and_a_picture_shows_the_last_moment(sim, tmp_path):
     paths = [tmp_path / "a.html", tmp_path / "a.png"]
