@@ -246,7 +246,10 @@ def _into_own(state: HeldState, each: Any) -> Iterable[Any]:
 
 def _unreadable(state: HeldState, each: Any) -> Iterable[Any]:
     kind = type(each)
-    raise UnknownState(f"a snapshot can't save a {kind.__module__}.{kind.__qualname__}")
+    name = f"{kind.__module__}.{kind.__qualname__}"
+    raise UnknownState(
+        f"a snapshot can't save a {name}; name the attribute in `of_the_present` to leave it out"
+    )
 
 
 _LOOKS: dict[type, Look] = {

@@ -21,6 +21,11 @@ TIME_STEP = 0.001  # [s], Gazebo's default
 WORLD_FRAMES = ("", "world", "map", "/map")
 
 
+PROPERTIES = ("inertia or gravity of a link", "stop or damping of a joint", "damping of a joint by its gains",
+              "friction of a link")  # fmt: skip
+"""What `Model.properties` returns, in order."""
+
+
 @dataclass(frozen=True)
 class SolverSettings:
     """ODE's solver parameters, with sdformat's defaults (docs/contract/gazebo.md 2.20).
@@ -296,10 +301,10 @@ class World:
                 "links have been changed since the snapshot, and the engine takes the models in another order"
             )
         for model, state in snapshot.models:
-            if model.properties() != state.properties:
+            now = zip(PROPERTIES, model.properties(), state.properties, strict=True)
+            if changed := [name for name, one, other in now if one != other]:
                 raise SnapshotError(
-                    f"model '{model.name}' has other properties than in the snapshot: inertia, "
-                    "gravity, damping, stops or friction"
+                    f"model '{model.name}' has another {' and '.join(changed)} than in the snapshot"
                 )
             attached = any(each.joins(model) for each in snapshot.attachments)
             if attached and model.body is not state.body:

@@ -9,6 +9,8 @@ from typing import Any
 from ros_utils.testing.bench import failure_folder, process_bench, tell
 from ros_utils.testing.robot_world import RobotWorld
 
+__unittest = True  # unittest leaves this module's frames out of tracebacks, so they end in the test
+
 
 class RobotTestCase(unittest.TestCase):
     """A test with an empty world at time 0 in `self.world`; one that fails runs once more, recorded."""

@@ -20,6 +20,9 @@ PACKAGE = "package://"
 DESCRIPTION = "robot_description"  # parameter
 
 
+__unittest = True  # see case.py
+
+
 class RobotWorld(SteppedWorld):
     """A simulated world that only this test moves.
 

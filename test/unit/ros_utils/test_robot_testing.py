@@ -159,6 +159,7 @@ def test_with_unittest_a_failure_says_where_its_recording_is(tmp_path):
     folder = tmp_path / "test_failures/__main__.Cart.test_it_gets_there"
     assert done.returncode == 1 and f"recorded in {folder}" in done.stdout, done.stdout
     assert done.stdout.count("\nrecorded in ") == 3  # the second run fails alike
+    assert "self.world.assert_joint(" in done.stdout and "robot_world.py" not in done.stdout
     assert done.stdout.count("torn down") == 6
     assert {path.name for path in folder.iterdir()} == {
         "failure.txt", "simulator.log", "world.bag", "world.html", "world.png"

@@ -12,6 +12,7 @@ from bullet_gazebo.physics.world import SnapshotError
 from bullet_gazebo.ros.services import ServiceRefused, offer
 from bullet_gazebo.ros.services.step_service import StepService
 from bullet_gazebo.simulator import Simulator, Snapshot
+from file_access.text import did_you_mean
 
 MOST = 1000  # names
 
@@ -70,7 +71,8 @@ class SnapshotServices:
             kept = self._kept.get(request.name)
             if kept is None:
                 raise ServiceRefused(
-                    f"no state '{request.name}' is kept: it was forgotten, or this simulator never saved it"
+                    f"no state '{request.name}' is kept{did_you_mean(request.name, self._kept)}; it was "
+                    "forgotten, or never saved in this simulator"
                 )
             self._sim.await_holds()
             try:
