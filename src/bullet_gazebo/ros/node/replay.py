@@ -8,7 +8,6 @@ from typing import Any
 import rosparam
 import rospy
 from bullet_gazebo_msgs.msg import JournalEntry
-from bullet_gazebo_msgs.srv import PreparedStep
 from gazebo_msgs.srv import SpawnModel
 from rospy.impl.registration import get_service_manager, get_topic_manager
 
@@ -17,7 +16,6 @@ from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal, fir
 from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.services.advance_service import reseed
 from bullet_gazebo.ros.services.step_requests import SLICE
-from bullet_gazebo.ros.services.step_service import COUNTED
 from bullet_gazebo.simulator import NANOSECONDS
 
 
@@ -67,9 +65,9 @@ class Replay:
             changes: what is to be otherwise.
             until: stop after the entry with which that much time has passed [s].
         """
-        assert node.journal is not None
+        assert node.journal is not None and node.steps is not None
         self._sim, self._journal, self._control = node.sim, node.journal, node.control
-        self._handles = recorded.facts["series"], node.series
+        node.steps.series = recorded.facts["series"]  # so the handles are the recorded ones
         self._changes, self._until = changes, until
         self._entries: Iterator[JournalEntry] = recorded.entries()
         self._next: JournalEntry | None = next(self._entries, None)
@@ -149,9 +147,7 @@ class Replay:
         request = service.protocol.recv_data_class().deserialize(entry.data)
         request._connection_header = {"callerid": entry.caller}
         self._changes.set_parameters(entry, request)
-        if entry.type == PreparedStep._type:
-            request.handle = self._handle(request.handle)
-        elif entry.type == SpawnModel._type:
+        if entry.type == SpawnModel._type:
             request.model_xml = self._changes.models.get(request.model_name, request.model_xml)
         try:
             answer = service.handler(request)
@@ -159,12 +155,6 @@ class Replay:
                 self._refusals[entry.number] = getattr(answer, "status_message", "")
         except Exception as fault:  # noqa: BLE001 - a user's service may raise anything, as recorded or not
             self._refusals[entry.number] = str(fault)
-
-    def _handle(self, recorded: int) -> int:
-        """Returns the handle that stands for what the recorded one stood for; 0 is none."""
-        before, now = self._handles
-        series, count = divmod(recorded, 2**COUNTED)
-        return now << COUNTED | count if series == before else 0
 
     def _deliver(self, entry: JournalEntry) -> None:
         subscription: Any = get_topic_manager().get_subscriber_impl(entry.name)
