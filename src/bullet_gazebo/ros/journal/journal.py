@@ -21,7 +21,6 @@ from bullet_gazebo.simulator import Simulator
 MOST_KEPT = 64 * 2**20  # [bytes]; without the beginning the rest can't be repeated
 OVERHEAD = 500  # [bytes] of an entry in memory, without what it holds
 START = genpy.Time()
-LOOK = "look"  # one that a new listener causes, for the state that it begins with
 
 
 class Entry(JournalEntry):

@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 from bullet_gazebo.pictures.recording import RecordingError
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.common.rospy_internals import wait_until_sent
-from bullet_gazebo.ros.journal.journal import LOOK, WorldJournal
+from bullet_gazebo.ros.journal.journal import WorldJournal
 
 # [s of wall time] between two messages. `rosbag record` keeps 100 of a topic while it is busy: it has 10 s.
 PERIOD = 0.1
@@ -56,9 +56,6 @@ class JournalOutput(rospy.SubscribeListener):
 
     def peer_subscribe(self, _name: str, _all: object, publish: Publish) -> None:
         """Lets a new subscriber have what was before; what comes twice has the same number."""
-        self._journal.listen(self._take)
-        with self._journal.command(LOOK):  # so that what was before can be compared by its outcome
-            pass
         before = self._journal.listen(self._take)
         if before is None:
             before = [JournalEntry(kind=JournalEntry.GONE)]

@@ -11,7 +11,6 @@ from bullet_gazebo_msgs.msg import JournalEntry
 from gazebo_msgs.srv import SpawnModel
 from rospy.impl.registration import get_service_manager, get_topic_manager
 
-from bullet_gazebo.ros.journal.journal import LOOK
 from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal, first_difference
 from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.services.advance_service import reseed
@@ -180,9 +179,6 @@ class Replay:
         elif name == "reseed":
             with self._journal.command(name, count):
                 reseed(self._sim, count)
-        elif name == LOOK:
-            with self._journal.command(name):
-                pass
         else:
             self._control.answer(name, *([count] if name == "step" else []))
 
