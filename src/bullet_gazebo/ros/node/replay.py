@@ -163,11 +163,12 @@ class Replay:
         self._changes.set_parameters(entry)
         header = {"callerid": entry.caller, "topic": entry.name, "type": entry.type}
         publisher = SimpleNamespace(callerid_pub=entry.caller, header=header, stat_bytes=0)
+        before = subscription.connections
         subscription.connections = [publisher] * entry.publishers  # controllers count them
         message = subscription.data_class().deserialize(entry.data)
         message._connection_header = header
         subscription.receive_callback([message], publisher)
-        subscription.connections = []
+        subscription.connections = before
 
     def _differ(self, entry: JournalEntry, text: str) -> None:
         self.difference = self.difference or f"at {entry.elapsed / NANOSECONDS:g} s {text}"
