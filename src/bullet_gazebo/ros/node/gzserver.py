@@ -211,7 +211,7 @@ class GazeboNode:
     def _end_journal(self) -> None:
         """Completes the journal's bag."""
         if self._output is not None:
-            self._output.close()
+            self._output.end_bag()
 
     def run(self, signals: SignalHandler, work: "Work | None" = None) -> int:
         """Simulates until the node is shut down, or the work is done; returns the exit code."""
