@@ -1,7 +1,9 @@
 """Repeats a recorded run in this process's simulator, entry by entry, and compares (docs/replay.md)."""
 
 import json
+import threading
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, wait
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,6 +18,8 @@ from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.services.advance_service import reseed
 from bullet_gazebo.ros.services.step_requests import SLICE
 from bullet_gazebo.simulator import NANOSECONDS
+
+PATIENCE = 60.0  # [s of wall time] for an entry during which no time passes
 
 
 class Changes:
@@ -74,6 +78,7 @@ class Replay:
         self._expected: dict[int, JournalEntry] = {}  # by number
         self._refusals: dict[int, str] = {}  # texts of requests that failed, by number
         self._done: list[JournalEntry] = []  # what the journal has of them, not compared yet
+        self._under_way: JournalEntry | None = None
         self.repeated = 0  # entries that were equal
         self.unknown = 0  # of them, those without a recorded state at the beginning
         self.difference = ""
@@ -82,9 +87,32 @@ class Replay:
     def run(self) -> None:
         """Repeats all; `difference` tells the first difference.
 
+        A handler of a user's may wait for what only a later entry does, and so for ever; a thread of its own
+        keeps it from holding up the caller.
+
         Raises:
             NoRecording: entries are missing in the bag.
         """
+        outcome: Future[None] = Future()
+
+        def carry_out() -> None:
+            try:
+                self._repeat_all()
+                outcome.set_result(None)
+            except BaseException as fault:  # noqa: BLE001 - raised again in the caller's thread
+                outcome.set_exception(fault)
+
+        threading.Thread(target=carry_out, name="replay", daemon=True).start()
+        seen: tuple[object, ...] = ()
+        while not wait([outcome], PATIENCE).done:
+            entry, before = self._under_way, seen
+            seen = id(entry), self._sim.elapsed
+            if entry is not None and seen == before:
+                self._differ(entry, f"{entry.name} was done, and now waits for what comes later")
+                return
+        outcome.result()
+
+    def _repeat_all(self) -> None:
         start = self._take()
         self._expected[start.number] = start
         done = self._done.extend
@@ -129,7 +157,7 @@ class Replay:
                 self._repeat(self._take())
 
     def _repeat(self, entry: JournalEntry) -> None:
-        self._expected[entry.number] = entry
+        self._expected[entry.number] = self._under_way = entry
         if entry.kind == JournalEntry.SERVICE:
             self._call(entry)
         elif entry.kind == JournalEntry.MESSAGE:
