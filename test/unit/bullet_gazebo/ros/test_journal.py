@@ -3,6 +3,7 @@
 import errno
 import json
 import math
+import os
 import threading
 from types import SimpleNamespace
 
@@ -315,6 +316,23 @@ def test_a_handler_that_waits_for_what_comes_later_ends_the_replay(
     repeated.run()
     later.set()
     assert "/hand/close was done, and now waits" in repeated.difference
+
+
+def test_a_replay_has_the_hashes_of_the_recorded_run(tmp_path, monkeypatch):
+    """They decide the order of sets, as in users' plugins, and Python takes them at its start."""
+    facts = json.dumps({"hashes": "7"}).encode()
+    path = written(tmp_path / "run.bag", entry(0, data=facts), entry(1))
+    started = []
+
+    def start_again(*_):
+        started.append(os.environ["PYTHONHASHSEED"])
+        raise SystemExit
+
+    monkeypatch.setenv("PYTHONHASHSEED", "0")
+    monkeypatch.setattr(os, "execv", start_again)
+    with pytest.raises(SystemExit):
+        replay_command.main([str(path)])
+    assert started == ["7"]
 
 
 def test_a_world_file_that_has_gone_is_written_again(tmp_path):
