@@ -25,6 +25,9 @@ class FairLock:
         RuntimeError: if the thread that holds it acquires it again: it would wait forever.
     """
 
+    # A snapshot of a plugin that refers to it keeps out of who holds it, and of the journal.
+    of_the_present = ("_waiting", "_held", "_holder", "turns", "taken", "leaving", "between")
+
     def __init__(self) -> None:
         self._guard = threading.Lock()
         self._waiting: deque[threading.Lock] = deque()

@@ -169,8 +169,10 @@ def _seed(text: str) -> int:
 
 def _writable(text: str) -> str:
     path = os.path.abspath(text)
-    if not os.access(os.path.dirname(path), os.W_OK):
-        raise argparse.ArgumentTypeError(f"{text}: there is no such folder that can be written to")
+    if os.path.isdir(path) or not os.access(os.path.dirname(path), os.W_OK):
+        raise argparse.ArgumentTypeError(
+            f"{text}: a file in a folder that can be written to is needed"
+        )
     return path
 
 

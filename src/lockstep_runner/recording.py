@@ -37,6 +37,9 @@ def _finish(path: str) -> None:
     if os.path.exists(path):
         tell(f"recorded {path}; what repeats it: rosrun cartpole replay.py {path}")
     elif os.path.exists(path + ACTIVE):
-        tell(f"the simulator was killed; what it recorded: rosbag reindex {path}{ACTIVE}")
+        tell(
+            "the bag isn't complete: the simulator was killed, or the disk is full; what it holds: "
+            f"rosbag reindex {path}{ACTIVE}"
+        )
     else:
         tell("--record: the script started no simulator in lock-step, so nothing is recorded")

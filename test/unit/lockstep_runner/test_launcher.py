@@ -35,7 +35,7 @@ def test_options_end_where_the_script_begins(given, triggers, script, arguments)
     "given",
     [[], ["--seed", "-1", "a.py"], ["--seed", "x", "a.py"], ["--dt", "0", "a.py"], ["--dt", "nan", "a.py"],
      ["--dt", "inf", "a.py"], ["--step-on", "--seed", "1", "a.py"], ["--nonsense", "a.py"],
-     ["--record", "/none/run.bag", "a.py"],
+     ["--record", "/none/run.bag", "a.py"], ["--record", "/tmp", "a.py"],
      ["--dt", "x", "a.py"], ["--dt", "1e9", "a.py"], ["--seed", "1.5", "a.py"],
      ["--step-on", "none", "/tick", "--seed", "1", "a.py"]],
 )  # fmt: skip

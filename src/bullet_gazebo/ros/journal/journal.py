@@ -21,7 +21,6 @@ from bullet_gazebo.simulator import Simulator
 MOST_KEPT = 64 * 2**20  # [bytes]; without the beginning the rest can't be repeated
 OVERHEAD = 500  # [bytes] of an entry in memory, without what it holds
 START = genpy.Time()
-LOOK = "look"  # one that a new listener causes, for the state that it begins with
 
 
 class Entry(JournalEntry):
@@ -63,7 +62,6 @@ class WorldJournal:
         self._size = 0  # [bytes] of the kept ones
         self._count = 0
         self._moving: tuple[int, list[Model], list[str]] = (-1, [], [])
-        self._parameters: dict[str, str] = {}  # those recorded last, as JSON by name
         # Called with finished entries, in order. States and answers are recorded while there are some.
         self.listeners: list[Callable[[list[JournalEntry]], None]] = []
         sim.lock.taken, sim.lock.leaving = self._taken, self._leaving
@@ -147,11 +145,10 @@ class WorldJournal:
     def note_parameter(self, name: str, value: list[object]) -> None:
         """Records that a parameter was read: its value in a list, which is empty if there was none."""
         entry = self._current.entry
-        text = json.dumps(value, default=str)
-        if entry is None or self._parameters.get(name) == text or name in (entry.read or ()):
+        if entry is None:
             return
-        self._parameters[name] = text
-        entry.read = {**(entry.read or {}), name: value}
+        entry.read = entry.read or {}
+        entry.read.setdefault(name, value)  # what its handler writes, that of the replay writes too
 
     def _taken(self) -> None:
         entry = self._current.entry

@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 from bullet_gazebo.pictures.recording import RecordingError
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.common.rospy_internals import wait_until_sent
-from bullet_gazebo.ros.journal.journal import LOOK, WorldJournal
+from bullet_gazebo.ros.journal.journal import WorldJournal
 
 # [s of wall time] between two messages. `rosbag record` keeps 100 of a topic while it is busy: it has 10 s.
 PERIOD = 0.1
@@ -44,7 +44,7 @@ class JournalOutput(rospy.SubscribeListener):
         self._news = threading.Condition()
         self._fresh: Entries = []
         self._newcomers: list[tuple[Publish, Entries]] = []
-        self._ending = False
+        self._ending = self._bag_ends = False
         if self._bag:
             journal.listen(self._take)
         self._publisher = rospy.Publisher(
@@ -56,9 +56,6 @@ class JournalOutput(rospy.SubscribeListener):
 
     def peer_subscribe(self, _name: str, _all: object, publish: Publish) -> None:
         """Lets a new subscriber have what was before; what comes twice has the same number."""
-        self._journal.listen(self._take)
-        with self._journal.command(LOOK):  # so that what was before can be compared by its outcome
-            pass
         before = self._journal.listen(self._take)
         if before is None:
             before = [JournalEntry(kind=JournalEntry.GONE)]
@@ -80,6 +77,13 @@ class JournalOutput(rospy.SubscribeListener):
                 self._news.wait_for(lambda: len(self._fresh) < MOST_WAITING, STOP_TIMEOUT)
             self._fresh += entries
 
+    def end_bag(self) -> None:
+        """Completes the bag; subscribers get what comes later."""
+        with self._news:
+            self._bag_ends = True
+            self._news.notify_all()
+            self._news.wait_for(lambda: self._bag is None, STOP_TIMEOUT)
+
     def close(self) -> None:
         """Sends what is left, and completes the bag."""
         self._journal.unlisten(self._take)
@@ -92,8 +96,9 @@ class JournalOutput(rospy.SubscribeListener):
         ending = False
         while not ending:
             with self._news:
-                self._news.wait_for(lambda: self._ending or self._newcomers, PERIOD)
+                self._news.wait_for(self._has_work, PERIOD)
                 ending = self._ending
+                bag_ends = ending or self._bag_ends
                 newcomers, self._newcomers = self._newcomers, []
                 fresh, self._fresh = self._fresh, []
                 self._news.notify_all()
@@ -101,17 +106,23 @@ class JournalOutput(rospy.SubscribeListener):
                 _send(before, publish)
             _send(fresh, self._publisher.publish)
             if self._bag:
-                self._write(self._bag, fresh)
+                self._write(self._bag, fresh, bag_ends)
         wait_until_sent(self._publisher)
-        if self._bag:
-            self._bag.close()
 
-    def _write(self, bag: "JournalBag", entries: Entries) -> None:
+    def _has_work(self) -> bool:
+        return bool(self._ending or self._newcomers or (self._bag and self._bag_ends))
+
+    def _write(self, bag: "JournalBag", entries: Entries, are_last: bool) -> None:
         try:
             bag.write(entries)
+            if not are_last:
+                return
+            bag.close()
         except OSError as fault:
-            self._bag = None
             rospy.logerr("The journal's bag ends here: %s", fault)
+        with self._news:
+            self._bag = None
+            self._news.notify_all()
 
 
 def _send(entries: Entries, publish: Publish) -> None:
@@ -126,18 +137,18 @@ class JournalBag:
     """
 
     def __init__(self, path: Path) -> None:
-        """Opens it; an existing file stays: the name gets a number.
+        """Opens it; an existing file stays, complete or not: the name gets a number.
 
         Raises:
             RecordingError: the file can't be written.
         """
         import rosbag  # needed only here, and slow
 
-        self._path, number = path, 2
-        while self._path.exists():
+        self._path, self._open, number = path, Path(f"{path}{ACTIVE}"), 2
+        while self._path.exists() or self._open.exists():  # another simulator may be writing
             self._path = path.with_stem(f"{path.stem}_{number}")
+            self._open = Path(f"{self._path}{ACTIVE}")
             number += 1
-        self._open = Path(f"{self._path}{ACTIVE}")
         try:
             self._bag = rosbag.Bag(str(self._open), "w", compression="lz4")
         except OSError as fault:

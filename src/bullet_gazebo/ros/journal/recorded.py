@@ -1,6 +1,7 @@
 """The journal in a bag: its entries, in order, and how one differs from another."""
 
 import json
+from array import array
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -105,6 +106,8 @@ def _moved(recorded: JournalEntry, now: JournalEntry) -> str:
         before, after = getattr(recorded, what), getattr(now, what)
         if list(before) != list(after):
             return f"{what} {', '.join(before)} were recorded, {', '.join(after)} are there now"
+    if array("d", recorded.numbers).tobytes() == array("d", now.numbers).tobytes():
+        return ""
     names = [f"{part} of model {model}" for model in now.models for part in MOTION]
     first = len(names)
     for name in now.joints:
@@ -112,8 +115,7 @@ def _moved(recorded: JournalEntry, now: JournalEntry) -> str:
         names += f"joint {joint} of {model}", f"velocity of joint {joint} of {model}"
     # Joints first: a model that its joints move may differ in its own pose only by a trace.
     for index in (*range(first, len(names)), *range(first)):
-        if recorded.numbers[index] != now.numbers[index]:
-            return (
-                f"{names[index]}: {recorded.numbers[index]!r} recorded, {now.numbers[index]!r} now"
-            )
+        before, after = repr(recorded.numbers[index]), repr(now.numbers[index])
+        if before != after:  # as text: NaN equals NaN
+            return f"{names[index]}: {before} recorded, {after} now"
     return ""

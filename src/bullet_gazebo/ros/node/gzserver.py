@@ -144,7 +144,7 @@ class GazeboNode:
         self.sim = Simulator(World(engine), lockstep=args.lockstep)
         self.journal: WorldJournal | None = None
         self._output: JournalOutput | None = None
-        self.series = 0  # of the handles of prepared steps
+        self.steps: StepService | None = None  # in lock-step
         if args.lockstep:
             self.journal = WorldJournal(self.sim)
             record_services(self.journal)
@@ -192,14 +192,13 @@ class GazeboNode:
         if self.journal is not None:
             one_at_a_time = threading.Lock()
             common = self.sim, plugins.sensing, self._watchdog, one_at_a_time
-            steps = StepService(*common)
+            self.steps = steps = StepService(*common)
             stepping = [
                 steps,
                 SnapshotServices(self.sim, steps, one_at_a_time),
                 AdvanceService(*common, thinner, self.journal),
             ]
             self._output = JournalOutput(self.journal, _journal_bag(args))
-            self.series = steps.series
             self.journal.start(facts_of(args, steps.series))
         spawning = threading.Lock()
         with spawning:  # once a model is there, clients use all other services without a wait
@@ -212,7 +211,7 @@ class GazeboNode:
     def _end_journal(self) -> None:
         """Completes the journal's bag."""
         if self._output is not None:
-            self._output.close()
+            self._output.end_bag()
 
     def run(self, signals: SignalHandler, work: "Work | None" = None) -> int:
         """Simulates until the node is shut down, or the work is done; returns the exit code."""

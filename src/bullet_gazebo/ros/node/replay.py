@@ -1,24 +1,25 @@
 """Repeats a recorded run in this process's simulator, entry by entry, and compares (docs/replay.md)."""
 
 import json
+import threading
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, wait
 from types import SimpleNamespace
 from typing import Any
 
 import rosparam
 import rospy
 from bullet_gazebo_msgs.msg import JournalEntry
-from bullet_gazebo_msgs.srv import PreparedStep
 from gazebo_msgs.srv import SpawnModel
 from rospy.impl.registration import get_service_manager, get_topic_manager
 
-from bullet_gazebo.ros.journal.journal import LOOK
 from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal, first_difference
 from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.services.advance_service import reseed
 from bullet_gazebo.ros.services.step_requests import SLICE
-from bullet_gazebo.ros.services.step_service import COUNTED
 from bullet_gazebo.simulator import NANOSECONDS
+
+PATIENCE = 60.0  # [s of wall time] for an entry during which no time passes
 
 
 class Changes:
@@ -67,9 +68,9 @@ class Replay:
             changes: what is to be otherwise.
             until: stop after the entry with which that much time has passed [s].
         """
-        assert node.journal is not None
+        assert node.journal is not None and node.steps is not None
         self._sim, self._journal, self._control = node.sim, node.journal, node.control
-        self._handles = recorded.facts["series"], node.series
+        node.steps.series = recorded.facts["series"]  # so the handles are the recorded ones
         self._changes, self._until = changes, until
         self._entries: Iterator[JournalEntry] = recorded.entries()
         self._next: JournalEntry | None = next(self._entries, None)
@@ -77,6 +78,7 @@ class Replay:
         self._expected: dict[int, JournalEntry] = {}  # by number
         self._refusals: dict[int, str] = {}  # texts of requests that failed, by number
         self._done: list[JournalEntry] = []  # what the journal has of them, not compared yet
+        self._under_way: JournalEntry | None = None
         self.repeated = 0  # entries that were equal
         self.unknown = 0  # of them, those without a recorded state at the beginning
         self.difference = ""
@@ -85,9 +87,32 @@ class Replay:
     def run(self) -> None:
         """Repeats all; `difference` tells the first difference.
 
+        A handler of a user's may wait for what only a later entry does, and so for ever; a thread of its own
+        keeps it from holding up the caller.
+
         Raises:
             NoRecording: entries are missing in the bag.
         """
+        outcome: Future[None] = Future()
+
+        def carry_out() -> None:
+            try:
+                self._repeat_all()
+                outcome.set_result(None)
+            except BaseException as fault:  # noqa: BLE001 - raised again in the caller's thread
+                outcome.set_exception(fault)
+
+        threading.Thread(target=carry_out, name="replay", daemon=True).start()
+        seen: tuple[object, ...] = ()
+        while not wait([outcome], PATIENCE).done:
+            entry, before = self._under_way, seen
+            seen = id(entry), self._sim.elapsed
+            if entry is not None and seen == before:
+                self._differ(entry, f"{entry.name} was done, and now waits for what comes later")
+                return
+        outcome.result()
+
+    def _repeat_all(self) -> None:
         start = self._take()
         self._expected[start.number] = start
         done = self._done.extend
@@ -132,7 +157,7 @@ class Replay:
                 self._repeat(self._take())
 
     def _repeat(self, entry: JournalEntry) -> None:
-        self._expected[entry.number] = entry
+        self._expected[entry.number] = self._under_way = entry
         if entry.kind == JournalEntry.SERVICE:
             self._call(entry)
         elif entry.kind == JournalEntry.MESSAGE:
@@ -149,9 +174,7 @@ class Replay:
         request = service.protocol.recv_data_class().deserialize(entry.data)
         request._connection_header = {"callerid": entry.caller}
         self._changes.set_parameters(entry, request)
-        if entry.type == PreparedStep._type:
-            request.handle = self._handle(request.handle)
-        elif entry.type == SpawnModel._type:
+        if entry.type == SpawnModel._type:
             request.model_xml = self._changes.models.get(request.model_name, request.model_xml)
         try:
             answer = service.handler(request)
@@ -159,12 +182,6 @@ class Replay:
                 self._refusals[entry.number] = getattr(answer, "status_message", "")
         except Exception as fault:  # noqa: BLE001 - a user's service may raise anything, as recorded or not
             self._refusals[entry.number] = str(fault)
-
-    def _handle(self, recorded: int) -> int:
-        """Returns the handle that stands for what the recorded one stood for; 0 is none."""
-        before, now = self._handles
-        series, count = divmod(recorded, 2**COUNTED)
-        return now << COUNTED | count if series == before else 0
 
     def _deliver(self, entry: JournalEntry) -> None:
         subscription: Any = get_topic_manager().get_subscriber_impl(entry.name)
@@ -174,11 +191,12 @@ class Replay:
         self._changes.set_parameters(entry)
         header = {"callerid": entry.caller, "topic": entry.name, "type": entry.type}
         publisher = SimpleNamespace(callerid_pub=entry.caller, header=header, stat_bytes=0)
+        before = subscription.connections
         subscription.connections = [publisher] * entry.publishers  # controllers count them
         message = subscription.data_class().deserialize(entry.data)
         message._connection_header = header
         subscription.receive_callback([message], publisher)
-        subscription.connections = []
+        subscription.connections = before
 
     def _differ(self, entry: JournalEntry, text: str) -> None:
         self.difference = self.difference or f"at {entry.elapsed / NANOSECONDS:g} s {text}"
@@ -190,9 +208,6 @@ class Replay:
         elif name == "reseed":
             with self._journal.command(name, count):
                 reseed(self._sim, count)
-        elif name == LOOK:
-            with self._journal.command(name):
-                pass
         else:
             self._control.answer(name, *([count] if name == "step" else []))
 

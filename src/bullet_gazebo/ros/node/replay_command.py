@@ -18,7 +18,7 @@ from rosmaster.master import Master
 from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal
 from bullet_gazebo.ros.node import gzserver
 from bullet_gazebo.ros.node.replay import Changes, Replay
-from bullet_gazebo.ros.node.start import arguments_of, versions
+from bullet_gazebo.ros.node.start import HASHES, arguments_of, versions
 from file_access.expansion import CannotExpand, expand
 
 UNUSABLE = 2
@@ -40,6 +40,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         ]
     except (NoRecording, CannotExpand, rosparam.RosParamException, OSError) as fault:
         return _tell(str(fault), UNUSABLE)
+    hashes = recorded.facts["hashes"]
+    if hashes not in (None, os.environ.get(HASHES)):
+        os.environ[HASHES] = hashes  # Python reads it at its start: run it again
+        os.execv(sys.executable, [sys.executable, *sys.argv])
     master = Master(0)
     os.environ["ROS_IP"] = LOOPBACK
     os.environ.pop("ROS_HOSTNAME", None)

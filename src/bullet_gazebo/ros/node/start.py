@@ -2,6 +2,7 @@
 
 import argparse
 import importlib.metadata
+import os
 import platform
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from bullet_gazebo.ros.services.spawn_services import find_world
 from file_access.content import FileError, read_file
 from file_access.xml_text import decode
 
+HASHES = "PYTHONHASHSEED"  # decides the order of sets
 ENGINES = ("pybullet", "mujoco", "numpy")  # packages whose versions may decide the bits
 
 
@@ -29,6 +31,7 @@ def facts_of(args: argparse.Namespace, series: int) -> dict[str, Any]:
         "physics": args.physics,
         "paused": args.paused,
         "seed": args.seed,
+        "hashes": os.environ.get(HASHES),
         "world": str(path or args.world),
         "world_text": text,
         "series": series,

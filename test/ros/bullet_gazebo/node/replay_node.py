@@ -16,6 +16,7 @@ import rosbag
 import rospkg
 import rostest
 
+from bullet_gazebo.ros.clients.gz import RemoteWorld
 from ros_calls.waiting import wait_until
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils.simulation import Simulation, reserved_port
@@ -204,6 +205,58 @@ class ReplayTest(unittest.TestCase):
             client.step(8)
         recorder.communicate(timeout=BOUND)
         self.assertRegex(self.check_equal(at_least=103), "no states were recorded with the first")
+
+    def test_gains_that_a_reconfigure_has_changed_and_a_script_loads_again(self):
+        with self.simulation() as simulation:
+            recorder = self.record(simulation)
+            add_cartpole()
+            client = StepClient()
+            for gain in (3.0, 5.0):
+                ros_controllers.load_controller_srv(CART, ns="/cartpole")
+                subprocess.run(
+                    ["rosservice", "call", f"/cartpole/{CART}/pid/set_parameters",
+                     f"config: {{doubles: [{{name: p, value: {gain}}}]}}"],
+                    env=simulation.environment(), check=True, capture_output=True, timeout=BOUND,
+                )  # fmt: skip
+                client.step(8)
+                ros_controllers.unload_controller_srv(CART, ns="/cartpole")
+                assert ros_params.ros_load_yaml_from_pkg(
+                    "cartpole_controller", "joint_position_control.yaml", ns="/cartpole"
+                )
+            ros_controllers.spawn_controllers_srv([STATES, CART], ns="/cartpole")
+            client.step(100, {f"/cartpole/{CART}": 0.3})
+        recorder.communicate(timeout=BOUND)
+        self.check_equal(at_least=10)
+
+    def test_a_snapshot_taken_and_restored(self):
+        """Time goes back, and so may be recorded twice."""
+        with self.simulation() as simulation:
+            recorder = self.record(simulation)
+            add_cartpole()
+            client = StepClient()
+            client.step(8)
+            environment = simulation.environment()
+            for request in ("save", "restore", "restore"):
+                subprocess.run(
+                    ["rosservice", "call", f"/gazebo/{request}_state", "name: here"],
+                    env=environment, check=True, capture_output=True, timeout=BOUND,
+                )  # fmt: skip
+                client.step(1200)
+        recorder.communicate(timeout=BOUND)
+        self.assertIn(" 3.608 s", self.check_equal(at_least=8))
+
+    def test_a_simulator_that_goes_on_behind_the_end_of_its_bag(self):
+        """As behind `lockstep.py --record`, if the script leaves its simulator running."""
+        first = self.folder / "first.bag"
+        with self.simulation(extra_gazebo_args=f"--journal {first}") as simulation:
+            StepClient().step(8)
+            RemoteWorld("/gazebo", simulation.master_uri).command("end_journal")
+            recorder = self.record(simulation)
+            StepClient().step(8)
+        recorder.communicate(timeout=BOUND)
+        self.assertIn(" 0.016 s", self.check_equal(at_least=3))
+        self.bag = first
+        self.assertIn(" 0.008 s", self.check_equal(at_least=2))
 
     def test_measurements_of_a_noisy_sensor(self):
         with self.simulation(extra_gazebo_args="--seed 7") as simulation:

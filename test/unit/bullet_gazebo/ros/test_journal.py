@@ -1,21 +1,27 @@
 """The journal's order, bound and contents, bags that can't be replayed, and how differences are told."""
 
+import errno
 import json
+import math
+import os
 import threading
 from types import SimpleNamespace
 
 import pytest
 import rosbag
+import rospy
 from bullet_gazebo_msgs.msg import Journal as JournalMessage
 from bullet_gazebo_msgs.msg import JournalEntry
 from genpy import Time
 from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
 
 from bullet_gazebo.pictures.recording import RecordingError
+from bullet_gazebo.ros.journal import journal_output
 from bullet_gazebo.ros.journal.journal import Entry, WorldJournal
 from bullet_gazebo.ros.journal.journal_output import JournalBag
 from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal, first_difference
-from bullet_gazebo.ros.node import replay_command
+from bullet_gazebo.ros.node import replay, replay_command
 from bullet_gazebo.ros.node.start import arguments_of
 from bullet_gazebo.timing import FairLock, Holds
 
@@ -101,12 +107,14 @@ def test_nothing_takes_effect_while_a_model_comes(sim, journal):
     assert found == [("", 0), ("spawn", 0), ("place", MS)] and not over.is_set()
 
 
-def test_parameters_are_recorded_where_they_have_changed(journal):
-    for value in ([1], [1], [2], []):
+def test_each_entry_has_the_parameters_that_it_read(journal):
+    """What a handler writes itself, it writes in a replay too: the first value counts."""
+    for values in ([[1], [3]], [[1]], [[]]):
         with journal.command("read"):
-            journal.note_parameter("/p", value)
-    read = [each.parameters and json.loads(each.parameters) for each in entries(journal)[1:]]
-    assert read == [{"/p": [1]}, "", {"/p": [2]}, {"/p": []}]
+            for value in values:
+                journal.note_parameter("/p", value)
+    read = [json.loads(each.parameters) for each in entries(journal)[1:]]
+    assert read == [{"/p": [1]}, {"/p": [1]}, {"/p": []}]
 
 
 def test_beyond_its_bound_nothing_is_kept(sim):
@@ -215,6 +223,7 @@ def moving(joint=0.0, velocity=0.0, model=MODEL, **fields):
         (moving(), "", ""),
         (moving(joint=0.5), "", "at 1.234 s joint elbow of arm: 0.0 recorded, 0.5 now"),
         (moving(0.5, 0.5, (1.0,) * 13), "", "joint elbow of arm"),
+        (moving(velocity=math.nan), "", "velocity of joint elbow of arm: 0.0 recorded, nan now"),
         (moving(velocity=0.5), "", "velocity of joint elbow of arm: 0.0 recorded, 0.5 now"),
         (moving(model=(0.0, 0.1, *MODEL[2:])), "", "position y of model arm: 0.0 recorded, 0.1 now"),
         (moving(joint=0.5, answer=4), "no such\nmodel", "answered otherwise than now: no such model"),
@@ -231,6 +240,11 @@ def test_the_first_difference_is_named(now, refusal, said):
     assert said in found and bool(said) == bool(found)
 
 
+def test_a_state_that_is_no_number_equals_itself():
+    recorded, now = (moving(joint=float("nan"), velocity=-0.0) for _ in range(2))
+    assert first_difference(recorded, now, "") == ""
+
+
 def test_a_bag_has_states_for_other_tools_and_time_never_goes_back(tmp_path):
     path = tmp_path / "run.bag"
     path.write_bytes(b"an older one")
@@ -245,9 +259,80 @@ def test_a_bag_has_states_for_other_tools_and_time_never_goes_back(tmp_path):
     assert [time.to_nsec() for _, _, time in read] == [5 * MS + 1, 6 * MS + 1]
 
 
+def test_simulators_at_one_time_write_bags_of_their_own(tmp_path):
+    bags = [JournalBag(tmp_path / "run.bag") for _ in range(2)]
+    for bag in bags:
+        bag.write([moving()])
+    for bag in bags:
+        bag.close()
+    for name in ("run.bag", "run_2.bag"):
+        assert rosbag.Bag(str(tmp_path / name)).get_message_count("/gazebo/journal") == 1
+
+
+def test_a_full_disk_ends_the_bag_and_not_the_journal(journal, tmp_path, monkeypatch, caplog):
+    sent = []
+    publisher = SimpleNamespace(publish=lambda message: sent.extend(message.entries))
+    monkeypatch.setattr(rospy, "Publisher", lambda *_, **__: publisher)
+    monkeypatch.setattr(journal_output, "wait_until_sent", lambda _: None)
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(JournalBag, "write", full)
+    output = journal_output.JournalOutput(journal, tmp_path / "run.bag")
+    for name in ("first", "second"):
+        with journal.command(name):
+            pass
+        output.end_bag()
+    output.close()
+    assert [each.name for each in sent] == ["first", "second"]
+    assert not (tmp_path / "run.bag").exists()
+
+
 def test_a_bag_in_no_folder_is_refused(tmp_path):
     with pytest.raises(RecordingError, match="No such file"):
         JournalBag(tmp_path / "none" / "run.bag")
+
+
+def test_a_handler_that_waits_for_what_comes_later_ends_the_replay(
+    sim, journal, monkeypatch, tmp_path
+):
+    """It was served beside others in the recorded run; a replay serves one after the other."""
+    later = threading.Event()
+    call = entry(1, kind=JournalEntry.SERVICE, name="/hand/close", type=Trigger._type)
+    call.md5sum, call.data = Trigger._md5sum, b""
+    path = written(tmp_path / "run.bag", entry(0, **START), call)
+    service = SimpleNamespace(
+        service_class=Trigger,
+        protocol=SimpleNamespace(recv_data_class=Trigger._request_class),
+        handler=lambda _: later.wait(60.0),
+    )
+    monkeypatch.setattr(
+        replay, "get_service_manager", lambda: SimpleNamespace(get_service=lambda _: service)
+    )
+    monkeypatch.setattr(replay, "PATIENCE", 0.05)
+    node = SimpleNamespace(sim=sim, journal=journal, control=None, steps=SimpleNamespace(series=0))
+    repeated = replay.Replay(RecordedJournal(path), node, replay.Changes({}, ()), 9.0)
+    repeated.run()
+    later.set()
+    assert "/hand/close was done, and now waits" in repeated.difference
+
+
+def test_a_replay_has_the_hashes_of_the_recorded_run(tmp_path, monkeypatch):
+    """They decide the order of sets, as in users' plugins, and Python takes them at its start."""
+    facts = json.dumps({"hashes": "7"}).encode()
+    path = written(tmp_path / "run.bag", entry(0, data=facts), entry(1))
+    started = []
+
+    def start_again(*_):
+        started.append(os.environ["PYTHONHASHSEED"])
+        raise SystemExit
+
+    monkeypatch.setenv("PYTHONHASHSEED", "0")
+    monkeypatch.setattr(os, "execv", start_again)
+    with pytest.raises(SystemExit):
+        replay_command.main([str(path)])
+    assert started == ["7"]
 
 
 def test_a_world_file_that_has_gone_is_written_again(tmp_path):
