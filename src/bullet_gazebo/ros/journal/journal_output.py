@@ -2,6 +2,7 @@
 
 import os
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ MOST_WAITING = 100_000  # entries that the bag is behind, before the world waits
 STOP_TIMEOUT = 10.0  # [s] to write what is left
 MOTION = 13  # numbers of a model: JournalEntry.msg
 TOPIC = "/gazebo/journal"
+FLUSH = 1.0  # [s] of wall time; what `rosbag reindex` can't find if the simulator is killed
 ACTIVE = ".active"  # the suffix of a bag that is being written, as rosbag's
 
 Publish = Callable[[Any], None]
@@ -154,6 +156,7 @@ class JournalBag:
         except OSError as fault:
             raise RecordingError(f"{self._open}: {fault.strerror}") from fault
         self._before: list[float] = []
+        self._flushed = time.monotonic()
 
     def write(self, entries: Entries) -> None:
         """Appends entries."""
@@ -162,6 +165,9 @@ class JournalBag:
             if entry.observed and entry.numbers != self._before:
                 self._before = entry.numbers
                 self._add_state(entry)
+        if time.monotonic() - self._flushed > FLUSH:  # rosbag keeps up to 768 kB to itself
+            self._flushed = time.monotonic()
+            self._bag.flush()
 
     def _add(self, topic: str, message: Any, entry: JournalEntry) -> None:
         self._bag.write(topic, message, to_time(entry.ended + 1))  # 0 is no time to ROS

@@ -2,11 +2,14 @@
 
 import json
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from bullet_gazebo_msgs.msg import Journal, JournalEntry
+from gazebo_msgs.srv import SpawnModel
+
+from file_access.text import did_you_mean
 
 MOTION = [
     *(f"position {axis}" for axis in "xyz"),
@@ -53,6 +56,37 @@ class RecordedJournal:
                 if entry.number == expected:
                     expected += 1
                     yield entry
+
+    def check_changes(self, models: Iterable[str], parameters: Iterable[Mapping[str, Any]]) -> None:
+        """Checks that changes change something: a misspelt name would leave all as it was.
+
+        Args:
+            models: names of those that are to be spawned from other files.
+            parameters: for each file, its values by full name.
+
+        Raises:
+            NoRecording: if no such model was spawned, or none of a file's parameters was read.
+        """
+        spawned, read = set(), set()
+        for entry in self.entries():
+            if entry.type == SpawnModel._type:
+                spawned.add(SpawnModel._request_class().deserialize(entry.data).model_name)
+            read |= json.loads(entry.parameters or "{}").keys()
+        for name in models:
+            if name not in spawned:
+                near = did_you_mean(name, spawned) or f"; there were {', '.join(spawned) or 'none'}"
+                raise NoRecording(f"{self._path}: no model '{name}' was spawned{near}")
+        for values in parameters:
+            if not any(_overlap(name, other) for name in values for other in read):
+                first = next(iter(values), "/")
+                near = did_you_mean(first, read)
+                raise NoRecording(f"{self._path}: nothing has read the parameter {first}{near}")
+
+
+def _overlap(name: str, other: str) -> bool:
+    """Returns whether one of two parameters is the other one, or in it."""
+    name, other = f"{name.rstrip('/')}/", f"{other.rstrip('/')}/"
+    return name.startswith(other) or other.startswith(name)
 
 
 def _missing(expected: int) -> str:

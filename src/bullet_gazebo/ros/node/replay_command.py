@@ -10,6 +10,7 @@ import tempfile
 import threading
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import rosparam
 import rospy
@@ -38,6 +39,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         parameters = [
             each for name, path in args.params for each in rosparam.load_file(str(path), name)
         ]
+        if models or parameters:
+            recorded.check_changes(models, [_named(*each) for each in parameters])
     except (NoRecording, CannotExpand, rosparam.RosParamException, OSError) as fault:
         return _tell(str(fault), UNUSABLE)
     hashes = recorded.facts["hashes"]
@@ -105,7 +108,7 @@ def _replay(
             replay.run()
         except NoRecording as fault:
             return _tell(str(fault), UNUSABLE)
-        code = _judge(args.bag, recorded, replay)
+        code = _judge(args.bag, recorded, replay, args.until)
         if args.gui and not over.is_set():
             with gzserver.window([]):
                 over.wait()
@@ -116,7 +119,12 @@ def _replay(
     return gzserver.main(["gzserver", *arguments_of(recorded.facts, folder)], work)
 
 
-def _judge(bag: Path, recorded: RecordedJournal, replay: Replay) -> int:
+def _named(values: dict[str, Any], namespace: str) -> dict[str, Any]:
+    """Returns parameters by their full names."""
+    return {rospy.names.ns_join(namespace, name): value for name, value in values.items()}
+
+
+def _judge(bag: Path, recorded: RecordedJournal, replay: Replay, until: float) -> int:
     """Says how the replay ended; returns the exit code."""
     if replay.difference:
         before, now = recorded.facts["versions"], versions()
@@ -125,6 +133,8 @@ def _judge(bag: Path, recorded: RecordedJournal, replay: Replay) -> int:
         return _tell(f"{bag}: first difference: {replay.difference}{with_others}", 1)
     if replay.was_interrupted:
         return gzserver.INTERRUPTED
+    if not replay.seconds and until:
+        return _tell(f"{bag}: no time passes in it, so there is nothing to compare", UNUSABLE)
     text = f"{bag}: equal to the bit: {replay.repeated} entries, {replay.seconds:g} s"
     if replay.unknown:
         text += f"; no states were recorded with the first {replay.unknown} of them"

@@ -1,6 +1,7 @@
 """The journal's order, bound and contents, bags that can't be replayed, and how differences are told."""
 
 import errno
+import io
 import json
 import math
 import os
@@ -12,6 +13,7 @@ import rosbag
 import rospy
 from bullet_gazebo_msgs.msg import Journal as JournalMessage
 from bullet_gazebo_msgs.msg import JournalEntry
+from gazebo_msgs.srv import SpawnModel, SpawnModelRequest
 from genpy import Time
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
@@ -203,6 +205,28 @@ def test_a_bag_that_cannot_be_replayed_is_refused_in_one_line(spoil, reason, tmp
     assert replay_command.main([str(path)]) == 2
     said = capsys.readouterr().err
     assert reason in said and said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("models", "parameters", "reason"),
+    [
+        (["amr"], [], "no model 'amr'.*did you mean 'arm'"),
+        ([], [{"/elbw/pid": {"p": 1.0}}], "/elbw/pid.*did you mean '/elbow'"),
+        ([], [{"/elbow/pid": {"p": 1.0}}, {"/other": 1}], "/other"),
+        (["arm"], [{"/unused": 1, "/elbow/pid": {"p": 1.0}}, {"/": {}}], ""),
+    ],
+)
+def test_changes_that_change_nothing_are_refused(models, parameters, reason, tmp_path):
+    request = io.BytesIO()
+    SpawnModelRequest(model_name="arm").serialize(request)
+    spawn = entry(1, type=SpawnModel._type, data=request.getvalue())
+    load = entry(2, parameters='{"/elbow": [{"pid": {"p": 2.0}}]}')
+    recorded = RecordedJournal(written(tmp_path / "run.bag", entry(0, **START), spawn, load))
+    if not reason:
+        recorded.check_changes(models, parameters)
+        return
+    with pytest.raises(NoRecording, match=reason):
+        recorded.check_changes(models, parameters)
 
 
 def moving(joint=0.0, velocity=0.0, model=MODEL, **fields):
