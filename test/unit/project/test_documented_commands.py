@@ -183,7 +183,8 @@ def test_lockstep_takes_it(command: Command, only_parsing: None) -> None:
 @pytest.mark.parametrize("command", GROUPS["replays"], ids=str)
 def test_a_replay_takes_it(command: Command, only_parsing: None) -> None:
     given = [word.partition("=")[2] for word in command.words if "=" in word]
-    assert all((ROOT / path).is_file() for path in given)
+    own = [path for path in given if PLACEHOLDERS.isdisjoint(Path(path).parts)]
+    assert all((ROOT / path).is_file() for path in own)
     with pytest.raises(Parsed):
         replay_command.main(command.words[3:])
 
