@@ -15,6 +15,7 @@ CHECKS=(bad good)
 CHECK_TITLE=([bad]="the bad one" [good]="the good one")
 check_bad() {{ echo wrong; return 3; }}
 check_good() {{ echo right; }}
+look_for_checks "$@"
 check "$@"
 """
 PASSED = "== 7 passed, 2 deselected in 1.50s =="

@@ -22,7 +22,7 @@ DANGEROUS = {
 # The launcher runs the script that its user names, as `python3 script.py` does.
 RUNS_A_SCRIPT = {("src/lockstep_runner/script.py", name) for name in ("compile", "exec")}
 # The process that draws a video reads what its own parent writes into their pipe.
-READS_ITS_PARENT = {("src/bullet_gazebo/pictures/recording.py", "pickle.load")}
+READS_ITS_PARENT = {("src/bullet_gazebo/pictures/films.py", "pickle.load")}
 MODEL = '<sdf version="1.6"><model name="m">{}</model></sdf>'
 INCLUDE = "<include><uri>{}</uri></include>"
 MESH = """<link name="l"><collision name="c"><geometry><mesh><uri>{}</uri></mesh></geometry></collision>

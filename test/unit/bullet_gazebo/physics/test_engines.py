@@ -94,9 +94,9 @@ def test_mujoco_stands_in_where_there_is_no_pybullet_and_says_so():
         "env = gymnasium.make('cartpole/Balance-v0'); env.reset(seed=0); print(len(env.step(0)[0]))"
     )
     answer = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
     )
-    assert answer.stdout.split() == ["MujocoEngine", "4"]
+    assert answer.stdout.split() == ["MujocoEngine", "4"], answer.stderr
     assert "There is no PyBullet for " in answer.stderr
 
 
