@@ -19,7 +19,7 @@ from ros_utils import ros_gazebo, ros_node
 from ros_utils._internal import roslaunch
 from ros_utils._internal.programs import Started
 from ros_utils.simulation import LOOPBACK, reserved_port
-from ros_utils.testing.ear import SIMULATOR, WorldError
+from ros_utils.testing.lockstep_subscriber import SIMULATOR, WorldError
 from ros_utils.testing.robot_world import RobotWorld
 from ros_utils.testing.world_bag import WorldBag
 

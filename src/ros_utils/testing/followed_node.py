@@ -14,7 +14,12 @@ from ros_calls.waiting import wait_until
 from ros_utils import ros_node
 from ros_utils._internal import nodes
 from ros_utils._internal.programs import Started
-from ros_utils.testing.ear import PATIENCE, SIMULATOR, Ear, WorldError
+from ros_utils.testing.lockstep_subscriber import (
+    PATIENCE,
+    SIMULATOR,
+    LockstepSubscriber,
+    WorldError,
+)
 
 CONNECTING = 30.0  # [s of wall time]
 
@@ -53,8 +58,9 @@ class FollowedNode:
             rospy.init_node("robot_test", anonymous=True, disable_signals=True)
         topic = f"{self.name}/commands"
         with contextlib.ExitStack() as ending:
-            self._ear = ending.enter_context(contextlib.closing(Ear(f"{self.name}_ear")))
-            self._ear.listen([hears])
+            subscriber = LockstepSubscriber(f"{self.name}_subscriber")
+            self._subscriber = ending.enter_context(contextlib.closing(subscriber))
+            self._subscriber.listen([hears])
             started = ros_node.ros_node_from_pkg(
                 package, executable, launch_new_term=False, name=name,
                 args=[*args, f"{commands}:={topic}"], timeout=CONNECTING,
@@ -80,7 +86,7 @@ class FollowedNode:
 
     def advance(self, ticks: int) -> int:
         """Lets at most `ticks` pass, until a followed node has to answer; returns how many have."""
-        passed, heard = self._ear.advance(ticks, [self._hears])
+        passed, heard = self._subscriber.advance(ticks, [self._hears])
         self._waiting += len(heard)
         return passed
 

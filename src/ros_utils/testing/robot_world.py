@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils._internal import packages, params
-from ros_utils.testing.ear import WorldError
+from ros_utils.testing.lockstep_subscriber import WorldError
 from ros_utils.testing.stepped_world import NANOSECONDS, SteppedWorld, Vector
 from ros_utils.testing.world_bag import WorldBag
 

@@ -9,8 +9,8 @@ from bullet_gazebo_msgs.srv import StepWorldRequest
 
 from ros_utils import ros_gazebo
 from ros_utils.step_client import PreparedSteps, StepAnswer, StepClient, StepNames
-from ros_utils.testing.ear import WorldError
 from ros_utils.testing.followed_node import FollowedNode
+from ros_utils.testing.lockstep_subscriber import WorldError
 from ros_utils.testing.world_bag import WorldBag
 
 NANOSECONDS = 1_000_000_000

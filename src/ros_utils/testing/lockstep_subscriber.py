@@ -21,7 +21,7 @@ class WorldError(Exception):
     """The test asks for something that can't be done; the text says what."""
 
 
-class Ear:
+class LockstepSubscriber:
     """A subscriber without a node of its own, in lock-step only; see AdvanceWorld.srv."""
 
     def __init__(self, name: str) -> None:
@@ -59,7 +59,7 @@ class Ear:
         return connection
 
     def advance(self, ticks: int, until: Sequence[str] = ()) -> tuple[int, list[TopicMessage]]:
-        """Lets at most `ticks` pass, until there is a message on a topic of `until`, for any ear.
+        """Lets at most `ticks` pass, until there is a message on a topic of `until` for any of its kind.
 
         Returns:
             How many have passed, and the messages since the last call.
