@@ -21,13 +21,12 @@ from ros_utils._internal.programs import Started
 from ros_utils.simulation import LOOPBACK, reserved_port
 from ros_utils.testing.lockstep_subscriber import SIMULATOR, WorldError
 from ros_utils.testing.robot_world import RobotWorld
-from ros_utils.testing.world_bag import WorldBag
 
 FAILURES = "ROS_TEST_FAILURES"  # environment variable: the folder of what failed tests leave
 STARTING = 120.0  # [s of wall time]
 DRAWING = 120.0  # [s of wall time] to complete a recording
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")  # of an object
-FILES = ("world.png", "world.html")
+FILMS, BAG = ("world.png", "world.html"), "world.bag"
 
 
 def failure_folder(test: str) -> Path:
@@ -88,7 +87,6 @@ class Bench:
         if seed < 1:
             raise WorldError(f"the seed is {seed}: 1 or more is needed")
         with contextlib.ExitStack() as ending:
-            bag = None
             if recorded is None:
                 if self._simulator is None or not self._simulator.running:
                     self._simulator = self._launch()
@@ -97,21 +95,22 @@ class Bench:
                 ending.callback(self._end_simulator)
                 self._simulator = self._launch(recorded)
                 ending.callback(_await_recordings, recorded)
-                bag = ending.enter_context(contextlib.closing(WorldBag(recorded / "world.bag")))
             before = _parameters()
             ending.callback(_forget_parameters, before)
             _set_physics(self._physics)
-            world = RobotWorld(seed, bag)
+            world = RobotWorld(seed)
             ending.callback(world.close)
             yield world
 
     def _launch(self, recorded: Path | None = None) -> Started:
-        films = [] if recorded is None else [recorded / name for name in FILES]
-        log = None if recorded is None else str(recorded / "simulator.log")
+        log, more = None, ""
+        if recorded is not None:
+            log, more = str(recorded / "simulator.log"), f"--journal '{recorded / BAG}'"
+            more += "".join(f" --video '{recorded / name}'" for name in FILMS)
         started = ros_gazebo.launch_Gazebo(
             gui=False, launch_new_term=False, lockstep=True, server_required=True, timeout=STARTING,
             output="screen" if log else "log", log_file=log,
-            extra_gazebo_args=" ".join(f"--video '{film}'" for film in films),
+            extra_gazebo_args=more,
         )  # fmt: skip
         if not isinstance(started, Started):
             raise WorldError(f"no simulator at {master.uri()}; the log says why")
@@ -150,12 +149,12 @@ def _forget_parameters(before: set[str]) -> None:
 
 
 def _await_recordings(folder: Path) -> None:
-    """Ends the simulator, and waits until the other processes have drawn what they have received."""
+    """Ends the simulator, and waits until it has completed the bag, and other processes their drawings."""
     ros_node.ros_kill_node(SIMULATOR)
-    log, lines = folder / "simulator.log", [f"recording: {folder / name}:" for name in FILES]
+    log, lines = folder / "simulator.log", [f"recording: {folder / name}:" for name in FILMS]
 
     def look() -> bool:
         text = log.read_text(encoding="utf-8", errors="replace")
-        return all(line in text for line in lines)
+        return all(line in text for line in lines) and (folder / BAG).exists()
 
     wait_until(look, DRAWING, "recordings")

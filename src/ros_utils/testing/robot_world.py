@@ -14,7 +14,6 @@ from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils._internal import packages, params
 from ros_utils.testing.lockstep_subscriber import WorldError
 from ros_utils.testing.stepped_world import NANOSECONDS, SteppedWorld, Vector
-from ros_utils.testing.world_bag import WorldBag
 
 PACKAGE = "package://"
 DESCRIPTION = "robot_description"  # parameter
@@ -31,9 +30,9 @@ class RobotWorld(SteppedWorld):
     stay so (`stays` [s]).
     """
 
-    def __init__(self, seed: int, bag: WorldBag | None = None) -> None:
+    def __init__(self, seed: int) -> None:
         """See the base class."""
-        super().__init__(seed, bag)
+        super().__init__(seed)
         self._prismatic: set[str] = set()  # joints
 
     def spawn(
@@ -88,8 +87,6 @@ class RobotWorld(SteppedWorld):
         if joints:
             positions = list(joints.values())
             self._client.send(StepWorldRequest(joints=list(joints), positions=positions))
-        if self._bag is not None:
-            self._bag.look()
         self._state = self._step(0)
 
     def assert_joint(

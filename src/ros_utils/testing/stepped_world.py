@@ -11,7 +11,6 @@ from ros_utils import ros_gazebo
 from ros_utils.step_client import PreparedSteps, StepAnswer, StepClient, StepNames
 from ros_utils.testing.followed_node import FollowedNode
 from ros_utils.testing.lockstep_subscriber import WorldError
-from ros_utils.testing.world_bag import WorldBag
 
 NANOSECONDS = 1_000_000_000
 MOTION = 13  # numbers per link: position, orientation, velocities
@@ -30,14 +29,13 @@ class RepeatedCommand:
 class SteppedWorld:
     """A simulated world in lock-step, which is emptied when this object is made."""
 
-    def __init__(self, seed: int, bag: WorldBag | None = None) -> None:
+    def __init__(self, seed: int) -> None:
         """Empties the world, at time 0.
 
         Args:
             seed: of the sensors' noise; at least 1.
-            bag: records what is published.
         """
-        self.seed, self._bag = seed, bag
+        self.seed = seed
         self._steps, self._client = PreparedSteps(), StepClient()
         self._commands: dict[str, Sequence[float]] = {}  # for the next step
         self._repeated: dict[str, RepeatedCommand] = {}
@@ -49,8 +47,6 @@ class SteppedWorld:
             if name != "ground_plane":
                 ros_gazebo.gazebo_delete_model(name)
         self._client.send(StepWorldRequest(reset=StepWorldRequest.SIMULATION, seed=seed))
-        if bag is not None:
-            bag.look()
         self._period = round(ros_gazebo.gazebo_get_time_step() * NANOSECONDS)  # [ns]
         self._state = self._step(0)
 
@@ -119,7 +115,6 @@ class SteppedWorld:
         answer = None
         while ticks:
             passed = min([ticks, *(each.left for each in self._repeated.values())])
-            passed = passed if self._bag is None else 1
             if self._nodes and not self._commands:
                 answer, passed = None, self._nodes[0].advance(passed)
             else:
@@ -134,9 +129,6 @@ class SteppedWorld:
             for node in self._nodes:
                 if values := node.answer():
                     self._commands[node.controller] = values
-            if self._bag is not None:
-                answer = answer or self._prepared_step(0)
-                self._bag.take(answer.now)
         return answer or self._prepared_step(0)
 
     def _prepared_step(self, ticks: int) -> StepAnswer:
