@@ -117,24 +117,24 @@ class HeldState:
 
 
 def _place(each: Any, seen: Collection[Any]) -> str:
-    """Returns where an object is: Class.attribute of the nearest object that has it, in containers or not."""
-    while True:
-        for holder in seen:
-            names = getattr(holder, "__dict__", {})
-            if name := next((name for name, value in names.items() if value is each), None):
+    """Returns where an object is: Class.attribute of what has it, in containers or not."""
+    holders = [one for one in seen if hasattr(one, "__dict__")]
+    containers = [one for one in seen if isinstance(one, (dict, list, tuple, deque))]
+    inner: Any = each
+    while inner is not None:
+        for holder in holders:
+            names = (name for name, value in vars(holder).items() if value is inner)
+            if name := next(names, None):
                 return f"{type(holder).__qualname__}.{name}"
-        inner = each
-        each = next((one for one in seen if _contains(one, each)), None)
-        if each is None:
-            return type(inner).__qualname__
+        around = next((one for one in containers if _contains(one, inner)), None)
+        containers = [one for one in containers if one is not around]  # circles end
+        inner = around
+    return type(each).__qualname__
 
 
 def _contains(container: Any, each: Any) -> bool:
-    if isinstance(container, dict):
-        container = container.values()
-    elif not isinstance(container, (list, tuple, deque)):
-        return False
-    return any(one is each for one in container)
+    items = container.values() if isinstance(container, dict) else container
+    return any(one is each for one in items)
 
 
 def _nowhere(state: HeldState, each: Any) -> Iterable[Any]:

@@ -209,6 +209,14 @@ def test_what_cannot_be_read_is_named_with_its_holder():
             HeldState([Part(inner=Part(item=odd))])
 
 
+def test_in_a_circle_of_lists_it_is_named_by_its_type():
+    first, second = [], [(each for each in "abc")]
+    first.append(second)
+    second.append(first)
+    with pytest.raises(UnknownState, match="generator"):
+        HeldState([first])
+
+
 def test_subclasses_of_containers_count_wholly():
     names = OrderedDict(a=1, b=2)
     counts = Counter("aab")
