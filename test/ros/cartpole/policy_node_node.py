@@ -173,9 +173,12 @@ class PolicyNode(unittest.TestCase):
         node.wait_for(AGAIN, BOUND)
         self.assertTrue(ros_controllers.stop_controllers_srv([CONTROLLER]))
         node.wait_for(f"'/{CONTROLLER}' is stopped, not running", BOUND)
-        before = node.output.count(AGAIN)
+        before, deadline = node.output.count(AGAIN), time.monotonic() + BOUND
         self.assertTrue(ros_controllers.start_controllers_srv([CONTROLLER]))
-        self.put(PUSHED)
+        while node.output.count(AGAIN) == before and time.monotonic() < deadline:
+            self.put(
+                PUSHED
+            )  # again, as the pole falls until the node knows that the controller runs
         self.eventually("continuing", lambda: node.output.count(AGAIN) > before)
         with self.news:
             self.assertTrue(all(abs(each) <= 0.5 for each in self.commands))
