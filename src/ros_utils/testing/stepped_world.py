@@ -1,12 +1,12 @@
 """A world whose time passes on request: its commands and its readings."""
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from bullet_gazebo_msgs.srv import StepWorldRequest
 
+from file_access.text import did_you_mean
 from ros_utils import ros_gazebo
 from ros_utils.step_client import PreparedSteps, StepAnswer, StepClient, StepNames
 from ros_utils.testing.followed_node import FollowedNode
@@ -151,7 +151,8 @@ class SteppedWorld:
         """Returns the position of a joint with a transmission [rad, m]."""
         joints = list(self._state.joints)
         if name not in joints:
-            raise WorldError(f"there is no joint '{name}' with a transmission{_near(name, joints)}")
+            near = did_you_mean(name, joints) or f"; there are: {', '.join(joints) or 'none'}"
+            raise WorldError(f"there is no joint '{name}' with a transmission{near}")
         return float(self._state.numbers[joints.index(name)])
 
     def link(self, name: str, frame: str = "") -> Vector:
@@ -189,10 +190,3 @@ class SteppedWorld:
             each.name: np.frombuffer(bytes(each.data), each.type).reshape(each.shape)
             for each in reading.values
         }
-
-
-def _near(name: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(name, known, 1)
-    return (
-        f" (did you mean '{near[0]}'?)" if near else f" (there are: {', '.join(known) or 'none'})"
-    )

@@ -86,11 +86,14 @@ def record_messages(journal: WorldJournal) -> None:
         subscription: _SubscriberImpl, messages: list[genpy.Message], connection: Any
     ) -> None:
         kind, caller = subscription.data_class, connection.callerid_pub
+        if caller == rospy.get_name():  # what a plugin tells another one follows from other entries
+            receive(subscription, messages, connection)
+            return
         for message in messages:
             entry = Entry(JournalEntry.MESSAGE, subscription.resolved_name, _bytes(message), caller)
             entry.type, entry.md5sum = kind._type, kind._md5sum
             entry.publishers = subscription.get_num_connections()
-            is_first = caller != rospy.get_name() and journal.begin(entry)
+            is_first = journal.begin(entry)
             try:
                 receive(subscription, [message], connection)
             finally:
