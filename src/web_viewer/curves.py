@@ -1,10 +1,10 @@
 """The curves of a training on a page: charts with a bounded number of points over a table that grows."""
 
 import math
+from array import array
 from collections import deque
 from html import escape
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import viser
@@ -166,73 +166,43 @@ def _title(tag: str, values: np.ndarray) -> tuple[str, float]:
     return title if len(title) <= MOST_LETTERS else f"{title[:half]}…{title[-half:]}", 10.0**power
 
 
-class _Bucket(NamedTuple):
-    """Consecutive values as one: their ends, their extremes in order, the moving average at the end."""
-
-    begin: float
-    end: float
-    first: float
-    last: float
-    average: float
-
-
 class Series:
     """Values over steps, with their moving average over the last WINDOW of them.
 
-    From 2 * MAX_BUCKETS values on, neighbours share a bucket, which is drawn by its least and its
-    greatest value. The average is that of the single values.
+    Beyond 2 * MAX_BUCKETS values, neighbours share a bucket, which is drawn by its least and its greatest
+    value. The average is that of the single values.
     """
 
     def __init__(self) -> None:
         self._recent: deque[float] = deque(maxlen=WINDOW)
-        self._closed: list[_Bucket] = []
-        self._size = 1  # values of a bucket
-        self._open: list[tuple[float, float]] = []  # x and value, in the bucket that isn't full
-        self.count = 0
+        self._rows = array("d")  # x, value and average, one after the other
+
+    @property
+    def count(self) -> int:
+        """The number of values."""
+        return len(self._rows) // 3
 
     def add(self, x: float, value: float) -> None:
         """Appends a value; x must not fall."""
-        self.count += 1
         self._recent.append(value)
-        self._open.append((x, value))
-        if len(self._open) == self._size:
-            self._closed.append(self._bucket())
-            self._open = []
-            if len(self._closed) == 2 * MAX_BUCKETS:
-                pairs = zip(self._closed[::2], self._closed[1::2], strict=True)
-                self._closed = [_join(first, second) for first, second in pairs]
-                self._size *= 2
+        self._rows.extend((x, value, self.average))
 
     @property
     def average(self) -> float:
         """The moving average at the end."""
         return sum(self._recent) / len(self._recent)
 
-    def _bucket(self) -> _Bucket:
-        first, last = _extremes([value for _, value in self._open])
-        return _Bucket(self._open[0][0], self._open[-1][0], first, last, self.average)
-
     def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns x, values and averages, each (N,) with N of at most 4 * MAX_BUCKETS."""
-        buckets = [*self._closed, *([self._bucket()] if self._open else [])]
-        if self._size == 1:
-            rows = [(each.end, each.last, each.average) for each in buckets]
-        else:
-            rows = []
-            before = buckets[0].average
-            for each in buckets:
-                rows += [(each.begin, each.first, before), (each.end, each.last, each.average)]
-                before = each.average
-        table = np.array(rows, dtype=np.float64).reshape(-1, 3)
-        return table[:, 0].copy(), table[:, 1].copy(), table[:, 2].copy()
+        """Returns x, values and averages, each (N,) with N of at most 2 * MAX_BUCKETS."""
+        table = np.array(self._rows).reshape(-1, 3)
+        if len(table) > 2 * MAX_BUCKETS:
+            table = np.concatenate([_ends(each) for each in np.array_split(table, MAX_BUCKETS)])
+        x, values, averages = table.T.copy()
+        return x, values, averages
 
 
-def _join(one: _Bucket, following: _Bucket) -> _Bucket:
-    first, last = _extremes([one.first, one.last, following.first, following.last])
-    return _Bucket(one.begin, following.end, first, last, following.average)
-
-
-def _extremes(values: list[float]) -> tuple[float, float]:
-    """Returns the least and the greatest value, in the order in which they came."""
-    low, high = min(values), max(values)
-    return (low, high) if values.index(low) <= values.index(high) else (high, low)
+def _ends(bucket: np.ndarray) -> np.ndarray:
+    """Returns the first and the last row (2, 3), with the extreme values in the order in which they came."""
+    ends = bucket[[0, -1]]
+    ends[:, 1] = bucket[sorted((bucket[:, 1].argmin(), bucket[:, 1].argmax())), 1]
+    return ends

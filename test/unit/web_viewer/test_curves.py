@@ -31,7 +31,7 @@ def test_long_ones_keep_their_extremes_and_their_end(count):
     values = [draw.gauss(100, 10) for _ in range(count)]
     values[count // 3], values[-2] = 1e4, -1e4
     x, each, average = filled(values).arrays()
-    assert len(x) == len(each) == len(average) <= 4 * MAX_BUCKETS
+    assert len(x) == len(each) == len(average) <= 2 * MAX_BUCKETS
     assert x[0] == 0
     assert x[-1] == count - 1
     assert (np.diff(x) >= 0).all()
