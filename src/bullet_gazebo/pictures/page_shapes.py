@@ -174,21 +174,8 @@ def _ball() -> Geometry:
 @cache
 def _cylinder() -> Geometry:
     """Returns a cylinder along z, radius and length 1 m. Its flat ends have vertices of their own."""
-    angles = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
-    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    low, high = (np.column_stack([circle, np.full(SIDES, z)]) for z in (-0.5, 0.5))
-    here = np.arange(SIDES)
-    following = np.roll(here, -1)
-    vertices = np.concatenate([low, high, low, high, [(0.0, 0.0, -0.5), (0.0, 0.0, 0.5)]])
-    middles = np.full(SIDES, 4 * SIDES)
-    triangles = [
-        (here, following, SIDES + following),
-        (here, SIDES + following, SIDES + here),
-        (middles, 2 * SIDES + following, 2 * SIDES + here),
-        (middles + 1, 3 * SIDES + here, 3 * SIDES + following),
-    ]
-    faces = np.concatenate([np.column_stack(corners) for corners in triangles])
-    return _geometry(vertices, faces, flat=False)
+    found = creation.cylinder(1.0, 1.0, sections=SIDES).smooth_shaded
+    return _geometry(found.vertices, found.faces, flat=False)
 
 
 def _geometry(vertices: np.ndarray, faces: np.ndarray, **look: Any) -> Geometry:
