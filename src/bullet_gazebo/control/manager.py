@@ -100,13 +100,13 @@ class ControllerManager:
         self.on_change()
         return controller
 
-    def unload(self, name: str) -> Controller:
-        """Forgets a controller that isn't running, and returns it."""
+    def unload(self, name: str) -> None:
+        """Forgets a controller that isn't running."""
         controller = self.get(name)
         if controller.state == RUNNING:
             raise ControlError(f"Could not unload controller '{name}' because it is still running")
         self.version += 1
-        return self._controllers.pop(name)
+        del self._controllers[name]
 
     def switch(
         self, start: Iterable[str], stop: Iterable[str], strictness: int = BEST_EFFORT
@@ -149,13 +149,11 @@ class ControllerManager:
             for c in self.loaded
         ]
 
-    def unload_all(self) -> list[Controller]:
-        """Stops and unloads all controllers, and returns them."""
+    def unload_all(self) -> None:
+        """Stops and unloads all controllers."""
         self.switch([], [c.name for c in self._running])
-        gone = list(self._controllers.values())
         self._controllers.clear()
         self.version += 1
-        return gone
 
     def loops_changed(self) -> None:
         """Has gains checked that someone has changed."""

@@ -1,7 +1,7 @@
 """Properties of links and joints that change while the world runs."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from bullet_gazebo.physics.description import Inertia
 from bullet_gazebo.physics.dynamics import is_positive_definite
@@ -81,8 +81,3 @@ def set_link_friction(model: Model, link: str, factor: float) -> None:
     if not 0.0 <= factor < math.inf:
         raise PropertyError(f"friction of '{link}' must be a factor >= 0, not {factor}")
     model.set_friction(link, factor)
-
-
-def at(inertia: Inertia, position: tuple[float, float, float]) -> Inertia:
-    """Returns `inertia` with its centre of mass at `position` [m] of the link; its axes stay."""
-    return replace(inertia, com=inertia.com._replace(position=position))

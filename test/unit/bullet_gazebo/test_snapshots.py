@@ -1,5 +1,6 @@
 """Snapshots of a simulator: the same commands lead to the same bits, or the snapshot is refused."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +15,7 @@ from bullet_gazebo.control.trajectory_goals import GoalRequest, Trajectory, Traj
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, from_rpy
-from bullet_gazebo.physics.properties import JointProperties, at, set_joint_properties
+from bullet_gazebo.physics.properties import JointProperties, set_joint_properties
 from bullet_gazebo.physics.world import SnapshotError, World, ground_plane
 from bullet_gazebo.sensors.schedule import Schedule
 from bullet_gazebo.sensors.sensing import Sensing
@@ -22,6 +23,7 @@ from bullet_gazebo.sensors.sensor_readers import SensorReaders
 from bullet_gazebo.simulator import Simulator
 
 S = 1_000_000_000  # [ns]
+OFF_CENTRE = Pose((0.01, 0.0, 0.0))
 
 
 @pytest.fixture
@@ -183,7 +185,7 @@ def test_a_link_that_is_another_one_to_the_engine_since_is_refused_while_attache
     with sim.lock:
         snapshot = sim.save_state()
     inertia = model.description.links[link].inertia
-    sim.world.set_inertia(model, link, at(inertia, (0.01, 0.0, 0.0)))
+    sim.world.set_inertia(model, link, replace(inertia, com=OFF_CENTRE))
     sim.world.set_inertia(model, link, inertia)
     is_loaded_again = model.body is not snapshot.world.models[-1][1].body
     sim.reset_world()
@@ -209,7 +211,7 @@ def test_models_in_another_order_of_the_engine_are_refused(sim):
 
     def change(model):
         body, inertia = model.body, model.description.links["cube_link"].inertia
-        sim.world.set_inertia(model, "cube_link", at(inertia, (0.01, 0.0, 0.0)))
+        sim.world.set_inertia(model, "cube_link", replace(inertia, com=OFF_CENTRE))
         sim.world.set_inertia(model, "cube_link", inertia)
         return model.body is not body
 

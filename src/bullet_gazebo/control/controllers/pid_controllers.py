@@ -42,12 +42,11 @@ class JointControllerSample(NamedTuple):
 class PositionLoop:
     """A PID that holds a joint at its set-point [rad, m] (docs/contract/ros_control.md 3.2)."""
 
-    __slots__ = ("_straight", "joint", "pid", "set_point", "target")
+    __slots__ = ("joint", "pid", "set_point", "target")
 
     def __init__(self, joint: JointHandle, pid: Pid) -> None:
         self.joint = joint
         self.pid = pid
-        self._straight = joint.kind == "prismatic"
         self.command(0.0)
 
     def command(self, set_point: float) -> None:
@@ -62,10 +61,8 @@ class PositionLoop:
 
     def update(self, dt: float) -> float:
         """Commands the joint; returns the error to the clamped set-point [rad, m]."""
-        joint, target = self.joint, self.target
-        # A shortcut for a rail: this runs on every tick.
-        error = target - joint.position if self._straight else joint.way_to(target)
-        joint.command = self.pid.compute(error, dt)
+        error = self.joint.way_to(self.target)
+        self.joint.command = self.pid.compute(error, dt)
         return error
 
 
