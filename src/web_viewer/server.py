@@ -26,7 +26,6 @@ from web_viewer.address import LOOPBACK, TOKEN_BYTES, Address, PortInUse, has_di
 
 Answer = Callable[[Any, Request], Response | None]
 LONGEST_PATH = 1000  # of a request [characters]
-LONGEST_TEXT = 1000  # of a field [characters]
 LARGEST = 2.0**53  # integers that JavaScript has exactly
 LARGEST_SIDE = 2**14  # of a page [pixels]
 Point = tuple[float, float, float]  # [m]
@@ -98,43 +97,6 @@ def _host_name(header: str) -> str:
         return ""
 
 
-def acceptable(current: object, props: object, value: object) -> bool:
-    """Returns whether a page may give a field another value.
-
-    Args:
-        current: the field's value.
-        props: the field's properties in viser, with its options or bounds.
-        value: what the page sends; anything that msgpack carries.
-    """
-    if isinstance(current, bool):
-        return isinstance(value, bool)
-    if isinstance(current, str):
-        options = getattr(props, "options", None)
-        return isinstance(value, str) and (
-            value in options if options is not None else len(value) <= LONGEST_TEXT
-        )
-    if not isinstance(current, (int, float)) or isinstance(value, bool):
-        return False
-    low, high = (getattr(props, bound, None) for bound in ("min", "max"))
-    least, most = -LARGEST if low is None else low, LARGEST if high is None else high
-    return isinstance(value, (int, float)) and least <= value <= most
-
-
-def _check_fields(server: viser.ViserServer) -> None:
-    """Passes on only what a field can take: viser casts anything, and broadcasts it to all pages."""
-    gui, pages = server.gui, server._websock_server
-    pages.unregister_handler(messages.GuiUpdateMessage, gui._handle_gui_updates)
-
-    async def checked(client: Any, message: messages.GuiUpdateMessage) -> None:
-        handle, updates = gui._gui_input_handle_from_uuid.get(message.uuid), message.updates
-        if handle is None or set(updates) != {"value"}:
-            return
-        if acceptable(handle._impl.value, handle._impl.props, updates["value"]):
-            await gui._handle_gui_updates(client, message)
-
-    pages.register_handler(messages.GuiUpdateMessage, checked)
-
-
 def _is_camera(message: messages.ViewerCameraMessage) -> bool:
     """Returns whether a page's camera is made of numbers that can be calculated with."""
     vectors = (message.wxyz, message.position, message.look_at, message.up_direction)
@@ -150,8 +112,8 @@ def _is_camera(message: messages.ViewerCameraMessage) -> bool:
     )
 
 
-USED = {  # what pages of ours send, and its check, by type; a field's value is checked by `_check_fields`
-    "GuiUpdateMessage": lambda each: isinstance(each.uuid, str) and isinstance(each.updates, dict),
+USED = {  # what pages of ours send, and its check, by type; viser casts a field's value
+    "GuiUpdateMessage": lambda each: isinstance(each.uuid, str) and [*each.updates] == ["value"],
     "ViewerCameraMessage": _is_camera,
     "GetRenderResponseMessage": lambda each: isinstance(each.payload, bytes),
 }
@@ -214,7 +176,6 @@ def serve(address: Address, title: str, camera: Point, look_at: Point) -> viser.
     if server.get_port() != address.port:
         stop(server)
         raise PortInUse(f"another process has just taken port {address.port}; start again")
-    _check_fields(server)
     server.gui.main_panel.dock_right()
     server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
     server.initial_camera.position = camera
