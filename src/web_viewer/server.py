@@ -41,12 +41,13 @@ class Gate:
     def refusal(self, request: Request) -> str:
         """Returns why the request is refused; empty if it is admitted."""
         host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
-        if origin is not None and _place(origin) != host.lower():
+        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
             return "it comes from another page"
         if self._token:
             return "" if self._has_token(request) else "the address needs its token"
         # A foreign name that resolves to this machine belongs to a foreign page (DNS rebinding).
-        return "" if is_loopback(_host_name(host)) else "the page is at 127.0.0.1 only"
+        name = urlsplit(f"//{host}").hostname or ""
+        return "" if is_loopback(name) else "the page is at 127.0.0.1 only"
 
     def _has_token(self, request: Request) -> bool:
         given = parse_qs(urlsplit(request.path).query).get("token", [])
@@ -81,20 +82,6 @@ class Gate:
 
 def _said(status: http.HTTPStatus, text: str) -> Response:
     return Response(status, status.phrase, Headers(), f"{text}\n".encode())
-
-
-def _place(origin: str) -> str:
-    try:
-        return urlsplit(origin).netloc.lower()
-    except ValueError:
-        return ""
-
-
-def _host_name(header: str) -> str:
-    try:
-        return urlsplit(f"//{header}").hostname or ""
-    except ValueError:
-        return ""
 
 
 def _is_camera(message: messages.ViewerCameraMessage) -> bool:

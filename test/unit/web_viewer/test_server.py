@@ -94,9 +94,11 @@ def test_this_machines_browsers_get_in(host):
     assert ask(gate, **upgrade, origin="null").status_code == 403
 
 
-@pytest.mark.parametrize("host", ["elsewhere.example:8080", "", "[", "127.0.0.1.elsewhere.example"])
+@pytest.mark.parametrize("host", ["elsewhere.example:8080", "", "127.0.0.1.elsewhere.example"])
 def test_a_name_that_leads_here_is_refused(host):
-    assert ask(Gate(Address("127.0.0.1", 8080)), host=host).status_code == 403
+    gate = Gate(Address("127.0.0.1", 8080))
+    assert ask(gate, host=host).status_code == 403
+    assert ask(gate, host="[").status_code == 400
 
 
 def test_without_the_token_nobody_gets_in():
@@ -114,14 +116,6 @@ def test_without_the_token_nobody_gets_in():
     assert ask(gate, host=host, cookie=cookie, origin="http://other").status_code == 403
 
 
-@pytest.mark.parametrize("origin", ["http://[", "http://[::1", "null"])
-def test_an_origin_that_is_none_is_refused(origin):
-    assert (
-        ask(Gate(Address("127.0.0.1", 8080)), host="127.0.0.1:8080", origin=origin).status_code
-        == 403
-    )
-
-
 def test_a_path_that_is_too_long_is_not_found():
     gate = Gate(Address("127.0.0.1", 8080))
     assert ask(gate, "/" + 7000 * "a", host="127.0.0.1:8080").status_code == 404
@@ -131,6 +125,7 @@ def test_a_path_that_is_too_long_is_not_found():
     ("path", "headers"),
     [
         ("/?token=\udcff", []), ("//[", []), ("http://[/", []),
+        ("/", [("Origin", "http://[")]), ("/", [("Origin", "http://[::1")]),
         ("/", [("Host", "127.0.0.1")]), ("/", 2 * [("Origin", "http://a")]), ("/", 2 * [("Cookie", "a=1")]),
     ],
 )  # fmt: skip
