@@ -9,7 +9,6 @@
 - `stop_hearing_clock`, `set_time`: the node that publishes /clock would hear it over a socket to itself
   (gazebo_parameters.test, gazebo_ros.test)
 - `registered_together`: clients find some services before the others (test_rospy_internals.py)
-- `register_again`: rospy doesn't register at a master that was started again (test_master_watch.py)
 """
 
 import contextlib
@@ -32,7 +31,6 @@ from rospy.impl.tcpros_pubsub import QueuedConnection
 from rospy.topics import Poller, _PublisherImpl, _SubscriberImpl, _TopicImpl
 
 from ros_calls import master
-from ros_calls.master import Refused
 
 Sink = Callable[[str, bytes], None]
 """Takes a topic and a message as it goes over the wire, its length in front."""
@@ -236,41 +234,3 @@ def registered_together() -> Iterator[None]:
     for code, text, _ in answers:
         if code != 1:
             rospy.logfatal("unable to register a service with the master: %s", text)
-
-
-def witness() -> tuple[str, str]:
-    """Returns name and address of a service that each node registers at its start, and never again."""
-    name = rospy.resolve_name("~get_loggers")
-    return name, dict(rospy.impl.registration.get_service_manager().get_services())[name]
-
-
-def register_again(timeout: float) -> None:
-    """Registers all topics and services of this node at the master, the witness last.
-
-    Each call takes up to `timeout` [s]. NoAnswer: the master has gone again.
-    """
-    topics = rospy.impl.registration.get_topic_manager()
-    with topics.lock:
-        publications, subscriptions = topics.get_publications(), topics.get_subscriptions()
-    for name, kind in publications:
-        _register("registerPublisher", name, kind, timeout)
-    for name, kind in subscriptions:
-        publishers = _register("registerSubscriber", name, kind, timeout)
-        for listener in rospy.impl.registration.get_registration_listeners().listeners:
-            if publishers and isinstance(listener, RegManager):
-                listener.publisher_update(name, publishers)
-    last = witness()
-    services = rospy.impl.registration.get_service_manager().get_services()
-    for name, address in [*(each for each in services if each != last), last]:
-        _register("registerService", name, address, timeout)
-
-
-def _register(method: str, name: str, what: str, timeout: float) -> list[str]:
-    """Registers one topic or service; returns a topic's publishers where the master names them."""
-    own = (rospy.get_name(), name, what, rospy.core.get_node_uri())
-    try:
-        answer = master.call_plain(master.uri(), method, *own, timeout=timeout)
-    except Refused as refusal:
-        rospy.logerr("%s of %s: the master refuses it: %s", method, name, refusal)
-        return []
-    return answer if isinstance(answer, list) else []

@@ -49,7 +49,7 @@ from bullet_gazebo.ros.journal.interception import (
 )
 from bullet_gazebo.ros.journal.journal import WorldJournal
 from bullet_gazebo.ros.journal.journal_output import JournalOutput
-from bullet_gazebo.ros.node.master_watch import MasterWatch, NameLoss, NodeNameTaken, refuse_twin
+from bullet_gazebo.ros.node.node_name import NameLoss, NodeNameTaken, refuse_twin
 from bullet_gazebo.ros.node.start import facts_of
 from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
@@ -161,7 +161,6 @@ class GazeboNode:
             self.sim.pause()
         self._advertise(_flag("~enable_ros_network"), args, found.plugins)
         self._recorders = [SimulationRecorder(self.sim, options) for options in recordings]
-        MasterWatch().start()
 
     def _advertise(self, network: bool, args: argparse.Namespace, of_world: list[Plugin]) -> None:
         sensors: list[SceneSensor] = []
