@@ -2,14 +2,12 @@
 
 import codecs
 import re
-from collections.abc import Callable
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 from file_access.content import MAX_BYTES, FileError, TooLarge
 
 MAX_DEPTH = 100  # nested elements; real models have about ten
 MAX_ELEMENTS = 500_000  # of one text: some 200 MB of memory; large worlds have tens of thousands
-STRIDE = 1000  # elements between two calls of `count`
 
 BYTE_ORDER_MARKS = (  # UTF-32's before UTF-16's, which are their first bytes
     (codecs.BOM_UTF8, "utf-8"),
@@ -33,10 +31,9 @@ HEAD = 4096  # [bytes] that are searched for the declaration
 class _BoundedBuilder(TreeBuilder):
     """Builds the tree; refuses document types (entities) and trees beyond the bounds."""
 
-    def __init__(self, count: Callable[[int], None]) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._depth = self._elements = self._counted = 0
-        self._count = count
+        self._depth = self._elements = 0
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
         raise FileError("a document type (<!DOCTYPE>) is not accepted")
@@ -48,29 +45,18 @@ class _BoundedBuilder(TreeBuilder):
             raise TooLarge(f"elements are nested more than {MAX_DEPTH} deep (MAX_DEPTH)")
         if self._elements > MAX_ELEMENTS:
             raise TooLarge(f"there are more than {MAX_ELEMENTS} elements (MAX_ELEMENTS)")
-        if self._elements % STRIDE == 0:
-            self._report()
         return super().start(tag, attributes)
 
     def end(self, tag: str) -> Element:
         self._depth -= 1
         return super().end(tag)
 
-    def close(self) -> Element:
-        self._report()
-        return super().close()
 
-    def _report(self) -> None:
-        self._count(self._elements - self._counted)
-        self._counted = self._elements
-
-
-def parse(text: str | bytes, count: Callable[[int], None] = lambda _: None) -> Element:
+def parse(text: str | bytes) -> Element:
     """Returns the root element.
 
     Args:
         text: a text, or the content of a file of any encoding.
-        count: called now and then with the number of further elements; it may raise to end the parsing.
 
     Raises:
         FileError: if it isn't well-formed, or has a document type.
@@ -79,7 +65,7 @@ def parse(text: str | bytes, count: Callable[[int], None] = lambda _: None) -> E
     if len(text) > MAX_BYTES:
         raise TooLarge(f"it has more than {MAX_BYTES} bytes (MAX_BYTES)")
     text = without_declaration(decode(text) if isinstance(text, bytes) else text)
-    parser = XMLParser(target=_BoundedBuilder(count))
+    parser = XMLParser(target=_BoundedBuilder())
     try:
         parser.feed(text)
         root: Element = parser.close()

@@ -116,20 +116,6 @@ def test_a_text_beyond_the_limit_is_not_looked_at(monkeypatch):
         assert str(raised.value) == check_none
 
 
-def test_who_counts_may_end_the_parsing():
-    counted = []
-
-    def count(elements):
-        counted.append(elements)
-        if len(counted) == 3:
-            raise TooLarge("enough")
-
-    assert len(parse("<a>" + "<b/>" * 1500 + "</a>", count)) == 1500
-    assert sum(counted) == 1501
-    with pytest.raises(TooLarge, match="enough"):
-        parse("<a>" + "<b/>" * 1500 + "</a>", count)
-
-
 @settings(deadline=None)
 @given(st.binary(max_size=60) | st.text(alphabet="<>?!-xml \n\ufeff", max_size=60).map(str.encode))
 def test_no_bytes_are_anything_but_a_tree_or_a_fault(data):

@@ -102,7 +102,7 @@ class Reading:
         self._cancelled = cancelled
         self._end = time.thread_time() + MAX_SECONDS
         self._bytes = self._elements = self._models = self._mesh_bytes = 0
-        self._files: dict[Path, tuple[Element, int]] = {}
+        self._files: dict[Path, Element] = {}
         self._meshes: dict[tuple[Path, Submesh | None], Mesh] = {}
 
     def parse(self, text: str | bytes) -> Element:
@@ -111,31 +111,30 @@ class Reading:
         if self._bytes > MAX_BYTES:
             raise LimitExceeded(f"more than {MAX_BYTES} bytes of XML (MAX_BYTES)")
         try:
-            return parse(text, self._count)
+            root = parse(text)
         except TooLarge as error:
             raise LimitExceeded(str(error)) from error
         except FileError as error:
             raise DescriptionError(str(error)) from error
+        self._count(root)
+        return root
 
     def open(self, path: Path) -> Element:
         """Returns the root element of a file. It is the same object each time: don't change it."""
         with place(str(path)):
             if path in self._files:
-                root, elements = self._files[path]
-                self._count(elements)
-                return root
+                self._count(self._files[path])
+                return self._files[path]
             if len(self._files) == MAX_FILES:
                 raise LimitExceeded(f"more than {MAX_FILES} files are included (MAX_FILES)")
-            before = self._elements
             try:
                 data = read_file(path)
             except TooLarge as error:
                 raise LimitExceeded(str(error)) from error
             except FileError as error:
                 raise DescriptionError(str(error)) from error
-            root = self.parse(data)
-            self._files[path] = root, self._elements - before
-            return root
+            self._files[path] = self.parse(data)
+            return self._files[path]
 
     def mesh(self, path: Path, submesh: Submesh | None = None) -> Mesh:
         """Returns the mesh of a file or of a named part of it. It is the same object each time."""
@@ -189,8 +188,8 @@ class Reading:
         if self._cancelled():
             raise LimitExceeded("reading was interrupted")
 
-    def _count(self, elements: int) -> None:
-        self._elements += elements
+    def _count(self, root: Element) -> None:
+        self._elements += sum(1 for _ in root.iter())
         if self._elements > MAX_ELEMENTS:
             raise LimitExceeded(f"more than {MAX_ELEMENTS} elements (MAX_ELEMENTS)")
         self.check()
