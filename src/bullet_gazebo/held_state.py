@@ -48,6 +48,7 @@ VALUES = (
     attrgetter, itemgetter, BaseException, np.ufunc, type(np.clip), type(str.lower), date, timedelta,
     Decimal,
 )  # fmt: skip
+SPAWNED = "n_children_spawned"  # of a SeedSequence
 POINTER = 8  # [bytes]; to an attribute in __slots__
 
 Put = Callable[[Any, Any], object]
@@ -191,12 +192,22 @@ def _into_array(state: HeldState, each: np.ndarray) -> Iterable[Any]:
 
 
 def _into_generator(state: HeldState, each: np.random.Generator) -> Iterable[Any]:
-    state.note(_put_generator, each, each.bit_generator.state)
+    bits = each.bit_generator
+    state.note(_put_generator, bits, (bits.state, getattr(bits.seed_seq, SPAWNED, None)))
     return ()
 
 
-def _put_generator(target: np.random.Generator, held: Any) -> None:
-    target.bit_generator.state = held
+def _put_generator(target: np.random.BitGenerator, held: tuple[Any, int | None]) -> None:
+    numbers, spawned = held
+    seeds: Any = target.seed_seq
+    if getattr(seeds, SPAWNED, None) == spawned:
+        target.state = numbers
+    else:
+        again = np.random.SeedSequence(
+            seeds.entropy, spawn_key=seeds.spawn_key, pool_size=seeds.pool_size,
+            n_children_spawned=spawned,
+        )  # fmt: skip
+        target.__setstate__((numbers, again))
 
 
 def _into_random(state: HeldState, each: random.Random) -> Iterable[Any]:

@@ -135,6 +135,16 @@ def test_random_numbers_come_again(generator):
     assert [generator.random() for _ in range(5)] == drawn
 
 
+def test_a_generator_spawns_the_same_again():
+    generator = np.random.default_rng(np.random.SeedSequence(1, spawn_key=(2,), pool_size=8))
+    generator.spawn(1)
+    state = HeldState([generator])
+    spawned = [each.random() for _ in range(2) for each in generator.spawn(2)]
+    for _ in range(2):
+        state.recall()
+        assert [each.random() for _ in range(2) for each in generator.spawn(2)] == spawned
+
+
 def test_an_object_may_say_itself_what_counts():
     class Own:
         def __init__(self):
