@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import sys
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -32,7 +33,11 @@ FILMS, BAG = ("world.png", "world.html"), "world.bag"
 def failure_folder(test: str) -> Path:
     """Makes an empty folder for what a failed test leaves, and returns it."""
     parent = Path(os.environ.get(FAILURES) or Path(rospkg.get_ros_home(), "test_failures"))
-    folder = parent.absolute() / re.sub(r"[^A-Za-z0-9_.-]+", "-", test).strip("-")
+    plain = test.replace("::", "-").replace("/", "-")
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "-", plain)
+    if name != plain:  # so that `test[<]` and `test[>]` have a folder each
+        name = f"{name.strip('-')}-{zlib.crc32(test.encode()):08x}"
+    folder = parent.absolute() / name
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     return folder

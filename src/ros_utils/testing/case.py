@@ -1,8 +1,9 @@
 """The base class for tests with unittest, and so with rostest."""
 
+import contextlib
 import traceback
 import unittest
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,19 +19,34 @@ class RobotTestCase(unittest.TestCase):
     seed = 1  # of the sensors' noise
     world: RobotWorld
     _recorded: Path | None = None
+    _fault: Exception | None = None  # the first one of a subtest
 
     def setUp(self) -> None:
         super().setUp()
         self.world = self.enterContext(process_bench().world(self.seed, self._recorded))
 
+    @contextlib.contextmanager
+    def subTest(self, *args: Any, **params: Any) -> Iterator[None]:
+        """See the base class; the test that has failed in a subtest fails itself at its end."""
+        with super().subTest(*args, **params):
+            try:
+                yield
+            except unittest.SkipTest:
+                raise
+            except Exception as fault:
+                self._fault = self._fault or fault
+                raise
+
     def _callTestMethod(self, method: Callable[[], Any]) -> None:
         try:
             super()._callTestMethod(method)  # type: ignore[misc]
+            if self._fault is not None:
+                raise self._fault
         except unittest.SkipTest:
             raise
         except Exception as fault:
             if self._recorded is None:
-                text = self._record(fault)
+                text = self._record(self._fault or fault)
                 fault.args = (f"{fault}\n{text}",)  # rostest leaves notes out
                 if text not in str(fault):  # an OSError's text is made of more
                     fault.add_note(text)

@@ -12,6 +12,8 @@ from PIL import Image
 from support.pages.viser_recording import of_page
 from support.ros.calls import executable
 
+from ros_utils.testing.bench import failure_folder
+
 pytestmark = pytest.mark.slow
 
 LIMIT = 300.0  # [s] for a process
@@ -75,11 +77,17 @@ class Cart(RobotTestCase):
     def test_a_file_is_there(self):
         open("/nowhere")
 
+    def test_in_parts(self):
+        for place in (0.0, 1.0):
+            with self.subTest(place=place):
+                self.world.wait(0.1)
+                self.assertEqual(self.world.time, place)
+
     def tearDown(self):
         print("torn down")
 
 class OtherCart(Cart):
-    test_a_file_is_there = None
+    test_a_file_is_there = test_in_parts = None
 
 unittest.main()
 """
@@ -127,6 +135,14 @@ def test_a_failure_leaves_its_recording_and_seed(tmp_path):
     assert f"it isn't repeatable; that run is recorded in {wavers}" in done.stdout
 
 
+def test_each_failure_has_a_folder_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROS_TEST_FAILURES", str(tmp_path))
+    tests = [f"test/test_cart.py::test_sorts[{sign}]" for sign in "<>"]
+    plain, *others = (failure_folder(test) for test in (tests[0].partition("[")[0], *tests))
+    assert plain == tmp_path / "test-test_cart.py-test_sorts"
+    assert {plain, *others} == set(tmp_path.iterdir()) and others[0] != others[1]
+
+
 def test_the_last_test_of_a_session_is_recorded_with_its_nodes(tmp_path):
     (tmp_path / "test_cart.py").write_text(FOLLOWING)
     done = run(tmp_path, "-m", "pytest", "test_cart.py")
@@ -161,9 +177,11 @@ def test_with_unittest_a_failure_says_where_its_recording_is(tmp_path):
     done = run(tmp_path, "cart.py")
     folder = tmp_path / "test_failures/__main__.Cart.test_it_gets_there"
     assert done.returncode == 1 and f"recorded in {folder}" in done.stdout, done.stdout
-    assert done.stdout.count("\nrecorded in ") == 3  # the second run fails alike
+    assert done.stdout.count("\nrecorded in ") == 4  # the second run fails alike
+    assert f"0.1 != 0.0\nrecorded in {folder.with_name('__main__.Cart.test_in_parts')}" in done.stdout
+    assert "(place=1.0)" in done.stdout
     assert "self.world.assert_joint(" in done.stdout and "robot_world.py" not in done.stdout
-    assert done.stdout.count("torn down") == 6
+    assert done.stdout.count("torn down") == 8
     assert {path.name for path in folder.iterdir()} == {
         "failure.txt", "simulator.log", "world.bag", "world.html", "world.png"
     }  # fmt: skip
