@@ -1,7 +1,9 @@
 """The bag of `lockstep.py --record`, which the simulator writes: made room for, and complete at the end."""
 
 import contextlib
+import glob
 import os
+import re
 from collections.abc import Iterator
 
 from lockstep_runner import originals
@@ -17,10 +19,14 @@ LOOK = 0.05  # [s]
 
 @contextlib.contextmanager
 def recorded(path: str) -> Iterator[None]:
-    """Lets the simulator that starts within the block record in a bag; an older file is replaced."""
-    for old in (path, path + ACTIVE):
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(old)
+    """Lets the simulators that start within the block record: in a bag, and then in others with a number.
+
+    Older files of these names are removed.
+    """
+    root, suffix = map(re.escape, os.path.splitext(path))
+    names = re.compile(rf"{root}(\.\d+)?{suffix}({re.escape(ACTIVE)})?")
+    for old in filter(names.fullmatch, glob.glob(f"{glob.escape(os.path.splitext(path)[0])}*")):
+        os.unlink(old)
     try:
         yield
     finally:

@@ -148,11 +148,12 @@ class JournalBag:
 
         self._path, self._open, number = path, Path(f"{path}{ACTIVE}"), 2
         while self._path.exists() or self._open.exists():  # another simulator may be writing
-            self._path = path.with_stem(f"{path.stem}_{number}")
+            self._path = path.with_stem(f"{path.stem}.{number}")
             self._open = Path(f"{self._path}{ACTIVE}")
             number += 1
         try:
-            self._bag = rosbag.Bag(str(self._open), "w", compression="lz4")
+            self._file = self._open.open("w+b")
+            self._bag = rosbag.Bag(self._file, "w", compression="lz4")
         except OSError as fault:
             raise RecordingError(f"{self._open}: {fault.strerror}") from fault
         self._before: list[float] = []
@@ -168,6 +169,7 @@ class JournalBag:
         if time.monotonic() - self._flushed > FLUSH:  # rosbag keeps up to 768 kB to itself
             self._flushed = time.monotonic()
             self._bag.flush()
+            self._file.flush()  # the index of it, without which rosbag leaves it out
 
     def _add(self, topic: str, message: Any, entry: JournalEntry) -> None:
         self._bag.write(topic, message, to_time(entry.ended + 1))  # 0 is no time to ROS

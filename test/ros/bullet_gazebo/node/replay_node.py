@@ -10,9 +10,11 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import xmlrpc.client
 from pathlib import Path
 
 import rosbag
+import rosgraph
 import rospkg
 import rostest
 
@@ -318,6 +320,39 @@ class ReplayTest(unittest.TestCase):
         self.assertEqual(code, 7, err)
         self.assertIn(f"recorded {self.bag}", err)
         self.check_equal(at_least=2)
+
+    def test_a_killed_simulators_bag_can_be_replayed(self):
+        """All but the last second is in the file; rosbag finds it."""
+        active = self.bag.with_name(f"{self.bag.name}.active")
+
+        def reindexed():
+            shutil.copy(active, self.bag)
+            subprocess.run(
+                ["rosbag", "reindex", "--force", self.bag], check=True, capture_output=True,
+                timeout=BOUND,
+            )
+            try:
+                messages = list(rosbag.Bag(str(self.bag)).read_messages("/gazebo/journal"))
+            except rosbag.ROSBagUnindexedException:  # nothing is in it yet
+                return False
+            entries = [each.name for _, message, _ in messages for each in message.entries]
+            return entries.count("/gazebo/prepared_step") == 10
+
+        with self.simulation(extra_gazebo_args=f"--journal {self.bag}") as simulation:
+            add_cartpole()
+            client = StepClient()
+            for _ in range(10):
+                client.step(8)
+            self.assertTrue(wait_until(reindexed, BOUND, "the bag"))
+            address = rosgraph.Master("/test", simulation.master_uri).lookupNode("/gazebo")
+            with xmlrpc.client.ServerProxy(address) as node:
+                _, _, process = node.getPid("/test")
+            os.kill(process, signal.SIGKILL)
+        code, _, err = replay(active)
+        self.assertEqual(code, 2)
+        self.assertIn(f"rosbag reindex {active}", err)
+        self.assertTrue(reindexed())
+        self.check_equal(at_least=11)
 
     def test_a_request_that_is_refused_now_is_the_first_difference(self):
         """The recorded model is of a package that isn't there any more."""

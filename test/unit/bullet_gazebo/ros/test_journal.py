@@ -278,7 +278,7 @@ def test_a_bag_has_states_for_other_tools_and_time_never_goes_back(tmp_path):
     bag.write([first, first, second])
     bag.close()
     assert path.read_bytes() == b"an older one"
-    read = list(rosbag.Bag(str(tmp_path / "run_2.bag")).read_messages("/joint_states"))
+    read = list(rosbag.Bag(str(tmp_path / "run.2.bag")).read_messages("/joint_states"))
     assert [message.position[0] for _, message, _ in read] == [0.0, 0.5]
     assert [time.to_nsec() for _, _, time in read] == [5 * MS + 1, 6 * MS + 1]
 
@@ -289,7 +289,7 @@ def test_simulators_at_one_time_write_bags_of_their_own(tmp_path):
         bag.write([moving()])
     for bag in bags:
         bag.close()
-    for name in ("run.bag", "run_2.bag"):
+    for name in ("run.bag", "run.2.bag"):
         assert rosbag.Bag(str(tmp_path / name)).get_message_count("/gazebo/journal") == 1
 
 
