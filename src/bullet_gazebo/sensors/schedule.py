@@ -105,6 +105,12 @@ class Schedule:
         self._sim.parts.append(clock)
         return clock
 
+    def go_on(self, clocks: list[SensorClock]) -> None:
+        """Takes back clocks that have ended; the caller holds the simulator's lock."""
+        self._clocks += clocks
+        self._sim.parts += clocks
+        self._take_part()
+
     def end(self, clock: SensorClock) -> None:
         with self._sim.lock:
             self.fail(clock)

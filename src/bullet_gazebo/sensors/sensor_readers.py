@@ -119,6 +119,10 @@ class SensorReaders:
         for clock in self._clocks:
             self._schedule.fail(clock)
 
+    def go_on(self) -> None:
+        """Lets the clocks go on from where a snapshot has put them, also after an end."""
+        self._schedule.go_on(self._clocks)
+
 
 def _is_gone(mount: Mount) -> bool:
     """Returns whether the sensor's model was deleted."""

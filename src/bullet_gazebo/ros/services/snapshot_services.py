@@ -11,6 +11,7 @@ from bullet_gazebo.held_state import UnknownState
 from bullet_gazebo.physics.world import SnapshotError
 from bullet_gazebo.ros.services import ServiceRefused, offer
 from bullet_gazebo.ros.services.step_service import StepService
+from bullet_gazebo.sensors.sensor_readers import SensorReaders
 from bullet_gazebo.simulator import Simulator, Snapshot
 from file_access.text import did_you_mean
 
@@ -18,10 +19,10 @@ MOST = 1000  # names
 
 
 class KeptState(NamedTuple):
-    """A snapshot, whether its contacts are those of a tick, and the random numbers of the process."""
+    """A snapshot, what the step service says of it, and the random numbers of the process."""
 
     snapshot: Snapshot
-    knows_contacts: bool
+    steps: tuple[bool, SensorReaders | None]
     python: Any
     numpy: Any
 
@@ -31,7 +32,7 @@ class SnapshotServices:
 
     Args:
         sim: the simulator.
-        steps: whose answers report contacts.
+        steps: whose answers report contacts and measurements.
         one_at_a_time: see `StepService`.
     """
 
@@ -60,7 +61,7 @@ class SnapshotServices:
                 raise ServiceRefused(str(error)) from error
             self._kept[request.name] = KeptState(
                 snapshot,
-                self._steps.knows_contacts,
+                self._steps.save_state(),
                 random.getstate(),
                 np.random.get_state(legacy=False),
             )
@@ -79,7 +80,7 @@ class SnapshotServices:
                 self._sim.restore_state(kept.snapshot)
             except (SnapshotError, UnknownState) as error:
                 raise ServiceRefused(str(error)) from error
-            self._steps.knows_contacts = kept.knows_contacts
+            self._steps.restore_state(kept.steps)
             random.setstate(kept.python)
             np.random.set_state(kept.numpy)
         return "RestoreState: state restored"

@@ -129,7 +129,7 @@ class StepService:
         self._is_reading = False  # whether the step under way asks for them
         sim.before_advance.append(self._end_unread)
         # Contacts are those of the last tick, until a reset or a placing makes them void.
-        self.knows_contacts = False
+        self._knows_contacts = False
         self._services = [
             rospy.Service("~prepare_step", PrepareStep, self._prepare),
             rospy.Service("~prepared_step", PreparedStep, self._step_prepared),
@@ -179,7 +179,7 @@ class StepService:
             try:
                 if request.ticks > SLICE:
                     self._check_layout(prepared)
-                numbers, contacts = prepared.read(self.knows_contacts)
+                numbers, contacts = prepared.read(self._knows_contacts)
             except UnknownName as error:
                 return self._refused(f"the ticks are done, but meanwhile {error}")
             sensors = self._sensed() if prepared.sensors else []
@@ -196,6 +196,17 @@ class StepService:
         """Ends the readers when somebody else lets time pass: who asked for them may be gone."""
         if not self._is_reading:
             self._end_readers()
+
+    def save_state(self) -> tuple[bool, SensorReaders | None]:
+        """Returns what a snapshot needs beside the simulator's state; the caller holds the lock."""
+        return self._knows_contacts, self._readers
+
+    def restore_state(self, state: tuple[bool, SensorReaders | None]) -> None:
+        """Takes back what `save_state` has returned, after the simulator's state; models are the same."""
+        self._end_readers()
+        self._knows_contacts, self._readers = state
+        if self._readers:
+            self._readers.go_on()
 
     def _end_readers(self) -> None:
         if self._readers:
@@ -233,7 +244,7 @@ class StepService:
                 return self._answer(status_message=f"StepWorld: {error}")
             self._advance(request.ticks, plan.commanded, request.joint_commands)
             try:
-                state = self._reader.read(self.knows_contacts)
+                state = self._reader.read(self._knows_contacts)
             except UnknownName as error:
                 fault = f"StepWorld: the ticks are done, but meanwhile {error}"
                 return self._answer(status_message=fault)
@@ -257,7 +268,7 @@ class StepService:
     def _begin(self, request: StepWorldRequest, plan: StepPlan) -> None:
         sim = self._sim
         if request.reset != StepWorldRequest.NONE or plan.placed_models or plan.placed_joints:
-            self.knows_contacts = False
+            self._knows_contacts = False
             with sim.one_move():
                 self._place(request, plan)
         plan.commanded.send(list(request.commands))
@@ -286,7 +297,7 @@ class StepService:
                 self._sim.lock.yield_turn()
                 self._sim.await_holds()
             self._pass(ticks, commanded, of_joints)
-        self.knows_contacts = True
+        self._knows_contacts = True
 
     def _pass(self, ticks: int, commanded: Commanded, of_joints: Sequence[float]) -> None:
         if not of_joints:

@@ -1,16 +1,22 @@
 """save_state and restore_state, case by case, in a world in lock-step with the cart-pole in it."""
 
 import unittest
+from pathlib import Path
 
+import rospkg
 from bullet_gazebo_msgs.srv import RestoreState, SaveState, StepWorld, StepWorldRequest
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty
 from support.ros.calls import call, delete_model, spawn_model
 from support.ros.subscribed import Listener
 
+from ros_utils import ros_gazebo
+from ros_utils.step_client import PreparedSteps, StepNames
+
 CART = "stand_cart_position_controller"
 MOST = 1000  # states
 MS = 1_000_000  # [ns]
+BOT = str(Path(rospkg.RosPack().get_path("cartpole"), "test/data/sensors/bot.sdf"))
 
 
 def save(name, forget=()):
@@ -84,6 +90,32 @@ class SnapshotsTest(unittest.TestCase):
         self.assertFalse(answer.success)
         self.assertIn("models", answer.status_message)
         delete_model("ball")
+
+    def test_sensors_of_prepared_steps_measure_at_the_same_times(self):
+        """Also those that another client's steps have ended since, and none that have begun since."""
+        self.assertTrue(ros_gazebo.gazebo_spawn_sdf_path(BOT, "bot", pos_y=3.0))
+        self.addCleanup(delete_model, "bot")
+        steps, names = PreparedSteps(), StepNames(sensors=("scanner",))
+        self.addCleanup(steps.close)
+
+        def measured():
+            seen = []
+            for _ in range(30):
+                steps.begin(names, 7, [])
+                seen.append([(each.now, each.values) for each in steps.end().sensors])
+            return seen
+
+        for ends_before in (False, True):
+            measured()
+            if ends_before:
+                step(5)
+            save("measuring")
+            first = measured()
+            for ends in (False, True):
+                if ends:
+                    step(5)
+                restore("measuring")
+                self.assertEqual(measured(), first)
 
     def test_states_are_bounded_and_can_be_forgotten(self):
         kept = 0
