@@ -38,6 +38,8 @@ from bullet_gazebo.simulator import Simulator
 CONTROL = re.compile("plugin .*(control|drive|steer|planar_move|hw_sim)", re.IGNORECASE)
 PARAMETER = "~plugins"  # users' plugins: library: "module:Factory"
 PATIENCE = 10.0  # [s of wall time]
+# The same in lock-step: a step in the middle of a spawn can't be repeated, and a script waits 30 s for one.
+LOCKSTEP_PATIENCE = 25.0
 Update = Callable[[int], None]
 
 
@@ -211,9 +213,10 @@ class PluginRegistry:
         """Holds time while a model comes and its plugins start: as in Gazebo, it has its drives before its
         first step. And while it goes.
 
-        If a plugin waits for time to pass, the hold ends after PATIENCE.
+        If a plugin waits for time to pass, the hold ends after a while.
         """
-        return self._sim.holds.hold(PATIENCE, partial(_warn_late, models))
+        patience = LOCKSTEP_PATIENCE if self._sim.lockstep else PATIENCE
+        return self._sim.holds.hold(patience, partial(_warn_late, models, patience))
 
     def load(self, model: Model, robot_namespace: str) -> None:
         """Starts the plugins of `model`. An unknown one and one that fails is logged and left out
@@ -311,11 +314,11 @@ def _tell_missing_control(model: Model) -> None:
         )  # fmt: skip
 
 
-def _warn_late(models: str) -> None:
+def _warn_late(models: str, patience: float) -> None:
     rospy.logwarn(
         "The plugins of %s have been starting or ending for %g s; time passes from now on",
         models,
-        PATIENCE,
+        patience,
     )
 
 

@@ -12,9 +12,13 @@ import rospy
 from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.world import World
+from bullet_gazebo.ros.plugins import plugin_loader
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.sensors.contact import collision_named
 from bullet_gazebo.simulator import Simulator
+from lockstep_runner import world
+from ros_calls.waiting import wait_until
 
 BOX = """<robot name="box"><link name="body"><inertial><mass value="1"/>
 <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>{plugins}</robot>"""
@@ -96,6 +100,15 @@ def setting(sim, tmp_path, monkeypatch):
     yield made
     for name in made.modules:
         sys.modules.pop(name, None)
+
+
+def test_in_lockstep_a_model_holds_time_for_longer(new_engine, monkeypatch) -> None:
+    monkeypatch.setattr(plugin_loader, "PATIENCE", 0.01)
+    paced, stepped = (Simulator(World(new_engine()), lockstep=each) for each in (False, True))
+    with PluginRegistry(stepped, None).time_held("a"), PluginRegistry(paced, None).time_held("b"):
+        assert wait_until(lambda: not paced.holds, 60.0, "the end of a hold")
+        assert stepped.holds
+    assert plugin_loader.LOCKSTEP_PATIENCE < world.TIMEOUT  # of a script for a step
 
 
 @pytest.mark.parametrize("error", RAISED)
