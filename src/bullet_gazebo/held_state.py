@@ -197,9 +197,9 @@ def _into_generator(state: HeldState, each: np.random.Generator) -> Iterable[Any
     return ()
 
 
-def _put_generator(target: np.random.BitGenerator, held: tuple[Any, int | None]) -> None:
+def _put_generator(target: Any, held: tuple[Any, Any]) -> None:
     numbers, spawned = held
-    seeds: Any = target.seed_seq
+    seeds = target.seed_seq
     if getattr(seeds, SPAWNED, None) == spawned:
         target.state = numbers
     else:

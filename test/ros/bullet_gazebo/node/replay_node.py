@@ -328,7 +328,9 @@ class ReplayTest(unittest.TestCase):
         def reindexed():
             shutil.copy(active, self.bag)
             subprocess.run(
-                ["rosbag", "reindex", "--force", self.bag], check=True, capture_output=True,
+                ["rosbag", "reindex", "--force", self.bag],
+                check=True,
+                capture_output=True,
                 timeout=BOUND,
             )
             try:
