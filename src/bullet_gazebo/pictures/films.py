@@ -6,8 +6,8 @@ import queue
 import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
-from typing import Any, BinaryIO, Protocol
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, BinaryIO
 
 import numpy as np
 from PIL import Image
@@ -22,6 +22,9 @@ from web_viewer.video import EncoderFailed, Mp4Writer
 NUMBERS = 7  # of a pose
 ROOM = 1.25  # factor on the camera's distance: things move
 END = 1.0  # [s] for which a page shows its last moment before it begins again
+
+Frames = Iterable[tuple[list[RecordedModel] | None, Sequence[float]]]
+"""Models, None while they are those of the frame before, and the poses of their links."""
 
 logger = logging.getLogger(__name__)
 
@@ -75,94 +78,62 @@ class FrameDrawer:
         return Camera(camera.target, ROOM * camera.distance, camera.yaw, camera.pitch, camera.view)
 
 
-class FrameWriter(Protocol):
-    """What becomes of the frames."""
-
-    def add(self, models: list[RecordedModel] | None, poses: Sequence[float]) -> None:
-        """Takes a frame; `models` is None while they are those of the frame before."""
-
-    def close(self) -> None:
-        """Completes the file, if there was a frame."""
-
-
-class Video:
-    """An MP4 file, drawn as frames come."""
-
-    def __init__(self, options: RecordingOptions) -> None:
-        self._drawer = FrameDrawer(options, Renderer())
-        self._writer = Mp4Writer(options.path, options.rate)
-
-    def add(self, models: list[RecordedModel] | None, poses: Sequence[float]) -> None:
+def write_video(options: RecordingOptions, frames: Frames) -> None:
+    """Writes an MP4 file, drawn as frames come."""
+    drawer, writer = FrameDrawer(options, Renderer()), Mp4Writer(options.path, options.rate)
+    for models, poses in frames:
         if models is not None:
-            self._drawer.change(models)
-        self._writer.add(self._drawer.frame(poses))
-
-    def close(self) -> None:
-        self._writer.close()
+            drawer.change(models)
+        writer.add(drawer.frame(poses))
+    writer.close()
 
 
-class LastMoment:
-    """A PNG file of the last frame."""
+def write_picture(options: RecordingOptions, frames: Frames) -> None:
+    """Writes a PNG file of the last frame."""
+    shown: list[RecordedModel] = []
+    last: Sequence[float] | None = None
+    for models, poses in frames:
+        shown, last = shown if models is None else models, poses
+    if last is None:
+        return
+    drawer = FrameDrawer(options, Renderer())
+    drawer.change(shown)
+    picture = drawer.frame(last)
+    with options.path.open("wb") as file:
+        Image.fromarray(picture).save(file, "PNG")
 
-    def __init__(self, options: RecordingOptions) -> None:
-        self._options = options
-        self._models: list[RecordedModel] = []
-        self._poses: Sequence[float] | None = None
 
-    def add(self, models: list[RecordedModel] | None, poses: Sequence[float]) -> None:
-        self._models, self._poses = self._models if models is None else models, poses
+def write_page(options: RecordingOptions, frames: Frames) -> None:
+    """Writes an HTML file that plays the frames in 3-D, in any browser and without a network."""
+    from bullet_gazebo.pictures.page import Picture
+    from web_viewer.server import hidden_page
 
-    def close(self) -> None:
-        if self._poses is None:
+    shown: list[RecordedModel] = []
+    last: Sequence[float] | None = None
+    with hidden_page() as server:
+        picture, recording = Picture(server, logger.warning), server.get_scene_serializer()
+        for models, last in frames:
+            if models is not None:
+                shown = models
+                picture.draw([each.seen for each in shown], empty_world().lights.values())
+            picture.move(np.reshape(np.asarray(last), (-1, NUMBERS)))
+            recording.insert_sleep(1.0 / options.rate)
+        if last is None:
             return
-        drawer = FrameDrawer(self._options, Renderer())
-        drawer.change(self._models)
-        picture = drawer.frame(self._poses)
-        with self._options.path.open("wb") as file:
-            Image.fromarray(picture).save(file, "PNG")
+        links = picture.links
+        movable = [seen for seen, _ in shown if not seen.static]
+        corners = [each.corners(links[each.name]) for each in movable if each.name in links]
+        camera = overview(np.concatenate([np.zeros((0, 3)), *corners]), ASPECT)
+        x, y, z = camera.eye.tolist()
+        server.initial_camera.position, server.initial_camera.look_at = (x, y, z), camera.target
+        recording.insert_sleep(END)
+        options.path.write_text(recording.as_html(), encoding="utf-8")
 
 
-class ScenePage:
-    """An HTML file that plays the frames in 3-D, in any browser and without a network."""
-
-    def __init__(self, options: RecordingOptions) -> None:
-        self._options = options
-        self._frames: list[tuple[list[RecordedModel] | None, Sequence[float]]] = []
-
-    def add(self, models: list[RecordedModel] | None, poses: Sequence[float]) -> None:
-        self._frames.append((models, poses))
-
-    def close(self) -> None:
-        if not self._frames:
-            return
-        from bullet_gazebo.pictures.page import Picture
-        from web_viewer.server import hidden_page
-
-        with hidden_page() as server:
-            picture, recording = Picture(server, logger.warning), server.get_scene_serializer()
-            shown: list[RecordedModel] = []
-            rows = np.zeros((0, NUMBERS))
-            for models, poses in self._frames:
-                if models is not None:
-                    shown = models
-                    picture.draw([each.seen for each in shown], empty_world().lights.values())
-                rows = np.reshape(np.asarray(poses), (-1, NUMBERS))
-                picture.move(rows)
-                recording.insert_sleep(1.0 / self._options.rate)
-            links = picture.links
-            movable = [seen for seen, _ in shown if not seen.static]
-            corners = [each.corners(links[each.name]) for each in movable if each.name in links]
-            camera = overview(np.concatenate([np.zeros((0, 3)), *corners]), ASPECT)
-            x, y, z = camera.eye.tolist()
-            server.initial_camera.position, server.initial_camera.look_at = (x, y, z), camera.target
-            recording.insert_sleep(END)
-            self._options.path.write_text(recording.as_html(), encoding="utf-8")
-
-
-FILMS: dict[str, Callable[[RecordingOptions], FrameWriter]] = {
-    ".mp4": Video,
-    ".html": ScenePage,
-    ".png": LastMoment,
+FILMS: dict[str, Callable[[RecordingOptions, Frames], None]] = {
+    ".mp4": write_video,
+    ".html": write_page,
+    ".png": write_picture,
 }
 
 
@@ -171,7 +142,7 @@ def main() -> int:
     logging.basicConfig(format="recording: %(message)s")
     options: RecordingOptions = pickle.load(sys.stdin.buffer)
     try:
-        count = _draw(FILMS[options.path.suffix.lower()](options))
+        count = _draw(options)
     except (EncoderFailed, OSError) as error:
         print(f"recording: {options.path}: {error}", file=sys.stderr, flush=True)
         return 1
@@ -180,7 +151,7 @@ def main() -> int:
     return 0
 
 
-def _draw(film: FrameWriter) -> int:
+def _draw(options: RecordingOptions) -> int:
     """Draws what comes by standard input; returns the number of frames."""
     inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
     stopping = False
@@ -194,10 +165,14 @@ def _draw(film: FrameWriter) -> int:
     # In a thread, so that the simulator never waits for a frame.
     threading.Thread(target=_read, args=(sys.stdin.buffer, inbox), daemon=True).start()
     count = 0
-    while (message := inbox.get()) is not None and not stopping:
-        film.add(*message)
-        count += 1
-    film.close()
+
+    def frames() -> Iterator[Any]:
+        nonlocal count
+        while (message := inbox.get()) is not None and not stopping:
+            count += 1
+            yield message
+
+    FILMS[options.path.suffix.lower()](options, frames())
     return count
 
 
