@@ -19,7 +19,7 @@ from rosmaster.master import Master
 from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal
 from bullet_gazebo.ros.node import gzserver
 from bullet_gazebo.ros.node.replay import Changes, Replay
-from bullet_gazebo.ros.node.start import HASHES, arguments_of, versions
+from bullet_gazebo.ros.node.start import HASHES, arguments_of
 from file_access.expansion import CannotExpand, expand
 
 UNUSABLE = 2
@@ -108,7 +108,7 @@ def _replay(
             replay.run()
         except NoRecording as fault:
             return _tell(str(fault), UNUSABLE)
-        code = _judge(args.bag, recorded, replay, args.until)
+        code = _judge(args.bag, replay, args.until)
         if args.gui and not over.is_set():
             with gzserver.window([]):
                 over.wait()
@@ -124,13 +124,10 @@ def _named(values: dict[str, Any], namespace: str) -> dict[str, Any]:
     return {rospy.names.ns_join(namespace, name): value for name, value in values.items()}
 
 
-def _judge(bag: Path, recorded: RecordedJournal, replay: Replay, until: float) -> int:
+def _judge(bag: Path, replay: Replay, until: float) -> int:
     """Says how the replay ended; returns the exit code."""
     if replay.difference:
-        before, now = recorded.facts["versions"], versions()
-        other = [f"{name} {before[name]}" for name in before if before[name] != now.get(name)]
-        with_others = f" (recorded with {', '.join(other)})" if other else ""
-        return _tell(f"{bag}: first difference: {replay.difference}{with_others}", 1)
+        return _tell(f"{bag}: first difference: {replay.difference}", 1)
     if replay.was_interrupted:
         return gzserver.INTERRUPTED
     if not replay.seconds and until:

@@ -1,9 +1,7 @@
 """How a simulator was started: facts in its journal's first entry, and the arguments that repeat it."""
 
 import argparse
-import importlib.metadata
 import os
-import platform
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +10,6 @@ from file_access.content import FileError, read_file
 from file_access.xml_text import decode
 
 HASHES = "PYTHONHASHSEED"  # decides the order of sets
-ENGINES = ("pybullet", "mujoco", "numpy")  # packages whose versions may decide the bits
 
 
 def facts_of(args: argparse.Namespace, series: int) -> dict[str, Any]:
@@ -35,19 +32,7 @@ def facts_of(args: argparse.Namespace, series: int) -> dict[str, Any]:
         "world": str(path or args.world),
         "world_text": text,
         "series": series,
-        "versions": versions(),
     }
-
-
-def versions() -> dict[str, str]:
-    """Returns the versions of what computes here."""
-    found = {"Python": platform.python_version(), "machine": platform.machine()}
-    for name in ENGINES:
-        try:
-            found[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            continue
-    return found
 
 
 def arguments_of(facts: dict[str, Any], folder: Path) -> list[str]:
