@@ -58,9 +58,8 @@ class FollowedNode:
             rospy.init_node("robot_test", anonymous=True, disable_signals=True)
         topic = f"{self.name}/commands"
         with contextlib.ExitStack() as ending:
-            subscriber = LockstepSubscriber(f"{self.name}_subscriber")
+            subscriber = LockstepSubscriber(f"{self.name}_subscriber", hears)
             self._subscriber = ending.enter_context(contextlib.closing(subscriber))
-            self._subscriber.listen([hears])
             started = ros_node.ros_node_from_pkg(
                 package, executable, launch_new_term=False, name=name,
                 args=[*args, f"{commands}:={topic}"], timeout=CONNECTING,
@@ -86,8 +85,8 @@ class FollowedNode:
 
     def advance(self, ticks: int) -> int:
         """Lets at most `ticks` pass, until a followed node has to answer; returns how many have."""
-        passed, heard = self._subscriber.advance(ticks, [self._hears])
-        self._waiting += len(heard)
+        passed, heard = self._subscriber.advance(ticks)
+        self._waiting += heard
         return passed
 
     def answer(self) -> list[float]:

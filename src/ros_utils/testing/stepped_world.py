@@ -1,7 +1,6 @@
 """A world whose time passes on request: its commands and its readings."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from bullet_gazebo_msgs.srv import StepWorldRequest
@@ -17,15 +16,6 @@ MOTION = 13  # numbers per link: position, orientation, velocities
 Vector = tuple[float, float, float]
 
 
-@dataclass
-class RepeatedCommand:
-    """A command that is sent once in `ticks`, for the next time in `left`."""
-
-    values: Sequence[float]
-    ticks: int
-    left: int
-
-
 class SteppedWorld:
     """A simulated world in lock-step, which is emptied when this object is made."""
 
@@ -38,7 +28,8 @@ class SteppedWorld:
         self.seed = seed
         self._steps, self._client = PreparedSteps(), StepClient()
         self._commands: dict[str, Sequence[float]] = {}  # for the next step
-        self._repeated: dict[str, RepeatedCommand] = {}
+        self._repeated: dict[str, tuple[int, Sequence[float]]] = {}  # period in ticks, and command
+        self._passed = 0  # ticks
         self._nodes: list[FollowedNode] = []
         self._links: dict[tuple[str, str], None] = {}
         self._touched: dict[str, None] = {}
@@ -92,7 +83,7 @@ class SteppedWorld:
                 raise WorldError(
                     "a command can't be sent every 0 s: a physics step or more is needed"
                 )
-            self._repeated[controller] = RepeatedCommand(values, ticks, ticks)
+            self._repeated[controller] = ticks, values
         self._commands[controller] = values
 
     @property
@@ -114,18 +105,18 @@ class SteppedWorld:
         """Lets time pass in parts, between which commands are repeated and followed nodes answer."""
         answer = None
         while ticks:
-            passed = min([ticks, *(each.left for each in self._repeated.values())])
+            periods = [period for period, _ in self._repeated.values()]
+            passed = min([ticks, *(period - self._passed % period for period in periods)])
             if self._nodes and not self._commands:
                 answer, passed = None, self._nodes[0].advance(passed)
             else:
                 passed = 1 if self._nodes else passed
                 answer = self._prepared_step(passed)
             ticks -= passed
-            for controller, command in self._repeated.items():
-                command.left -= passed
-                if not command.left:
-                    command.left = command.ticks
-                    self._commands[controller] = command.values
+            self._passed += passed
+            for controller, (period, values) in self._repeated.items():
+                if self._passed % period == 0:
+                    self._commands[controller] = values
             for node in self._nodes:
                 if values := node.answer():
                     self._commands[node.controller] = values
