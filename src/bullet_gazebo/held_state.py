@@ -309,17 +309,13 @@ def _look_by_attributes(kind: type) -> Look:
     has_dict = kind.__dictoffset__ != 0
     parts = [look for look in (base, _slots_look(slots) if slots else None) if look]
     if has_dict:
-        parts.append(_dict_look(frozenset(getattr(kind, "of_the_present", ())), _is_frozen(kind)))
+        parts.append(_dict_look(frozenset(getattr(kind, "of_the_present", ()))))
     if not parts:
         # A class of Python's without any attribute has an empty __slots__.
         return _nowhere if "__slots__" in vars(kind) else _unreadable
     if len(parts) == 1:
         return parts[0]
     return lambda state, each: list(chain.from_iterable(look(state, each) for look in parts))
-
-
-def _is_frozen(kind: type) -> bool:
-    return bool(getattr(getattr(kind, "__dataclass_params__", None), "frozen", False))
 
 
 def _slots(kind: type) -> Iterable[str]:
@@ -331,11 +327,9 @@ def _slots(kind: type) -> Iterable[str]:
                 yield f"_{each.__name__.lstrip('_')}{name}" if hidden else name
 
 
-def _dict_look(present: frozenset[str], frozen: bool) -> Look:
+def _dict_look(present: frozenset[str]) -> Look:
     def look(state: HeldState, each: Any) -> Iterable[Any]:
         own = each.__dict__
-        if frozen:
-            return list(own.values())
         held = own.copy()
         for name in present:
             held.pop(name, None)
