@@ -119,17 +119,13 @@ class HeldState:
 
 def _place(each: Any, seen: Collection[Any]) -> str:
     """Returns where an object is: Class.attribute of what has it, in containers or not."""
-    holders = [one for one in seen if hasattr(one, "__dict__")]
-    containers = [one for one in seen if isinstance(one, (dict, list, tuple, deque))]
-    inner: Any = each
-    while inner is not None:
-        for holder in holders:
-            names = (name for name, value in vars(holder).items() if value is inner)
-            if name := next(names, None):
-                return f"{type(holder).__qualname__}.{name}"
-        around = next((one for one in containers if _contains(one, inner)), None)
-        containers = [one for one in containers if one is not around]  # circles end
-        inner = around
+    for one in seen:
+        names = (name for name, value in getattr(one, "__dict__", {}).items() if value is each)
+        if name := next(names, None):
+            return f"{type(one).__qualname__}.{name}"
+    for one in seen:
+        if isinstance(one, (dict, list, tuple, deque)) and _contains(one, each):
+            return _place(one, [other for other in seen if other is not one])  # circles end
     return type(each).__qualname__
 
 
