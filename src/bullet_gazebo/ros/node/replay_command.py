@@ -1,7 +1,6 @@
 """The command line of `replay.py`: a master, the simulator and the replay in one process (docs/replay.md)."""
 
 import argparse
-import contextlib
 import logging
 import math
 import os
@@ -70,7 +69,7 @@ def parse_args(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("bag", type=Path, help="the recorded run")
     parser.add_argument(
         "--until",
-        type=_seconds,
+        type=float,
         default=math.inf,
         metavar="SECONDS",
         help="stop after the request with which that much simulated time has passed since the start",
@@ -149,11 +148,3 @@ def _pair(text: str) -> tuple[str, str]:
     if not name or not path:
         raise argparse.ArgumentTypeError(f"{text}: a name, = and a file are needed")
     return name, path
-
-
-def _seconds(text: str) -> float:
-    with contextlib.suppress(ValueError):
-        value = float(text)
-        if 0.0 <= value < math.inf:
-            return value
-    raise argparse.ArgumentTypeError(f"{text}: a number of seconds is needed")
