@@ -4,8 +4,8 @@
     ./ws extras python3 benchmark/snapshots.py [--out FOLDER] [--plans 10] [--horizon 20] [--rounds 5]
 
 The robots that come along, in-process with both engines and over ROS. Each plan, of random actions, begins
-with a restore. The share is of the plans' time that their steps take, in the same round. Medians over rounds,
-in-process of the processor's time, over ROS by the clock. Prints a table and writes snapshots.json.
+with a restore. Medians over rounds, in-process of the processor's time, over ROS by the clock. Prints a table
+and writes snapshots.json.
 """
 
 import statistics
@@ -26,11 +26,11 @@ IDS = (
     "robot_envs/Hopper-v0", "robot_envs/Navigate-v0", "robot_envs/NavigateImages-v0",
 )  # fmt: skip
 BACKENDS = ("bullet", "mujoco", "ros-own")
-COLUMNS = ("save [ms]", "restore [ms]", "steps/s", "share")
+COLUMNS = ("save [ms]", "restore [ms]", "steps/s")
 
 
 def measure(env: RobotEnv, clock: Callable[[], float], plans: int, horizon: int) -> list[float]:
-    """Returns what a save and a restore take [ms], steps a second, and their share of the time."""
+    """Returns what a save and a restore take [ms], and steps a second."""
     actions = [env.action_space.sample() for _ in range(horizon)]
     now, steps = env.save_state(), 0
     saves, restores, stepped = [], [], 0.0  # [s]
@@ -50,14 +50,13 @@ def measure(env: RobotEnv, clock: Callable[[], float], plans: int, horizon: int)
         stepped += done - restored
     env.restore_state(now)
     save, restore = (1000.0 * statistics.median(each) for each in (saves, restores))
-    whole = stepped + sum(restores)
-    return [save, restore, steps / whole, stepped / whole]
+    return [save, restore, steps / (stepped + sum(restores))]
 
 
 def main() -> None:
     chosen = reporting.options(__doc__ or "", plans=10, horizon=20, rounds=5)
     results = {}
-    print("{:34} {:>10} {:>13} {:>8} {:>6}".format("", *COLUMNS))
+    print("{:34} {:>10} {:>13} {:>8}".format("", *COLUMNS))
     for identifier in IDS:
         for backend in BACKENDS:
             env: Any = gymnasium.make(identifier, backend=backend).unwrapped
@@ -70,9 +69,9 @@ def main() -> None:
             env.close()
             found = [statistics.median(each) for each in zip(*rounds, strict=True)]
             results[f"{identifier}, {backend}"] = dict(zip(COLUMNS, found, strict=True))
-            save, restore, rate, share = found
+            save, restore, rate = found
             name = f"{identifier.partition('/')[2]}, {backend}"
-            print(f"{name:34} {save:10.3f} {restore:13.3f} {rate:8,.0f} {share:6.0%}", flush=True)
+            print(f"{name:34} {save:10.3f} {restore:13.3f} {rate:8,.0f}", flush=True)
     reporting.write(chosen.out, "snapshots", results)
 
 
