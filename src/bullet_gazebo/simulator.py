@@ -82,9 +82,8 @@ class Simulator:
         self.listeners: list[Callable[[int], None]] = []
         # Called under the lock after something other than time has moved bodies, or time was reset.
         self.moved: list[Callable[[], None]] = []
-        self.parts: list[
-            object
-        ] = []  # whose state snapshots save, beside that of robots and callbacks
+        # Whose state snapshots save, beside that of robots and callbacks.
+        self.parts: list[object] = []
         self.restored: list[Callable[[], None]] = []  # called under the lock after a restore
         # Called under the lock before each advance, and how many moves are still told of as one.
         self.before_advance: list[Callable[[], None]] = []

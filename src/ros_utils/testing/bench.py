@@ -70,9 +70,8 @@ class Bench:
 
     def __init__(self) -> None:
         self._simulator: Started | None = None
-        self._physics: Any = (
-            None  # gazebo_msgs/GetPhysicsProperties, of a simulator that has just started
-        )
+        # gazebo_msgs/GetPhysicsProperties, of a simulator that has just started
+        self._physics: Any = None
         if "__name" not in rosgraph.names.load_mappings(sys.argv):
             os.environ["ROS_MASTER_URI"] = f"http://{LOOPBACK}:{reserved_port()}"
             os.environ["ROS_IP"] = LOOPBACK

@@ -80,9 +80,7 @@ class WorldJournal:
         """Makes an entry this thread's; returns False within another one, which it follows from."""
         if self._current.entry is not None:
             return False
-        if (
-            self._sim.holds
-        ):  # also looked at in `_taken`; but here the handler has no locks of its own yet
+        if self._sim.holds:  # as in `_taken`; but here the handler has no locks of its own yet
             with self._sim.lock.glance():
                 self._sim.await_holds()
         self._current.entry = entry

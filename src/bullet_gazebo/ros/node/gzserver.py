@@ -197,7 +197,8 @@ class GazeboNode:
                 SnapshotServices(self.sim, steps, one_at_a_time),
                 AdvanceService(*common, thinner, self.journal),
             ]
-            self._output = JournalOutput(self.journal, _journal_bag(args))
+            bag = Path(args.journal).absolute() if args.journal else None
+            self._output = JournalOutput(self.journal, bag)
             self.journal.start(facts_of(args, steps.series))
         spawning = threading.Lock()
         with spawning:  # once a model is there, clients use all other services without a wait
@@ -238,11 +239,6 @@ class GazeboNode:
 
 Work = Callable[[GazeboNode], int]
 """What is done with the simulator, in a thread of its own; returns the exit code."""
-
-
-def _journal_bag(args: argparse.Namespace) -> Path | None:
-    """Returns the bag that the command line asks for."""
-    return Path(args.journal).absolute() if args.journal else None
 
 
 def _recordings(args: argparse.Namespace) -> list[RecordingOptions]:

@@ -71,6 +71,13 @@ def replay(*arguments, **options):
     return process.returncode, out, err
 
 
+def ask(simulation, method):
+    """Returns what the simulator's node answers by XML-RPC."""
+    address = rosgraph.Master("/test", simulation.master_uri).lookupNode("/gazebo")
+    with xmlrpc.client.ServerProxy(address) as node:
+        return getattr(node, method)("/test")[2]
+
+
 def add_cartpole(name="cartpole", pos_y=0.0):
     assert ros_urdf.urdf_load_from_pkg(
         "cartpole_gazebo", "cartpole_v1.urdf", "robot_description", folder="/robots", ns=f"/{name}"
@@ -108,14 +115,10 @@ class ReplayTest(unittest.TestCase):
             env=simulation.environment(),
         )  # fmt: skip
         self.addCleanup(self.end, recorder)
-        info = f"{simulation.master_uri}"
 
         def is_connected():
-            found = subprocess.run(
-                ["rosnode", "info", "/gazebo"], env={**os.environ, "ROS_MASTER_URI": info},
-                capture_output=True, text=True, check=False, timeout=BOUND,
-            )  # fmt: skip
-            return re.search(r"topic: /gazebo/journal\s+\* to: /recorder", found.stdout)
+            lines = ask(simulation, "getBusInfo")
+            return any(line[1:5:3] == ["/recorder", "/gazebo/journal"] for line in lines)
 
         self.assertTrue(wait_until(is_connected, BOUND, "the recorder"))
         return recorder
@@ -346,10 +349,7 @@ class ReplayTest(unittest.TestCase):
             for _ in range(10):
                 client.step(8)
             self.assertTrue(wait_until(reindexed, BOUND, "the bag"))
-            address = rosgraph.Master("/test", simulation.master_uri).lookupNode("/gazebo")
-            with xmlrpc.client.ServerProxy(address) as node:
-                _, _, process = node.getPid("/test")
-            os.kill(process, signal.SIGKILL)
+            os.kill(ask(simulation, "getPid"), signal.SIGKILL)
         code, _, err = replay(active)
         self.assertEqual(code, 2)
         self.assertIn(f"rosbag reindex {active}", err)
