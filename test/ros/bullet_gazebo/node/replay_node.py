@@ -43,17 +43,6 @@ while not rospy.is_shutdown():
     count += 1
     rospy.rostime.wallsleep(0.003)
 """
-CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
-TETRAHEDRON = "\n".join([
-    "solid part",
-    *(
-        "facet normal 0 0 0\nouter loop\n"
-        + "".join(f"vertex {x} {y} {z}\n" for x, y, z in (CORNERS[i] for i in face))
-        + "endloop\nendfacet"
-        for face in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
-    ),
-    "endsolid part",
-])  # fmt: skip
 BOUND = 300  # [s]
 
 
@@ -357,31 +346,16 @@ class ReplayTest(unittest.TestCase):
         self.check_equal(at_least=11)
 
     def test_a_request_that_is_refused_now_is_the_first_difference(self):
-        """The recorded model is of a package that isn't there any more."""
-        package = self.folder / "their_robot"
-        (package / "meshes").mkdir(parents=True)
-        (package / "package.xml").write_text(
-            '<package format="2"><name>their_robot</name><version>0.0.1</version>'
-            "<description>d</description><maintainer email='a@b.de'>m</maintainer>"
-            "<license>BSD</license></package>"
-        )
-        (package / "meshes" / "part.stl").write_text(TETRAHEDRON)
-        robot = (
-            '<robot name="r"><link name="base"><inertial><mass value="1"/>'
-            '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial><collision><geometry>'
-            '<mesh filename="package://their_robot/meshes/part.stl"/></geometry></collision></link></robot>'
-        )
-        before = os.environ["ROS_PACKAGE_PATH"]
-        self.addCleanup(os.environ.__setitem__, "ROS_PACKAGE_PATH", before)
-        os.environ["ROS_PACKAGE_PATH"] = f"{self.folder}:{before}"
         with self.simulation() as simulation:
             recorder = self.record(simulation)
-            self.assertTrue(ros_gazebo.gazebo_spawn_urdf_string(robot, "r"))
+            add_cartpole()
             StepClient().step(1)
         recorder.communicate(timeout=BOUND)
-        self.check_equal(at_least=2)
-        os.environ["ROS_PACKAGE_PATH"] = before
-        self.check_difference("spawn_urdf_model answered otherwise than now: .*their_robot")
+        file = self.folder / "robot.urdf"
+        file.write_text('<robot name="empty"/>')
+        self.check_difference(
+            "spawn_urdf_model answered otherwise than now: .*no <link>", f"--model=cartpole={file}"
+        )
 
 
 if __name__ == "__main__":
