@@ -1,7 +1,6 @@
 """The bag of `lockstep.py --record`, which the simulator writes: made room for, and complete at the end."""
 
 import contextlib
-import glob
 import os
 import re
 from collections.abc import Iterator
@@ -23,10 +22,11 @@ def recorded(path: str) -> Iterator[None]:
 
     Older files of these names are removed.
     """
-    root, suffix = map(re.escape, os.path.splitext(path))
-    names = re.compile(rf"{root}(\.\d+)?{suffix}({re.escape(ACTIVE)})?")
-    for old in filter(names.fullmatch, glob.glob(f"{glob.escape(os.path.splitext(path)[0])}*")):
-        os.unlink(old)
+    folder, name = os.path.split(os.path.abspath(path))
+    stem, suffix = map(re.escape, os.path.splitext(name))
+    names = re.compile(rf"{stem}(\.\d+)?{suffix}({re.escape(ACTIVE)})?")
+    for old in filter(names.fullmatch, os.listdir(folder)):
+        os.unlink(os.path.join(folder, old))
     try:
         yield
     finally:
