@@ -60,8 +60,9 @@ class RobotTestCase(unittest.TestCase):
         try:
             again._recorded = folder = failure_folder(self.id())
             again.run(result)
-            other = "".join(text for _, text in (*result.errors, *result.failures)[:1]).strip()
-            other = message if other.endswith(message) else other.rpartition("\n")[2]
+            texts = [text.strip() for _, text in (*result.errors, *result.failures)]
+            is_same = any(text.endswith(message) for text in texts)
+            other = message if is_same else "".join(texts[:1]).rpartition("\n")[2]
             return tell(
                 folder, self.seed, "".join(traceback.format_exception(fault)), message, other
             )

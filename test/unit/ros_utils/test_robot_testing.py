@@ -82,6 +82,7 @@ class Cart(RobotTestCase):
             with self.subTest(place=place):
                 self.world.wait(0.1)
                 self.assertEqual(self.world.time, place)
+        raise ValueError("another fault")
 
     def tearDown(self):
         print("torn down")
@@ -178,10 +179,9 @@ def test_with_unittest_a_failure_says_where_its_recording_is(tmp_path):
     folder = tmp_path / "test_failures/__main__.Cart.test_it_gets_there"
     assert done.returncode == 1 and f"recorded in {folder}" in done.stdout, done.stdout
     assert done.stdout.count("\nrecorded in ") == 4  # the second run fails alike
-    assert (
-        f"0.1 != 0.0\nrecorded in {folder.with_name('__main__.Cart.test_in_parts')}" in done.stdout
-    )
-    assert "(place=1.0)" in done.stdout
+    parts = folder.with_name("__main__.Cart.test_in_parts")
+    assert f"\nrecorded in {parts}\n" in done.stdout and "(place=1.0)" in done.stdout
+    assert "0.1 != 0.0" in (parts / "failure.txt").read_text()
     assert "self.world.assert_joint(" in done.stdout and "robot_world.py" not in done.stdout
     assert done.stdout.count("torn down") == 8
     assert {path.name for path in folder.iterdir()} == {
