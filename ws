@@ -70,7 +70,8 @@ usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
        ws shell              open an interactive bash in the workspace, with roscd and completion
        ws extras [CMD...]    install requirements/extras.txt too, then run CMD, if any
        ws rviz [CMD...]      install Debian's RViz too, then run CMD, if any
-       ws foreign [CMD...]   install what other people's packages commonly build against, then run CMD, if any
+       ws foreign [CMD...]   install compilers and what other people's packages commonly build against, then
+                             run CMD, if any
        ws clean              remove everything that ws made
        ws --help             show this text
 
@@ -92,10 +93,10 @@ ROS uses loopback only, and a master on a port of this user and checkout: $DEFAU
 To use another master or network, set ROS_MASTER_URI, ROS_IP or ROS_HOSTNAME.
 
 CARTPOLE_WITH (with colons) and ROS_PACKAGE_PATH may name FOLDERs, too. ws builds what CMake has to
-make of their packages, such as messages, in .ws/with; it uses sourced catkin workspaces as they
-were built. Your packages win over this checkout's of the same name, except cartpole and
-bullet_gazebo_msgs. ws ignores the rest of PYTHONPATH and CMAKE_PREFIX_PATH, a whole ROS,
-ROS_NAMESPACE, conda and virtual environments.
+make of their packages, such as messages, in .ws/with, for which it installs compilers
+(requirements/compiler.txt); it uses sourced catkin workspaces as they were built. Your packages win
+over this checkout's of the same name, except cartpole and bullet_gazebo_msgs. ws ignores the rest of
+PYTHONPATH and CMAKE_PREFIX_PATH, a whole ROS, ROS_NAMESPACE, conda and virtual environments.
 END
 }
 
@@ -162,7 +163,7 @@ main() {
     case $1 in
         test)
             steps=(debian venv test_tools companions build)
-            [[ " $* " == *" --fast "* ]] || steps+=(extras)
+            [[ " $* " == *" --fast "* ]] || steps+=(compiler extras)
             ;;
         check)
             look_for_checks "${@:2}"
@@ -170,7 +171,8 @@ main() {
             ;;
         docs) steps=(debian venv doc_tools companions build) ;;
         extras) steps=(debian venv extras companions build) ;;
-        rviz | foreign) steps=(debian "$1" venv companions build) ;;
+        rviz) steps=(debian rviz venv companions build) ;;
+        foreign) steps=(debian compiler foreign venv companions build) ;;
     esac
     look_at_system /etc/os-release /opt/ros/one
     choose_place "${steps[@]}"

@@ -5,7 +5,8 @@ CHECKOUT=$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")
 
 useradd --create-home --shell /bin/bash cartpole
 PIP_NO_CACHE_DIR=1 "$CHECKOUT/ws" true
-apt-get install --yes --no-install-recommends tini
+# Compilers for packages that are mounted into a container.
+sed '/^#/d' "$CHECKOUT/requirements/compiler.txt" | xargs apt-get install --yes --no-install-recommends tini
 apt-get clean
 rm -rf /var/lib/apt/lists/*
 chown --recursive cartpole: "$CHECKOUT"

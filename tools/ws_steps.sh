@@ -9,6 +9,7 @@
 declare -A TITLE=(
     [debian]="Debian packages"
     [checkers]="Debian packages for ws check"
+    [compiler]="Debian packages that compile"
     [rviz]="Debian packages for RViz"
     [foreign]="Debian packages that others build against"
     [venv]="Python packages"
@@ -23,7 +24,7 @@ COMPILER="mend what the compiler or CMake complains of; if that is nothing of yo
 # shellcheck disable=SC2034
 declare -A REMEDY=(
     [debian]="$NETWORK; on other systems than Debian 12 and 13 see docs/catkin.md"
-    [checkers]=$NETWORK [rviz]=$NETWORK [foreign]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [doc_tools]=$NETWORK [extras]=$NETWORK
+    [checkers]=$NETWORK [compiler]=$NETWORK [rviz]=$NETWORK [foreign]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [doc_tools]=$NETWORK [extras]=$NETWORK
     [companions]=$COMPILER [build]=$COMPILER
 )
 
@@ -73,6 +74,7 @@ debian_missing() {  # file
 # The key is what is missing, which is nothing when ready: a package removed later is noticed.
 key_debian() { debian_missing debian.txt; }
 key_checkers() { debian_missing check.txt; }
+key_compiler() { debian_missing compiler.txt; }
 key_rviz() { debian_missing rviz.txt; }
 key_foreign() { debian_missing foreign.txt; }
 
@@ -90,6 +92,7 @@ apt() {
 
 plan_debian() { plan_packages debian.txt; }
 plan_checkers() { plan_packages check.txt; }
+plan_compiler() { plan_packages compiler.txt; }
 plan_rviz() { plan_packages rviz.txt; }
 plan_foreign() { plan_packages foreign.txt; }
 plan_packages() {  # file
@@ -120,6 +123,7 @@ sizes_of_debian() {  # package...
 
 make_debian() { make_packages debian.txt; }
 make_checkers() { make_packages check.txt; }
+make_compiler() { make_packages compiler.txt; }
 make_rviz() { make_packages rviz.txt; }
 make_foreign() { make_packages foreign.txt; }
 make_packages() {  # file
@@ -237,7 +241,7 @@ key_companions() {
     local folders
     mapfile -t folders < <(companions_behind)
     key_place
-    hash_files "${folders[@]}"
+    hash_files tools/workspace.cmake "${folders[@]}"
 }
 
 key_build() {
@@ -245,7 +249,7 @@ key_build() {
     echo "${PARTS[@]}" "${FRONT[@]}"
     cd -- "$ROOT" || return
     find scripts src -mindepth 1 -maxdepth 1 ! -name __pycache__ ! -name '*.egg-info' 2>/dev/null | sort || true
-    hash_files CMakeLists.txt package.xml setup.py companions
+    hash_files CMakeLists.txt package.xml setup.py companions tools/workspace.cmake
 }
 
 hash_files() {  # path...
@@ -278,6 +282,7 @@ make_build() {
 
 catkin_workspace() {  # folder
     local made_for=$1/build/cartpole-place wanted
+    ln -s -- "$ROOT/tools/workspace.cmake" "$1/src/CMakeLists.txt"
     wanted=$(key_place; ls -- "$1/src")
     if [[ ! -f $made_for || $(<"$made_for") != "$wanted" ]]; then
         # CMake's cache holds absolute paths, and what a package left behind would still be found.
@@ -287,6 +292,5 @@ catkin_workspace() {  # folder
     fi
     # pytest runs the tests, so catkin need not look for its test tools. Messages in C++ and Python are enough.
     ROS_LANG_DISABLE=geneus:genlisp:gennodejs "${ROS_PREFIX:-/usr}/bin/catkin_make" --directory "$1" --force-cmake \
-        -DPYTHON_EXECUTABLE="$VENV/bin/python3" -DCATKIN_ENABLE_TESTING=OFF \
-        -DCMAKE_BUILD_TYPE=Release
+        -DPYTHON_EXECUTABLE="$VENV/bin/python3" -DCATKIN_ENABLE_TESTING=OFF
 }

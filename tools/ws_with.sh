@@ -26,11 +26,15 @@ make_theirs_ready() {  # ROS_PACKAGE_PATH
     local lines line hint=''
     is_ready foreign || hint="./ws foreign installs what is common ($(size_of foreign.txt))"
     # The lists of the stamps tell whether what their packages are built on has changed.
-    lines=$(PYTHONPATH=$ROOT "$SYSTEM_PYTHON" -P -m tools.user_packages \
-        --root "$CHECKOUT" --place "$STATE/with" --python "$VENV/bin/python3" \
-        --prefixes "${CALLER[CMAKE_PREFIX_PATH]:+${CALLER[CMAKE_PREFIX_PATH]}:}$WS/devel:$COMPANIONS/devel" \
-        --state "$(cat -- "$WS/stamp/companions" "$WS/stamp/build")" \
-        --hint "$hint" --also "$1" -- "${WITH[@]}") || exit
+    local call=(env "PYTHONPATH=$ROOT" "$SYSTEM_PYTHON" -P -m tools.user_packages
+        --root "$CHECKOUT" --place "$STATE/with" --python "$VENV/bin/python3"
+        --prefixes "${CALLER[CMAKE_PREFIX_PATH]:+${CALLER[CMAKE_PREFIX_PATH]}:}$WS/devel:$COMPANIONS/devel"
+        --state "$(cat -- "$WS/stamp/companions" "$WS/stamp/build")" --hint "$hint" --also "$1")
+    # In a workspace that can't be written no step is made; building theirs says what is missing.
+    if [[ $STATE == "$WS" && -n $(debian_missing compiler.txt) ]] && "${call[@]}" --ask -- "${WITH[@]}"; then
+        make_ready compiler
+    fi
+    lines=$("${call[@]}" -- "${WITH[@]}") || exit
     while IFS= read -r line; do
         [[ -z $line ]] || THEIRS[${line%%=*}]=${line#*=}
     done <<<"$lines"

@@ -25,11 +25,14 @@ def main() -> int:
     parser.add_argument("--state", required=True, help="changes when those are made again")
     parser.add_argument("--hint", default="", help="where Debian packages come from")
     parser.add_argument("--also", default="", help="ROS_PACKAGE_PATH")
+    parser.add_argument("--ask", action="store_true", help="only: is there something to build?")
     parser.add_argument("folders", nargs="*", type=Path, help="the user's folders")
     args = parser.parse_args()
 
     also = [Path(each) for each in args.also.split(":") if each]
     found = look_through(args.folders, also, args.root.resolve())
+    if args.ask:
+        return 0 if any(each.is_made for each in found.packages.values()) else 1
     if not found.folders:
         for note in found.problems + found.notes:
             say(note)

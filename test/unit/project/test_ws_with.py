@@ -266,6 +266,41 @@ def test_what_changes_is_built_anew_and_what_goes_is_gone(ws, tmp_path):
     assert ws(*python).returncode == 1
 
 
+COMPILER = """
+set -euo pipefail
+source tools/ws_place.sh; source tools/ws_environment.sh; source tools/ws_with.sh
+CHECKOUT=$PWD ROOT=$PWD SYSTEM_PYTHON=/usr/bin/python3
+set_place {place}
+debian_missing() {{ [[ $1 != compiler.txt ]] || echo {missing}; }}
+is_ready() {{ true; }}
+make_ready() {{ echo "made: $*"; }}
+add_folder --with {folder}
+make_theirs_ready ''
+"""
+
+
+@pytest.mark.parametrize(
+    ("cmake", "missing", "made"),
+    [
+        ("catkin_package()\n", "g++", ""),  # nothing to build
+        ("add_library(x x.cpp)\n", "g++", "made: compiler\n"),
+        ("add_library(x x.cpp)\n", "", ""),
+    ],
+)
+def test_a_compiler_comes_with_the_first_package_that_is_built(
+    root, tmp_path, cmake, missing, made
+):
+    package(tmp_path / "theirs", "mine", cmake)
+    (tmp_path / "ws/stamp").mkdir(parents=True)
+    for name in ("companions", "build"):
+        (tmp_path / "ws/stamp" / name).touch()
+    code = COMPILER.format(place=tmp_path / "ws", missing=missing, folder=tmp_path / "theirs")
+    done = subprocess.run(
+        ["bash", "-c", code], cwd=root, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == made
+
+
 def test_two_at_once(root, tmp_path):
     """The second waits for the first, and uses what that has built."""
     made = package(tmp_path, "shared", MESSAGES.partition("\n")[2], "message_generation")
