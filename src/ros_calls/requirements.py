@@ -17,12 +17,11 @@ PAGE = "docs/catkin.md"
 # For the simulator (physics, meshes of all kinds), for its window, and for all programs. Elsewhere PyBullet
 # and embreex have no wheels.
 PHYSICS = ("embreex", "pybullet") if platform.machine() == "x86_64" else ("mujoco",)
-SIMULATOR = (*PHYSICS, "collada", "numpy", "scipy", "trimesh", "vhacdx", "xacro", "yaml")
+SIMULATOR = (*PHYSICS, "collada", "manifold3d", "numpy", "trimesh", "vhacdx", "xacro", "yaml")
 WINDOW = (*SIMULATOR, "PIL", "viser", "websockets")
 ALL = (
     *WINDOW,
     "gymnasium",
-    "imageio_ffmpeg",
     "matplotlib",
     "psutil",
     "pygame",

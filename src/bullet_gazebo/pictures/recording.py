@@ -5,6 +5,7 @@ lives in a session of its own and ends with the pipe, so that even a killed simu
 can be played.
 """
 
+import importlib.util
 import logging
 import os
 import pickle
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bullet_gazebo.physics.description import Shape
+from bullet_gazebo.physics.engines import installing
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.pictures.visuals import VisibleModel, visible_model, visible_shapes
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
@@ -59,6 +61,9 @@ class RecordingOptions:
             raise RecordingError(
                 f"a recording's name ends in {', '.join(SUFFIXES)}: not '{self.path}'"
             )
+        if self.path.suffix.lower() == ".mp4" and not importlib.util.find_spec("imageio_ffmpeg"):
+            command = installing("imageio-ffmpeg")
+            raise RecordingError(f"an MP4 needs imageio-ffmpeg, an extra: '{command}' installs it")
         if self.path.is_dir() or not os.access(self.path.parent, os.W_OK):
             raise RecordingError(f"'{self.path}' can't be written")
         if not 0.0 < self.rate <= FASTEST:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 from file_access.locks import scratch_folder
-from rl_workbench.errors import WorkbenchError
+from rl_workbench.errors import WorkbenchError, need
 from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import POLICIES, add_policy_flags, env_options, number, typed_values
 from rl_workbench.training.progress import tell
@@ -83,6 +83,8 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     suffix = out.suffix.lower()
     if suffix not in RATES:
         raise WorkbenchError(f"a video's name ends in {', '.join(RATES)}: not {out}")
+    if suffix == ".mp4":
+        need("imageio_ffmpeg", "imageio-ffmpeg", "an MP4")
     rate = arguments.fps or RATES[suffix]
     if suffix == ".gif" and rate > MAX_GIF_RATE:
         raise WorkbenchError(f"--fps: a GIF has at most {MAX_GIF_RATE:g} frames a second")

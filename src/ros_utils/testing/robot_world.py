@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import rosgraph
 from bullet_gazebo_msgs.srv import StepWorldRequest
-from scipy.spatial.transform import Rotation
+from tf.transformations import quaternion_from_euler
 
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils._internal import packages, params
@@ -64,7 +64,7 @@ class RobotWorld(SteppedWorld):
         Raises:
             WorldError: if one of these fails; the log says why.
         """
-        pose = (*xyz, *Rotation.from_euler("xyz", rpy).as_quat().tolist())
+        pose = (*xyz, *quaternion_from_euler(*rpy).tolist())
         path = _located(file)
         if file.endswith(".sdf"):
             done = ros_gazebo.gazebo_spawn_sdf_path(path, name, ns, "world", *pose)

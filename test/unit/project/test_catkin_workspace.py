@@ -176,7 +176,7 @@ def bare(installed: Workspace):
 @pytest.mark.parametrize(
     ("package", "program", "missing"),
     [
-        ("gazebo_ros", "gzserver", "collada, pybullet, scipy, trimesh, xacro"),
+        ("gazebo_ros", "gzserver", "collada, manifold3d, pybullet, trimesh, xacro"),
         ("cartpole", "pg_train.py", "gymnasium, matplotlib, pygame, tensorboard"),
         ("xacro", "xacro", "xacro"),
     ],

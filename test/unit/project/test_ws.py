@@ -94,7 +94,7 @@ def test_the_workspaces_are_built_without_a_compiler(ws, root, place):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["python", "python3"])
 def test_interpreter_is_the_workspaces(ws, root, name):
-    code = "import bullet_gazebo_msgs.srv, rospy, scipy, cartpole, sys; print(sys.prefix)"
+    code = "import bullet_gazebo_msgs.srv, rospy, trimesh, cartpole, sys; print(sys.prefix)"
     result = ws(name, "-c", code)
     assert Path(result.stdout.strip()).resolve() == root / ".ws/venv", result.stderr
 

@@ -110,7 +110,7 @@ def test_a_workspace_that_is_ready_serves_who_cannot_write_it(open_root):
     """As on a read-only disk; what commands write goes to the user's own folders."""
     with tempfile.TemporaryDirectory() as home:
         os.chown(home, NOBODY, NOBODY)
-        code = "import os, rospy, scipy, bullet_gazebo_msgs.srv; print(os.environ['ROS_LOG_DIR'])"
+        code = "import os, rospy, trimesh, bullet_gazebo_msgs.srv; print(os.environ['ROS_LOG_DIR'])"
         result = as_nobody(open_root / "ws", "python3", "-c", code, HOME=home)
         assert (result.returncode, result.stderr) == (0, "")
         assert result.stdout.startswith(f"{home}/.cache/cartpole/")

@@ -36,7 +36,8 @@ def distributions() -> dict[str, set[str]]:
     lines = (ROOT / "requirements/base.txt").read_text().splitlines()
     needed = [Requirement(text) for line in lines if (text := line.partition("#")[0].strip())]
     names = [each.name.lower() for each in needed if not each.marker or each.marker.evaluate()]
-    modules: dict[str, set[str]] = {name: set() for name in names}
+    # Python 3.11 doesn't see a module that is a single compiled file: it has its package's name.
+    modules = {name: {name} for name in names}
     for module, owners in metadata.packages_distributions().items():
         for owner in owners:
             if owner.lower() in modules:

@@ -45,9 +45,7 @@ def make_engine(name: str = BULLET[0]) -> Engine:
         name = MUJOCO
     if name == MUJOCO:
         if importlib.util.find_spec("mujoco") is None:
-            workspace = os.environ.get("CARTPOLE_WS")  # the path of `ws`, which sets it
-            pip = [sys.executable, "-m", "pip", "install", "mujoco"]
-            command = shlex.join([workspace, "extras"] if workspace else pip)
+            command = installing("mujoco")
             raise EngineError(f"physics engine 'mujoco' is not installed; '{command}' installs it")
         from bullet_gazebo.physics.engines.mujoco_engine import MujocoEngine
 
@@ -55,3 +53,10 @@ def make_engine(name: str = BULLET[0]) -> Engine:
     from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
 
     return BulletEngine()
+
+
+def installing(package: str) -> str:
+    """Returns the command that installs a package of requirements/extras.txt."""
+    workspace = os.environ.get("CARTPOLE_WS")  # the path of `ws`, which sets it
+    pip = [sys.executable, "-m", "pip", "install", package]
+    return shlex.join([workspace, "extras"] if workspace else pip)

@@ -35,10 +35,12 @@ def hull_points(points: np.ndarray) -> np.ndarray:
 def convex_pieces(vertices: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
     """Returns the corners (k, 3) of convex bodies that fill a mesh; none if it is convex enough itself."""
     import trimesh
+    from manifold3d import Manifold
     from vhacdx import compute_vhacd
 
     mesh = trimesh.Trimesh(vertices, faces)  # joins corners
-    if mesh.is_watertight and abs(mesh.volume) > CONVEX * mesh.convex_hull.volume:
+    hull = Manifold.hull_points(mesh.vertices)
+    if mesh.is_watertight and abs(mesh.volume) > CONVEX * hull.volume():
         return []
     counted = np.insert(mesh.faces, 0, 3, axis=1)  # corners of each face, as VTK has it
     found = compute_vhacd(
@@ -63,12 +65,16 @@ def _different(points: np.ndarray) -> np.ndarray:
 
 def _corners(points: np.ndarray) -> np.ndarray:
     """Returns the corners of the convex hull; all points, if they are flat."""
-    from scipy.spatial import ConvexHull, QhullError
+    from manifold3d import Manifold
 
-    try:
-        return points[np.sort(ConvexHull(points).vertices)]
-    except QhullError:
+    hull = Manifold.hull_points(points)
+    if hull.volume() == 0.0:
         return points
+    # It has copies of them: each is found right behind the point.
+    both = np.concatenate([points, hull.to_mesh64().vert_properties])
+    order = np.lexsort(both.T)
+    is_copy = (np.diff(both[order], axis=0) == 0.0).all(axis=1)
+    return points[np.sort(order[:-1][is_copy])]
 
 
 def _outermost(points: np.ndarray) -> np.ndarray:

@@ -177,7 +177,7 @@ def test_a_world_without_meshes_does_not_pay_for_them():
         "from bullet_gazebo.physics.files.sdf import parse_sdf\n"
         "there = world.World(BulletEngine())\n"
         "there.spawn('m', parse_sdf(sys.argv[1]), world.Pose())\n"
-        "assert not {'trimesh', 'collada', 'scipy.spatial'} & set(sys.modules)"
+        "assert not {'trimesh', 'collada', 'manifold3d'} & set(sys.modules)"
     )
     subprocess.run(
         [sys.executable, "-c", code, BALL.format(1)],

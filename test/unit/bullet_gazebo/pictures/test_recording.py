@@ -153,6 +153,17 @@ def test_what_cannot_be_recorded_is_refused(tmp_path, changed, text):
         RecordingOptions(**{"path": tmp_path / "a.mp4", **changed}).check()
 
 
+def test_a_video_without_its_encoder_is_refused_with_the_command_that_installs_it(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(
+        RecordingError, match=r"an MP4 needs imageio-ffmpeg, .*/ws extras' installs"
+    ):
+        options(tmp_path).check()
+    RecordingOptions(tmp_path / "a.html").check()
+
+
 def test_a_folder_that_goes_is_said_in_one_line(sim, tmp_path, capfd):
     folder = tmp_path / "gone"
     folder.mkdir()

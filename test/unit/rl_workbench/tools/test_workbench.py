@@ -310,6 +310,8 @@ def test_an_extra_that_is_missing(runs: Path, tmp_path: Path, monkeypatch, capsy
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     monkeypatch.setattr("shutil.which", lambda name: None)
     assert "installs it" in refused(capsys, "sweep", "--out", tmp_path / "sweep")
+    line = refused(capsys, "record", runs / "dqn_0", "--out", tmp_path / "a.mp4")
+    assert "an MP4 needs imageio-ffmpeg, an extra: " in line
     with pytest.raises(SystemExit):
         work("train", "--algo", "ppo")
     assert "installs it" in capsys.readouterr().err
