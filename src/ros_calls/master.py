@@ -9,6 +9,7 @@ import functools
 import http.client
 import socket
 import xmlrpc.client
+from collections.abc import Iterator
 from contextvars import ContextVar
 from typing import Any
 from urllib.parse import urlsplit
@@ -105,27 +106,17 @@ def uri() -> str:
     return _chosen.get() or str(rosgraph.get_master_uri())
 
 
-class _Chosen:
-    """The block of `using`; a class because a generator takes three times as long, and each step has one."""
-
-    __slots__ = ("_token", "_uri")
-
-    def __init__(self, master_uri: str) -> None:
-        self._uri = master_uri
-
-    def __enter__(self) -> None:
-        self._token = _chosen.set(self._uri)
-
-    def __exit__(self, *_: object) -> None:
-        _chosen.reset(self._token)
-
-
-def using(master_uri: str | None) -> contextlib.AbstractContextManager[None]:
+@contextlib.contextmanager
+def using(master_uri: str | None) -> Iterator[None]:
     """Returns a block in which this thread's calls go to another master; None changes nothing.
 
     The environment stays unchanged, so the rest of the process is unaffected.
     """
-    return contextlib.nullcontext() if master_uri is None else _Chosen(master_uri)
+    token = _chosen.set(master_uri or _chosen.get())
+    try:
+        yield
+    finally:
+        _chosen.reset(token)
 
 
 def call(method: str, *args: Any, timeout: float = TIMEOUT) -> Any:

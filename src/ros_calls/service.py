@@ -203,7 +203,6 @@ class Connection:
             TimeoutError: no answer in time.
         """
         self._kind = kind
-        self._kernels_timeout = 0.0  # [s]; none is set yet
         deadline = time.monotonic() + timeout
         try:
             host, port = rospy.core.parse_rosrpc_uri(address)
@@ -242,10 +241,12 @@ class Connection:
         """
         payload = _serialized(message)
         try:
-            self._set_timeout(_finite(timeout))
+            self._socket.settimeout(_finite(timeout))
             self._socket.sendall(payload)
+        except TimeoutError:
+            raise
         except OSError as fault:
-            raise _told(fault) from fault
+            raise ConnectionEnded(str(fault)) from fault
 
     def receive(self, timeout: float) -> Any:
         """Returns the response to the last request; the time limit starts now.
@@ -256,12 +257,14 @@ class Connection:
         """
         deadline = time.monotonic() + timeout
         try:
-            self._set_timeout(_finite(timeout))
+            self._socket.settimeout(_finite(timeout))
             if timeout == math.inf:
                 self._await_data(deadline)
             ok, answer = self._receive(deadline)
+        except TimeoutError:
+            raise
         except OSError as fault:
-            raise _told(fault) from fault
+            raise ConnectionEnded(str(fault)) from fault
         if not ok:
             reason = answer.decode(errors="replace") or "without a reason"
             raise CallFailed(f"it failed: {reason}")
@@ -272,18 +275,8 @@ class Connection:
             raise CallFailed(f"its answer can't be read: {fault}") from fault
         return response
 
-    def _set_timeout(self, timeout: float) -> None:
-        """Sets the kernel's time limit on the socket: Python's costs one more system call per wait."""
-        if timeout == self._kernels_timeout:
-            return
-        limit = struct.pack("@ll", int(timeout), int(timeout % 1.0 * 1e6))
-        self._socket.settimeout(None)
-        for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
-            self._socket.setsockopt(socket.SOL_SOCKET, option, limit)
-        self._kernels_timeout = timeout
-
     def _receive(self, deadline: float) -> tuple[bool, bytes]:
-        """Reads one answer; for one in a single piece, as most are, the kernel's time limit is enough."""
+        """Reads one answer; for one in a single piece, as most are, the socket's time limit is enough."""
         data = self._part()
         while len(data) < HEAD.size:
             self._await_data(deadline)
@@ -330,13 +323,6 @@ def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
         return rospy.msg.args_kwds_to_message(kind._request_class, request, {})
     except TypeError as fault:
         raise CallFailed(f"the request can't be sent: {fault}") from fault
-
-
-def _told(fault: OSError) -> Exception:
-    """Returns the exception for a socket's fault; the kernel reports its time limit as BlockingIOError."""
-    if isinstance(fault, BlockingIOError | TimeoutError):
-        return TimeoutError()
-    return ConnectionEnded(str(fault))
 
 
 def _finite(timeout: float) -> float:
