@@ -67,8 +67,6 @@ class RosSession:
     def start(self, say: Say) -> None:
         """Starts what is missing, and makes this the process's session.
 
-        If the simulator was started here and dies before its robots are there, another one is started once.
-
         Args:
             say: called with a line for each thing that is started.
 
@@ -76,16 +74,6 @@ class RosSession:
             RobotEnvError: if something can't be started, or what runs doesn't fit; `close` ends what was
                 started before.
         """
-        try:
-            self._start(say)
-        except RobotEnvError as error:
-            if not self._started_simulator or _simulator_runs():
-                raise
-            rospy.logwarn("%s; another simulator is started in its place", error)
-            self._undo.close()
-            self._start(say)
-
-    def _start(self, say: Say) -> None:
         robot = self._scene.robots[0]
         if rospy.core.is_initialized() and rospy.is_shutdown():
             raise RobotEnvError(
@@ -94,7 +82,7 @@ class RosSession:
             )
         if self._rviz:
             windows.check_rviz(robot)
-        self._started_simulator = not _simulator_runs()
+        self._started_simulator = not (node.master_is_up() and running.simulator_answers())
         if self._started_simulator:
             say("starting the simulator")
             self._start_simulator()
@@ -243,10 +231,6 @@ def running_session(scene: Scene, realtime: bool) -> RosSession:
         raise
     atexit.register(session.close)
     return session
-
-
-def _simulator_runs() -> bool:
-    return node.master_is_up() and running.simulator_answers()
 
 
 def _undo_if_running(before: RunningSimulator, undo: Undo) -> None:
