@@ -60,8 +60,8 @@ class ScriptWorld:
         """Whether a simulator was found and hasn't ended since."""
         return self._call is not None
 
-    def look(self, at_once: bool = False) -> bool:
-        """Looks for a simulator, at most once per LOOK unless `at_once`; returns whether there is one.
+    def look(self) -> bool:
+        """Looks for a simulator, at most once per LOOK; returns whether there is one.
 
         Raises:
             RunsByItself: the simulator found isn't in lock-step.
@@ -71,7 +71,7 @@ class ScriptWorld:
         if self._left or not rospy.core.is_initialized():
             return False
         with self._guard:
-            if not at_once and originals.monotonic() < self._next_look:
+            if originals.monotonic() < self._next_look:
                 return False
             self._next_look = originals.monotonic() + LOOK
             if not is_running():

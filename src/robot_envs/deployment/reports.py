@@ -112,10 +112,6 @@ class JointListener:
             self._known.clear()
             self._faults.clear()
 
-    def close(self) -> None:
-        """Unsubscribes."""
-        self._subscriber.unregister()
-
 
 class ControllerWatch:
     """Asks a robot's controller manager again and again, in a thread, whether the controllers run.
