@@ -1,6 +1,5 @@
 """The Gymnasium environment: it passes commands to robots, and lets the task judge the state."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -331,21 +330,16 @@ class RobotEnv(DrawnEnv):
         if sent is not None:
             state = state._replace(commands=sent)
         self._state, self._steps = state, number
-        terminated: Any = judge.is_terminal(state)
-        if type(terminated) is not bool:
-            terminated = bool(checks.checked(task, "is_terminal", terminated, checks.FLAGS))
+        ended = checks.checked(task, "is_terminal", judge.is_terminal(state), checks.FLAGS)
+        terminated = bool(ended)
         truncated = not terminated and number == self.max_steps
         if terminated or truncated:
             self._steps = None
         measured = state if self._sensor is None else self._sensor.measure(state, self.np_random)
         self._show()
-        reward: Any = judge.reward(state, action)
-        if type(reward) is not float or not math.isfinite(reward):
-            reward = checks.checked_number(task, "reward", reward)
+        reward = checks.checked_number(task, "reward", judge.reward(state, action))
         observation = self._observe(measured)
-        info: Any = judge.info(state)
-        if type(info) is not dict:
-            info = checks.checked(task, "info", info, dict)
+        info = checks.checked(task, "info", judge.info(state), dict)
         return observation, reward, terminated, truncated, info
 
     def save_state(self) -> EnvSnapshot:

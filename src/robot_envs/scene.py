@@ -100,16 +100,8 @@ class Scene:
                 f"commands are given by controller, {{{next(iter(self.ports), '')!r}: ...}}, not {given!r}"
             ) from None
         for name, value in items:
-            if type(value) is float and name in self._singles and math.isfinite(value):
-                found[name] = value  # the usual case, fast
-            else:
-                found[name] = _command(self._port(name), name, value)
+            found[name] = _command(self._port(name), name, value)
         return found
-
-    @cached_property
-    def _singles(self) -> frozenset[str]:
-        """Names of controllers that take one number."""
-        return frozenset(name for name, (_, port) in self.ports.items() if port.single)
 
     def _port(self, name: str) -> CommandPort:
         found = self.ports.get(name)

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import starmap
-from operator import attrgetter
 from typing import Any
 
 from bullet_gazebo.control.errors import ControlError
@@ -56,9 +55,6 @@ from robot_envs.world_state import (
     WorldState,
     link_keys,
 )
-
-_numbers = attrgetter("position", "velocity", "effort")
-_make = tuple.__new__  # what a NamedTuple's constructor does, twice as fast
 
 
 class InProcessWorld(RobotBackend):
@@ -207,8 +203,8 @@ class InProcessWorld(RobotBackend):
         joints = Joints()
         total = 0.0
         for name, joint in self._joints:
-            joints[name] = state = _make(JointState, _numbers(joint))
-            total += state[0] + state[1]
+            joints[name] = JointState(joint.position, joint.velocity, joint.effort)
+            total += joint.position + joint.velocity
         if not math.isfinite(total):
             raise SimulatorError(f"the joint state isn't finite: {joints}")
         passed = self._sim.now - self._begin
