@@ -277,18 +277,11 @@ class Connection:
 
     def _receive(self, deadline: float) -> tuple[bool, bytes]:
         """Reads one answer; for one in a single piece, as most are, the socket's time limit is enough."""
-        data = self._part()
-        while len(data) < HEAD.size:
+        data = bytearray(self._part())
+        while len(data) < HEAD.size or len(data) < HEAD.size + HEAD.unpack_from(data)[1]:
             self._await_data(deadline)
             data += self._part()
-        ok, length = HEAD.unpack_from(data)
-        if len(data) == HEAD.size + length:
-            return bool(ok), data[HEAD.size :]
-        whole = bytearray(data)
-        while len(whole) < HEAD.size + length:
-            self._await_data(deadline)
-            whole += self._part()
-        return bool(ok), bytes(whole[HEAD.size :])
+        return bool(data[0]), bytes(data[HEAD.size :])
 
     def _part(self) -> bytes:
         part = self._socket.recv(CHUNK)
