@@ -1,6 +1,6 @@
 """The cart-pole's description: a cart that moves along a rail, and a pole that swings on it."""
 
-from pathlib import Path
+from functools import partial
 
 from robot_envs.files import own_file
 from robot_envs.robot import Robot
@@ -12,17 +12,9 @@ CART_JOINT, POLE_JOINT = "stand_cart", "cart_pole"
 CONTROLLER = "stand_cart_position_controller"
 
 
-def _urdf() -> Path:
-    return own_file("cartpole", "urdf/cartpole.urdf.xacro")
-
-
-def _parameters() -> Path:
-    return own_file("cartpole_controller", "config/joint_position_control.yaml")
-
-
 ROBOT = Robot(
-    urdf=_urdf,
-    controllers=_parameters,
+    urdf=partial(own_file, "cartpole", "urdf/cartpole.urdf.xacro"),
+    controllers=partial(own_file, "cartpole_controller", "config/joint_position_control.yaml"),
     run=(CONTROLLER,),
     name=MODEL,
     world=None,  # it never touches the ground

@@ -80,11 +80,22 @@ class Picking(Task):
         return actions(4)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
-        """Draws the places of tip and cube."""
-        return begun(rng, self.helped)
+        """Draws how an episode begins; see `PickCube`."""
+        tip, cube = MIDDLE + rng.uniform(-0.05, 0.05, 3), draw_cube(rng)
+        turned = float(rng.uniform(-TURNED, TURNED))
+        yaw, drawn = math.atan2(cube[1], cube[0]) + turned, rng.random()
+        if drawn < 0.5 * self.helped:
+            return placed(tip, tip, math.atan2(tip[1], tip[0]), in_hand=True)
+        if drawn < self.helped:
+            tip = cube + (0.0, 0.0, rng.uniform(0.0, 0.1))
+        return placed(tip, cube, yaw)
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
-        return moved(action, state)
+        tip = np.clip(aim(state) + STEP * action[:3], MIDDLE - REACH, MIDDLE + REACH)
+        tip[2] = max(tip[2], LOWEST)
+        finger = state.commands["gripper_controller"][0] - CLOSING * float(action[3])
+        finger = min(max(finger, SHUT), OPEN)
+        return {"arm_controller": angles(tip), "gripper_controller": (finger, finger)}
 
 
 class PickCube(Picking):
@@ -206,17 +217,6 @@ class PickCubeGoal(Picking, GoalTask):
         return away.max(axis=-1) <= CLOSE / UNIT
 
 
-def begun(rng: np.random.Generator, helped: float) -> InitialState:
-    """Draws how an episode begins; see `PickCube`."""
-    tip, cube = MIDDLE + rng.uniform(-0.05, 0.05, 3), draw_cube(rng)
-    yaw, drawn = math.atan2(cube[1], cube[0]) + float(rng.uniform(-TURNED, TURNED)), rng.random()
-    if drawn < 0.5 * helped:
-        return placed(tip, tip, math.atan2(tip[1], tip[0]), in_hand=True)
-    if drawn < helped:
-        tip = cube + (0.0, 0.0, rng.uniform(0.0, 0.1))
-    return placed(tip, cube, yaw)
-
-
 def draw_cube(rng: np.random.Generator) -> np.ndarray:
     """Returns a place of the cube on the table [m]."""
     x, y = rng.uniform(np.negative(SPREAD), SPREAD)
@@ -263,15 +263,6 @@ def aim(state: WorldState) -> np.ndarray:
     away = UPPER * math.sin(shoulder) + FORE * math.cos(shoulder + elbow)
     up = UPPER * math.cos(shoulder) - FORE * math.sin(shoulder + elbow)
     return np.array([away * math.cos(waist), away * math.sin(waist), SHOULDER - HAND + up])
-
-
-def moved(action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
-    """Returns the commands of the controllers [rad, m]."""
-    tip = np.clip(aim(state) + STEP * action[:3], MIDDLE - REACH, MIDDLE + REACH)
-    tip[2] = max(tip[2], LOWEST)
-    finger = state.commands["gripper_controller"][0] - CLOSING * float(action[3])
-    finger = min(max(finger, SHUT), OPEN)
-    return {"arm_controller": angles(tip), "gripper_controller": (finger, finger)}
 
 
 def places(state: WorldState) -> tuple[np.ndarray, np.ndarray]:

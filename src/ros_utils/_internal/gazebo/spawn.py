@@ -329,17 +329,7 @@ def gazebo_spawn_sdf_string(
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
 ) -> bool:
-    """Spawns a model from SDF text.
-
-    Args:
-        model_string: the SDF.
-        model_name: name of the new model.
-        robot_namespace: namespace of its plugins, e.g. of its controller manager.
-        reference_frame: model or link that the pose refers to; "world" for the origin.
-        pos_x, pos_y, pos_z: position [m].
-        ori_x, ori_y, ori_z, ori_w: orientation, a quaternion.
-        timeout, gazebo_ns: see `ros_gazebo`.
-        verify: return only once the model is in the world's list.
+    """Spawns a model from SDF text; the arguments are those of `gazebo_spawn_urdf_string`.
 
     Returns:
         True if it was spawned; a single value, unlike the pair for a URDF.
