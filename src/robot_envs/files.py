@@ -147,11 +147,7 @@ def read_parameters(source: Source) -> dict[str, Any]:
     """Returns the parameters in a YAML file or a text of several lines; raises RobotEnvError otherwise."""
     if isinstance(source, str) and "\n" in source:
         return _parameters(source.encode(), "the controllers' text")
-    return _parameters_of(locate(source))
-
-
-@lru_cache(maxsize=32)
-def _parameters_of(path: Path) -> dict[str, Any]:
+    path = locate(source)
     return _parameters(_read(path), str(path))
 
 
