@@ -31,7 +31,7 @@ def world(answers):
         made = ScriptWorld()
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(rospy.core, "is_initialized", lambda: True)
-            assert made.look(at_once=True)
+            assert made.look()
         yield made
         made.forget()
     service.close()
