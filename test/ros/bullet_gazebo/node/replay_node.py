@@ -89,9 +89,7 @@ class ReplayTest(unittest.TestCase):
     def simulation(self, **options):
         simulation = Simulation(lockstep=True, **options)
         self.addCleanup(simulation.close)
-        active = simulation.active()
-        active.__enter__()
-        self.addCleanup(active.__exit__)
+        self.enterContext(simulation.active())
         return simulation
 
     def record(self, simulation, *topics):
