@@ -67,11 +67,12 @@ def _corners(points: np.ndarray) -> np.ndarray:
     """Returns the corners of the convex hull; all points, if they are flat."""
     from manifold3d import Manifold
 
-    hull = Manifold.hull_points(points)
+    scaled = _scaled(points)
+    hull = Manifold.hull_points(scaled)
     if hull.volume() == 0.0:
         return points
     # It has copies of them: each is found right behind the point.
-    both = np.concatenate([points, hull.to_mesh64().vert_properties])
+    both = np.concatenate([scaled, hull.to_mesh64().vert_properties])
     order = np.lexsort(both.T)
     is_copy = (np.diff(both[order], axis=0) == 0.0).all(axis=1)
     return points[np.sort(order[:-1][is_copy])]
@@ -83,14 +84,10 @@ def _outermost(points: np.ndarray) -> np.ndarray:
     height = 1.0 - (2.0 * np.arange(MOST_POINTS) + 1.0) / MOST_POINTS
     ring = np.sqrt(1.0 - height**2)
     directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
-    centred = points - points.mean(axis=0)
-    spread = np.abs(centred).max(axis=0)
-    centred = (
-        centred / np.where(spread > 0.0, spread, 1.0)
-    ).T  # a flat body has as fine an outline
+    scaled = _scaled(points).T
     best, farthest = np.full(MOST_POINTS, -np.inf), np.zeros(MOST_POINTS, int)
     for start in range(0, len(points), BLOCK):
-        piece = np.ascontiguousarray(centred[:, start : start + BLOCK])
+        piece = np.ascontiguousarray(scaled[:, start : start + BLOCK])
         for some in np.array_split(np.arange(MOST_POINTS), MOST_POINTS // BLOCK):
             reach = directions[some] @ piece
             index = reach.argmax(axis=1)
@@ -98,3 +95,12 @@ def _outermost(points: np.ndarray) -> np.ndarray:
             better = value > best[some]
             best[some[better]], farthest[some[better]] = value[better], start + index[better]
     return points[np.unique(farthest)]
+
+
+def _scaled(points: np.ndarray) -> np.ndarray:
+    """Returns the points about their mean, within 1 along each axis: so hulls are as fine of what is flat or
+    far from the origin. Their corners are the same.
+    """
+    centred = points - points.mean(axis=0)
+    spread = np.abs(centred).max(axis=0)
+    return centred / np.where(spread > 0.0, spread, 1.0)

@@ -203,6 +203,16 @@ def test_a_hull_of_very_many_corners_is_cut_down_by_next_to_nothing():
     assert 0.0 <= lost.max() < 0.006
 
 
+@pytest.mark.parametrize("scale, place", [((1.0, 1.0, 1.0), 1e6), ((1.0, 1.0, 1e-6), 0.0)])
+def test_a_hull_far_from_the_origin_and_one_of_a_thin_plate_keep_their_corners(scale, place):
+    random = np.random.default_rng(0)
+    ball = random.normal(size=(1000, 3))
+    ball /= np.linalg.norm(ball, axis=1, keepdims=True)
+    inside = random.uniform(-0.5, 0.5, (MOST_POINTS, 3))
+    corners = ball * scale + place
+    assert np.array_equal(hull_points(np.concatenate([corners, inside * scale + place])), corners)
+
+
 def test_points_inside_of_a_hull_go_only_where_there_are_very_many():
     inside = np.random.default_rng(0).uniform(-1.0, 1.0, (MOST_POINTS, 3))
     points = np.concatenate([inside, CUBE])
