@@ -174,8 +174,11 @@ def _ball() -> Geometry:
 @cache
 def _cylinder() -> Geometry:
     """Returns a cylinder along z, radius and length 1 m. Its flat ends have vertices of their own."""
-    found = creation.cylinder(1.0, 1.0, sections=SIDES).smooth_shaded
-    return _geometry(found.vertices, found.faces, flat=False)
+    # trimesh's own smooth_shaded needs SciPy or NetworkX.
+    found = creation.cylinder(1.0, 1.0, sections=SIDES)
+    is_end = np.abs(found.face_normals[:, 2:]) > 0.5
+    faces = np.where(is_end, found.faces, found.faces + len(found.vertices))
+    return _geometry(np.concatenate([found.vertices] * 2), faces, flat=False)
 
 
 def _geometry(vertices: np.ndarray, faces: np.ndarray, **look: Any) -> Geometry:

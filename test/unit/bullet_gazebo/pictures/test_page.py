@@ -1,5 +1,8 @@
 """Many shapes of many models as few objects of a page."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from support.pages.viser_recording import Recording
@@ -126,3 +129,20 @@ def test_a_file_with_looks_is_sent_once_for_all_models(server, picture, tmp_path
     picture.move(in_a_row(5) + 0.5)
     picture.draw(models[:2], [])
     picture.move(in_a_row(2))
+
+
+def test_all_shapes_are_drawn_without_scipy_and_networkx():
+    """What the window needs in a user's own workspace (ros_calls/requirements.py) has neither."""
+    program = """
+import sys
+sys.modules.update(scipy=None, networkx=None)
+from bullet_gazebo.physics.description import Link, Shape
+from bullet_gazebo.pictures.page import Picture
+from bullet_gazebo.pictures.visuals import VisibleModel
+from web_viewer.server import hidden_page
+with hidden_page() as server:
+    shapes = [Shape("box", (1, 1, 1)), Shape("sphere", (1,)), Shape("cylinder", (1, 1))]
+    Picture(server, sys.exit).draw([VisibleModel(1, "m", [Link("l", visuals=shapes)])], [])
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
