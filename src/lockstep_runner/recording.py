@@ -1,8 +1,8 @@
 """The bag of `lockstep.py --record`, which the simulator writes: made room for, and complete at the end."""
 
 import contextlib
+import itertools
 import os
-import re
 from collections.abc import Iterator
 
 from lockstep_runner import originals
@@ -20,17 +20,23 @@ LOOK = 0.05  # [s]
 def recorded(path: str) -> Iterator[None]:
     """Lets the simulators that start within the block record: in a bag, and then in others with a number.
 
-    Older files of these names are removed.
+    Older files of these names are removed: the numbers of one recording have no gap, unlike dates in names of
+    the user's.
     """
-    folder, name = os.path.split(os.path.abspath(path))
-    stem, suffix = map(re.escape, os.path.splitext(name))
-    names = re.compile(rf"{stem}(\.\d+)?{suffix}({re.escape(ACTIVE)})?")
-    for old in filter(names.fullmatch, os.listdir(folder)):
-        os.unlink(os.path.join(folder, old))
+    stem, suffix = os.path.splitext(path)
+    numbered = (f"{stem}.{number}{suffix}" for number in itertools.count(2))
+    for bag in (path, *itertools.takewhile(_files, numbered)):
+        for old in _files(bag):
+            os.unlink(old)
     try:
         yield
     finally:
         _finish(path)
+
+
+def _files(bag: str) -> list[str]:
+    """Returns the files that there are of a bag, complete or not."""
+    return [each for each in (bag, bag + ACTIVE) if os.path.exists(each)]
 
 
 def _finish(path: str) -> None:
