@@ -28,7 +28,8 @@ class SteppedWorld:
         self.seed = seed
         self._steps, self._client = PreparedSteps(), StepClient()
         self._commands: dict[str, Sequence[float]] = {}  # for the next step
-        self._repeated: dict[str, tuple[int, Sequence[float]]] = {}  # period in ticks, and command
+        # The tick in which a command was given, its period in ticks, and the command.
+        self._repeated: dict[str, tuple[int, int, Sequence[float]]] = {}
         self._passed = 0  # ticks
         self._nodes: list[FollowedNode] = []
         self._links: dict[tuple[str, str], None] = {}
@@ -83,7 +84,7 @@ class SteppedWorld:
                 raise WorldError(
                     "a command can't be sent every 0 s: a physics step or more is needed"
                 )
-            self._repeated[controller] = ticks, values
+            self._repeated[controller] = self._passed, ticks, values
         self._commands[controller] = values
 
     @property
@@ -105,8 +106,9 @@ class SteppedWorld:
         """Lets time pass in parts, between which commands are repeated and followed nodes answer."""
         answer = None
         while ticks:
-            periods = [period for period, _ in self._repeated.values()]
-            passed = min([ticks, *(period - self._passed % period for period in periods)])
+            repeated = self._repeated.values()
+            left = [period - (self._passed - begin) % period for begin, period, _ in repeated]
+            passed = min([ticks, *left])
             if self._nodes and not self._commands:
                 answer, passed = None, self._nodes[0].advance(passed)
             else:
@@ -114,8 +116,8 @@ class SteppedWorld:
                 answer = self._prepared_step(passed)
             ticks -= passed
             self._passed += passed
-            for controller, (period, values) in self._repeated.items():
-                if self._passed % period == 0:
+            for controller, (begin, period, values) in self._repeated.items():
+                if (self._passed - begin) % period == 0:
                     self._commands[controller] = values
             for node in self._nodes:
                 if values := node.answer():

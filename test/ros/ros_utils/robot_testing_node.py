@@ -141,6 +141,18 @@ class Robots(RobotTestCase):
         self.world.command(CART, 0.2)
         self.world.assert_joint("stand_cart", 0.2, within=0.02, by=3.0, stays=0.5)
 
+    def test_a_commands_period_begins_with_it(self):
+        """It is sent again at 0.15 s, not at 0.1 s: moving the joint between them loses the command before."""
+        self.spawn(name="cart")
+        self.world.wait(0.05)
+        self.world.command(CART, 0.1, every=0.1)
+        self.world.wait(0.07)
+        ros_gazebo.gazebo_set_model_configuration("cart", ["stand_cart"], [0.0])
+        self.world.wait(0.03)
+        self.assertLess(self.world.joint("stand_cart"), 0.001)
+        self.world.wait(0.049)
+        self.assertGreater(self.world.joint("stand_cart"), 0.005)
+
 
 if __name__ == "__main__":
     rostest.rosrun("cartpole", "robot_testing", "__main__")
