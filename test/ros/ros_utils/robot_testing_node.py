@@ -142,7 +142,7 @@ class Robots(RobotTestCase):
         self.world.assert_joint("stand_cart", 0.2, within=0.02, by=3.0, stays=0.5)
 
     def test_a_commands_period_begins_with_it(self):
-        """It is sent again at 0.15 s, not at 0.1 s: moving the joint between them loses the command before."""
+        """It is sent again at 0.15 s, not at 0.1 s: what moves the joint between them voids the first."""
         self.spawn(name="cart")
         self.world.wait(0.05)
         self.world.command(CART, 0.1, every=0.1)

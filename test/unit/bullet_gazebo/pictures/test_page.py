@@ -144,5 +144,6 @@ with hidden_page() as server:
     shapes = [Shape("box", (1, 1, 1)), Shape("sphere", (1,)), Shape("cylinder", (1, 1))]
     Picture(server, sys.exit).draw([VisibleModel(1, "m", [Link("l", visuals=shapes)])], [])
 """
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stderr) == (0, "")
