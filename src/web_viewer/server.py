@@ -99,7 +99,7 @@ def _is_camera(message: messages.ViewerCameraMessage) -> bool:
     )
 
 
-USED = {  # what pages of ours send, and its check, by type; viser casts a field's value
+USED = {  # what pages of ours send, and its check, by type; for a field's value see `can_be`
     "GuiUpdateMessage": lambda each: isinstance(each.uuid, str) and [*each.updates] == ["value"],
     "ViewerCameraMessage": _is_camera,
     "GetRenderResponseMessage": lambda each: isinstance(each.payload, bytes),
@@ -118,6 +118,28 @@ def is_used(raw: Any) -> bool:
         return kind in USED and USED[kind](getattr(messages, kind)(**content))
     except (LookupError, TypeError, ValueError, AttributeError, RecursionError):
         return False
+
+
+def can_be(props: object, value: Any) -> bool:
+    """Returns whether a field's options or bounds admit a value: viser casts it, and takes any."""
+    if hasattr(props, "options"):
+        return value in props.options
+    if hasattr(props, "min") and hasattr(props, "max"):
+        return type(value) in (int, float) and bool(props.min <= value <= props.max)
+    return True
+
+
+def _check_fields(server: viser.ViserServer) -> None:
+    """Passes on only what a field can have: programs rely on it, and viser sends it to all other pages."""
+    gui, pages = server.gui, server._websock_server
+    pages.unregister_handler(messages.GuiUpdateMessage, gui._handle_gui_updates)
+
+    async def checked(client: Any, message: messages.GuiUpdateMessage) -> None:
+        field = gui._gui_input_handle_from_uuid.get(message.uuid)
+        if field is not None and can_be(field._impl.props, message.updates["value"]):
+            await gui._handle_gui_updates(client, message)
+
+    pages.register_handler(messages.GuiUpdateMessage, checked)
 
 
 class Door(websockets.asyncio.server.ServerConnection):
@@ -163,6 +185,7 @@ def serve(address: Address, title: str, camera: Point, look_at: Point) -> viser.
     if server.get_port() != address.port:
         stop(server)
         raise PortInUse(f"another process has just taken port {address.port}; start again")
+    _check_fields(server)
     server.gui.main_panel.dock_right()
     server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
     server.initial_camera.position = camera

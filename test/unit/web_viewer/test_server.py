@@ -202,6 +202,33 @@ def test_only_messages_of_our_pages_come_in(page):
     assert box.value is True
 
 
+def test_a_field_takes_only_what_its_options_and_bounds_admit(page):
+    """A speed that isn't offered, and a step below the first, would end a program that looks them up."""
+    gui, code = page.gui, msgspec.msgpack.encode
+    speed, step = gui.add_dropdown("d", ["1 x", "2 x"]), gui.add_slider("s", 0, 9, 1, 5)
+    seen = []
+    for field in (speed, step):
+        field.on_update(lambda event: seen.append(event.target.value))
+    sent = [
+        (speed, "unknown"), (speed, 3), (speed, None), (step, -9999), (step, 10), (step, float("nan")),
+        (step, "7"), (step, None), (speed, "2 x"), (step, 7),
+    ]  # fmt: skip
+    with connect(
+        f"ws://127.0.0.1:{page.get_port()}",
+        subprotocols=[f"viser-v{version('viser')}"],
+        max_size=None,
+    ) as browser:
+        browser.send(code(CAMERA))
+        for field, value in sent:
+            update = {"uuid": field._impl.uuid, "updates": {"value": value}}
+            browser.send(code({"type": "GuiUpdateMessage", **update}))
+        deadline = time.monotonic() + 60.0
+        while step.value != 7:
+            assert time.monotonic() < deadline
+    assert (speed.value, step.value) == ("2 x", 7)
+    assert set(seen) <= {"2 x", 7}
+
+
 def test_a_page_with_such_a_camera_is_none(page):
     address = f"ws://127.0.0.1:{page.get_port()}"
     with connect(address, subprotocols=[f"viser-v{version('viser')}"], max_size=None) as browser:
