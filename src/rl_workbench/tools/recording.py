@@ -5,6 +5,7 @@ environments have to stay in one thread.
 """
 
 import contextlib
+import ctypes.util
 import os
 import threading
 from collections.abc import Iterator
@@ -199,7 +200,8 @@ def step_rate(env: gymnasium.Env[Any, Any]) -> float:
 def draw_without_display() -> None:
     """Makes pygame, and MuJoCo where there is no display, draw off screen; call it before importing them."""
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
-    if not any(os.environ.get(name) for name in DISPLAYS):
+    # Without that library MuJoCo couldn't be imported any more, whether it draws or not.
+    if not any(os.environ.get(name) for name in DISPLAYS) and ctypes.util.find_library("EGL"):
         os.environ.setdefault("MUJOCO_GL", "egl")
 
 

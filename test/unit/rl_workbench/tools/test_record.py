@@ -1,6 +1,8 @@
 """Episodes as films: which frames, how long they last, what stands below them, and several at once."""
 
 import base64
+import ctypes.util
+import os
 import re
 from io import BytesIO
 from pathlib import Path
@@ -15,7 +17,12 @@ from support.training.workbench_runs import record as bare_run
 import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli
 from rl_workbench.tools.record import Film, SideBySide, write_video
-from rl_workbench.tools.recording import EpisodeFrame, PictureView, record_episode
+from rl_workbench.tools.recording import (
+    EpisodeFrame,
+    PictureView,
+    draw_without_display,
+    record_episode,
+)
 
 RATE = 40.0  # [Hz]
 
@@ -246,3 +253,15 @@ def test_several_are_seen_beside_each_other(robot_run: Path, tmp_path: Path, cap
 def test_a_size_is_refused_where_it_has_none(robot_run: Path, tmp_path: Path, capsys):
     assert record(robot_run, tmp_path / "a.html", "--size", "64x48") == 1
     assert "as large as the browser's window" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("library", "display", "renderer"),
+    [("libEGL.so.1", "", "egl"), (None, "", None), ("libEGL.so.1", ":0", None)],
+)
+def test_mujoco_draws_by_egl_where_it_is_and_no_display(monkeypatch, library, display, renderer):
+    """MuJoCo can't be imported where MUJOCO_GL names a library that isn't there."""
+    monkeypatch.setattr(os, "environ", {"DISPLAY": display})
+    monkeypatch.setattr(ctypes.util, "find_library", lambda name: library)
+    draw_without_display()
+    assert os.environ.get("MUJOCO_GL") == renderer
