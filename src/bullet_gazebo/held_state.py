@@ -49,7 +49,7 @@ VALUES = (
     Decimal,
 )  # fmt: skip
 SPAWNED = "n_children_spawned"  # of a SeedSequence
-POINTER = 8  # [bytes]; to an attribute in __slots__
+POINTER = 8  # [bytes]; to an attribute in __slots__, or to the __dict__ of a compiled class
 
 Put = Callable[[Any, Any], object]
 Look = Callable[["HeldState", Any], Iterable[Any]]
@@ -61,7 +61,7 @@ class UnknownState(TypeError):
 
 
 ROOM = UnknownState.__basicsize__ - TypeError.__basicsize__
-"""What a class takes for its __dict__ and weak references [bytes]."""
+"""What a class of Python's takes for its __dict__ and weak references [bytes]: none in 3.12."""
 
 
 class HeldState:
@@ -299,7 +299,8 @@ def _look_of(kind: type) -> Look:
 def _look_by_attributes(kind: type) -> Look:
     known = next((each for each in _BASES if issubclass(kind, each)), object)
     slots = tuple(_slots(kind))
-    if kind.__basicsize__ > known.__basicsize__ + ROOM + POINTER * len(slots):
+    pointers = len(slots) + (kind.__dictoffset__ > 0 == known.__dictoffset__)
+    if kind.__basicsize__ > known.__basicsize__ + ROOM + POINTER * pointers:
         return _unreadable  # it is compiled, and holds more than attributes
     base = _LOOKS.get(known)
     has_dict = kind.__dictoffset__ != 0
