@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 from support.plugins import stress_plugin
 from support.plugins.rostest_plugin import pytest_collect_file
 from support.plugins.stress_plugin import (
@@ -37,6 +38,9 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # Such small networks only lose by more threads: on a busy machine seconds become a minute.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("busy")
 
 # nohup ignores SIGHUP and a script's background job SIGINT, and so would whatever a test starts.
 # Run the tests as if from a terminal.
