@@ -106,6 +106,7 @@ def test_a_world_that_is_stopped_has_not_failed(told) -> None:
     watchdog.start()
     assert sim.running.wait(BOUND)
     watchdog.stop()
+    watchdog._thread.join(BOUND)
     assert not watchdog._thread.is_alive()
     assert not watchdog.failed() and not told
 
