@@ -61,7 +61,7 @@ class UnknownState(TypeError):
 
 
 ROOM = UnknownState.__basicsize__ - TypeError.__basicsize__
-"""What a class of Python's takes for its __dict__ and weak references [bytes]: none in 3.12."""
+"""What a class of Python's takes for its __dict__ and weak references [bytes]: none since 3.12."""
 
 
 class HeldState:

@@ -39,9 +39,10 @@ def convex_pieces(vertices: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
     from vhacdx import compute_vhacd
 
     mesh = trimesh.Trimesh(vertices, faces)  # joins corners
-    hull = Manifold.hull_points(mesh.vertices)
-    if mesh.is_watertight and abs(mesh.volume) > CONVEX * hull.volume():
-        return []
+    if mesh.is_watertight:
+        hull = Manifold.hull_points(mesh.vertices)
+        if abs(mesh.volume) > CONVEX * hull.volume():
+            return []
     counted = np.insert(mesh.faces, 0, 3, axis=1)  # corners of each face, as VTK has it
     found = compute_vhacd(
         mesh.vertices, counted.ravel().astype(np.uint32), maxConvexHulls=MOST_PIECES,
