@@ -213,7 +213,7 @@ class ControlledRobot:
             else:
                 motors.append((drive, index, *drive.motor(dt)))
         body = self.model.body
-        yields = not body.bears_any_motor and any(drive.pushed for drive, *_ in motors)
+        yields = any(drive.pushed for drive, *_ in motors)
         for drive, index, speed, most in motors:
             strongest = drive.strongest if yields else STRONGEST
             body.set_motor(index, speed, min(most, strongest, STRONGEST))

@@ -87,6 +87,7 @@ class Shape:
     name: str = ""
     mu: float = 1.0  # coefficient of friction; Gazebo's default
     retro: float = 0.0  # the intensity that lasers report of it
+    max_vel: float = 0.01  # [m/s]; at most so fast a contact ends an overlap; Gazebo's default
     solid: Mesh | None = None
 
 
@@ -99,6 +100,11 @@ class Link:
     gravity: bool = True  # whether gravity acts on it
     self_collide: bool = False  # also with links of its own model that it isn't joined to
     part_of: str = ""  # of a helper link for the engine: the link that it was split from
+
+    @property
+    def max_vel(self) -> float:
+        """The speed [m/s] at which its contacts end overlaps, at most."""
+        return min((shape.max_vel for shape in self.collisions), default=math.inf)
 
     @property
     def owner(self) -> str:

@@ -51,8 +51,6 @@ class Body(ABC):
 
     implicit_damping: ClassVar[bool]
     """Whether joint damping acts on the velocity after the step, instead of before it."""
-    bears_any_motor: ClassVar[bool]
-    """Whether joints stand still that motors of any force press against something."""
     joint_names: tuple[str, ...]
     link_names: tuple[str, ...]
     overlapping: frozenset[frozenset[str]] = frozenset()
@@ -205,6 +203,10 @@ class Engine(ABC):
     @abstractmethod
     def set_iterations(self, count: int) -> None:
         """Sets the number of iterations of the solver in a step."""
+
+    @abstractmethod
+    def set_fastest_separation(self, speed: float) -> None:
+        """Bounds the speed [m/s] at which contacts end overlaps; `Shape.max_vel` bounds it for a shape."""
 
     @abstractmethod
     def step(self) -> None:

@@ -30,7 +30,8 @@ PROPERTIES = ("inertia or gravity of a link", "stop or damping of a joint", "dam
 class SolverSettings:
     """ODE's solver parameters, with sdformat's defaults (docs/contract/gazebo.md 2.20).
 
-    Our engines have other solvers: only `iterations` has an effect. Clients read the others back.
+    Our engines have other solvers: only `iterations` and `contact_max_correcting_vel` have an effect.
+    Clients read the others back.
     """
 
     auto_disable_bodies: bool = False
@@ -105,9 +106,9 @@ class World:
         self._recalled: Sequence[Contact] | None = None  # until the next step
         self.time_step = time_step
         self.gravity = gravity
-        self.solver = SolverSettings()
         engine.set_gravity(gravity)
         engine.set_time_step(time_step)
+        self.set_solver(SolverSettings())
 
     def spawn(self, name: str, description: ModelDescription, pose: Pose) -> Model:
         """Adds a model with its frame at `pose`.
@@ -210,9 +211,10 @@ class World:
             model.apply_damping(time_step)
 
     def set_solver(self, solver: SolverSettings) -> None:
-        """Stores the solver's settings, and sets the engine's number of iterations."""
+        """Stores the solver's settings, and sets those that the engine has."""
         self.solver = solver
         self.engine.set_iterations(solver.iterations)
+        self.engine.set_fastest_separation(solver.contact_max_correcting_vel)
 
     def set_inertia(self, model: Model, link: str, inertia: Inertia) -> None:
         """Gives a link of `model` another inertia; poses and velocities stay.

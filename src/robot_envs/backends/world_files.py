@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Sequence
-from dataclasses import replace
 
 from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
 from bullet_gazebo.physics.files.reading import Reading
@@ -40,8 +39,7 @@ def fill(sim: Simulator, source: Source | None) -> None:
         logger.warning("world %s: %s", _shown(source), warning)
     sim.set_time_step(found.time_step)
     sim.world.set_gravity(found.gravity)
-    if found.iterations is not None:
-        sim.world.set_solver(replace(sim.world.solver, iterations=found.iterations))
+    sim.world.set_solver(found.solver)
     for name, description in found.models.items():
         try:
             sim.world.spawn(name, description, description.initial_pose)

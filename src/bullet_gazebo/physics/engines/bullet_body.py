@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Link, ModelDescription
 from bullet_gazebo.physics.engine import FASTEST, FURTHEST, GEAR, OVERLAP, STRONGEST, Body, Twist
+from bullet_gazebo.physics.engines.bullet_contacts import Separation
 from bullet_gazebo.physics.engines.bullet_files import is_plane
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
@@ -29,7 +30,6 @@ class BulletBody(Body):
     """A multi-body of PyBullet, without PyBullet's default motors and damping."""
 
     implicit_damping = False
-    bears_any_motor = False
 
     def __init__(
         self,
@@ -38,6 +38,7 @@ class BulletBody(Body):
         description: ModelDescription,
         pose: Pose,
         weightless: set[tuple[int, int]],
+        separation: Separation,
         offsets: Mapping[str, Pose],
     ) -> None:
         """
@@ -47,11 +48,13 @@ class BulletBody(Body):
             description: in the engine's form.
             pose: of the root link.
             weightless: bodies and links of the world on which gravity doesn't act.
+            separation: of what overlaps in the world.
             offsets: frames of links, as seen from PyBullet's, where they differ.
         """
         self.id = body
         self._client = client
         self._weightless = weightless
+        self._separation = separation
         self._description = description
         self._offsets = offsets
         self._fixed = description.fixed_base
@@ -132,6 +135,7 @@ class BulletBody(Body):
         for name in self.link_names:
             self.set_friction(name, 1.0)
         self._choose_self_collisions()
+        self._separation.add(self.id, self._description, self._links)
         for name in self.link_names:
             link = self._description.links[name]
             self.set_link_gravity(name, link.gravity)
@@ -312,7 +316,7 @@ class BulletBody(Body):
         )  # fmt: skip
 
     def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
-        self.moved = True
+        self.moved = self._separation.placed = True
         pybullet.resetJointState(self.id, self._indices[index], position, velocity, self._client)
 
     def reset_base(self, pose: Pose, twist: Twist = (ZERO, ZERO)) -> None:
@@ -334,7 +338,7 @@ class BulletBody(Body):
             )
 
     def _put_base(self, com: Pose) -> None:
-        self._base, self.moved = com, True
+        self._base, self.moved, self._separation.placed = com, True, True
         pybullet.resetBasePositionAndOrientation(self.id, *com, physicsClientId=self._client)
 
     def motion(self) -> BulletMotion:

@@ -2,6 +2,7 @@
 
 import contextlib
 import locale
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -14,6 +15,7 @@ from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.engine import STRONGEST, Body, Contact, Engine, LinkOf, Side
 from bullet_gazebo.physics.engine_form import at_joints, parents_first
 from bullet_gazebo.physics.engines.bullet_body import BASE, BulletBody
+from bullet_gazebo.physics.engines.bullet_contacts import Separation
 from bullet_gazebo.physics.engines.bullet_files import is_plane, write_urdf
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, scale
@@ -27,11 +29,12 @@ MOST_WASTE = 1_000_000  # [bytes] of files that removed bodies were loaded from:
 
 @dataclass
 class BulletSettings:
-    """Gravity [m/s²], length of a step [s] and iterations of the solver; the defaults are PyBullet's."""
+    """Gravity [m/s²], length of a step [s], iterations of the solver; the defaults are PyBullet's."""
 
     gravity: Vector = ZERO
     time_step: float = 1.0 / 240.0
     iterations: int = 50
+    separation: float = math.inf  # [m/s], the fastest
 
 
 class Fastening(NamedTuple):
@@ -60,6 +63,7 @@ class BulletClient:
             physicsClientId=self._client,
         )  # fmt: skip
         self._step = partial(pybullet.stepSimulation, self._client)
+        self._separation = Separation(self._client)
         self._gravity: Vector = ZERO
         self._time_step = 0.0
         self._bodies: dict[int, BulletBody] = {}
@@ -83,6 +87,7 @@ class BulletClient:
     def apply(self, settings: BulletSettings) -> None:
         """Applies settings to the world."""
         self._gravity, self._time_step = settings.gravity, settings.time_step
+        self._separation.fastest = settings.separation
         iterations = max(1, min(settings.iterations, MOST_ITERATIONS))
         pybullet.setGravity(*settings.gravity, physicsClientId=self._client)
         pybullet.setTimeStep(settings.time_step, physicsClientId=self._client)
@@ -97,14 +102,20 @@ class BulletClient:
         if is_plane(description):
             return self._load_plane(description, pose)
         engine_form, offsets = at_joints(description)
-        flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_MAINTAIN_LINK_ORDER
+        flags = (
+            pybullet.URDF_USE_INERTIA_FROM_FILE
+            | pybullet.URDF_MAINTAIN_LINK_ORDER
+            | pybullet.URDF_USE_IMPLICIT_CYLINDER  # with 32 sides a wheel would rock
+        )
         if description.collides_with_itself:
             flags |= (
                 pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
             )
         body = self._load_files(engine_form, pose, flags)
         try:
-            made = BulletBody(self._client, body, engine_form, pose, self._weightless, offsets)
+            made = BulletBody(
+                self._client, body, engine_form, pose, self._weightless, self._separation, offsets
+            )
         except DescriptionError:
             self.remove(body)
             raise
@@ -139,7 +150,11 @@ class BulletClient:
             0.0, shape, -1, plane.position, plane.orientation, physicsClientId=self._client
         )
         self._sizes[body] = PLANE
-        return self._keep(BulletBody(self._client, body, description, pose, self._weightless, {}))
+        return self._keep(
+            BulletBody(
+                self._client, body, description, pose, self._weightless, self._separation, {}
+            )
+        )
 
     def _keep(self, body: BulletBody) -> BulletBody:
         body.set_time_step(self._time_step)
@@ -154,10 +169,13 @@ class BulletClient:
         self._weightless -= {key for key in self._weightless if key[0] == body}
         self.waste += self._sizes.pop(body)
         self._bodies.pop(body, None)
+        self._separation.remove(body)
         self._sides = {key: side for key, side in self._sides.items() if key[0] != body}
 
     def step(self) -> None:
         """Integrates by one time step."""
+        if self._separation.placed:
+            self._separation.ease(self._time_step)
         if self._weightless:
             self._hold_up()
         self._step()
@@ -176,6 +194,7 @@ class BulletClient:
 
     def forget_contacts(self) -> None:
         """See `Engine.forget_contacts`."""
+        self._separation.placed = True
         for body in self._bodies.values():
             body.forget_contacts()
 
@@ -207,6 +226,7 @@ class BulletClient:
     def unfasten(self, number: int) -> None:
         """See `Engine.unfasten`."""
         self._let_meet(number, True)
+        self._separation.placed = True
         pybullet.removeConstraint(self.fastened.pop(number).constraint, self._client)
 
     def _let_meet(self, number: int, on: bool) -> None:
@@ -304,6 +324,10 @@ class BulletEngine(Engine):
 
     def set_iterations(self, count: int) -> None:
         self._settings.iterations = count
+        self._client.apply(self._settings)
+
+    def set_fastest_separation(self, speed: float) -> None:
+        self._settings.separation = speed
         self._client.apply(self._settings)
 
     def step(self) -> None:

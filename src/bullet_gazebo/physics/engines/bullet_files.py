@@ -1,6 +1,5 @@
 """Writes models as the URDF and mesh files that PyBullet loads."""
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -10,11 +9,9 @@ import numpy as np
 from bullet_gazebo.physics.description import Inertia, Joint, Link, Mesh, ModelDescription, Shape
 from bullet_gazebo.physics.pose import Pose, to_rpy
 
-SIDES = 128  # of what stands for a cylinder
+TURNING = ("revolute", "continuous")
+TREAD = 5e-6  # [m]; much less than contacts yield, so the whole line carries
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of STL
-
-
-MARGIN = 0.001  # [m]; PyBullet's, around convex hulls
 
 
 def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
@@ -39,18 +36,6 @@ def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
         points = np.concatenate(mesh.hulls)
         path.write_bytes(_stl(points[np.arange(-(-len(points) // 3) * 3) % len(points)]))
     return str(path)
-
-
-def drum(folder: Path) -> Path:
-    """Returns a file in `folder` with a cylinder of radius 1 and length 1 about z, with a flat side below."""
-    path = folder / "drum.obj"
-    if not path.exists():
-        angles = [2.0 * math.pi * (side + 0.5) / SIDES for side in range(SIDES)]
-        rims = [f"v {math.cos(a)!r} {math.sin(a)!r} {z}" for z in (-0.5, 0.5) for a in angles]
-        sides = [(i, i % SIDES + 1) for i in range(1, SIDES + 1)]
-        faces = [f"f {i} {j} {j + SIDES}\nf {i} {j + SIDES} {i + SIDES}" for i, j in sides]
-        path.write_text("\n".join([*rims, *faces, ""]))
-    return path
 
 
 def _stl(corners: np.ndarray) -> bytes:
@@ -79,40 +64,47 @@ def write_urdf(model: ModelDescription, folder: Path) -> str:
     opens a user's file: it would crash over a broken one, and cache an old one.
     """
     robot = Element("robot", name="model")
+    turning = {joint.child for joint in model.joints.values() if joint.kind in TURNING}
     for link in model.links.values():
-        _write_link(robot, link, model.static, folder)
+        shapes = link.collisions
+        if link.name in turning:
+            shapes = [part for shape in shapes for part in _treads(shape)]
+        _write_link(robot, replace(link, collisions=shapes), model.static, folder)
     for joint in model.joints.values():
         _write_joint(robot, joint)
     indent(robot)  # PyBullet breaks lines of more than 8 KiB anywhere
     return tostring(robot, encoding="unicode")
 
 
+def _treads(shape: Shape) -> list[Shape]:
+    """Returns a cylinder, which may be a wheel, with a narrow tread in its middle.
+
+    It touches along a line, of which PyBullet finds the ends only. A wheel that steers on the spot would turn
+    about its outer one. The line's friction turns it about a point near its middle.
+    """
+    if shape.kind != "cylinder":
+        return [shape]
+    radius, length = shape.size
+    return [
+        replace(shape, size=(radius - min(TREAD, 0.5 * radius), length)),
+        replace(shape, size=(radius, 0.1 * length)),
+    ]
+
+
 def _write_link(robot: Element, link: Link, static: bool, folder: Path) -> None:
     element = SubElement(robot, "link", name=link.name)
     # Without an inertial PyBullet would assume 1 kg; only the immovable link `world` has none.
     _write_inertia(element, link.inertia or Inertia(mass=0.0))
-    for given in link.collisions:
-        shape = _finer(given, folder)
+    for shape in link.collisions:
         written = SubElement(element, "collision")
         if static and shape.kind == "mesh":
             written.set("concave", "yes")  # moving bodies collide by their convex hulls
         if shape.solid is not None:
             objects = shape.solid.in_pieces or Path(shape.mesh).suffix.lower() == ".obj"
             written_mesh = write_mesh(shape.solid, folder, concave=static, objects=objects)
-            shape = replace(shape, mesh=written_mesh)
-        _write_shape(written, shape)
-
-
-def _finer(shape: Shape, folder: Path) -> Shape:
-    """Returns a cylinder as a mesh with more sides than PyBullet's own, on whose 32 sides a wheel rocks.
-
-    PyBullet adds a margin around a mesh, by which a wheel would be too large.
-    """
-    if shape.kind != "cylinder":
-        return shape
-    radius, length = max(shape.size[0] - MARGIN, 0.5 * shape.size[0]), shape.size[1]
-    length = max(length - 2.0 * MARGIN, 0.5 * length)
-    return replace(shape, kind="mesh", size=(radius, radius, length), mesh=str(drum(folder)))
+            _write_shape(written, replace(shape, mesh=written_mesh))
+        else:
+            _write_shape(written, shape)
 
 
 def _write_inertia(link: Element, inertia: Inertia) -> None:

@@ -1,32 +1,20 @@
-"""A model in MuJoCo, and the state that all models of a world share."""
+"""A model in MuJoCo."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from math import hypot
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription, Shape
 from bullet_gazebo.physics.engine import (
-    FASTEST,
-    FURTHEST,
-    GEAR,
-    OVERLAP,
     STRONGEST,
     Body,
-    Contact,
-    Side,
     Twist,
 )
 from bullet_gazebo.physics.engines.mujoco_model import Elements, geoms_of, priority, wxyz, xyzw
-from bullet_gazebo.physics.pose import ZERO, Pose, Quaternion, Vector, add, conjugate, rotate, scale
-
-FREE = 6  # degrees of freedom of a body without joints
-FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
-TENDON = mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON
-
+from bullet_gazebo.physics.engines.mujoco_state import MujocoState
+from bullet_gazebo.physics.pose import ZERO, Pose, Quaternion, Vector, conjugate, rotate
 
 FREE_POSITIONS, FREE_VELOCITIES = 7, 6  # of a free base
 
@@ -45,139 +33,6 @@ class MujocoMotion(NamedTuple):
 
 
 @dataclass
-class MujocoState:
-    """MuJoCo's model and data of the world, shared by the engine and its bodies."""
-
-    model: mujoco.MjModel
-    data: mujoco.MjData
-    stale: bool = True  # whether poses and twists are those of another state
-    loaded: bool = False  # whether efforts or wrenches act in the next step
-    speeds: dict[int, float] = field(default_factory=dict)  # of motors, by degree of freedom
-    gears: dict[int, float] = field(default_factory=dict)  # lengths [rad, m] of tendons
-
-    def __post_init__(self) -> None:
-        self._watch()
-
-    def replace(self, model: mujoco.MjModel) -> None:
-        """Uses another model; the bodies have to be bound to it."""
-        self.model, self.data = model, mujoco.MjData(model)
-        self._watch()
-        self.stale, self.loaded = True, False
-        self.speeds.clear()
-        self.gears.clear()
-
-    def step(self) -> None:
-        """Integrates by one time step; efforts and wrenches end with it."""
-        np.copyto(self._before, self._positions)
-        if self.speeds or self.gears:
-            mujoco.mj_step1(self.model, self.data)
-            self._drive()
-            mujoco.mj_step2(self.model, self.data)
-        else:
-            mujoco.mj_step(self.model, self.data)
-        self.stale = True
-        if not hypot(*self._speeds()) < self._fast:  # also if one of them is NaN
-            self._slow_down()
-        if self.loaded:
-            self.data.qfrc_applied[:] = 0.0
-            self.data.xfrc_applied[:] = 0.0
-            self.loaded = False
-
-    def set_time_step(self, dt: float) -> None:
-        """Sets the length of a step [s]."""
-        model = self.model
-        model.opt.timestep = dt
-        alone = np.bincount(model.dof_treeid)[model.dof_treeid] == FREE
-        free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
-        self._fastest = np.where(alone & free, FASTEST, FURTHEST / dt)
-        self._fast = FURTHEST / dt
-
-    def _watch(self) -> None:
-        # Each access to an attribute of MuJoCo makes a new array object.
-        self._positions, self._speeds = self.data.qpos, self.data.qvel.tolist
-        self._before = self._positions.copy()
-        self.set_time_step(self.model.opt.timestep)
-
-    def _slow_down(self) -> None:
-        """Limits speeds, and integrates the positions again.
-
-        NaN counts as rest: it would spread to the whole world.
-        """
-        model, data, fastest = self.model, self.data, self._fastest
-        if (np.abs(data.qvel) <= fastest).all():
-            return  # only their sum is large
-        data.qvel[np.isnan(data.qvel)] = 0.0
-        np.clip(data.qvel, -fastest, fastest, out=data.qvel)
-        np.copyto(data.qpos, self._before)
-        mujoco.mj_integratePos(model, data.qpos, data.qvel, model.opt.timestep)
-
-    def _drive(self) -> None:
-        """Drives motors and gears: dry friction brakes towards speed 0, they move towards another speed."""
-        data = self.data
-        for row in np.flatnonzero(data.efc_type == TENDON):
-            tendon = int(data.efc_id[row])
-            missing = self.gears[tendon] - data.ten_length[tendon]
-            speed = GEAR * missing / self.model.opt.timestep
-            data.efc_aref[row] += data.efc_KBIP[row, 1] * speed
-        for row in np.flatnonzero(data.efc_type == FRICTION):
-            speed = self.speeds.get(int(data.efc_id[row]))
-            if speed:
-                data.efc_aref[row] += data.efc_KBIP[row, 1] * speed
-
-    def link(self, index: int) -> tuple[Pose, Twist]:
-        """Returns pose and twist of the frame of body `index`, in the world."""
-        model, data = self.model, self.data
-        if self.stale:
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            mujoco.mj_comVel(model, data)
-            self.stale = False
-        speed = np.empty(6)
-        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, index, speed, 0)
-        x, y, z = data.xpos[index].tolist()
-        ax, ay, az, vx, vy, vz = speed.tolist()
-        return Pose((x, y, z), xyzw(data.xquat[index])), ((vx, vy, vz), (ax, ay, az))
-
-    def overlapping(
-        self, touching: Mapping[int, tuple[str, tuple[str, ...]]]
-    ) -> frozenset[frozenset[str]]:
-        """Returns pairs of links that overlap with all joints at zero, of a model with these geoms."""
-        data = mujoco.MjData(self.model)
-        mujoco.mj_fwdPosition(self.model, data)
-        pairs = [contact.geom.tolist() for contact in data.contact if contact.dist < -OVERLAP]
-        return frozenset(
-            frozenset((touching[a][0], touching[b][0]))
-            for a, b in pairs
-            if a in touching and b in touching
-        )
-
-    def contacts(self, sides: Mapping[int, Side]) -> list[Contact]:
-        """Returns where bodies touched in the last step, without those that were only near."""
-        found, wrench = [], np.empty(6)
-        for index in range(self.data.ncon):
-            mujoco.mj_contactForce(self.model, self.data, index, wrench)
-            force, along, across, *_ = wrench.tolist()
-            if force > 0.0:
-                contact = self.data.contact[index]
-                x, y, z = contact.pos.tolist()
-                axes = contact.frame.tolist()  # of the contact, row by row
-                normal, one, other = _vector(axes[:3]), _vector(axes[3:6]), _vector(axes[6:])
-                friction = add(scale(one, along), scale(other, across))
-                # The normal points towards the second geom, which is our first one then.
-                second, first = (sides[geom] for geom in contact.geom.tolist())
-                depth = -float(contact.dist)
-                found.append(
-                    Contact((x, y, z), scale(normal, force), friction, normal, depth, first, second)
-                )
-        return found
-
-
-def _vector(numbers: Sequence[float]) -> Vector:
-    x, y, z = numbers
-    return (x, y, z)
-
-
-@dataclass
 class JointSettings:
     """Settings of a joint that change: [N m s/rad, N s/m], [rad, m], [rad/s, m/s], [N m, N]."""
 
@@ -192,7 +47,6 @@ class MujocoBody(Body):
     """The bodies and joints of one model. `bind` finds them again after the world was recompiled."""
 
     implicit_damping = True
-    bears_any_motor = True
 
     def __init__(
         self,
@@ -225,8 +79,9 @@ class MujocoBody(Body):
         self.touching = {}  # links and collisions by MuJoCo's shape: a link's follow one another in order
         for link, index in self._ids.items():
             first = int(model.body_geomadr[index])
-            for place, shape in enumerate(self._geoms(link)):
-                self.touching[first + place] = (link, (shape.name,))
+            for place, shape in enumerate(self._geoms(link), start=first):
+                self.touching[place] = (link, (shape.name,))
+                self._state.max_vel[place] = shape.max_vel
         self._indices = [elements.joints[name].id for name in self.joint_names]
         self._q = model.jnt_qposadr[self._indices].tolist()
         self._v = model.jnt_dofadr[self._indices].tolist()

@@ -10,19 +10,22 @@ import numpy as np
 from bullet_gazebo.physics.description import ModelDescription
 from bullet_gazebo.physics.engine import Body, Contact, Engine, LinkOf, Side
 from bullet_gazebo.physics.engine_form import check_bounds
-from bullet_gazebo.physics.engines.mujoco_body import MujocoBody, MujocoState
+from bullet_gazebo.physics.engines.mujoco_body import MujocoBody
 from bullet_gazebo.physics.engines.mujoco_model import (
     Elements,
     ModelWriter,
     compile_spec,
     wxyz,
 )
+from bullet_gazebo.physics.engines.mujoco_state import MujocoState
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector
 
 MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
 DEFAULT_STEP = 0.001  # [s]
 STIFFEST = 2.0  # steps: MuJoCo's shortest time constant of a constraint
-GRIPPED = 2.0  # of critical damping: between fingers with a gear a light object would rattle at 1
+GRIPPED = (
+    2.0  # of critical damping: what slides hops, and light objects rattle between fingers, at 1
+)
 # Constraints yield to a ten-thousandth of what acts against them, MuJoCo's minimum.
 IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 IMPRATIO = 10.0  # how much stiffer friction is than the contact, so that nothing at rest creeps
@@ -46,6 +49,7 @@ class MujocoEngine(Engine):
         self._gravity: Vector = ZERO
         self._time_step = DEFAULT_STEP
         self._iterations = 50
+        self._separation = np.inf  # [m/s], the fastest
         self._bodies: dict[str, MujocoBody] = {}
         self._sides: dict[int, Side] = {}  # by number of the geom
         self._keys = count()
@@ -94,6 +98,10 @@ class MujocoEngine(Engine):
     def set_iterations(self, count: int) -> None:
         self._iterations = max(1, min(count, MOST_ITERATIONS))
         self._state.model.opt.iterations = self._iterations
+
+    def set_fastest_separation(self, speed: float) -> None:
+        self._separation = speed
+        self._state.set_fastest_separation(speed)
 
     def step(self) -> None:
         self._state.step()
@@ -163,6 +171,8 @@ class MujocoEngine(Engine):
     def _configure(self) -> None:
         model, option = self._state.model, self._state.model.opt
         self._state.set_time_step(self._time_step)
+        self._state.set_fastest_separation(self._separation)
+        self._state.whole_steps = self._runge_kutta
         option.gravity[:] = self._gravity
         option.iterations = self._iterations
         integrators = mujoco.mjtIntegrator
@@ -187,8 +197,7 @@ class MujocoEngine(Engine):
             model.eq_solref,
         ):
             reference[:] = (STIFFEST * self._time_step, 1.0)
-        if model.ntendon:
-            model.geom_solref[:, 1] = GRIPPED
+        model.geom_solref[:, 1] = GRIPPED
         for impedance in (
             model.jnt_solimp,
             model.dof_solimp,

@@ -186,7 +186,14 @@ class ShapeReader:
         if not collides:
             return shape
         retro = value(element, "laser_retro", where, 0.0)
-        return replace(shape, mu=_friction(element, where), retro=retro)
+        return replace(
+            shape,
+            mu=_not_negative(element, "surface/friction/ode/mu", where, "friction", shape.mu),
+            max_vel=_not_negative(
+                element, "surface/contact/ode/max_vel", where, "max_vel", shape.max_vel
+            ),
+            retro=retro,
+        )
 
 
 def _submesh(mesh: Element) -> Submesh | None:
@@ -196,11 +203,11 @@ def _submesh(mesh: Element) -> Submesh | None:
     return Submesh(name, truth(mesh.findtext("submesh/center")))
 
 
-def _friction(collision: Element, where: str) -> float:
-    mu = value(collision, "surface/friction/ode/mu", where, 1.0)
-    if mu < 0.0:
-        raise DescriptionError(f"{where}: a friction of {mu} is negative")
-    return mu
+def _not_negative(collision: Element, path: str, where: str, name: str, default: float) -> float:
+    number = value(collision, path, where, default)
+    if number < 0.0:
+        raise DescriptionError(f"{where}: a {name} of {number} is negative")
+    return number
 
 
 def _size(solid: Element, where: str) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ that can't be read is left out of its link with a warning; a joint that can't be
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import (
@@ -49,6 +49,7 @@ MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 Part = TypeVar("Part")
 YES = ("true", "yes", "1")
 NO = ("false", "no", "0")
+SURFACE = {"mu1": "mu", "maxVel": "max_vel", "laserRetro": "retro"}  # of shapes, by element
 
 
 def read_origin(element: Element, place: str) -> Pose:
@@ -302,14 +303,12 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
     model.sensors += read_sensors(block, link.name, model.warnings)
     for element in block:
         place = f"<gazebo reference='{shown(link.name)}'>, <{element.tag}>"
-        if element.tag == "mu1":
-            mu = finite(_value(element), place)
-            if mu < 0.0:
-                raise DescriptionError(f"{place}: {mu} is negative")
-            link.collisions = [replace(shape, mu=mu) for shape in link.collisions]
-        elif element.tag == "laserRetro":
-            retro = finite(_value(element), place)
-            link.collisions = [replace(shape, retro=retro) for shape in link.collisions]
+        if element.tag in SURFACE:
+            number = finite(_value(element), place)
+            if number < 0.0 and element.tag != "laserRetro":
+                raise DescriptionError(f"{place}: {number} is negative")
+            changed: dict[str, Any] = {SURFACE[element.tag]: number}
+            link.collisions = [replace(shape, **changed) for shape in link.collisions]
         elif element.tag == "turnGravityOff":
             link.gravity = (
                 _value(element) in NO

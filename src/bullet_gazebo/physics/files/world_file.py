@@ -27,10 +27,19 @@ from bullet_gazebo.physics.files.sdf import (
 from bullet_gazebo.physics.files.sdf_parts import read_color, read_pose, value
 from bullet_gazebo.physics.files.urdf import read_urdf
 from bullet_gazebo.physics.pose import Vector
-from bullet_gazebo.physics.world import GRAVITY, TIME_STEP, ground_plane
+from bullet_gazebo.physics.world import GRAVITY, TIME_STEP, SolverSettings, ground_plane
 
 UPDATE_RATE = 1000.0  # [Hz], SDF's default
-ITERATIONS = 50  # of the solver, SDF's default
+SOLVER = {
+    "precon_iterations": "solver/precon_iters",
+    "iterations": "solver/iters",
+    "sor": "solver/sor",
+    "cfm": "constraints/cfm",
+    "erp": "constraints/erp",
+    "contact_max_correcting_vel": "constraints/contact_max_correcting_vel",
+    "contact_surface_layer": "constraints/contact_surface_layer",
+}
+"""Elements of `<physics><ode>`."""
 NOT_SIMULATED = ("actor", "population", "road", "joint")
 
 
@@ -44,7 +53,7 @@ class WorldDescription:
     gravity: Vector = GRAVITY
     time_step: float = TIME_STEP  # [s]
     update_rate: float = UPDATE_RATE  # [Hz of wall time]; 0 means as fast as possible
-    iterations: int | None = None  # None: the engine's own
+    solver: SolverSettings = SolverSettings()
     warnings: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
     plugins: list[Plugin] = field(default_factory=list)
@@ -151,12 +160,22 @@ def _read_physics(world: WorldDescription, element: Element) -> None:
         world.gravity = (x, y, z)
     world.time_step = value(profile, "max_step_size", "<physics>", TIME_STEP)
     world.update_rate = value(profile, "real_time_update_rate", "<physics>", UPDATE_RATE)
-    if profile is not None and profile.find("ode/solver/iters") is not None:
-        world.iterations = int(value(profile, "ode/solver/iters", "<physics>", ITERATIONS))
+    world.solver = _read_solver(profile)
     if not 0.0 < world.time_step <= 1.0:
         raise DescriptionError(f"<max_step_size>: {world.time_step} is not between 0 and 1 s")
     if world.update_rate < 0.0:
         raise DescriptionError(f"<real_time_update_rate>: {world.update_rate} is negative")
+
+
+def _read_solver(profile: Element | None) -> SolverSettings:
+    read: dict[str, Any] = {}
+    for name, path in SOLVER.items():
+        default = getattr(SolverSettings, name)
+        number = value(profile, f"ode/{path}", "<physics>", default)
+        if number < 0.0:
+            raise DescriptionError(f"<physics>: {number} in <{path.split('/')[-1]}> is negative")
+        read[name] = type(default)(number)
+    return SolverSettings(**read)
 
 
 class UnknownFormat(DescriptionError):

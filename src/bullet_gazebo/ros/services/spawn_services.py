@@ -10,7 +10,6 @@ import re
 import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import rospkg
@@ -185,8 +184,7 @@ def fill_world(sim: Simulator, world: WorldDescription, interrupted: Callable[[]
         sim.set_time_step(world.time_step)
         sim.max_update_rate = world.update_rate
         sim.world.set_gravity(world.gravity)
-        if world.iterations is not None:
-            sim.world.set_solver(replace(sim.world.solver, iterations=world.iterations))
+        sim.world.set_solver(world.solver)
         sim.world.lights.update(world.lights)
         for name, description in world.models.items():
             if interrupted():

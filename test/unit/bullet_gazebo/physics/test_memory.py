@@ -111,7 +111,7 @@ def stays_among_others(world: World, tmp_path: Path, done: Callable = lambda: No
     Path(tmp_path, "mesh.obj").unlink()
     done()
     for _ in range(CYCLES):
-        world.spawn("m", model_of("cylinder", tmp_path), Pose())
+        world.spawn("m", model_of("links", tmp_path), Pose())
         world.delete("m")
     world.step()
     assert model.state()[1][0][2] < 0.0

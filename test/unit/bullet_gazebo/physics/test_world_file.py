@@ -9,6 +9,7 @@ from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.world_file import empty_world, load_world, parse_world
 from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.world import SolverSettings
 from bullet_gazebo.ros.services.spawn_services import fill_world, find_world, read_world
 
 EMPTY = Path(__file__).resolve().parents[4] / "companions/gazebo_ros/worlds/empty.world"
@@ -32,6 +33,7 @@ def test_the_empty_world_has_gazebos_defaults():
     assert list(empty.models) == ["ground_plane"]
     assert list(empty.lights) == ["sun"]
     assert (empty.gravity, empty.time_step, empty.update_rate) == ((0.0, 0.0, -9.8), 0.001, 1000.0)
+    assert empty.solver == SolverSettings()
     assert empty.models.keys() == empty_world().models.keys()
     assert empty.lights == empty_world().lights
     assert empty.warnings == empty.left_out == []
@@ -46,6 +48,17 @@ def test_models_includes_and_their_poses():
     assert found.models["a"].initial_pose.position == (1.0, 2.0, 3.0)
     assert (found.models["a"].static, found.models["b"].static) == (False, True)
     assert found.models["floor"].initial_pose.position == (0.0, 0.0, -1.0)
+
+
+def test_solver_parameters_are_those_of_the_file():
+    ode = """<solver><iters>80</iters><sor>1.4</sor></solver><constraints><cfm>0.1</cfm><erp>0.5</erp>
+        <contact_max_correcting_vel>0.2</contact_max_correcting_vel>
+        <contact_surface_layer>0.003</contact_surface_layer></constraints>"""
+    found = world(f"<physics type='ode'><ode>{ode}</ode></physics>")
+    assert found.solver == SolverSettings(
+        iterations=80, sor=1.4, cfm=0.1, erp=0.5, contact_max_correcting_vel=0.2,
+        contact_surface_layer=0.003,
+    )  # fmt: skip
 
 
 INCLUDE = "<include><uri>model://{}</uri></include>"
@@ -151,6 +164,8 @@ def test_a_faulty_model_is_left_out_alone_and_named():
          "<gravity> must hold 3 numbers, not 'down'"),
         ("<sdf version='1.6'><world name='w'><physics><max_step_size>0</max_step_size></physics></world>"
          "</sdf>", "<max_step_size>: 0.0 is not between 0 and 1 s"),
+        ("<sdf version='1.6'><world name='w'><physics><ode><solver><iters>-3</iters></solver></ode></physics>"
+         "</world></sdf>", "<physics>: -3.0 in <iters> is negative"),
     ],
 )  # fmt: skip
 def test_a_fault_of_the_whole_file_is_one_line_with_its_place(tmp_path, text, fault):
