@@ -116,7 +116,7 @@ class MujocoBody(Body):
         self._qpos[q], self._qvel[v] = motion.positions, motion.velocities
         self._qfrc[v] = motion.efforts
         self._state.data.xfrc_applied[list(self._ids.values())] = motion.wrenches
-        self._state.loaded = self._state.stale = self.moved = True
+        self._state.loaded = self._state.stale = self._state.placed = self.moved = True
 
     def _places(self) -> tuple[list[int], list[int]]:
         if self._free is None:
@@ -188,13 +188,12 @@ class MujocoBody(Body):
         self._state.gears[tendon] = self.description.mimics[joint].offset
 
     def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
-        self.moved = True
+        self._state.stale = self._state.placed = self.moved = True
         self._qpos[self._q[index]] = position
         self._qvel[self._v[index]] = velocity
-        self._state.stale = True
 
     def reset_base(self, pose: Pose, twist: Twist = (ZERO, ZERO)) -> None:
-        self._state.stale = self.moved = True
+        self._state.stale = self._state.placed = self.moved = True
         orientation = wxyz(pose.orientation)
         if self._free is None:
             self.pose = pose

@@ -109,6 +109,9 @@ class MujocoEngine(Engine):
     def contacts(self) -> list[Contact]:
         return self._state.contacts(self._sides)
 
+    def forget_contacts(self) -> None:
+        self._state.placed = True
+
     def order(self) -> list[MujocoBody]:
         return list(self._bodies.values())
 

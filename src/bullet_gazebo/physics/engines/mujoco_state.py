@@ -30,6 +30,7 @@ class MujocoState:
     loaded: bool = False  # whether efforts or wrenches act in the next step
     speeds: dict[int, float] = field(default_factory=dict)  # of motors, by degree of freedom
     gears: dict[int, float] = field(default_factory=dict)  # lengths [rad, m] of tendons
+    placed: bool = True  # whether bodies may have been put into each other
     whole_steps: bool = False  # for integrators of several stages: contacts are MuJoCo's own then
 
     def __post_init__(self) -> None:
@@ -41,7 +42,8 @@ class MujocoState:
         self._watch()
         self.max_vel = np.full(model.ngeom, np.inf)  # [m/s], of each geom
         self.set_fastest_separation(np.inf)
-        self.stale, self.loaded = True, False
+        self.stale = self.placed = True
+        self.loaded = False
         self.speeds.clear()
         self.gears.clear()
 
@@ -81,27 +83,33 @@ class MujocoState:
 
     def set_fastest_separation(self, speed: float) -> None:
         """Bounds the speed [m/s] at which contacts end overlaps, in addition to the geoms' `max_vel`."""
-        self._fastest_each = np.minimum(self.max_vel, speed)
-        speeds = np.unique(self._fastest_each)
-        self._fastest_all = float(speeds[0]) if len(speeds) == 1 else None
+        fastest = np.minimum(self.max_vel, speed)
+        equal = np.unique(fastest)
+        self._fastest = equal if equal.size == 1 else fastest
 
     def _ease_contacts(self) -> None:
         """Changes the accelerations [m/s²] that contacts aim at: see BRAKING and `set_fastest_separation`."""
         data = self.data
         first = data.ne + data.nf + data.nl  # contacts are the last constraints
-        aims = data.efc_aref[first:].reshape(-1, ROWS)
-        if not len(aims):
+        aims = data.efc_aref[first:]
+        if not aims.size:
             return
-        speeds = data.efc_vel[first:].reshape(-1, ROWS)
-        fastest = self._fastest_all
-        if fastest is None:
+        if self.placed:
+            self._bound_separation(first, aims[::ROWS])
+        most = BRAKING / self.model.opt.timestep
+        across = aims.reshape(-1, ROWS)[:, 1:]
+        squares = np.einsum("ij,ij->i", across, across)
+        across *= (most / np.sqrt(np.maximum(squares, most**2)))[:, np.newaxis]
+
+    def _bound_separation(self, first: int, aims: np.ndarray) -> None:
+        """Bounds the speeds at which overlaps end; `aims` are those of the normals, from row `first` on."""
+        data, fastest = self.data, self._fastest
+        if fastest.size > 1:
             geoms = data.contact.geom[data.contact.efc_address >= 0]
-            fastest = self._fastest_each[geoms].min(axis=1)
-        aims[:, 0] = np.minimum(aims[:, 0], data.efc_KBIP[first, 1] * (fastest - speeds[:, 0]))
-        across = aims[:, 1:]
-        fast = np.hypot(across[:, 0], across[:, 1]) * self.model.opt.timestep / BRAKING
-        if fast.max() > 1.0:
-            across /= np.maximum(fast, 1.0)[:, np.newaxis]
+            fastest = fastest[geoms].min(axis=1)
+        most = data.efc_KBIP[first, 1] * (fastest - data.efc_vel[first::ROWS])
+        self.placed = bool((most < aims).any())
+        np.minimum(aims, most, out=aims)
 
     def _slow_down(self) -> None:
         """Limits speeds, and integrates the positions again.
