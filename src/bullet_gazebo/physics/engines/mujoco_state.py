@@ -15,7 +15,7 @@ FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
 TENDON = mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON
 ROWS = 3  # constraints of a contact: along its normal, and two across it
-BRAKING = 0.15
+BRAKING = 0.3
 """The most [m/s] by which friction aims to slow in a step what slides. It would aim to stop it, and MuJoCo
 would push the bodies apart to reach that."""
 
