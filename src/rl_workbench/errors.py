@@ -33,10 +33,18 @@ class EnvironmentFailure(WorkbenchError):
 def error_line(error: BaseException) -> str:
     """Returns an error as one line, with the place in the user's own code if it went through that."""
     frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
-    place = (own or frames)[-1]
+    place = (_own(frames) or frames)[-1]
     text = " ".join(str(error).split())
     return f"{type(error).__name__}{': ' if text else ''}{text} ({place.filename}:{place.lineno})"
+
+
+def passed_own_code(error: BaseException) -> bool:
+    """Returns whether an error went through the user's own code."""
+    return bool(_own(traceback.extract_tb(error.__traceback__)))
+
+
+def _own(frames: traceback.StackSummary) -> list[traceback.FrameSummary]:
+    return [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
 
 
 def need(module: str, package: str, what: str) -> None:
