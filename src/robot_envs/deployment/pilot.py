@@ -7,7 +7,14 @@ from typing import Any
 import numpy as np
 
 from bullet_gazebo.control.joint import JointLimits
-from robot_envs.checks import action_reader, checked_goal, observation_reader, set_goal, with_goals
+from robot_envs.checks import (
+    action_reader,
+    checked_goal,
+    made_space,
+    observation_reader,
+    set_goal,
+    with_goals,
+)
 from robot_envs.controllers import TWIST, CommandPort
 from robot_envs.deployment.kinematics import LinkView
 from robot_envs.errors import RobotEnvError
@@ -153,8 +160,8 @@ class Pilot:
         self._judge = task if task.reward_query == StateQuery() else Unjudged()
         self._links, self._model = LinkView(robot, task.query), robot.model
         self._limits = {port.name: CommandLimits(robot, port, way, period) for port in robot.ports}
-        self._read_action = action_reader(task.action_space())
-        self._read = observation_reader(task.observation_space(), type(task).__name__)
+        self._read_action = action_reader(made_space(task, "action_space"))
+        self._read = observation_reader(made_space(task, "observation_space"), type(task).__name__)
         self._generator = np.random.default_rng(seed)
         self._reported: set[str] = set()
         self._held: dict[str, Command] = {}
