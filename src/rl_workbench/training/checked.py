@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, passed_own_code
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, own_frames
 from rl_workbench.training.progress import warn
 
 LARGEST = float(np.finfo(np.float32).max)  # networks and replay buffers hold no larger number
@@ -156,7 +156,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         except WorkbenchError:
             raise
         except (Exception, SystemExit) as error:
-            if _OLD_GYM.search(str(error)) and not passed_own_code(error):
+            if _OLD_GYM.search(str(error)) and not own_frames(error):
                 raise self._old_gym() from error
             raise self._failure(method, error) from error
 

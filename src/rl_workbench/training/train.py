@@ -111,8 +111,8 @@ def run_training(
                 folder = holding.enter_context(run_folder.opened(*place))
             begin(folder)
             training = Training(options, folder, interrupt, callbacks)
-            for line in options.doubts():
-                warn(line)
+            if doubt := options.doubt():
+                warn(doubt)
             interrupt.defer()
             training.run()
     finally:
