@@ -1,5 +1,8 @@
 """Snapshots of environments beyond the conformance suite: refusals, users' objects, what stays."""
 
+import copy
+import pickle
+
 import gymnasium
 import pytest
 
@@ -147,6 +150,22 @@ def test_varied_robots_are_varied_as_they_were():
     env.restore_state(snapshot)
     assert returns(env) == first
     env.close()
+
+
+def test_environments_and_snapshots_are_neither_copied_nor_pickled(made):
+    env = made()
+    env.reset(seed=0)
+    for each, words in (
+        (env, "environment .* save_state"),
+        (env.save_state(), "snapshot .* restore"),
+    ):
+        for use in (copy.copy, copy.deepcopy, pickle.dumps):
+            with pytest.raises(TypeError, match=f"^an? {words}"):
+                use(each)
+    wrapped = gymnasium.make("cartpole/Balance-v0")
+    with pytest.raises(TypeError, match="^an environment can't be copied or pickled"):
+        copy.deepcopy(wrapped)
+    wrapped.close()
 
 
 def test_refusals_name_the_reason(made):
