@@ -64,7 +64,7 @@ def test_joints_that_a_contact_stops_stand_still_and_say_so(rig):
     """They jumped by 0.1 rad in each step, and joint states, of every 20th step, told constant velocities."""
     robot = rig("Position")
     command(robot, GOALS)
-    robot.run(2.0)
+    robot.run(4.0)  # with MuJoCo the arm has been pressed into the box; it comes out at 0.01 m/s
     states = np.array(robot.run(0.1))
     assert np.ptp(states[:, :, 0], axis=0).max() < 1e-3
     assert np.abs(states[:, :, 1]).max() < 0.02
