@@ -143,8 +143,10 @@ class Schedule:
         fresh = []
         for clock in self._clocks:
             was_heard, clock.heard = clock.heard, clock.listens()
-            came = clock.has_newcomer or not was_heard
-            clock.has_newcomer = False
+            came = clock.has_newcomer
+            if came:  # one that comes from now on is for the next look
+                clock.has_newcomer = False
+            came = came or not was_heard
             if clock.heard and not was_heard:
                 clock.plan(now)
             # Who was sent the last one may be gone, unnoticed: what there is now is measured anew.
