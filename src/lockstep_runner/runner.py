@@ -75,7 +75,8 @@ class ScriptRunner:
         self._period = period
         self._looks = 0
         self._looked_at = -1
-        self._failed = False
+        self._failed = 0  # the exit code
+        self._ending: set[threading.Thread] = set()
 
     @_ends_with_the_world(False)
     def is_connected(self) -> bool:
@@ -91,12 +92,20 @@ class ScriptRunner:
 
     def fail(self, fault: Exception, code: int = FAILED) -> NoReturn:
         """Ends the script with one line on stderr, even if it catches SystemExit."""
-        if self._failed:  # the script has caught the SystemExit below
+        if not self._failed:
+            self._failed = code
+            tell(str(fault))
+            self.clock.release_all()  # the end waits for the script's threads
+        self._end()
+
+    def _end(self) -> NoReturn:
+        """Ends each of the script's threads, and the process where one has caught the SystemExit."""
+        thread = threading.current_thread()
+        if thread in self._ending or not threading.main_thread().is_alive():
             sys.stdout.flush()
-            os._exit(code)
-        self._failed = True
-        tell(str(fault))
-        raise SystemExit(code)
+            os._exit(self._failed)
+        self._ending.add(thread)
+        raise SystemExit(self._failed)
 
     def _check_period(self) -> None:
         """Raises BadPeriod unless the period is a whole number of physics steps."""
@@ -116,6 +125,8 @@ class ScriptRunner:
         in_pause: float = math.inf,
     ) -> bool:
         """As Clock.wait."""
+        if self._failed:
+            self._end()
         self._settle()
         before = self.clock.waits
         try:
@@ -131,6 +142,8 @@ class ScriptRunner:
     @_ends_with_the_world(True)
     def waits_for_others(self, seconds: float) -> bool:
         """Returns True while a library polls for another node: messages arrive, but no time passes yet."""
+        if self._failed:
+            self._end()
         if not (self.clock.covers_this_thread() and self.is_connected()):
             return True
         passed = self.clock.passed
@@ -172,6 +185,8 @@ class ScriptRunner:
     @_ends_with_the_world(None)
     def before_call(self, service: str) -> None:
         """Delivers what was published before a service call, so that it arrives before the call."""
+        if self._failed:
+            self._end()
         self.clock.callbacks.acted()
         if self._may_step():
             self.clock.others.settle()

@@ -4,6 +4,7 @@ rospy's proxies have no time limit, keep a dead connection, and ask the process'
 know the address.
 """
 
+import contextlib
 import io
 import math
 import select
@@ -26,6 +27,9 @@ HEAD = struct.Struct("<BI")  # of an answer: whether the call succeeded, and its
 LENGTH = struct.Struct("<I")
 CONNECTING = 10.0  # [s] to connect or to send, for a call without a time limit
 LOOK = 0.1  # [s] between two checks of such a call for the node's shutdown
+WORK = "gazeboWork"  # XML-RPC method of a simulator's node: a number that grows while it computes
+ANSWERING = 10.0  # [s] for that; a picture's rays may keep Python's lock for seconds
+WORKING = 1.0  # [s] between two looks at it
 
 
 class ServiceFailed(Exception):
@@ -231,6 +235,7 @@ class Connection:
         answer = rosgraph.network.read_ros_handshake_header(self._socket, io.BytesIO(), CHUNK)
         if "error" in answer:
             raise CallFailed(answer["error"])
+        self._node = answer.get("callerid", "")
 
     def send(self, message: genpy.Message, timeout: float) -> None:
         """Sends a request; `receive` must take its answer before the next one.
@@ -251,16 +256,15 @@ class Connection:
     def receive(self, timeout: float) -> Any:
         """Returns the response to the last request; the time limit starts now.
 
+        While a simulator in lock-step computes, no limit ends the wait.
+
         Raises:
             CallFailed: the service failed; ConnectionEnded: the connection broke.
             TimeoutError: no answer in time; the connection can't be used afterwards.
         """
-        deadline = time.monotonic() + timeout
         try:
             self._socket.settimeout(_finite(timeout))
-            if timeout == math.inf:
-                self._await_data(deadline)
-            ok, answer = self._receive(deadline)
+            ok, answer = self._receive(timeout)
         except TimeoutError:
             raise
         except OSError as fault:
@@ -275,13 +279,31 @@ class Connection:
             raise CallFailed(f"its answer can't be read: {fault}") from fault
         return response
 
-    def _receive(self, deadline: float) -> tuple[bool, bytes]:
+    def _receive(self, timeout: float) -> tuple[bool, bytes]:
         """Reads one answer; for one in a single piece, as most are, the socket's time limit is enough."""
-        data = bytearray(self._part())
+        deadline, data = time.monotonic() + timeout, bytearray()
         while len(data) < HEAD.size or len(data) < HEAD.size + HEAD.unpack_from(data)[1]:
-            self._await_data(deadline)
-            data += self._part()
+            try:
+                if data or timeout == math.inf:
+                    self._await_data(deadline)
+                data += self._part()
+            except TimeoutError:
+                if timeout == math.inf or not self._computes():
+                    raise
+                deadline = time.monotonic() + timeout
         return bool(data[0]), bytes(data[HEAD.size :])
+
+    def _computes(self) -> bool:
+        """Returns whether the node is a simulator in lock-step that computes, or has answered meanwhile."""
+        try:
+            uri = master.call("lookupNode", self._node)
+            before = master.call_node(uri, WORK, timeout=ANSWERING)
+            with contextlib.suppress(TimeoutError):
+                self._await_data(time.monotonic() + WORKING)
+                return True
+            return bool(master.call_node(uri, WORK, timeout=ANSWERING) != before)
+        except (NoAnswer, Refused):
+            return False
 
     def _part(self) -> bytes:
         part = self._socket.recv(CHUNK)

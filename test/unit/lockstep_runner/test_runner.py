@@ -100,6 +100,34 @@ def test_a_world_that_dies_ends_the_script_also_where_it_catches_everything(
     assert capsys.readouterr().err == "lockstep: the simulator has died\n"
 
 
+def test_a_world_that_dies_in_another_thread_ends_the_script(runner, capsys, monkeypatch):
+    """Else the script waits in wall time for what never comes."""
+
+    def died():
+        raise WorldFailed("the simulator has died")
+
+    ended = []
+
+    def leave(code):
+        ended.append(code)
+        raise SystemExit(code)
+
+    monkeypatch.setattr(os, "_exit", leave)
+    runner.world.exchanged = died
+    thread = threading.Thread(target=runner.called, args=("/gazebo/reset_world", bytes))
+    thread.start()
+    originals.join(thread, BOUND)
+    runner.world.exchanged, runner.world.there = lambda: None, False
+    monkeypatch.setattr(rospy.core, "_shutdown_flag", True)
+    with pytest.raises(SystemExit):
+        runner.wait(0.0)
+    assert ended == []
+    with pytest.raises(SystemExit):  # the script has caught the first one
+        runner.before_call("/gazebo/reset_world")
+    assert ended == [1]
+    assert capsys.readouterr().err == "lockstep: the simulator has died\n"
+
+
 def test_a_period_that_is_no_multiple_names_both_numbers(runner, capsys):
     runner.world.step = 3 * MS
     runner.world.there = False
