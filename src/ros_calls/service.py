@@ -4,7 +4,6 @@ rospy's proxies have no time limit, keep a dead connection, and ask the process'
 know the address.
 """
 
-import contextlib
 import io
 import math
 import select
@@ -287,8 +286,8 @@ class Connection:
                 if data or timeout == math.inf:
                     self._await_data(deadline)
                 data += self._part()
-            except TimeoutError:
-                if timeout == math.inf or not self._computes():
+            except TimeoutError as fault:
+                if timeout == math.inf or not _is_own(fault) or not self._computes():
                     raise
                 deadline = time.monotonic() + timeout
         return bool(data[0]), bytes(data[HEAD.size :])
@@ -298,10 +297,11 @@ class Connection:
         try:
             uri = master.call("lookupNode", self._node)
             before = master.call_node(uri, WORK, timeout=ANSWERING)
-            with contextlib.suppress(TimeoutError):
-                self._await_data(time.monotonic() + WORKING)
-                return True
-            return bool(master.call_node(uri, WORK, timeout=ANSWERING) != before)
+            poll = select.poll()
+            poll.register(self._socket, select.POLLIN)
+            return bool(poll.poll(1000.0 * WORKING)) or bool(
+                master.call_node(uri, WORK, timeout=ANSWERING) != before
+            )
         except (NoAnswer, Refused):
             return False
 
@@ -338,6 +338,14 @@ def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
         return rospy.msg.args_kwds_to_message(kind._request_class, request, {})
     except TypeError as fault:
         raise CallFailed(f"the request can't be sent: {fault}") from fault
+
+
+def _is_own(fault: BaseException) -> bool:
+    """Returns whether this module has raised a fault, rather than a signal's handler in the middle of it."""
+    place = fault.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    return place is not None and place.tb_frame.f_globals is globals()
 
 
 def _finite(timeout: float) -> float:

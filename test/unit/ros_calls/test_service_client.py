@@ -189,6 +189,19 @@ def test_while_a_simulator_computes_no_limit_ends_a_call(simulator, client, mast
     assert next(looks) > 6
 
 
+def test_what_a_signal_s_handler_raises_ends_a_call(simulator, client, master):
+    def ring(*_):
+        raise TimeoutError("the script's own")
+
+    master.work = itertools.count()
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, LIMIT)
+    with pytest.raises(TimeoutError, match="the script's own"):
+        client()(True)
+    signal.signal(signal.SIGALRM, before)
+    simulator.set()
+
+
 def test_a_simulator_that_stands_still_hangs(simulator, client):
     with pytest.raises(ServiceHangs, match=r"/fake/set: no answer within 0.3 s"):
         client(timeout=LIMIT)(True)
