@@ -1,5 +1,6 @@
 """A world whose time passes on request: its commands and its readings."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -97,7 +98,7 @@ class SteppedWorld:
         self._state = self._step(self._ticks(duration))
 
     def _ticks(self, duration: float) -> int:
-        ticks = round(duration * NANOSECONDS / self._period)
+        ticks = round(duration * NANOSECONDS / self._period) if math.isfinite(duration) else -1
         if ticks < 0 or abs(ticks * self._period - duration * NANOSECONDS) > 1.0:
             raise WorldError(f"{duration} s isn't a number of steps of {self._period / 1e6:g} ms")
         return ticks

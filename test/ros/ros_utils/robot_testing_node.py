@@ -51,8 +51,9 @@ class Robots(RobotTestCase):
         self.world.wait(0.123)
         self.world.wait(0.001)
         self.assertEqual(self.world.time, 0.124)
-        with self.assertRaisesRegex(WorldError, r"0\.0005 s isn't a number of steps of 1 ms"):
-            self.world.wait(0.0005)
+        for wrong in (0.0005, float("nan"), float("inf")):
+            with self.assertRaisesRegex(WorldError, f"{wrong} s isn't a number of steps of 1 ms"):
+                self.world.wait(wrong)
 
     def test_time_that_would_never_pass_is_refused(self):
         self.spawn()

@@ -188,3 +188,13 @@ def test_refusals_name_the_reason(made):
     unreadable.reset(seed=1)
     with pytest.raises(SimulatorError, match="Reading.lines.*generator"):
         unreadable.save_state()
+
+
+def test_a_task_with_an_environment_of_another_class_is_refused():
+    """Its save_state() would save the task again, and so on."""
+    env = gymnasium.make("cartpole/Balance-v0", backend="bullet").unwrapped
+    env.reset(seed=1)
+    env.task.env = env
+    with pytest.raises(SimulatorError, match=r"^BalanceTask.env: a snapshot doesn't save an env"):
+        env.save_state()
+    env.close()

@@ -269,7 +269,7 @@ class StepService:
         sim = self._sim
         if request.reset != StepWorldRequest.NONE or plan.placed_models or plan.placed_joints:
             self._knows_contacts = False
-            with sim.one_move():
+            with sim.moves.as_one():
                 self._place(request, plan)
         plan.commanded.send(list(request.commands))
         plan.commanded.hold(request.joint_commands)

@@ -244,6 +244,14 @@ class Contract(SensorCase):
             self.assertEqual(stamp(message), 150 * MS)
             self.assertAlmostEqual(message.ranges[0], expected, delta=0.05)
 
+    def test_moves_of_an_obstacle_leave_the_rate_as_it_is(self):
+        heard = self.hear("/scan", LaserScan)
+        self.step(150)
+        for number in range(5):
+            self.put(x=2.0 + 0.1 * number, z=0.5, name="wall")
+            self.step(30)
+        self.assertEqual(heard.stamps(4), [0, 100 * MS, 200 * MS, 300 * MS])
+
 
 def simulator():
     """The process of the simulator."""
