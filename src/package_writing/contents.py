@@ -296,14 +296,17 @@ def ranges_text(survey: Survey, starts: Mapping[str, float]) -> str:
 def goals_text(survey: Survey, base: Base | None, starts: Mapping[str, float]) -> str:
     """Returns where a test moves joints, and how near, as the inside of a Python dict.
 
-    It goes a quarter of the way up from where a joint starts; on a free base, which might fall, nowhere.
+    It goes a quarter of the way up from where a joint starts; on a free base, which might fall, nowhere. The
+    legs of one that balances sag: they have no i.
     """
+    least = SAG / 2.0 if 0 < len(feet(survey.model)) < TRIPOD else 0.0
     share = 0.25 if survey.model.fixed_base else 0.0
     lines = []
     for motor in held_motors(survey, base):
         if not motor.wheel:
             start = starts.get(motor.joint, 0.0)
             goal, near = start + share * (motor.high - start), 0.025 * (motor.high - motor.low)
+            near = max(near, least)
             lines.append(f"    {literal(motor.joint)}: ({goal:.3g}, {near:.3g}),\n")
     return "".join(lines)
 
