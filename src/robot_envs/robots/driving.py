@@ -141,6 +141,9 @@ class DriveToGoal(Task):
             raise ValueError(f"a goal is (x, y) [m], not {tuple(goal)}")
         self.goal = (float(goal[0]), float(goal[1]))
 
+    def goal_mark(self) -> tuple[Vector, float]:
+        return (*self.goal, 0.0), THERE
+
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
         self._before = self.distance(state)
         if self._before <= THERE:

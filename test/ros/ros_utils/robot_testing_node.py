@@ -66,6 +66,40 @@ class Robots(RobotTestCase):
         with self.assertRaisesRegex(WorldError, "the world is paused"):
             self.world.wait(1.0)
 
+    def test_a_wrong_name_is_refused_with_its_reason_and_the_world_goes_on(self):
+        self.spawn()
+        for text, call in (
+            ("link.*'pol'.*'pole'", lambda: self.world.link("pol")),
+            ("link.*'pol'", lambda: self.world.contacts("pol")),
+            ("sensor.*'laser'", lambda: self.world.sensor("laser")),
+            ("there is a model 'robot' already", self.spawn),
+        ):
+            with self.subTest(text), self.assertRaisesRegex(WorldError, text):
+                call()
+            self.world.wait(0.01)
+        for text, controller, values in (
+            (f"2 commands where '{CART}' takes 1 .*{CART}: 0.1, 0.2", CART, (0.1, 0.2)),
+            ("'stand_cart'", "stand_cart", (0.1,)),
+        ):
+            self.world.command(controller, *values, every=0.01)
+            with self.subTest(text), self.assertRaisesRegex(WorldError, text):
+                self.world.wait(0.01)
+            self.world.wait(0.1)
+
+    def test_a_spawn_that_fails_says_why(self):
+        for text, run, joints in (
+            (f"no controller '{CART}s' .*did you mean '{CART}'", f"{CART}s", {}),
+            ("'stand_cart' can't start at 45: its stops are -", CART, {"stand_cart": 45.0}),
+        ):
+            with self.subTest(text), self.assertRaisesRegex(WorldError, text):
+                self.world.spawn(
+                    "package://cartpole_gazebo/robots/cartpole_v1.urdf",
+                    self.file("controllers.yaml", CONTROLLERS),
+                    [run],
+                    joints=joints,
+                )
+        self.spawn()
+
     def test_no_world_has_the_physics_of_the_one_before(self):
         first = ros_gazebo.gazebo_get_physics_properties()
         ros_gazebo.gazebo_set_physics_properties(time_step=0.002, gravity=(0.0, 0.0, -1.0))
@@ -96,7 +130,7 @@ class Robots(RobotTestCase):
         with self.assertRaisesRegex(WorldError, r"'stand_car' .*did you mean 'stand_cart'\?"):
             self.world.joint("stand_car")
         with self.assertRaisesRegex(WorldError, "nowhere.urdf can't be spawned"):
-            self.world.spawn("/nowhere.urdf")
+            self.world.spawn("/nowhere.urdf", name="other")
 
     def test_a_box_falls_touches_the_ground_and_stays_there(self):
         self.spawn_box("0.2 0.2 0.2", xyz=(1.0, 2.0, 0.5), rpy=(0.0, 0.0, math.pi / 2))

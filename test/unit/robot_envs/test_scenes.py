@@ -50,7 +50,7 @@ def test_a_coarser_physics_step(make) -> None:
     places = [each.state.models["rover"].pose.position for each in (env, fine)]
     assert places[0] == pytest.approx(places[1], abs=0.02) and places[0] != places[1]
     env.close()
-    with pytest.raises(ValueError, match="0.02 s is not a multiple of the physics step 0.003 s"):
+    with pytest.raises(RobotEnvError, match="0.02 s is not a multiple of the physics step 0.003 s"):
         RobotEnv(replace(ROVER, physics_step=0.003), Roll(), "ros-own")
     with pytest.raises(RobotEnvError, match="physics_step must be a time between 1e-06 and 1"):
         RobotEnv(replace(ROVER, physics_step=0.0), Roll())

@@ -78,9 +78,13 @@ class _Prepared:
         if not 0 <= request.ticks <= MAX_TICKS:
             raise ControlError(f"ticks is {request.ticks}: it is 0 to {MAX_TICKS}")
         if commanded.size + len(commanded.joints) != len(commands):
+            wanted = [
+                f"'{each.name}' takes {1 if isinstance(at, int) else at.stop - at.start}"
+                for each, (_, at) in zip(commanded.controllers, commanded.ports, strict=True)
+            ]
+            wanted += [f"joint '{each.name}' takes 1" for each in commanded.joints]
             raise ControlError(
-                f"{len(commands)} commands where {len(commanded.controllers)} controllers take "
-                f"{commanded.size} and {len(commanded.joints)} joints one each"
+                f"{len(commands)} commands where {', '.join(wanted) or 'none is taken'}"
             )
         check_numbers("commands", commands)
 

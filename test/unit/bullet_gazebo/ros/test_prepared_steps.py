@@ -93,7 +93,7 @@ def test_an_unknown_handle_is_stale_and_handles_are_bounded(world):
 @pytest.mark.parametrize(
     ("ticks", "commands", "text"),
     [
-        (1, [1.0], "1 commands where 1 controllers take 1 and 1 joints one each"),
+        (1, [1.0], "1 commands where 'effort_joint' takes 1, joint 'position_a' takes 1"),
         (1, [1.0, float("nan")], "commands has nan"),
         (1, [1e300, 0.0], "commands has 1e+300"),
         (-1, [1.0, 0.0], "ticks is -1"),
