@@ -7,6 +7,7 @@ from concurrent.futures import Future, wait
 from types import SimpleNamespace
 from typing import Any
 
+import genpy
 import rosparam
 import rospy
 from bullet_gazebo_msgs.msg import JournalEntry
@@ -19,6 +20,7 @@ from bullet_gazebo.ros.services.advance_service import reseed
 from bullet_gazebo.ros.services.step_requests import SLICE
 from bullet_gazebo.simulator import NANOSECONDS
 
+LONGEST = 20  # digits of a command's number
 PATIENCE = 60.0  # [s of wall time] for an entry during which no time passes
 
 
@@ -91,7 +93,7 @@ class Replay:
         keeps it from holding up the caller.
 
         Raises:
-            NoRecording: entries are missing in the bag.
+            NoRecording: entries are missing in the bag, or one is damaged.
         """
         outcome: Future[None] = Future()
 
@@ -163,7 +165,7 @@ class Replay:
         elif entry.kind == JournalEntry.MESSAGE:
             self._deliver(entry)
         else:
-            self._command(entry.name, int(entry.data))
+            self._command(entry)
 
     def _call(self, entry: JournalEntry) -> None:
         service = get_service_manager().get_service(entry.name)
@@ -171,7 +173,7 @@ class Replay:
         if kind is None or kind._md5sum != entry.md5sum:
             self._differ(entry, f"there is no service {entry.name} of type {entry.type}")
             return
-        request = service.protocol.recv_data_class().deserialize(entry.data)
+        request = _received(service.protocol.recv_data_class(), entry)
         request._connection_header = {"callerid": entry.caller}
         self._changes.set_parameters(entry, request)
         if entry.type == SpawnModel._type:
@@ -193,7 +195,7 @@ class Replay:
         publisher = SimpleNamespace(callerid_pub=entry.caller, header=header, stat_bytes=0)
         before = subscription.connections
         subscription.connections = [publisher] * entry.publishers  # controllers count them
-        message = subscription.data_class().deserialize(entry.data)
+        message = _received(subscription.data_class(), entry)
         message._connection_header = header
         subscription.receive_callback([message], publisher)
         subscription.connections = before
@@ -201,7 +203,11 @@ class Replay:
     def _differ(self, entry: JournalEntry, text: str) -> None:
         self.difference = self.difference or f"at {entry.elapsed / NANOSECONDS:g} s {text}"
 
-    def _command(self, name: str, count: int) -> None:
+    def _command(self, entry: JournalEntry) -> None:
+        name, number = entry.name, entry.data
+        if not number.isdigit() or len(number) > LONGEST:
+            raise _damaged(entry, f"{name} of {number!r}")
+        count = int(number)
         if name == "advance":
             with self._journal.command(name, count):
                 self._advance(count)
@@ -235,3 +241,15 @@ class Replay:
             self.difference = first_difference(recorded, entry, refusal)
             self.unknown += not recorded.observed and self.unknown == self.repeated
             self.repeated += not self.difference
+
+
+def _received(message: genpy.Message, entry: JournalEntry) -> Any:
+    """Returns the message that an entry holds."""
+    try:
+        return message.deserialize(entry.data)
+    except genpy.DeserializationError as fault:
+        raise _damaged(entry, str(fault)) from fault
+
+
+def _damaged(entry: JournalEntry, fault: str) -> NoRecording:
+    return NoRecording(f"entry {entry.number} is damaged: {fault}")
