@@ -4,6 +4,7 @@
 import importlib.util
 import itertools
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -31,6 +32,7 @@ def lockstep(*arguments, **options):
 def written(text):
     """A script of a few lines, in a folder of its own."""
     path = Path(tempfile.mkdtemp(prefix="lockstep_test_")) / "script.py"
+    unittest.addModuleCleanup(shutil.rmtree, path.parent)
     path.write_text(text)
     return path
 

@@ -159,7 +159,8 @@ def test_the_second_run_is_alone_and_of_what_failed(root, tmp_path):
     (tmp_path / "test/test_it.py").write_text(FLAKY)
     script = tmp_path / "ws"
     script.write_text(
-        "#!/usr/bin/env bash\nunset PYTEST_XDIST_WORKER\n[[ $1 == test ]] || exit 0\nshift; [[ $# -gt 0 ]] || set -- -n 2\n"
+        "#!/usr/bin/env bash\nunset PYTEST_XDIST_WORKER\n[[ $1 == test ]] || exit 0\n"
+        "shift; [[ $# -gt 0 ]] || set -- -n 2\n"
         f'exec {sys.executable} -m pytest -p no:randomly -c /dev/null --rootdir . "$@" test\n'
     )
     script.chmod(0o755)
