@@ -1,6 +1,7 @@
 """Repeats a recorded run in this process's simulator, entry by entry, and compares (docs/replay.md)."""
 
 import json
+import re
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, wait
@@ -9,6 +10,7 @@ from typing import Any
 
 import genpy
 import rosparam
+import rospkg
 import rospy
 from bullet_gazebo_msgs.msg import JournalEntry
 from gazebo_msgs.srv import SpawnModel
@@ -20,6 +22,7 @@ from bullet_gazebo.ros.services.advance_service import reseed
 from bullet_gazebo.ros.services.step_requests import SLICE
 from bullet_gazebo.simulator import NANOSECONDS
 
+PACKAGES = re.compile(r"package://(\w+)/")
 LONGEST = 20  # digits of a command's number
 PATIENCE = 60.0  # [s of wall time] for an entry during which no time passes
 
@@ -239,6 +242,8 @@ class Replay:
                 continue
             refusal = self._refusals.pop(entry.number, "")
             self.difference = first_difference(recorded, entry, refusal)
+            if self.difference and recorded.type == SpawnModel._type:
+                _require_packages(recorded)
             self.unknown += not recorded.observed and self.unknown == self.repeated
             self.repeated += not self.difference
 
@@ -249,6 +254,17 @@ def _received(message: genpy.Message, entry: JournalEntry) -> Any:
         return message.deserialize(entry.data)
     except genpy.DeserializationError as fault:
         raise _damaged(entry, str(fault)) from fault
+
+
+def _require_packages(spawn: JournalEntry) -> None:
+    """Raises NoRecording if a package that a spawned model names isn't found here."""
+    for name in sorted(set(PACKAGES.findall(spawn.data.decode(errors="replace")))):
+        try:
+            rospkg.RosPack().get_path(name)
+        except rospkg.ResourceNotFound as fault:
+            raise NoRecording(
+                f"package {name} isn't found: ./ws --with names its folder"
+            ) from fault
 
 
 def _damaged(entry: JournalEntry, fault: str) -> NoRecording:

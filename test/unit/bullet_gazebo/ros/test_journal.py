@@ -14,7 +14,7 @@ import rosbag
 import rospy
 from bullet_gazebo_msgs.msg import Journal as JournalMessage
 from bullet_gazebo_msgs.msg import JournalEntry
-from gazebo_msgs.srv import SpawnModel, SpawnModelRequest
+from gazebo_msgs.srv import SpawnModel, SpawnModelRequest, SpawnModelResponse
 from genpy import Time
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
@@ -347,6 +347,34 @@ def test_a_handler_that_waits_for_what_comes_later_ends_the_replay(
     repeated.run()
     later.set()
     assert "/hand/close was done, and now waits" in repeated.difference
+
+
+def test_a_difference_for_want_of_a_package_is_none(sim, journal, tmp_path, monkeypatch):
+    request = io.BytesIO()
+    SpawnModelRequest(model_xml="<mesh filename='package://my_arm/a.stl'/>").serialize(request)
+    call = entry(
+        1, kind=JournalEntry.SERVICE, name="/gazebo/spawn_urdf_model", type=SpawnModel._type
+    )
+    call.md5sum, call.data, call.answer = SpawnModel._md5sum, request.getvalue(), 7
+    path = written(tmp_path / "run.bag", entry(0, **START), call)
+
+    def refuse(_):
+        with journal.command("spawn") as made:
+            made.kind, made.name = JournalEntry.SERVICE, call.name
+        return SpawnModelResponse(False, "there is no package my_arm")
+
+    service = SimpleNamespace(
+        service_class=SpawnModel,
+        protocol=SimpleNamespace(recv_data_class=SpawnModelRequest),
+        handler=refuse,
+    )
+    monkeypatch.setattr(
+        replay, "get_service_manager", lambda: SimpleNamespace(get_service=lambda _: service)
+    )
+    node = SimpleNamespace(sim=sim, journal=journal, control=None, steps=SimpleNamespace(series=0))
+    repeated = replay.Replay(RecordedJournal(path), node, replay.Changes({}, ()), 9.0)
+    with pytest.raises(NoRecording, match="package my_arm isn't found: ./ws --with"):
+        repeated.run()
 
 
 def test_a_replay_has_the_hashes_of_the_recorded_run(tmp_path, monkeypatch):
