@@ -4,6 +4,7 @@
 import contextlib
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -100,6 +101,8 @@ class LaunchingTest(unittest.TestCase):
     @unittest.skipUnless(EXISTING.is_file(), "the existing script isn't here")
     def test_the_existing_script_is_repeatable_also_on_a_busy_machine(self):
         folders = [tempfile.mkdtemp(prefix="lockstep_test_") for _ in range(2)]
+        for folder in folders:
+            self.addCleanup(shutil.rmtree, folder)
         both = [start("--seed", 0, EXISTING, env=environment(), cwd=each) for each in folders]
         self.assertEqual(*map(self.episodes, both, folders))
 

@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 """Scripts under lockstep.py in a running lock-step world (docs/lockstep.md)."""
 
+import atexit
 import importlib.util
 import itertools
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -31,6 +33,9 @@ def lockstep(*arguments, **options):
 def written(text):
     """A script of a few lines, in a folder of its own."""
     path = Path(tempfile.mkdtemp(prefix="lockstep_test_")) / "script.py"
+    atexit.register(
+        shutil.rmtree, path.parent, ignore_errors=True
+    )  # rostest runs no module cleanups
     path.write_text(text)
     return path
 
