@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import gc
 import math
-from typing import Any
+import weakref
+from typing import Any, NamedTuple
 
 import pytest
 import rospy
 from geometry_msgs.msg import Vector3, Wrench
+from support.robots.grippers import cube
 from support.ros.silent_topics import SilentPublisher, SilentSubscriber, silence
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, from_rpy, to_rpy
 from bullet_gazebo.ros.common.messages import to_transform
-from bullet_gazebo.ros.plugins import acting_plugins
+from bullet_gazebo.ros.plugins import acting_plugins, gripper_plugins
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.simulator import Simulator
 
@@ -83,6 +86,50 @@ def test_a_hand_of_god_pulls_a_link_to_a_frame_of_tf(free):
     sent = SilentPublisher.messages["/tf"][-1].transforms[0]
     assert (sent.header.frame_id, sent.child_frame_id) == ("world", "hand_actual")
     assert sent.transform.translation.x == pytest.approx(pose.position[0], abs=1e-3)
+
+
+def test_a_hand_of_god_keeps_a_bounded_number_of_frames(free, monkeypatch):
+    monkeypatch.setattr(acting_plugins, "MOST_FRAMES", 10)
+    free.spawn("hand_of_god", "<linkName>body</linkName>")
+    for number in range(9):
+        SilentSubscriber.send("/tf", to_transform(0, "world", f"other{number}", Pose()))
+    SilentSubscriber.send("/tf", to_transform(0, "world", "hog_desired", Pose((1.0, 0.0, 1.0))))
+    assert not free.logged
+    SilentSubscriber.send("/tf", to_transform(0, "world", "one_more", Pose()))
+    assert "more than 10 frames: 'one_more' is ignored" in free.logged[-1]
+    SilentSubscriber.send("/tf", to_transform(0, "world", "hog_desired", Pose((0.5, 0.0, 1.0))))
+    free.advance(3000)
+    assert free.model.link_state("body")[0].position[0] == pytest.approx(0.5, abs=1e-2)
+
+
+class Attaching(NamedTuple):
+    """An attach request."""
+
+    model_name_1: str
+    link_name_1: str
+    model_name_2: str
+    link_name_2: str
+
+
+def test_a_link_attacher_keeps_nothing_of_models_that_are_gone(make_world, monkeypatch):
+    world = make_world()
+    monkeypatch.setattr(gripper_plugins.rospy, "Service", lambda *arguments: None)
+    sim = Simulator(world, lockstep=True)
+    attacher, gone = gripper_plugins.LinkAttacher(sim), []
+    for number in range(3):
+        names = f"first{number}", f"second{number}"
+        request = Attaching(names[0], "cube_link", names[1], "cube_link")
+        for place, name in enumerate(names):
+            gone.append(weakref.ref(world.spawn(name, parse_urdf(cube()), Pose((place, 0.0, 1.0)))))
+        assert attacher._attach(request).ok
+        assert attacher._detach(request).ok
+        assert not attacher._detach(request).ok
+        assert attacher._attach(request).ok
+        for name in names:
+            world.delete(name)
+        assert not attacher._detach(request).ok
+    gc.collect()
+    assert [each() for each in gone] == [None] * 6
 
 
 def test_a_hand_of_god_that_only_hears_itself_sends_nothing(free):
