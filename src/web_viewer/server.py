@@ -4,6 +4,7 @@ viser serves everybody who reaches the port. Pages of other sites in the same br
 browser lets them connect anywhere and only reports where they come from. So `Gate` checks each request.
 """
 
+import asyncio
 import contextlib
 import hmac
 import http
@@ -19,6 +20,8 @@ import msgspec
 import viser
 import websockets.asyncio.server
 from viser import _messages as messages
+from viser.infra import _infra
+from viser.infra._async_message_buffer import AsyncMessageBuffer
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
@@ -140,6 +143,32 @@ def _check_fields(server: viser.ViserServer) -> None:
             await gui._handle_gui_updates(client, message)
 
     pages.register_handler(messages.GuiUpdateMessage, checked)
+
+
+class LoopEvent(asyncio.Event):
+    """An event that only its loop's thread sets; viser asks the loop for it as well.
+
+    In another thread asyncio's `set` raises while a page comes or goes, and wakes no one.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        super().__init__()
+        self._owner = loop
+
+    def set(self) -> None:
+        """Sets it, in the loop's thread."""
+        if asyncio._get_running_loop() is self._owner:
+            super().set()
+
+
+class SafeBuffer(AsyncMessageBuffer):
+    """viser's buffer of messages, which any thread may fill while pages wait for it."""
+
+    def __init__(self, event_loop: asyncio.AbstractEventLoop, persistent_messages: bool) -> None:
+        super().__init__(event_loop, persistent_messages, LoopEvent(event_loop))
+
+
+setattr(_infra, "AsyncMessageBuffer", SafeBuffer)  # noqa: B010 - it is no public name
 
 
 class Door(websockets.asyncio.server.ServerConnection):

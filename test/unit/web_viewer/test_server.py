@@ -1,6 +1,8 @@
 """Where a page is, and who gets in."""
 
+import asyncio
 import socket
+import threading
 import time
 from importlib.metadata import version
 
@@ -242,3 +244,34 @@ def test_a_page_with_such_a_camera_is_none(page):
             assert time.monotonic() < deadline
             seen |= {tuple(each.camera.position) for each in page.get_clients().values()}
     assert seen <= {(3, 0, 1), (5, 6, 7)}
+
+
+def test_a_drawing_thread_leaves_it_to_the_pages_thread_to_wake_them(page):
+    """asyncio's event, set while its thread removes a page that waits, raises in the thread that draws."""
+    buffer = page._websock_server._broadcast_buffer
+    woken, busy, released = [], threading.Event(), threading.Event()
+
+    async def read(number):
+        async for window in buffer.window_generator(number):
+            woken.append(len(window))
+
+    def block():
+        busy.set()
+        assert released.wait(60.0)
+
+    def wait_until(condition):
+        deadline = time.monotonic() + 60.0
+        while not condition():
+            assert time.monotonic() < deadline
+
+    for number in range(3):
+        asyncio.run_coroutine_threadsafe(read(1000 + number), buffer.event_loop)
+    wait_until(lambda: len(buffer.message_event._waiters) == 3)
+    woken.clear()
+    buffer.event_loop.call_soon_threadsafe(block)
+    assert busy.wait(60.0)
+    page.scene.add_frame("/moved")
+    touched = [each.done() for each in buffer.message_event._waiters]
+    released.set()
+    assert touched == [False] * 3
+    wait_until(lambda: len(woken) >= 3)
