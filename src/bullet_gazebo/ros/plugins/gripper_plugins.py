@@ -152,7 +152,13 @@ class VacuumPlugin(SensorPlugin):
         topic = topic_in(namespace, context.required("topicName"))
         SensorTopic(context, topic, Bool, 0.0, self._held)
         for name, act in (("on", self._turn_on), ("off", self._turn_off)):
-            service = rospy.Service(topic_in(namespace, name), Empty, act)
+            place = topic_in(namespace, name)
+            try:
+                service = rospy.Service(place, Empty, act)
+            except rospy.service.ServiceException as error:
+                raise DescriptionError(
+                    f"there is a service {place} already: give each gripper a <robotNamespace>"
+                ) from error
             context.closing(service.shutdown)
         context.on_update(self._suction.update)
         context.closing(self._let_go)

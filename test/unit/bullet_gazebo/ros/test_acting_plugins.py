@@ -35,12 +35,12 @@ class Free:
     def __init__(self, world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         self.logged = silence(monkeypatch)
         self.sim = Simulator(world, lockstep=True)
-        self._plugins = PluginRegistry(self.sim, None)
+        self.plugins = PluginRegistry(self.sim, None)
 
     def spawn(self, library: str, elements: str) -> Any:
         text = MODEL.format(links=LINKS, library=library, elements=elements)
         self.model = self.sim.world.spawn("m", parse_urdf(text), Pose((0.0, 0.0, 1.0)))
-        self._plugins.load(self.model, "/")
+        self.plugins.load(self.model, "/")
         return self.model
 
     def model_topic(self, name: str) -> SilentPublisher:
@@ -132,6 +132,17 @@ def test_a_link_attacher_keeps_nothing_of_models_that_are_gone(make_world, monke
     assert [each() for each in gone] == [None] * 6
 
 
+def test_a_second_vacuum_gripper_in_a_namespace_is_told_in_a_line(free):
+    elements = "<bodyName>body</bodyName><topicName>held</topicName>"
+    first = free.spawn("vacuum_gripper", elements)
+    text = MODEL.format(links=LINKS, library="vacuum_gripper", elements=elements)
+    second = free.sim.world.spawn("other", parse_urdf(text), Pose((2.0, 0.0, 1.0)))
+    free.plugins.load(second, "/")
+    [line] = free.logged
+    assert "there is a service /on already: give each gripper a <robotNamespace>" in line
+    free.sim.delete_model(first)
+
+
 def test_a_hand_of_god_that_only_hears_itself_sends_nothing(free):
     free.spawn("hand_of_god", "<linkName>body</linkName>")
     sent, topic = SilentPublisher.messages["/tf"], free.model_topic("/tf")
@@ -188,5 +199,5 @@ def test_wheel_slip_is_accepted(free, monkeypatch):
     ways = ("lateral", "longitudinal")
     assert offered == [("/m/wheel_slip", [f"slip_compliance_unitless_{way}" for way in ways])]
     assert not free.logged
-    free._plugins.unload(free.model)
+    free.plugins.unload(free.model)
     assert not offered
