@@ -6,6 +6,7 @@ browser lets them connect anywhere and only reports where they come from. So `Ga
 
 import asyncio
 import contextlib
+import gzip
 import hmac
 import http
 import io
@@ -29,6 +30,8 @@ from web_viewer.address import LOOPBACK, TOKEN_BYTES, Address, PortInUse, has_di
 
 Answer = Callable[[Any, Request], Response | None]
 LONGEST_PATH = 1000  # of a request [characters]
+HTML, EMPTY = "text/html", b'<div id="root">'
+LOADING = b"<p style='font-family: sans-serif; padding: 1em'>The page is loading ...</p>"
 LARGEST = 2.0**53  # integers that JavaScript has exactly
 LARGEST_SIDE = 2**14  # of a page [pixels]
 Point = tuple[float, float, float]  # [m]
@@ -74,6 +77,8 @@ class Gate:
                 response = answer(connection, request)
             except (LookupError, ValueError, OSError):  # two hosts, a path that is no text, ...
                 return _said(http.HTTPStatus.BAD_REQUEST, "it is no browser's request")
+            if response is not None and response.headers.get("Content-Type", "").startswith(HTML):
+                response = _with_words(response)
             if self._token and response is not None:
                 response.headers["Set-Cookie"] = (
                     f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
@@ -81,6 +86,18 @@ class Gate:
             return response
 
         return guarded
+
+
+def _with_words(response: Response) -> Response:
+    """Has viser's page say that it is loading, until its program has come and been unpacked."""
+    packed = response.headers.get("Content-Encoding") == "gzip"
+    body = gzip.decompress(response.body) if packed else response.body
+    body = body.replace(EMPTY, EMPTY + LOADING, 1)
+    body = gzip.compress(body, 1) if packed else body
+    headers = Headers(response.headers)
+    del headers["Content-Length"]
+    headers["Content-Length"] = str(len(body))
+    return Response(response.status_code, response.reason_phrase, headers, body)
 
 
 def _said(status: http.HTTPStatus, text: str) -> Response:

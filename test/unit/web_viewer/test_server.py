@@ -1,9 +1,11 @@
 """Where a page is, and who gets in."""
 
 import asyncio
+import gzip
 import socket
 import threading
 import time
+import urllib.request
 from importlib.metadata import version
 
 import msgspec
@@ -275,3 +277,14 @@ def test_a_drawing_thread_leaves_it_to_the_pages_thread_to_wake_them(page):
     released.set()
     assert touched == [False] * 3
     wait_until(lambda: len(woken) >= 3)
+
+
+@pytest.mark.parametrize("encoding", ["gzip", "identity"])
+def test_a_page_says_that_it_is_loading(page, encoding):
+    request = urllib.request.Request(
+        f"http://127.0.0.1:{page.get_port()}/", headers={"Accept-Encoding": encoding}
+    )
+    with urllib.request.urlopen(request, timeout=60.0) as answer:
+        body = answer.read()
+    text = gzip.decompress(body) if encoding == "gzip" else body
+    assert b"The page is loading" in text
