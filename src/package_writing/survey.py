@@ -126,8 +126,13 @@ def root_link(xml: str) -> str:
     if robot.tag != "robot":
         raise CannotWrite(f"the file is no URDF: it begins with <{robot.tag}>, not <robot>")
     children = {e.get("link") for e in robot.findall("joint/child")}
-    links = (link.get("name", "") for link in robot.findall("link"))
-    return next((name for name in links if name not in children), "")
+    links = [link.get("name", "") for link in robot.findall("link")]
+    roots = [name for name in links if name not in children]
+    if links and not roots:
+        raise CannotWrite(
+            f"links {links[:10]} form a ring: each is a joint's child, so none is the root"
+        )
+    return roots[0] if roots else ""
 
 
 def _check_passive(passive: Sequence[str], movable: list[str], driven: dict[str, str]) -> None:

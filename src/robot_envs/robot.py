@@ -27,7 +27,7 @@ from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError
 from robot_envs.files import Source
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 CONTROL_PERIOD = 0.01  # [s]
 EMPTY = "empty"

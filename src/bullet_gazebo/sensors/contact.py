@@ -7,7 +7,7 @@ from bullet_gazebo.sensors.sensing import Mount, sensor_of
 from bullet_gazebo.simulator import NANOSECONDS
 from bullet_gazebo.state import ContactPair, contact_pairs
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 
 class ContactSensor:

@@ -121,7 +121,7 @@ def _replay(
         return code
 
     # Warnings have been seen when the run was recorded.
-    logging.getLogger("rosout").addFilter(lambda log: log.levelno >= logging.ERROR)
+    logging.disable(logging.WARNING)
     return gzserver.main(["gzserver", *arguments_of(recorded.facts, folder)], work)
 
 

@@ -64,11 +64,12 @@ class _Prepared:
     def __init__(
         self, sim: Simulator, sensing: Sensing, addresses: Addresses, request: PrepareStepRequest
     ) -> None:
+        query = query_of(request)
         for name in request.sensors:
             find_sensor(sim, sensing, name)
         self.addresses = addresses
         self.commanded = addresses.commanded(request.controllers, request.commanded_joints)
-        self.reader = StateReader(sim.world, query_of(request))
+        self.reader = StateReader(sim.world, query)
         self.models = list(self.reader.read(stepped=False).models)
         self.sensors = tuple(request.sensors)
 
