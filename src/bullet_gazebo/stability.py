@@ -199,7 +199,7 @@ def too_high(
     implicit = model.body.implicit_damping
     added = {name: damping / 2.0 for name, damping in own.items()} if implicit else {}
     matrix = mobility(model.description, poses_at_zero(model.description), added)
-    stiffness = {name: sum(_stiffness(each.loop, dt)) for name, each in left.items()}
+    stiffness = {name: math.fsum(_stiffness(each.loop, dt)) for name, each in left.items()}
     if not implicit:  # Model.apply_damping cuts it at half of what stops the joint in one step
         for name in left:
             place = order.index(name)

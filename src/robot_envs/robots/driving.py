@@ -167,7 +167,7 @@ class DriveToGoal(Task):
         (pose, twist), (fast, round_) = self._motion(state), self.fastest
         x, y, _ = pose.position
         bearing = math.atan2(self.goal[1] - y, self.goal[0] - x) - to_rpy(pose.orientation)[2]
-        ahead = sum(a * b for a, b in zip(heading(pose), twist.linear, strict=True))
+        ahead = math.fsum(a * b for a, b in zip(heading(pose), twist.linear, strict=True))
         return [
             min(self.distance(state) / 4.0, 1.0), math.cos(bearing), math.sin(bearing),
             ahead / fast, twist.angular[2] / round_,
