@@ -40,7 +40,7 @@ from bullet_gazebo.ros.common.messages import (
     to_twist_msg,
 )
 from bullet_gazebo.ros.common.node_process import seed_random_numbers
-from bullet_gazebo.ros.services import ServiceRefused, offer
+from bullet_gazebo.ros.services import NO_LINK, ServiceRefused, existing, offer
 from bullet_gazebo.ros.services.step_requests import (
     MAX_TICKS,
     SLICE,
@@ -337,11 +337,7 @@ class StepService:
 
     def _set_friction(self, request: SetLinkFrictionRequest) -> str:
         with self._sim.lock:
-            found = self._sim.world.link(request.link_name)
-            if found is None:
-                raise ServiceRefused(
-                    "link not found, did you forget to scope the link by model name?"
-                )
+            found = existing(self._sim.world.link(request.link_name), NO_LINK)
             try:
                 set_link_friction(*found, request.factor)
             except PropertyError as error:
