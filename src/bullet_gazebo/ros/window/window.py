@@ -5,6 +5,7 @@ import io
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -249,13 +250,10 @@ def show(address: Address, browser: bool) -> None:
         if not address.token:  # which is for no one else; other programs may show the lines
             rospy.set_param(ADVICE, advice)
         if browser:  # may block until its user closes it
-            threading.Thread(target=open_browser, args=(address, _warn), daemon=True).start()
+            warn = partial(rospy.logwarn, "gazebo_gui: %s")
+            threading.Thread(target=open_browser, args=(address, warn), daemon=True).start()
         window.run()
     finally:
         stop(server)
         with contextlib.suppress(KeyError, OSError, rospy.ROSException):  # the master has gone
             rospy.delete_param(ADVICE)
-
-
-def _warn(text: str) -> None:
-    rospy.logwarn("gazebo_gui: %s", text)
