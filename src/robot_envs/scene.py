@@ -15,7 +15,7 @@ from robot_envs.world_state import Commands, InitialState, JointState, Motion, P
 
 BEYOND = 0.01  # [rad, m] of a joint's stop, as a moving joint may be
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 Placed = dict[str, tuple[float, float]]
 """Position and velocity of joints, by name."""
