@@ -92,7 +92,7 @@ class MujocoState:
         self.placed = bool(aims.size) and self._bound_separation(first, aims[::ROWS])
 
     def _bound_separation(self, first: int, aims: np.ndarray) -> bool:
-        """Bounds the accelerations [m/s²] that normals aim at, from row `first` on; returns whether any was above."""
+        """Bounds the accelerations [m/s²] that normals aim at; returns whether one was above."""
         data, fastest = self.data, self._separation
         if fastest.size > 1:
             geoms = data.contact.geom[data.contact.efc_address >= 0]

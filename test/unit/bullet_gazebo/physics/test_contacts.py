@@ -300,4 +300,4 @@ def test_a_wall_throws_nothing_back_faster_than_it_came(world, speed, effort):
         world.step()
         (_, (linear, _)) = model.state()
         fastest = max(fastest, math.hypot(*linear))
-    assert fastest < speed + 1.0  # of wheels that lose the ground
+    assert fastest < speed + 2.0  # it falls from where it has climbed
