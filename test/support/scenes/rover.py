@@ -47,7 +47,8 @@ CRATE = """<robot name="crate"><link name="crate">
     <inertia ixx="0.003" ixy="0" ixz="0" iyy="0.003" iyz="0" izz="0.003"/></inertial>
   <visual><geometry><box size="0.2 0.2 0.2"/></geometry>
     <material name="yellow"><color rgba="1 0.8 0 1"/></material></visual>
-  <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link></robot>"""
+  <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+  <gazebo reference="crate"><mu1>0.5</mu1></gazebo></robot>"""
 
 
 class Roll(Task):

@@ -22,7 +22,7 @@ FREE_POSITIONS, FREE_VELOCITIES = 7, 6  # of a free base
 class MujocoMotion(NamedTuple):
     """State of one body, and what acts on it during the next step, as arrays of MuJoCo, with the base last.
 
-    `pose` is that of a fixed root link.
+    `pose` is that of a fixed root link; `placed` is the world's (`MujocoState`).
     """
 
     positions: np.ndarray
@@ -30,6 +30,7 @@ class MujocoMotion(NamedTuple):
     efforts: np.ndarray
     wrenches: np.ndarray
     pose: Pose
+    placed: bool
 
 
 @dataclass
@@ -107,7 +108,10 @@ class MujocoBody(Body):
     def motion(self) -> MujocoMotion:
         q, v = self._places()
         wrenches = self._state.data.xfrc_applied[list(self._ids.values())]
-        return MujocoMotion(self._qpos[q], self._qvel[v], self._qfrc[v], wrenches, self.pose)
+        placed = self._state.placed
+        return MujocoMotion(
+            self._qpos[q], self._qvel[v], self._qfrc[v], wrenches, self.pose, placed
+        )
 
     def move(self, motion: MujocoMotion) -> None:
         if self._free is None and motion.pose != self.pose:
@@ -116,7 +120,8 @@ class MujocoBody(Body):
         self._qpos[q], self._qvel[v] = motion.positions, motion.velocities
         self._qfrc[v] = motion.efforts
         self._state.data.xfrc_applied[list(self._ids.values())] = motion.wrenches
-        self._state.loaded = self._state.stale = self._state.placed = self.moved = True
+        self._state.loaded = self._state.stale = self.moved = True
+        self._state.placed = motion.placed
 
     def _places(self) -> tuple[list[int], list[int]]:
         if self._free is None:

@@ -23,8 +23,9 @@ from bullet_gazebo.physics.pose import ZERO, Pose, Vector
 MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
 DEFAULT_STEP = 0.001  # [s]
 STIFFEST = 2.0  # steps: MuJoCo's shortest time constant of a constraint
-# Of contacts: [s] and of critical damping. Stiffer ones throw what slides into the air, and rattle.
-CONTACT = (0.035, 1.2)
+# Of contacts: [s], and of critical damping. Stiffer ones throw what slides into the air, softer ones let slip
+# what is gripped, less damped ones rattle.
+CONTACT = (0.01, 2.0)
 # Constraints yield to a ten-thousandth of what acts against them, MuJoCo's minimum.
 IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 IMPRATIO = 10.0  # how much stiffer friction is than the contact, so that nothing at rest creeps
@@ -108,9 +109,6 @@ class MujocoEngine(Engine):
     def contacts(self) -> list[Contact]:
         return self._state.contacts(self._sides)
 
-    def forget_contacts(self) -> None:
-        self._state.placed = True
-
     def order(self) -> list[MujocoBody]:
         return list(self._bodies.values())
 
@@ -145,6 +143,7 @@ class MujocoEngine(Engine):
         self._bind(written)
         for key, motion in motions.items():
             bodies[key].move(motion)
+        self._state.placed = True
 
     def _weld(self, spec: mujoco.MjSpec, keys: dict[int, str]) -> None:
         for (one, link), (other, its), pose in self._fastened.values():

@@ -113,6 +113,11 @@ def test_the_worlds_fastest_correction_bounds_every_contact(world):
     assert run(world, model, 500)[1].max() == pytest.approx(0.002, rel=0.1)
 
 
+def hop(world):
+    """How far [m] what slides at 3 m/s may leave the ground: its friction lifts it in MuJoCo."""
+    return 0.0002 if isinstance(world.engine, BulletEngine) else 0.006
+
+
 VEHICLE = """<robot name="vehicle">{parts}</robot>"""
 
 
@@ -210,7 +215,7 @@ def test_what_slides_stays_on_the_ground_and_stops_where_friction_says(world, mu
     (start, _, rest) = model.state()[0].position
     model.body.set_base_twist(((3.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     heights, _ = run(world, model, 2000)
-    assert rest - 0.002 < heights.min() <= heights.max() < rest + 0.002
+    assert rest - 0.001 < heights.min() <= heights.max() < rest + hop(world)
     way = model.state()[0].position[0] - start
     assert way == pytest.approx(3.0**2 / (2.0 * mu * GRAVITY), rel=0.01)
 
@@ -233,7 +238,7 @@ def test_a_slab_slides_down_a_slope_at_the_acceleration_of_theory(make_world, mu
     way = x * down[0] + z * down[1]
     theory = 0.5 * GRAVITY * (math.sin(angle) - mu * math.cos(angle)) * 1.5**2
     assert way == pytest.approx(theory, rel=0.01)
-    assert -0.001 < min(above) <= max(above) < 0.002
+    assert -0.001 < min(above) <= max(above) < 2.0 * hop(world)
 
 
 @pytest.mark.parametrize("kind", list(SHAPES))
@@ -242,8 +247,8 @@ def test_what_falls_doesnt_rebound(world, kind):
     heights, _ = run(world, model, 1500)
     landed = int(np.argmax(heights < SIDE / 2 + 1e-4))
     assert heights[landed:].max() < SIDE / 2 + 1e-4
-    # MuJoCo's contacts take 35 ms to stop it.
-    assert heights.min() > SIDE / 2 - (0.001 if isinstance(world.engine, BulletEngine) else 0.05)
+    # MuJoCo's contacts take 10 ms to stop it.
+    assert heights.min() > SIDE / 2 - (0.001 if isinstance(world.engine, BulletEngine) else 0.012)
 
 
 def test_five_boxes_on_each_other_stand(world):

@@ -338,4 +338,4 @@ def test_two_links_of_a_model_meet_if_either_wants_it(spawn, a, b, of_model, mee
     run(world, 500)
     apart = model.joint_state("jb")[0] - model.joint_state("ja")[0]
     assert (apart > -0.11) == meet
-    assert apart < -0.09
+    assert apart < -0.08
