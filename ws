@@ -157,6 +157,8 @@ main() {
         '' | -h | --help | help) usage; [[ -n ${1-} ]]; return ;;
         clean) choose_place; clean; return ;;
         -*) fail_usage "unknown option $1" ;;
+        docs) [[ ${2-} != -* ]] || fail_usage "docs: unknown option $2" ;;
+        *) ask_about "$1" ;;
     esac
     COMMAND=$*
     local steps=(debian venv companions build)
@@ -199,6 +201,26 @@ run() {
         return 127
     fi
     exec -- "$@"
+}
+
+# A slip of the finger would run another program: Debian has a tset.
+ask_about() {  # command
+    local own i head tail program
+    for own in test check docs shell extras rviz foreign clean; do
+        [[ $1 != "$own" ]] || return 0
+    done
+    for own in test check docs shell extras rviz foreign clean; do
+        for ((i = 0; i <= ${#own}; i++)); do
+            head=${own:0:i} tail=${own:i}
+            case $1 in
+                "$head"?"$tail" | "$head${tail:1}" | "$head"?"${tail:1}" | \
+                    "$head${tail:1:1}${tail:0:1}${tail:2}")
+                    program=$(type -P -- "$1") || program=/path/to/$1
+                    fail_usage "did you mean: ws $own? If not: ws $program"
+                    ;;
+            esac
+        done
+    done
 }
 
 fail_usage() {

@@ -204,12 +204,12 @@ def unheard(results: dict[str, float], rounds: int) -> None:
     """Ticks of a world with sensors that nobody hears against those of one without; in turns."""
     sims = [Simulator(World(BulletEngine()), lockstep=True) for _ in range(2)]
     sensing = Sensing(sims[1])
-    for _ in range(UNHEARD):
-        sensing.schedule.add(10.0, lambda _: None, lambda: False)
     for sim in sims:
         sim.world.spawn("ground", ground_plane(), Pose())
         text = MODEL.format(static=0, shape=SHELL, sensor="")
-        sim.world.spawn("robot", parse_sdf(text), Pose((0.0, 0.0, 0.05)))
+        robot = sim.world.spawn("robot", parse_sdf(text), Pose((0.0, 0.0, 0.05)))
+    for _ in range(UNHEARD):
+        sensing.schedule.add(robot, 10.0, lambda _: None, lambda: False)
 
     def ticks(sim: Simulator) -> float:
         with sim.lock:

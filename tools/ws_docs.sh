@@ -3,16 +3,33 @@
 
 # A page of the site has the place that it has in the repository, so the same links work in both.
 PAGES=(README.md CONTRIBUTING.md CHANGELOG.md CITATION.cff docs examples)
-# Public names come from a module's __all__.
-API=(robot_envs robot_envs.testing rl_workbench bullet_gazebo ros_utils)
+# Pages and what is on each. Public names come from a module's __all__.
+API=(
+    "robot_envs robot_envs.vector robot_envs.variation.variation.Variation robot_envs.backends.backend.side_by_side
+        robot_envs.backends.ros.session.RosSession"
+    "robot_envs.testing"
+    "rl_workbench rl_workbench.agents.dqn_agent.DQNAgent rl_workbench.agents.settings rl_workbench.tools.policies
+        rl_workbench.tools.runs"
+    "bullet_gazebo bullet_gazebo.ros.plugins.plugin_loader.PluginContext
+        bullet_gazebo.ros.plugins.sensor_topics.SensorTopic"
+    "ros_utils ros_utils.readiness ros_utils.ros_controllers ros_utils.ros_gazebo ros_utils.ros_launch
+        ros_utils.ros_node ros_utils.ros_params ros_utils.ros_spawn ros_utils.ros_urdf ros_utils.simulation
+        ros_utils.step_client ros_utils.testing ros_calls.service"
+    "cartpole.environment cartpole.robot"
+)
 
 mkdocs() {  # command, argument...
-    local module source=$WS/docs/source
+    local source=$WS/docs/source
     rm -rf -- "$source"
     mkdir -p -- "$source/api"
     ln -s -- "${PAGES[@]/#/$ROOT/}" "$source/"
-    for module in "${API[@]}"; do
-        printf '# %s\n\n::: %s\n' "$module" "$module" >"$source/api/$module.md"
+    local page on_page name
+    for page in "${API[@]}"; do
+        read -rd '' -a on_page <<<"$page" || true
+        printf '# %s\n' "${on_page[0]}" >"$source/api/${on_page[0]}.md"
+        for name in "${on_page[@]}"; do
+            printf '\n::: %s\n' "$name" >>"$source/api/${on_page[0]}.md"
+        done
     done
     cd -- "$ROOT" || return
     CARTPOLE_DOCS=$source NO_MKDOCS_2_WARNING=true "$VENV/bin/python3" -m mkdocs "$1" --strict --quiet "${@:2}"

@@ -22,6 +22,15 @@ roscore() {  # as ws does
     command "$CARTPOLE_WS" roscore "$@"
 }
 
+gzserver() { rosrun gazebo_ros gzserver "$@"; }
+gzclient() { rosrun gazebo_ros gzclient "$@"; }
+if ! command -v check_urdf >/dev/null; then
+    check_urdf() {
+        echo "check_urdf: apt-get install liburdfdom-tools; spawn_model says, too, what is wrong with a URDF" >&2
+        return 127
+    }
+fi
+
 PS1="(cartpole) ${PS1-\$ }"
 
 # roscd, rosls, rosed, ..., and the completion of all ROS commands. They leave out what lies below a

@@ -78,7 +78,7 @@ class AppliedForces:
 
     def effort_on(self, model: Model, joint: str, now: int) -> float:
         """Returns the effort [N m, N] on a movable joint in the step that ends at `now` [ns]."""
-        return sum(
+        return math.fsum(
             _truncated(each)
             for each in self.efforts
             if each.model is model and each.joint == joint and each.interval.covers(now)

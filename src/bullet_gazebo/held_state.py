@@ -48,6 +48,7 @@ VALUES = (
     attrgetter, itemgetter, BaseException, np.ufunc, type(np.clip), type(str.lower), date, timedelta,
     Decimal,
 )  # fmt: skip
+ENVIRONMENT = "gymnasium.core.Env"
 SPAWNED = "n_children_spawned"  # of a SeedSequence
 POINTER = 8  # [bytes]; to an attribute in __slots__, or to the __dict__ of a compiled class
 
@@ -246,9 +247,15 @@ def _into_own(state: HeldState, each: Any) -> Iterable[Any]:
     try:
         held = each.save_state()
     except Exception as error:  # a user's code
-        raise UnknownState(f"save_state() raised {error!r}") from error
+        raise UnknownState(f"save_state() raised {error!r:.300}") from error
     state.note_own(each, held)
     return ()
+
+
+def _environment(state: HeldState, each: Any) -> Iterable[Any]:
+    raise UnknownState(
+        "a snapshot doesn't save an environment; name the attribute in `of_the_present` to leave it out"
+    )
 
 
 def _unreadable(state: HeldState, each: Any) -> Iterable[Any]:
@@ -286,6 +293,8 @@ def _look_of(kind: type) -> Look:
     """Finds how to look into objects of a class, and remembers it."""
     if issubclass(kind, VALUES) or f"{kind.__module__}.{kind.__qualname__}".startswith(OUTSIDE):
         look: Look = _nowhere
+    elif any(f"{base.__module__}.{base.__qualname__}" == ENVIRONMENT for base in kind.__mro__):
+        look = _environment  # its save_state() would come back here
     elif issubclass(kind, random.SystemRandom):
         look = _unreadable
     elif hasattr(kind, "save_state") and hasattr(kind, "restore_state"):

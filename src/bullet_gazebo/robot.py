@@ -18,7 +18,7 @@ FAST = 0.999 * FURTHEST  # [rad, m] in a step: only what has blown up moves like
 
 SLOWEST = 3600.0  # [s]; the longest control period
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 
 def control_period_of(plugin: Plugin) -> float:

@@ -1,12 +1,12 @@
 """The clockwork: ties physics and control together, tick by tick (docs/architecture.md, "One tick")."""
 
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
 from bullet_gazebo.applied_forces import AppliedForces
 from bullet_gazebo.held_state import HeldState
+from bullet_gazebo.moves import Moves
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose
@@ -80,14 +80,11 @@ class Simulator:
         self.applied = AppliedForces()
         # Called with `now` before each physics step, under the lock: topics, plugins and sensors.
         self.listeners: list[Callable[[int], None]] = []
-        # Called under the lock after something other than time has moved bodies, or time was reset.
-        self.moved: list[Callable[[], None]] = []
+        self.moves = Moves(world)
         # Whose state snapshots save, beside that of robots and callbacks.
         self.parts: list[object] = []
         self.restored: list[Callable[[], None]] = []  # called under the lock after a restore
-        # Called under the lock before each advance, and how many moves are still told of as one.
-        self.before_advance: list[Callable[[], None]] = []
-        self._moves_under_way = 0
+        self.before_advance: list[Callable[[], None]] = []  # called under the lock
         self.resets = 0  # of the world or the simulation
         # Called under the lock with a seed from which all random numbers start again.
         self.reseeded: list[Callable[[int], None]] = []
@@ -240,7 +237,7 @@ class Simulator:
         """Puts joints of `model` at `positions` [rad, m], at rest; the caller holds the lock."""
         model.set_joint_positions(positions)
         self._joints_moved(model)
-        self._tell_of_move()
+        self.moves.tell([model])
 
     def set_joint_states(
         self, model: Model, positions: Mapping[str, float], velocities: Mapping[str, float]
@@ -252,7 +249,7 @@ class Simulator:
         model.set_joint_positions(positions)
         model.set_joint_velocities(velocities)
         self._joints_moved(model)
-        self._tell_of_move()
+        self.moves.tell([model])
 
     def place_model(self, model: Model, pose: Pose, twist: Twist) -> None:
         """Moves `model` rigidly, its joints at rest as in Gazebo; the caller holds the lock."""
@@ -261,7 +258,7 @@ class Simulator:
         model.rest_joints()
         if model.joint_states() != before:
             self._joints_moved(model)
-        self._tell_of_move()
+        self.moves.tell([model])
 
     def place_link(self, model: Model, link: str, pose: Pose, twist: Twist) -> None:
         """Moves one link as near as the joints that carry it allow; the caller holds the lock."""
@@ -269,7 +266,7 @@ class Simulator:
         place_link(model, link, pose, twist)
         if model.joint_states() != before:
             self._joints_moved(model)
-        self._tell_of_move()
+        self.moves.tell([model])
 
     def delete_model(self, model: Model) -> None:
         """Takes a model out of the world, and what acts on it; the caller holds the lock."""
@@ -299,7 +296,7 @@ class Simulator:
             self.now = 0
             for robot in self.robots:
                 robot.joints_moved(self.now, relatch=False)
-            self._tell_of_move()
+            self.moves.tell(None)
 
     def save_state(self) -> Snapshot:
         """Returns all that decides the future; the caller holds the lock.
@@ -307,7 +304,7 @@ class Simulator:
         Raises:
             UnknownState: if the state of a user's controller or plugin can't be read.
         """
-        callbacks = (*self.listeners, *self.moved, *self.reseeded)
+        callbacks = (*self.listeners, *self.moves.listeners, *self.reseeded)
         world = self.world.save_state()
         held = HeldState((self.applied, *self.robots, *self.parts, *callbacks))
         return Snapshot(self, self._layout, self.now, self.resets, world, held)
@@ -344,21 +341,6 @@ class Simulator:
         for listener in self.reseeded:
             listener(seed)
 
-    @contextmanager
-    def one_move(self) -> Iterator[None]:
-        """Tells of all moves in the block at its end, as one; the caller holds the lock."""
-        self._moves_under_way += 1
-        try:
-            yield
-        finally:
-            self._moves_under_way -= 1
-            self._tell_of_move()
-
-    def _tell_of_move(self) -> None:
-        if self._moves_under_way == 0:
-            for listener in self.moved:
-                listener()
-
     def _joints_moved(self, model: Model) -> None:
         for robot in self._robots_of.get(model, ()):
             robot.joints_moved(self.now, self.relatch)
@@ -371,7 +353,7 @@ class Simulator:
         self.world.reset(joints=everything)
         for robot in self.robots:
             robot.joints_moved(self.now, self.relatch)
-        self._tell_of_move()
+        self.moves.tell(None)
 
     def _update_flow(self) -> None:
         if self._paused or self.lockstep or self.holds:

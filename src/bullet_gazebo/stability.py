@@ -30,6 +30,7 @@ MOST = 4.0  # of the eigenvalue
 P_ONLY_DAMPING = 0.05  # of critical damping
 P_ONLY_TAG = "pOnlyDamping"
 STILL = 1e-3  # [rad, m] by which a stalled joint may move
+OFF = 0.05  # [rad, m] of a stalled joint to its goal, if its motor isn't at the limit
 STALLED = 1_000_000_000  # [ns]
 
 
@@ -96,25 +97,37 @@ class StabilityWatch:
     def report_stalls(self, now: int, contacts: Callable[[], Sequence[Contact]]) -> None:
         """Logs, once for each joint, that a contact has stalled its motor for a second; `now` [ns].
 
-        A motor may well press on another model, as a gripper does, so that is no warning.
+        A motor may well press on another model, as a gripper does, so that is no warning. One that doesn't
+        give all it has, its gains being low or softened, is stalled if its own model holds it off its goal.
         """
+        joints = self._hardware.joints
+        full = [each.name for each in self._hardware.at_their_limits()]
+        held = dict.fromkeys(full, "its motor at the limit")
+        for _, loop in self._acting():
+            off = 0.0 if loop.of_velocity else loop.pid.p_error
+            if loop.joint in joints and abs(off) > OFF:
+                held.setdefault(loop.joint, f"{abs(off):.2g} rad or m off its goal")
         pushing = {}
         touching: Sequence[Contact] | None = None
-        for joint in self._hardware.at_their_limits():
-            since, place = self._pushing.get(joint.name, (now, joint.position))
-            if now < since or abs(joint.position - place) > STILL:
-                since, place = now, joint.position
-            pushing[joint.name] = since, place
-            if now - since < STALLED or ("stalled", joint.name) in self._logged:
+        for name, how in held.items():
+            position = joints[name].position
+            since, place = self._pushing.get(name, (now, position))
+            if now < since or abs(position - place) > STILL:
+                since, place = now, position
+            pushing[name] = since, place
+            if now - since < STALLED or ("stalled", name) in self._logged:
                 continue
             touching = contacts() if touching is None else touching
-            for own, text in self._stops(joint.name, touching):
-                self._logged.add(("stalled", joint.name))
-                self._log(logging.WARNING if own else logging.INFO, text)
-                break
+            for own, text in self._stops(name, how, touching):
+                if own or name in full:
+                    self._logged.add(("stalled", name))
+                    self._log(logging.WARNING if own else logging.INFO, text)
+                    break
         self._pushing = pushing
 
-    def _stops(self, joint: str, contacts: Sequence[Contact]) -> Iterator[tuple[bool, str]]:
+    def _stops(
+        self, joint: str, how: str, contacts: Sequence[Contact]
+    ) -> Iterator[tuple[bool, str]]:
         """Yields for each contact that stops a joint whether it is of two links of the model, and a text."""
         model = self._model
         carried = {link for link in model.link_names if joint in model.carriers(link)}
@@ -126,8 +139,8 @@ class StabilityWatch:
                 own = other.body is model.body
                 yield (
                     own,
-                    f"joint '{joint}' of model '{model.name}' has been stalled for a second, its motor at "
-                    f"the limit: link '{link.link}' touches link '{other.link}' of "
+                    f"joint '{joint}' of model '{model.name}' has been stalled for a second, {how}: "
+                    f"link '{link.link}' touches link '{other.link}' of "
                     f"{'its own' if own else 'another'} model",
                 )
 
@@ -186,7 +199,7 @@ def too_high(
     implicit = model.body.implicit_damping
     added = {name: damping / 2.0 for name, damping in own.items()} if implicit else {}
     matrix = mobility(model.description, poses_at_zero(model.description), added)
-    stiffness = {name: sum(_stiffness(each.loop, dt)) for name, each in left.items()}
+    stiffness = {name: math.fsum(_stiffness(each.loop, dt)) for name, each in left.items()}
     if not implicit:  # Model.apply_damping cuts it at half of what stops the joint in one step
         for name in left:
             place = order.index(name)

@@ -10,7 +10,7 @@ from cartpole.robot import CART_JOINT, CART_LINK, POLE_JOINT, POLE_LINK, ROBOT
 from cartpole.tasks import TASKS, CartPoleTask
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.environment import RobotEnv
-from robot_envs.making import check_options
+from robot_envs.making import check_options, rendering
 from robot_envs.pictures.drawn import Camera, CameraLike
 from robot_envs.variation import LinkScale, Variation
 from robot_envs.vector import RobotVectorEnv
@@ -189,6 +189,7 @@ class CartPoleRandomisation:
         return drawn.of_robot(), np.array(drawn)
 
 
+@rendering
 def make_environment(
     task: str,
     backend: str | None = None,

@@ -23,7 +23,7 @@ from lockstep_runner import originals
 from lockstep_runner.clock import Others
 from lockstep_runner.line import ADDRESS, Line, LineEnded
 from lockstep_runner.looks import LOOK, QUIET, WORKING, Seen, look_at
-from lockstep_runner.notices import tell_once
+from lockstep_runner.notices import tell, tell_once
 
 SITE = Path(__file__).with_name("site")
 STARTING_PATIENCE = 30.0  # [s of wall time]
@@ -119,12 +119,19 @@ class Followers(Others):
         folder = contextlib.ExitStack()
         address = str(folder.enter_context(scratch_folder()) / "clock")
         atexit.register(folder.close)
+        atexit.register(self._tell_of_end)
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._listener.bind(address)
         self._listener.listen(64)
         os.environ[ADDRESS] = address
         thread = threading.Thread(target=self._accept, name="nodes under the clock", daemon=True)
         originals.start(thread)
+
+    def _tell_of_end(self) -> None:
+        with self._guard:
+            names = ", ".join(sorted(self._nodes))
+        if names:
+            tell(f"the script has ended, and so do the nodes that follow its clock: {names}")
 
     def has(self, node: str) -> bool:
         """Returns whether a node of that name follows the clock."""

@@ -51,5 +51,5 @@ def _follow(name: str) -> None:
         connection.close()
         return
     rospy.core.add_shutdown_hook(lambda reason: line.close())  # ends a rest at Ctrl-C
-    options = argparse.Namespace(seed=None, dt=0.001, step_on=["none"], virtual_wall_clock=False)
+    options = argparse.Namespace(seed=None, dt=0.0, step_on=["none"], virtual_wall_clock=False)
     install(options, FollowedWorld(line))

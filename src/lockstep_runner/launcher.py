@@ -109,7 +109,7 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         "--dt",
         type=_period,
         default=0.008,
-        help="simulated time that passes at each trigger [s]; a multiple of the physics step"
+        help="simulated time that passes at each trigger [s], rounded up to whole physics steps"
         " (default: %(default)s)",
     )
     parser.add_argument(

@@ -18,7 +18,7 @@ from lockstep_runner.topics import Topics
 from lockstep_runner.triggers import Triggers
 from lockstep_runner.world import NODE, RunsByItself, ScriptWorld, WorldFailed, WorldGone
 
-USAGE, FAILED = 2, 1  # exit codes
+FAILED = 1  # exit code
 OTHERS = 2.0  # [s of wall time] for another node to come up before time passes
 LOOK = 0.05  # [s of wall time]
 PAUSE = f"{NODE}/pause_physics"
@@ -26,10 +26,6 @@ SWITCHES = (PAUSE, f"{NODE}/unpause_physics")
 POLLED = 10  # equal calls of a service in a row
 POLLED_TIME = 1000  # time readings in a row, with nothing in between
 QUIET = ("get_", "list_", "pause_physics", "unpause_physics")  # services that publish nothing
-
-
-class BadPeriod(Exception):
-    """The period at a trigger is not a whole number of physics steps; the text gives both."""
 
 
 Method = TypeVar("Method", bound=Callable[..., Any])
@@ -47,8 +43,6 @@ def _ends_with_the_world(instead: bool | None) -> Callable[[Method], Method]:
                 if not self.is_over:  # Ctrl-C ends both
                     tell_once("gone", f"{gone}: without another one, sleeps are wall time")
                 return instead
-            except BadPeriod as fault:
-                self.fail(fault, USAGE)
             except (RunsByItself, WorldFailed) as fault:
                 self.fail(fault)
 
@@ -64,7 +58,7 @@ class ScriptRunner:
         """Sets the runner up; nothing is replaced yet.
 
         Args:
-            period: simulated time that passes at a trigger [s].
+            period: simulated time that passes at a trigger [s], in whole physics steps; 0 is one.
             triggers: topics and services; None for the commands to controllers.
             world: the simulator, and the source of time.
         """
@@ -72,40 +66,54 @@ class ScriptRunner:
         self.topics = Topics(self.world)
         self.clock = Clock(self.world)
         self.triggers = Triggers(triggers)
-        self._period = period
+        self._wanted = self._period = period
         self._looks = 0
         self._looked_at = -1
         self._failed = False
+        self._ending: set[threading.Thread] = set()
 
     @_ends_with_the_world(False)
     def is_connected(self) -> bool:
         """Returns whether there is a simulator; looks for one if none is connected."""
+        if self._failed:
+            self._end()
         if self.world.there:
             return True
         found = self.world.look()
         if found:
             self.topics.changed()
             self.clock.exchange()
-            self._check_period()
+            self._round_period()
         return found
 
-    def fail(self, fault: Exception, code: int = FAILED) -> NoReturn:
+    def fail(self, fault: Exception) -> NoReturn:
         """Ends the script with one line on stderr, even if it catches SystemExit."""
-        if self._failed:  # the script has caught the SystemExit below
-            sys.stdout.flush()
-            os._exit(code)
-        self._failed = True
-        tell(str(fault))
-        raise SystemExit(code)
+        if not self._failed:
+            self._failed = True
+            if fault.args:
+                tell(str(fault))
+            self.clock.release_all()  # the end waits for the script's threads
+        self._end()
 
-    def _check_period(self) -> None:
-        """Raises BadPeriod unless the period is a whole number of physics steps."""
+    def _end(self) -> NoReturn:
+        """Ends each of the script's threads, and the process where one has caught the SystemExit."""
+        thread = threading.current_thread()
+        if thread in self._ending or not threading.main_thread().is_alive():
+            sys.stdout.flush()
+            os._exit(FAILED)
+        self._ending.add(thread)
+        raise SystemExit(FAILED)
+
+    def _round_period(self) -> None:
         step = self.world.step / NANOSECONDS
-        ticks = self._period / step
-        if round(ticks) < 1 or abs(ticks - round(ticks)) > 1e-6:
-            raise BadPeriod(
-                f"--dt {self._period:g} is not a multiple of the physics step, {step:g} s"
+        ticks = self._wanted / step
+        whole = max(1, math.ceil(ticks - 1e-6))
+        if self._wanted and whole - ticks > 1e-6:
+            tell_once(
+                "period",
+                f"--dt {self._wanted:g} is rounded up to {whole * step:g} s: a step takes {step:g} s",
             )
+        self._period = whole * step
 
     @_ends_with_the_world(False)
     def wait(
@@ -143,7 +151,9 @@ class ScriptRunner:
     @_ends_with_the_world(None)
     def before_publishing(self, topic: str) -> None:
         """Lets time pass before a message is published, if its topic triggers that."""
-        if self.is_connected():
+        if (
+            not self._failed and self.is_connected()
+        ):  # a script may still say at its end what is to stop
             self._settle()
             if self._may_step() and self.triggers.before(topic, topic in self.topics.commands):
                 self._pass_period()

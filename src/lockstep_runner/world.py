@@ -33,7 +33,7 @@ class WorldGone(Exception):
 
 
 class WorldFailed(Exception):
-    """The simulator has died, or hangs; the text says which."""
+    """The simulator has died, or hangs; the text says which. It is empty where the user knows already."""
 
 
 class ScriptWorld:
@@ -208,7 +208,7 @@ class FollowedWorld(ScriptWorld):
         except (LineEnded, KeyError) as fault:
             if rospy.core.is_shutdown():
                 return 0.0
-            raise WorldFailed("the script that it followed has ended") from fault
+            raise WorldFailed from fault  # the script has told of its end, for all that followed it
 
 
 def _raised_elsewhere(fault: BaseException) -> BaseException | None:

@@ -19,7 +19,8 @@ from bullet_gazebo.physics.dynamics import (
 )
 from bullet_gazebo.physics.pose import rotate
 from package_writing import CannotWrite
-from package_writing.survey import EFFORT, POSITION, Motor, Survey, feet
+from package_writing.standing import centre_of_mass, feet
+from package_writing.survey import EFFORT, POSITION, Motor, Survey
 from package_writing.vehicle import DRIVE, Base, scan_topic
 from package_writing.vehicle import controller as drive_controller
 from robot_envs.files import PACKAGE
@@ -27,6 +28,10 @@ from robot_envs.files import PACKAGE
 # [rad/s], at least, of a joint on its p and d with all that it carries stretched out
 FREQUENCY = 12.0
 HIGHEST = 250.0  # [rad/s], of a joint's own inertia; steps of 1 ms can't follow a higher one
+STIFFEST = 700.0  # [rad/s], likewise, of the p alone with which a leg balances its body
+DAMPED = 350.0  # [rad/s], likewise, of its d alone
+TRIPOD = 3  # feet that need no balance; on fewer i would feed the body's slow sway
+MARGIN = 2.0  # of p over what lets a body tip over about a leg's joint
 MOST = 25.0  # largest ratio of carried to own inertia
 SAG = 0.1  # [rad, m], largest sag under its weight with p alone
 SHARE = 0.05  # largest sag as a share of the joint's range
@@ -48,6 +53,7 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
     own = effective_inertias(model, poses_at_zero(model))
     below = _masses(model)
     stances = _stances(model, below)
+    balancing = stances if len(feet(model)) < TRIPOD else {}
     found = {}
     for name, inertia in carried.items():
         ratio = min(inertia / own[name], MOST) if own[name] > 0.0 else 1.0
@@ -59,22 +65,28 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
         p, d = moved * frequency**2, 2.0 * moved * frequency
         stable = math.inf  # the largest i with which joint and load don't shake
         if name in stances:
-            load, standing = stances[name]
+            load, standing, tipping = stances[name]
+            fastest = DAMPED if name in balancing else HIGHEST
             p = max(p, min(load / sag, own[name] * HIGHEST**2))
-            d = max(d, min(2.0 * math.sqrt(p * standing), 2.0 * own[name] * HIGHEST))
+            p = max(p, min(MARGIN * tipping, own[name] * STIFFEST**2))
+            d = max(d, min(2.0 * math.sqrt(p * standing), 2.0 * own[name] * fastest))
             weight = max(weight, load)
             stable = p * d / standing if standing else math.inf
-        i = min(2.0 * p, stable / 2.0)
+        i = 0.0 if name in balancing else min(2.0 * p, stable / 2.0)
         found[name] = _rounded({"p": p, "i": i, "d": d, "i_clamp": weight})
     return found
 
 
-def _stances(model: ModelDescription, below: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Returns load [N m, N] and inertia [kg m², kg] of legs' joints, with half the feet on the ground.
+def _stances(
+    model: ModelDescription, below: Mapping[str, float]
+) -> dict[str, tuple[float, float, float]]:
+    """Returns load, inertia and m g h [N m, kg m², N m/rad] of legs' joints, half the feet on the ground.
 
+    The body above a joint is an inverted pendulum, which a p of m g h or less lets fall.
     `below` is the mass that each joint carries with its foot in the air [kg].
     """
     poses, on = poses_at_zero(model), feet(model)
+    top = centre_of_mass(model, poses)[2] if on else 0.0
     total = sum(each.inertia.mass for each in model.links.values() if each.inertia is not None)
     found = {}
     for foot in on:
@@ -83,11 +95,16 @@ def _stances(model: ModelDescription, below: Mapping[str, float]) -> dict[str, t
             x, y, z = rotate(frame.orientation, joint.axis)
             mass = (total - below[joint.name]) / max(1, len(on) // 2)
             if joint.kind == "prismatic":
-                found[joint.name] = (GRAVITY * mass * abs(z), mass)
+                found[joint.name] = (GRAVITY * mass * abs(z), mass, 0.0)
             else:
                 soles = [poses[foot].compose(each.pose) for each in model.links[foot].collisions]
                 arm = max(math.dist(frame.position, each.position) for each in soles)
-                found[joint.name] = (GRAVITY * mass * arm * math.hypot(x, y), mass * arm**2)
+                height, level = max(0.0, float(top) - frame.position[2]), math.hypot(x, y)
+                found[joint.name] = (
+                    GRAVITY * mass * arm * level,
+                    mass * max(arm, height) ** 2,
+                    GRAVITY * mass * height * level,
+                )
     return found
 
 
@@ -266,24 +283,30 @@ def base_text(package: str, survey: Survey, base: Base | None) -> dict[str, str]
     }  # fmt: skip
 
 
-def ranges_text(survey: Survey) -> str:
-    """Returns the ranges of the postures to reach, as the inside of a Python dict."""
-    return "".join(
-        f"    {literal(each.joint)}: ({each.low}, {each.high}),\n" for each in survey.motors
-    )
+def ranges_text(survey: Survey, starts: Mapping[str, float]) -> str:
+    """Returns the ranges of the postures to reach, the stance included, as the inside of a Python dict."""
+    lines = []
+    for each in survey.motors:
+        start = 0.0 if each.wheel else starts.get(each.joint, 0.0)
+        low, high = min(each.low, start), max(each.high, start)
+        lines.append(f"    {literal(each.joint)}: ({low}, {high}),\n")
+    return "".join(lines)
 
 
 def goals_text(survey: Survey, base: Base | None, starts: Mapping[str, float]) -> str:
     """Returns where a test moves joints, and how near, as the inside of a Python dict.
 
-    It goes a quarter of the way up from where a joint starts; on a free base, which might fall, nowhere.
+    It goes a quarter of the way up from where a joint starts; on a free base, which might fall, nowhere. The
+    legs of one that balances sag: they have no i.
     """
+    least = SAG / 2.0 if 0 < len(feet(survey.model)) < TRIPOD else 0.0
     share = 0.25 if survey.model.fixed_base else 0.0
     lines = []
     for motor in held_motors(survey, base):
         if not motor.wheel:
             start = starts.get(motor.joint, 0.0)
             goal, near = start + share * (motor.high - start), 0.025 * (motor.high - motor.low)
+            near = max(near, least)
             lines.append(f"    {literal(motor.joint)}: ({goal:.3g}, {near:.3g}),\n")
     return "".join(lines)
 

@@ -1,13 +1,10 @@
 """Writes one package, and reports its contents."""
 
-import importlib.util
 import json
 import math
 import os
 import re
 import shlex
-import subprocess
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,15 +14,9 @@ import yaml
 
 from bullet_gazebo.physics.files.reading import Resources
 from package_writing import CannotWrite, contents
-from package_writing.survey import (
-    Survey,
-    feet,
-    height_note,
-    look_at,
-    root_link,
-    stance,
-    standing_height,
-)
+from package_writing.standing import feet, stance, standing_height
+from package_writing.survey import Survey, height_note, look_at, root_link
+from package_writing.trial import stands_note, try_out
 from package_writing.urdf_files import Copied, copy_urdf, expanded
 from package_writing.vehicle import DRIVE, Base, find_base
 from robot_envs import Robot, RobotEnvError, controllers, files
@@ -37,14 +28,6 @@ PARENT = TREE.parent if IS_CHECKOUT else Path()
 
 INTERFACES = ("effort", "position", "velocity")
 ARM = contents.TEMPLATE / "urdf/two_link_arm.urdf.xacro"
-TRIAL = """
-import sys, gymnasium
-env = gymnasium.make(sys.argv[1])
-env.action_space.seed(0)
-env.reset(seed=0)
-env.step(env.action_space.sample())
-"""
-TRIAL_LIMIT = 300.0  # [s] of wall time, imports included
 NOTES = 3  # largest number of a URDF's warnings to show
 OURS = ("cartpole", "controller_manager", "gazebo_ros", "xacro")  # the template depends on them
 
@@ -113,7 +96,7 @@ def write(request: PackageRequest, made: Path) -> list[str]:
     base = find_base(survey)
     held = contents.held_motors(survey, base)
     contents.check_controllers(held, base)
-    starts = stance(survey)
+    starts = stance(survey.model)
     stands = None if survey.model.fixed_base else standing_height(survey.model, starts)
     if request.height is None:
         request = replace(request, height=stands or 0.0)
@@ -126,35 +109,12 @@ def write(request: PackageRequest, made: Path) -> list[str]:
     wrong = list(controllers.faults(run, None, parameters, robot.hardware(), movable))
     if wrong:
         raise CannotWrite("; ".join(wrong))
-    _try_out(f"{request.name}.environment:{request.name}/{values['task']}-v0", made)
+    on = feet(survey.model)
+    env_id = f"{request.name}.environment:{request.name}/{values['task']}-v0"
+    faults = try_out(request.name, env_id, made, stands=bool(on))
+    note = stands_note(on, faults) if on else ""
     more = f"urdf/{urdf}, which includes it, adds {' and '.join(lacks)}" if lacks else ""
-    return list(_report(request, copied, survey, base, more, stands))
-
-
-def _try_out(env_id: str, made: Path) -> None:
-    """Makes the package's environment and takes a step in it, in a process of its own; not without ROS.
-
-    Raises:
-        CannotWrite: if that fails.
-    """
-    if importlib.util.find_spec("rospkg") is None:  # without ROS nothing finds it by its name
-        return
-    paths = os.environ.get("ROS_PACKAGE_PATH", "")
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join([str(made / "src"), *sys.path]),
-        "ROS_PACKAGE_PATH": f"{made}:{paths}",
-    }
-    try:
-        ended = subprocess.run(
-            [sys.executable, "-B", "-c", TRIAL, env_id],
-            env=environment, timeout=TRIAL_LIMIT, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired as error:
-        raise CannotWrite(f"a step of the robot took more than {TRIAL_LIMIT:g} s") from error
-    if ended.returncode:
-        lines = ended.stderr.strip().splitlines() or [f"it ended with {ended.returncode}"]
-        raise CannotWrite(f"the robot can't take a step: {lines[-1]}")
+    return list(_report(request, copied, survey, base, more, stands, note))
 
 
 def _completed(
@@ -246,7 +206,7 @@ def _values(
         ),
         "controllers_yaml": contents.controllers_text(survey, base),
         **contents.base_text(request.name, survey, base),
-        "ranges": contents.ranges_text(survey),
+        "ranges": contents.ranges_text(survey, starts),
         "goals": contents.goals_text(survey, base, starts),
         **contents.stance_text(request.name, survey, starts),
         "units": ", ".join(each for each in ("rad", "m", "rad/s") if each in units),
@@ -285,6 +245,7 @@ def _report(
     base: Base | None,
     more: str,
     stands: float | None,
+    note: str,
 ) -> Iterator[str]:
     yield f"written: {request.folder}"
     joints = ", ".join(each.joint for each in survey.motors)
@@ -303,9 +264,8 @@ def _report(
         )
     if not survey.model.fixed_base:
         yield height_note(request.height or 0.0, stands)
-        on = feet(survey.model)
-        if on:
-            yield f"gains are for a robot that stands on its feet: {', '.join(on)}"
+        if note:
+            yield note
     if survey.passive:
         yield f"joints that move without a motor, and that tasks don't see: {', '.join(survey.passive)}"
     if survey.followers:

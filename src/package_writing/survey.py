@@ -1,12 +1,11 @@
-"""Surveys a URDF: its motors and passive joints, its plugin, and the height at which the robot stands."""
+"""Surveys a URDF: its motors, passive joints and plugin."""
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
-import numpy as np
 import yaml
 
 from bullet_gazebo.control.errors import ControlError
@@ -15,17 +14,17 @@ from bullet_gazebo.control.transmissions import RobotDescription, read_descripti
 from bullet_gazebo.physics.description import (
     DescriptionError,
     ModelDescription,
-    Shape,
     is_control_plugin,
 )
 from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose, Vector, conjugate, rotate
+from bullet_gazebo.physics.pose import Pose, rotate
 from file_access.content import FileError
 from file_access.text import did_you_mean
 from file_access.xml_text import parse
 from package_writing import CannotWrite
+from package_writing.standing import FOOT, lows_of
 
 EFFORT, POSITION, VELOCITY = (
     f"{kind}JointInterface" for kind in ("Effort", "Position", "Velocity")
@@ -34,13 +33,7 @@ SHARE = 0.6  # of a joint's range, about its middle, from which postures to reac
 WIDEST = 1.8  # [rad, m], largest half-width of that range
 FARTHEST = 1e6  # [rad, m], of the range's middle
 FASTEST = 5.0  # [rad/s], of wheels
-# Of the height at which a robot stands: how much higher than its lowest link feet may be.
-FOOT = 0.05
 UPRIGHT = 0.99  # cosine of the tilt of a caster's swivel, at least
-NEAR = 1e-6  # [m], how exactly a foot is put below its leg
-DOWN = (0.0, 0.0, -1.0)
-TURNS = 50  # of a search for a leg's posture
-SMALL = 1e-4  # [rad, m], for slopes
 
 
 @dataclass(frozen=True)
@@ -133,8 +126,13 @@ def root_link(xml: str) -> str:
     if robot.tag != "robot":
         raise CannotWrite(f"the file is no URDF: it begins with <{robot.tag}>, not <robot>")
     children = {e.get("link") for e in robot.findall("joint/child")}
-    links = (link.get("name", "") for link in robot.findall("link"))
-    return next((name for name in links if name not in children), "")
+    links = [link.get("name", "") for link in robot.findall("link")]
+    roots = [name for name in links if name not in children]
+    if links and not roots:
+        raise CannotWrite(
+            f"links {links[:10]} form a ring: each is a joint's child, so none is the root"
+        )
+    return roots[0] if roots else ""
 
 
 def _check_passive(passive: Sequence[str], movable: list[str], driven: dict[str, str]) -> None:
@@ -174,7 +172,7 @@ def _motors(
 
 def _casters(model: ModelDescription) -> set[str]:
     """Returns the continuous joints of casters: what swivels on the ground, and what that carries."""
-    lows, poses = _lows(model, {}), link_poses(model, Pose(), {})
+    lows, poses = lows_of(model, {}), link_poses(model, Pose(), {})
     ground = min(lows.values(), default=0.0)
     found = set()
     for foot in (name for name, low in lows.items() if low <= (1.0 - FOOT) * ground):
@@ -220,90 +218,6 @@ def _plugins(robot: Element) -> Iterator[Element]:
                 yield plugin
 
 
-def stance(survey: Survey) -> dict[str, float]:
-    """Returns where joints start that don't start at 0 [rad, m, three decimals].
-
-    A joint whose range excludes 0 starts in its middle. The other joints of its leg then put the foot below
-    where it is with all joints at 0.
-    """
-    own = {each.joint: (each.low, each.high) for each in survey.motors if not each.wheel}
-    ranges, found = {}, {}
-    for joint in survey.model.movable_joints:
-        stops = (joint.lower, joint.upper) if joint.bounded else (-math.inf, math.inf)
-        low, high = ranges[joint.name] = own.get(joint.name, stops)
-        start = 0.0 if stops[0] <= 0.0 <= stops[1] else sum(stops) / 2.0
-        found[joint.name] = min(max(start, low), high)
-    bent = {name for name, start in found.items() if start}
-    for foot in feet(survey.model) if bent else ():
-        leg = [each.name for each in survey.model.carriers(foot) if each.movable]
-        if bent.intersection(leg):
-            _put_below(
-                survey.model, foot, [each for each in leg if each not in bent], found, ranges
-            )
-    return {name: round(start, 3) for name, start in found.items() if round(start, 3)}
-
-
-def _put_below(
-    model: ModelDescription,
-    foot: str,
-    joints: Sequence[str],
-    positions: dict[str, float],
-    ranges: Mapping[str, tuple[float, float]],
-) -> None:
-    """Moves `joints`, within their ranges, so that a foot is below where it is with all joints at 0."""
-    sole = min(
-        (each.pose for each in model.links[foot].collisions), key=lambda each: each.position[2]
-    )
-
-    def place(changed: Mapping[str, float]) -> np.ndarray:
-        poses = link_poses(model, Pose(), changed)
-        return np.array(poses[foot].compose(sole).position[:2])
-
-    wanted = place({})
-    for _ in range(TURNS if joints else 0):
-        here = place(positions)
-        if np.linalg.norm(wanted - here) < NEAR:
-            return
-        slopes = [
-            (place({**positions, name: positions[name] + SMALL}) - here) / SMALL for name in joints
-        ]
-        steps = np.linalg.pinv(np.array(slopes).T, rcond=0.05) @ (wanted - here)
-        for name, step in zip(joints, np.clip(steps, -0.2, 0.2).tolist(), strict=True):
-            low, high = ranges[name]
-            positions[name] = min(max(positions[name] + step, low), high)
-
-
-def standing_height(model: ModelDescription, positions: Mapping[str, float]) -> float | None:
-    """Returns the least height at which no collision is below the ground [m, three decimals].
-
-    `positions` are those of the joints; others are at 0. None if there are no collisions.
-    """
-    lows = _lows(model, positions)
-    if not lows:
-        return None
-    return max(0.0, math.ceil(round(-min(lows.values()) * 1000.0, 6)) / 1000.0)  # 0.1 stays 0.1
-
-
-def feet(model: ModelDescription) -> list[str]:
-    """Returns the links on which a robot stands, joints at zero; none on wheels, or on its base."""
-    lows = {} if model.fixed_base else _lows(model, {})
-    ground = min(lows.values(), default=0.0)
-    found = [name for name, low in lows.items() if low <= (1.0 - FOOT) * ground]
-    kinds = {joint.kind for name in found for joint in model.carriers(name)}
-    return [] if model.root in found or "continuous" in kinds else found
-
-
-def _lows(model: ModelDescription, positions: Mapping[str, float]) -> dict[str, float]:
-    """Returns how low each link with a collision reaches, seen from the root [m]."""
-    return {
-        name: -max(
-            reach(shape, pose.compose(shape.pose), DOWN) for shape in model.links[name].collisions
-        )
-        for name, pose in link_poses(model, Pose(), positions).items()
-        if model.links[name].collisions
-    }
-
-
 def height_note(height: float, stands: float | None) -> str:
     """Returns a line on the height at which a robot is spawned, and at which it stands on the ground [m]."""
     if stands is None:
@@ -312,18 +226,3 @@ def height_note(height: float, stands: float | None) -> str:
     if height < stands:
         return f"note: {spawned} its lowest collision lies below the ground; --height {stands:g} is enough"
     return f"{spawned}; its lowest collision touches the ground at {stands:g} m"
-
-
-def reach(shape: Shape, pose: Pose, way: Vector) -> float:
-    """Returns how far a shape reaches along a direction of length 1, from the origin of its pose [m]."""
-    turned = np.array(rotate(conjugate(pose.orientation), way))  # in the shape's frame
-    size = np.array(shape.size)
-    if shape.kind == "sphere":
-        half = float(size[0])
-    elif shape.kind == "cylinder":
-        half = float(size[0] * math.hypot(turned[0], turned[1]) + size[1] / 2.0 * abs(turned[2]))
-    elif shape.solid is not None:
-        half = float(np.max(np.concatenate(shape.solid.hulls) * size @ turned))
-    else:
-        half = float(np.abs(turned) @ size / 2.0)
-    return float(np.dot(pose.position, way)) + half

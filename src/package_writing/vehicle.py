@@ -14,7 +14,8 @@ from bullet_gazebo.physics.pose import Pose, rotate
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.sensors.laser import KINDS, Laser
 from bullet_gazebo.sensors.rays import RayScene
-from package_writing.survey import DOWN, SHARE, VELOCITY, Motor, Survey, reach
+from package_writing.standing import DOWN, reach
+from package_writing.survey import SHARE, VELOCITY, Motor, Survey
 
 DRIVE = "diff_drive_controller"
 ASKEW = 0.02  # of a wheel's axis, at most, off the base's y

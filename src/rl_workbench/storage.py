@@ -117,5 +117,6 @@ def read_record(folder: Path) -> Any:
     record = read_json(folder / CONFIG_RECORD)
     if record is None:
         why = f"it has no {CONFIG_RECORD}" if folder.is_dir() else "there is no such folder"
+        why = "it is a file; RUN is a folder, as runs/NAME" if folder.is_file() else why
         raise WorkbenchError(f"{folder} is not a run folder: {why}")
     return record

@@ -169,8 +169,9 @@ def checked_steps(most: Any) -> int | None:
 
 
 def made_space(task: Task, method: str, kind: type = gymnasium.Space) -> Any:
-    """Calls a method that makes a space; raises TaskError unless the space is of that kind."""
-    return checked(task, method, getattr(task, method)(), kind)
+    """Returns a space that a method makes, or an attribute is; raises TaskError unless it is of that kind."""
+    made = getattr(task, method)
+    return checked(task, method, made() if callable(made) else made, kind)
 
 
 def checked(task: Task, method: str, given: Any, kind: type | tuple[type, ...]) -> Any:

@@ -45,6 +45,9 @@ class EnvSnapshot(NamedTuple):
     held: HeldState  # by the task, the imperfections, the randomisation and the generator
     world: Any  # the backend's
 
+    def __reduce__(self) -> Any:
+        raise TypeError("a snapshot can't be copied or pickled; restore_state() may take it often")
+
 
 class RobotEnv(DrawnEnv):
     """A robot with a task, as a Gymnasium environment.
@@ -377,6 +380,9 @@ class RobotEnv(DrawnEnv):
         snapshot.held.recall()
         self._state, self._first, self._initial, self._steps, self._np_random = snapshot.episode
         self._show()
+
+    def __reduce__(self) -> Any:
+        raise TypeError("an environment can't be copied or pickled; save_state() takes a snapshot")
 
     def _vary(self, variation: Variation) -> None:
         self._variation = variation

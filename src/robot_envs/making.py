@@ -3,19 +3,29 @@
 import importlib
 import inspect
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, TypeVar
 
 from file_access.text import did_you_mean
 from robot_envs.checks import short
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError
+from robot_envs.pictures.drawn import RENDER_MODES
 from robot_envs.robot import Robot
 from robot_envs.task import Task
 from robot_envs.vector import RobotVectorEnv
 
 NAMED = ("robot", "task")  # options of RobotEnv that are given by name here
 
+Maker = TypeVar("Maker", bound=Callable[..., RobotEnv])
 
+
+def rendering(make: Maker) -> Maker:
+    """Tells `gymnasium.make` an entry point's render modes: from these it makes "rgb_array_list"."""
+    vars(make)["metadata"] = {"render_modes": list(RENDER_MODES)}
+    return make
+
+
+@rendering
 def make_environment(robot: str, task: str, backend: str | None = None, **options: Any) -> RobotEnv:
     """Makes an environment.
 

@@ -3,9 +3,10 @@
 import logging
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from numbers import Real
+from typing import Any, Self
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
@@ -18,6 +19,7 @@ from bullet_gazebo.physics.description import (
 )
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.world import TIME_STEP
 from bullet_gazebo.robot import control_period_of
 from file_access.text import did_you_mean
 from robot_envs import controllers, files
@@ -25,7 +27,7 @@ from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError
 from robot_envs.files import Source
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 CONTROL_PERIOD = 0.01  # [s]
 EMPTY = "empty"
@@ -80,6 +82,15 @@ class Robot:
     rviz: tuple[str, str] | None = None
     odometry: str | None = None
     sensor_topics: Mapping[str, str] = field(default_factory=dict)
+
+    def __new__(cls, *_: Any, **options: Any) -> Self:
+        """Refuses an unknown option with the nearest name."""
+        known = [each.name for each in fields(cls)]
+        for name in options:
+            if name not in known:
+                near = did_you_mean(name, known) or f"; there are {', '.join(known)}"
+                raise TypeError(f"a Robot has no option '{name}'{near}")
+        return super().__new__(cls)
 
     @cached_property
     def xml(self) -> str:
@@ -187,10 +198,20 @@ class Robot:
 
     def _world_faults(self) -> Iterator[str]:
         """Yields what is wrong with control period, world and namespace."""
-        if not 0.0 < self.control_period < math.inf:
-            yield f"control_period must be a time above 0 [s], not {self.control_period}"
-        if self.physics_step is not None and not 1e-6 <= self.physics_step <= 1.0:
-            yield f"physics_step must be a time between 1e-06 and 1 [s], not {self.physics_step}"
+        period, step = self.control_period, self.physics_step
+        if step is None and self.world in (None, EMPTY):
+            step = TIME_STEP
+        if not _is_within(period, 0.0, math.inf):
+            yield f"control_period must be a time above 0 [s], not {period!r}"
+        elif step is not None and not _is_within(step, 1e-6, 1.0):
+            yield f"physics_step must be a time between 1e-06 and 1 [s], not {step!r}"
+        elif step is None or period == CONTROL_PERIOD:  # an environment may take another than that
+            pass
+        elif abs(period - max(1, round(period / step)) * step) > 1e-9:
+            yield (
+                f"control period {period} s is not a multiple of the physics step {step} s: change "
+                "control_period or physics_step"
+            )
         if self.world is not None and self.world != EMPTY and not files.is_text(self.world):
             try:
                 files.need_file(files.locate(self.world))
@@ -231,6 +252,11 @@ class Robot:
         self.check()
         loaded = controllers.load(self.run, self.parameters, self.hardware())[1]
         return tuple(controllers.ports(self.commanded, self.parameters, loaded))
+
+
+def _is_within(value: Any, low: float, high: float) -> bool:
+    """Returns whether a value is a finite number above 0 within bounds."""
+    return isinstance(value, Real) and 0.0 < float(value) < math.inf and low <= float(value) <= high
 
 
 def unfit_pose(pose: Any) -> str:

@@ -1,16 +1,22 @@
 """The robots and objects of one world, and the names of their joints and controllers in it."""
 
+import logging
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
+from bullet_gazebo.physics.description import Joint
 from file_access.text import did_you_mean
 from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError, TaskError
 from robot_envs.robot import Robot, unfit_pose
 from robot_envs.task import Object
 from robot_envs.world_state import Commands, InitialState, JointState, Motion, Pose
+
+BEYOND = 0.01  # [rad, m] of a joint's stop, as a moving joint may be
+
+logger = logging.getLogger(__name__)
 
 Placed = dict[str, tuple[float, float]]
 """Position and velocity of joints, by name."""
@@ -45,6 +51,7 @@ class Scene:
         _once("model", [*models, *(each.name for each in self.objects)])
         _once("namespace", [robot.namespace.strip("/") for robot in self.robots])
         self.several = len(self.robots) > 1
+        self._warned: set[str] = set()
 
     def joint(self, robot: Robot, name: str) -> str:
         """Returns the name of a joint in a state."""
@@ -122,7 +129,20 @@ class Scene:
                 near = did_you_mean(name, found) or f"; there are {', '.join(found)}"
                 raise TaskError(f"there is no joint '{name}' to place{near}")
             found[name] = _place(name, given)
+            robot, own = self.moved[name]
+            self._warn_of_stops(name, robot.links.joints[own], found[name][0])
         return found
+
+    def _warn_of_stops(self, name: str, joint: Joint, position: float) -> None:
+        """Warns, once for each joint, of a start beyond its stops, which is moved to the nearer one."""
+        low, high = joint.lower, joint.upper
+        beyond = joint.bounded and not low - BEYOND <= position <= high + BEYOND
+        if beyond and name not in self._warned:
+            self._warned.add(name)
+            logger.warning(
+                "an episode puts the joint '%s' at %g, beyond its stops: it starts at %g",
+                name, position, min(max(position, low), high),
+            )  # fmt: skip
 
     def placed_models(self, initial: InitialState) -> dict[str, Motion]:
         """Returns the models to place; raises TaskError for an impossible pose."""

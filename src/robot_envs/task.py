@@ -11,6 +11,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from bullet_gazebo.physics.pose import Vector
 from robot_envs.files import Source
 from robot_envs.world_state import Commands, InitialState, Pose, StateQuery, WorldState
 
@@ -93,6 +94,10 @@ class Task(ABC):
         By default there are none; a `GoalTask`'s are those of its `goals`.
         """
         raise ValueError(f"{type(self).__name__} has no goal")
+
+    def goal_mark(self) -> tuple[Vector, float] | None:
+        """Returns where pictures mark the episode's goal, and how near counts as there [m]; None: nowhere."""
+        return None
 
     def is_terminal(self, state: WorldState) -> bool:
         """Returns whether the state terminates the episode; by default none does."""

@@ -10,6 +10,7 @@ LOCKSTEP = (
     "set_link_friction",
 )  # fmt: skip
 MANAGER = "controller_manager"
+SPAWNS = "gazeboSpawns"  # XML-RPC method of the simulator's node: see `spawns`
 
 
 def is_offered(service: str) -> bool:
@@ -56,3 +57,11 @@ def why_not_up(service: str) -> str:
         return "its node doesn't answer" if is_offered(service) else why_absent(service)
     except NoAnswer as fault:
         return f"the master at {master.uri()}: {fault}"
+
+
+def spawns() -> list[int]:
+    """Returns how many models are being spawned, and how many have been; nothing if no simulator says."""
+    try:
+        return list(master.call_node(master.call("lookupNode", "/gazebo"), SPAWNS))
+    except (NoAnswer, Refused):
+        return []

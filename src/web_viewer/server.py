@@ -4,7 +4,9 @@ viser serves everybody who reaches the port. Pages of other sites in the same br
 browser lets them connect anywhere and only reports where they come from. So `Gate` checks each request.
 """
 
+import asyncio
 import contextlib
+import gzip
 import hmac
 import http
 import io
@@ -19,6 +21,8 @@ import msgspec
 import viser
 import websockets.asyncio.server
 from viser import _messages as messages
+from viser.infra import _infra
+from viser.infra._async_message_buffer import AsyncMessageBuffer
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
@@ -26,6 +30,8 @@ from web_viewer.address import LOOPBACK, TOKEN_BYTES, Address, PortInUse, has_di
 
 Answer = Callable[[Any, Request], Response | None]
 LONGEST_PATH = 1000  # of a request [characters]
+HTML, EMPTY = "text/html", b'<div id="root">'
+LOADING = b"<p style='font-family: sans-serif; padding: 1em'>The page is loading ...</p>"
 LARGEST = 2.0**53  # integers that JavaScript has exactly
 LARGEST_SIDE = 2**14  # of a page [pixels]
 Point = tuple[float, float, float]  # [m]
@@ -71,6 +77,8 @@ class Gate:
                 response = answer(connection, request)
             except (LookupError, ValueError, OSError):  # two hosts, a path that is no text, ...
                 return _said(http.HTTPStatus.BAD_REQUEST, "it is no browser's request")
+            if response is not None and response.headers.get("Content-Type", "").startswith(HTML):
+                response = _with_words(response)
             if self._token and response is not None:
                 response.headers["Set-Cookie"] = (
                     f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
@@ -78,6 +86,18 @@ class Gate:
             return response
 
         return guarded
+
+
+def _with_words(response: Response) -> Response:
+    """Has viser's page say that it is loading, until its program has come and been unpacked."""
+    packed = response.headers.get("Content-Encoding") == "gzip"
+    body = gzip.decompress(response.body) if packed else response.body
+    body = body.replace(EMPTY, EMPTY + LOADING, 1)
+    body = gzip.compress(body, 1) if packed else body
+    headers = Headers(response.headers)
+    del headers["Content-Length"]
+    headers["Content-Length"] = str(len(body))
+    return Response(response.status_code, response.reason_phrase, headers, body)
 
 
 def _said(status: http.HTTPStatus, text: str) -> Response:
@@ -140,6 +160,32 @@ def _check_fields(server: viser.ViserServer) -> None:
             await gui._handle_gui_updates(client, message)
 
     pages.register_handler(messages.GuiUpdateMessage, checked)
+
+
+class LoopEvent(asyncio.Event):
+    """An event that only its loop's thread sets; viser asks the loop for it as well.
+
+    In another thread asyncio's `set` raises while a page comes or goes, and wakes no one.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        super().__init__()
+        self._owner = loop
+
+    def set(self) -> None:
+        """Sets it, in the loop's thread."""
+        if asyncio._get_running_loop() is self._owner:
+            super().set()
+
+
+class SafeBuffer(AsyncMessageBuffer):
+    """viser's buffer of messages, which any thread may fill while pages wait for it."""
+
+    def __init__(self, event_loop: asyncio.AbstractEventLoop, persistent_messages: bool) -> None:
+        super().__init__(event_loop, persistent_messages, LoopEvent(event_loop))
+
+
+setattr(_infra, "AsyncMessageBuffer", SafeBuffer)  # noqa: B010 - it is no public name
 
 
 class Door(websockets.asyncio.server.ServerConnection):

@@ -131,9 +131,11 @@ class SteeredWheels:
         levers = [x * math.sin(angle) - y * math.cos(angle) for (x, y), _, angle in wheels]
         # What each pivot moves by along its wheel is the wheel's speed and `outside` times the turn.
         outside = [math.copysign(self.offset, y) for (_, y), _, _ in wheels]
-        moments = sum(lever * speed for lever, (_, speed, _) in zip(levers, wheels, strict=True))
+        moments = math.fsum(
+            lever * speed for lever, (_, speed, _) in zip(levers, wheels, strict=True)
+        )
         inertia = self.base**2 + self.track**2
-        inertia -= sum(lever * arm for lever, arm in zip(levers, outside, strict=True))
+        inertia -= math.fsum(lever * arm for lever, arm in zip(levers, outside, strict=True))
         turn = moments / inertia
         ahead = left = 0.0
         for arm, (_, speed, angle) in zip(outside, wheels, strict=True):

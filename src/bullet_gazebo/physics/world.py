@@ -1,6 +1,6 @@
 """The physics world: models by name, Gazebo's name look-up, and the step that integrates them all."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -197,6 +197,17 @@ class World:
 
     def _of(self, model: Model) -> list[Attachment]:
         return [each for each in self.attachments if each.joins(model)]
+
+    def with_attached(self, models: Iterable[Model]) -> set[Model]:
+        """Returns models, and all that is attached to them, also by way of others."""
+        found = set(models)
+        waiting = list(found)
+        while waiting:
+            for each in self._of(waiting.pop()):
+                fresh = {each.first[0], each.second[0]} - found
+                found |= fresh
+                waiting += fresh
+        return found
 
     def set_gravity(self, gravity: Vector) -> None:
         """Sets the acceleration of gravity [m/s²]."""

@@ -26,7 +26,7 @@ END = 1.0  # [s] for which a page shows its last moment before it begins again
 Frames = Iterable[tuple[list[RecordedModel] | None, Sequence[float]]]
 """Models, None while they are those of the frame before, and the poses of their links."""
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 
 class FrameDrawer:

@@ -29,7 +29,7 @@ SUFFIXES = (".mp4", ".html", ".png")
 MOST_WAITING = 100_000_000  # [bytes] for the other process; beyond it frames are dropped
 LEAST_SIZE, LARGEST_SIZE, FASTEST = 16, 4096, 240.0
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 
 class RecordingError(ValueError):

@@ -29,7 +29,7 @@ NOTHING = 0.9999  # OpenGL depth beyond which nothing is visible
 Region = tuple[int, int, int, int]
 """Left, top, right and bottom [pixels]."""
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 
 class DrawnPart:

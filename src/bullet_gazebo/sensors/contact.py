@@ -7,7 +7,7 @@ from bullet_gazebo.sensors.sensing import Mount, sensor_of
 from bullet_gazebo.simulator import NANOSECONDS
 from bullet_gazebo.state import ContactPair, contact_pairs
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 
 class ContactSensor:
@@ -37,9 +37,9 @@ class ContactSensor:
         self._collisions = {(model.name, link, each) for each in found if each is not None}
 
     def is_stale(self, now: int) -> bool:
-        """Returns whether a service has moved something since the last step, so that nothing is known."""
+        """Returns whether a service has moved the model since the last step, so that nothing is known."""
         step = round(self._mount.sim.world.time_step * NANOSECONDS)
-        return now - self._mount.sensing.schedule.moved_at <= step
+        return now - self._mount.sensing.schedule.last_move(self._mount.model).at <= step
 
     def measure(self, now: int) -> list[ContactPair]:
         """Returns what they touched in the last step."""

@@ -184,13 +184,14 @@ class ForceTorqueSensor:
     rate = 0.0
 
     def __init__(self, mount: Mount) -> None:
-        self._schedule = mount.sensing.schedule
+        self._mount = mount
         self._joint = JointForces(mount.sim, mount.model, sensor_of(mount, ("force_torque",)).joint)
 
     def measure(self, now: int) -> Wrench | None:
         """Returns force [N] and torque [N m] in the last step; none after a move, None if not known."""
-        self._joint.look(now, self._schedule.moves)
-        return NOTHING if now == self._schedule.moved_at else self._joint.wrench()
+        moves, moved_at = self._mount.sensing.schedule.last_move(self._mount.model)
+        self._joint.look(now, moves)
+        return NOTHING if now == moved_at else self._joint.wrench()
 
 
 def _joint(description: ModelDescription, name: str) -> Joint:

@@ -140,8 +140,8 @@ class ModelImu:
         """Returns a measurement at a time [ns]; None for the first one."""
         mount = self._mount
         motion = motion_of(self._model, self._link, self._offset)
-        gravity, moves = mount.sim.world.gravity, mount.sensing.schedule.moves
-        sample = self._imu.measure(now, moves, motion, gravity)
+        moves, _ = mount.sensing.schedule.last_move(self._model)
+        sample = self._imu.measure(now, moves, motion, mount.sim.world.gravity)
         if sample is None:
             return None
         sample = sample._replace(orientation=multiply(self._turn, sample.orientation))

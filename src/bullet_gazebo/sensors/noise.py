@@ -70,11 +70,11 @@ def read_noise(parent: Element | None, where: str) -> Noise | None:
         checked_deviation(number if name in DEVIATIONS else abs(number), what)
         if name == "precision" and 0.0 < abs(number) < 1.0 / LARGEST:
             raise DescriptionError(f"{what} is {number:g}; it must be {1.0 / LARGEST:g} or more")
-    return Noise(**found)
+    return Noise(**{name: number + 0.0 for name, number in found.items()})
 
 
 def checked_deviation(deviation: float, what: str) -> float:
     """Returns a deviation; a negative or absurd one is a DescriptionError."""
     if not 0.0 <= deviation <= LARGEST:
         raise DescriptionError(f"{what} is {deviation:g}; it must be between 0 and {LARGEST:g}")
-    return deviation
+    return deviation + 0.0  # of -0.0 NumPy's generator says that it is negative

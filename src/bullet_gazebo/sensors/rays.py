@@ -23,7 +23,7 @@ from bullet_gazebo.physics.world import World
 from bullet_gazebo.pictures.visuals import Piece, pieces_of, solid_of
 from bullet_gazebo.sensors.intersection import DISTANCES, NORMALS, reach
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 LARGE = 2000  # triangles of a mesh that isn't built anew with its neighbours
 NONE = -1
 MARGIN = 1e-5  # [m], and relative: of the comparison of rays and balls, in float32

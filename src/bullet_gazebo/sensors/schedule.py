@@ -2,17 +2,31 @@
 
 Due times are whole multiples of a sensor's period after it was made or time was reset (in ns, without
 drift), whoever listens: a late or second listener changes no measurement. A reset with a seed begins them
-anew. After a service has moved bodies, all that is heard measures at once. See docs/contract/sensors.md 0.4.
+anew. After a reset all that is heard measures at once, after a move of a model what that model carries.
+See docs/contract/sensors.md 0.4.
 """
 
 import threading
 from collections.abc import Callable
+from typing import NamedTuple
 
+from bullet_gazebo.moves import Moved
+from bullet_gazebo.physics.model import Model
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 
 Measure = Callable[[int], None]
 SLOWEST = 1e-9  # [Hz]
 LONG_AGO = -(10**18)  # [ns]
+
+
+class Move(NamedTuple):
+    """The last move of a model."""
+
+    number: int  # of the world's moves until then
+    at: int  # [ns]
+
+
+NEVER = Move(0, LONG_AGO)
 
 
 class SensorClock:
@@ -23,6 +37,7 @@ class SensorClock:
     def __init__(
         self,
         schedule: "Schedule",
+        model: Model,
         rate: float,
         measure: Measure,
         listens: Callable[[], bool],
@@ -30,6 +45,7 @@ class SensorClock:
         now: int,
     ) -> None:
         self._schedule = schedule
+        self.model = model
         self.measure = measure
         self.listens = listens
         self.at_once = at_once
@@ -73,20 +89,28 @@ class Schedule:
         self._is_looking = False
         self.moves = 0  # how often something other than time has moved bodies
         self.moved_at = LONG_AGO  # when it did so last [ns]
+        self._last_reset = NEVER
+        self._moves_of: dict[Model, Move] = {}  # since then
         self.moves_before_seed = 0
-        self._begins_anew = False  # with the next move
+        self._begins_anew = False  # with the next reset
         self.prepare: list[Callable[[], None]] = []  # called before the measurements of one time
-        sim.moved.append(self._moved)
+        sim.moves.listeners.append(self._moved)
         sim.before_advance.append(self._catch_up)
         sim.reseeded.append(self._reseeded)
         sim.restored.append(self._restored)
 
     def add(
-        self, rate: float, measure: Measure, listens: Callable[[], bool], at_once: bool = True
+        self,
+        model: Model,
+        rate: float,
+        measure: Measure,
+        listens: Callable[[], bool],
+        at_once: bool = True,
     ) -> SensorClock:
         """Returns a clock that calls `measure` with the time [ns], under the simulator's lock.
 
         Args:
+            model: that carries the sensor.
             rate: in Hz of simulated time; 0 is every step.
             measure: takes a measurement and sends it.
             listens: returns whether somebody listens; called under the simulator's lock.
@@ -94,13 +118,18 @@ class Schedule:
                 measurement or something was moved.
         """
         with self._sim.lock:
-            return self.begin(rate, measure, listens, at_once)
+            return self.begin(model, rate, measure, listens, at_once)
 
     def begin(
-        self, rate: float, measure: Measure, listens: Callable[[], bool], at_once: bool = True
+        self,
+        model: Model,
+        rate: float,
+        measure: Measure,
+        listens: Callable[[], bool],
+        at_once: bool = True,
     ) -> SensorClock:
         """As `add`; the caller holds the simulator's lock."""
-        clock = SensorClock(self, rate, measure, listens, at_once, self._sim.now)
+        clock = SensorClock(self, model, rate, measure, listens, at_once, self._sim.now)
         self._clocks.append(clock)
         self._sim.parts.append(clock)
         return clock
@@ -143,14 +172,15 @@ class Schedule:
         fresh = []
         for clock in self._clocks:
             was_heard, clock.heard = clock.heard, clock.listens()
-            came = clock.has_newcomer or not was_heard
-            clock.has_newcomer = False
+            came = clock.has_newcomer
+            if came:  # one that comes from now on is for the next look
+                clock.has_newcomer = False
+            came = came or not was_heard
             if clock.heard and not was_heard:
                 clock.plan(now)
             # Who was sent the last one may be gone, unnoticed: what there is now is measured anew.
-            is_old = clock.last in (None, now, self.moved_at) or now - clock.last >= max(
-                clock.period, 1
-            )
+            moved_at = self.last_move(clock.model).at
+            is_old = clock.last in (None, now, moved_at) or now - clock.last >= max(clock.period, 1)
             if clock.heard and came and clock.at_once and is_old:
                 fresh.append(clock)
         self._take_part()
@@ -194,14 +224,27 @@ class Schedule:
                 clock.plan(now)
         self._take_part()
 
-    def _moved(self) -> None:
-        """Measures afresh all that is heard, after a service has moved bodies or reset time."""
+    def last_move(self, model: Model) -> Move:
+        """Returns the last move of a model by something other than time, resets included."""
+        return self._moves_of.get(model, self._last_reset)
+
+    def _moved(self, moved: Moved) -> None:
+        """Measures afresh what is heard: all after a reset of world or time, else what the models carry."""
         self.moves += 1
         now = self.moved_at = self._sim.now
-        anew, self._begins_anew = self._begins_anew, False
-        for clock in self._clocks:
+        move = Move(self.moves, now)
+        anew = False
+        if moved is None:
+            self._last_reset, self._moves_of = move, {}
+            anew, self._begins_anew = self._begins_anew, False
+        else:
+            there = set(self._sim.world.models.values())
+            kept = {model: each for model, each in self._moves_of.items() if model in there}
+            self._moves_of = {**kept, **dict.fromkeys(moved, move)}
+        concerned = [each for each in self._clocks if moved is None or each.model in moved]
+        for clock in concerned:
             if anew or now < clock.begin or (clock.last is not None and now < clock.last):
                 clock.begin = now
             clock.last = None
             clock.plan(now)
-        self._take([clock for clock in self._clocks if clock.heard])
+        self._take([clock for clock in concerned if clock.heard])

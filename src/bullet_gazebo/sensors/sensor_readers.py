@@ -87,7 +87,7 @@ class SensorReaders:
                 self.end()
                 raise UnknownName(f"the sensor '{name}' can't be simulated: {error}") from error
             take = self._taker(name, mount, sensor)
-            self._clocks.append(self._schedule.begin(sensor.rate, take, lambda: True))
+            self._clocks.append(self._schedule.begin(mount.model, sensor.rate, take, lambda: True))
         self._schedule.review()
 
     def serves(self, names: Sequence[str]) -> bool:
@@ -181,13 +181,14 @@ class MeasuringHandle(SensorHandle):
             raise ControlError(f"the sensor '{self.name}' can't be simulated: {error}") from error
         if isinstance(self._sensor, ImuSensor):
             self._sensor.start()
-        self._schedule = mount.sensing.schedule
+        self._model, self._schedule = mount.model, mount.sensing.schedule
         self._clock: SensorClock | None = None
 
     def begin(self, moved: Callable[[int], None]) -> None:
         self._told = moved
         if self._clock is None:
-            self._clock = self._schedule.begin(self._sensor.rate, self._take, lambda: True)
+            rate = self._sensor.rate
+            self._clock = self._schedule.begin(self._model, rate, self._take, lambda: True)
             self._schedule.review()
 
     def end(self) -> None:
@@ -197,7 +198,7 @@ class MeasuringHandle(SensorHandle):
 
     def _take(self, now: int) -> None:
         self.value = self._sensor.measure(now)
-        if now == self._schedule.moved_at:
+        if now == self._schedule.last_move(self._model).at:
             self._told(now)
 
 

@@ -28,6 +28,7 @@ from lockstep_runner.runner import ScriptRunner
 from lockstep_runner.world import NODE, RunsByItself, is_running
 from lockstep_runner.world import SERVICE as ADVANCE
 from ros_calls import master
+from ros_calls.absence import spawns
 from ros_calls.service import ServiceClient
 
 SILENCE = 10.0  # [s] of waiting for a topic before its silence is reported
@@ -154,6 +155,8 @@ def _why(topic: str) -> str:
     # <topicName>, <imageTopicName>, <topic>, ...: relative to the robot's namespace
     named = rf"<\w*topic\w*>\s*/?{re.escape(topic.rpartition('/')[2])}\s*<"
     if any(re.search(named, text, re.IGNORECASE) for text in descriptions):
+        if spawns()[1:] == [0]:
+            return "it is named in the robot's description, and no model has been spawned yet"
         return "it is named in the robot's description, by a sensor or plugin that isn't simulated"
     return "it has no publisher"
 

@@ -7,6 +7,7 @@ learning loop and the content of a checkpoint. Its module has two functions:
     load_policy(options, checkpoint, env) -> Policy      of a checkpoint's content
 """
 
+import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from importlib import import_module
@@ -15,6 +16,7 @@ from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
+import torch
 from torch import nn
 
 from rl_workbench.errors import WorkbenchError
@@ -101,6 +103,18 @@ class Algorithm(ABC):
             OSError: If a file can't be written.
         """
         return
+
+
+def check_device(name: str) -> None:
+    """Refuses a device that torch doesn't have here: Stable-Baselines3 would take the CPU instead."""
+    try:
+        torch.empty(0, device=name)
+    except (RuntimeError, AssertionError) as error:
+        there = "cpu and cuda" if torch.cuda.is_available() else "cpu"
+        reason = textwrap.shorten(str(error), 60, placeholder=" ...")
+        raise WorkbenchError(
+            f"torch can't use the device {name!r} ({reason}); here it has {there}"
+        ) from error
 
 
 class Policy(NamedTuple):

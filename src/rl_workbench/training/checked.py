@@ -11,15 +11,18 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, own_frames
+from rl_workbench.training.progress import warn
 
 LARGEST = float(np.finfo(np.float32).max)  # networks and replay buffers hold no larger number
 COMPUTE_REWARD = "compute_reward"  # method of an environment with a goal
 BEGIN_STEP = "begin_step"  # method of an environment whose step takes time in another process
-
+LONGEST = 10_000  # [steps], of an episode where nothing says how long one lasts
 
 CURVES = "episode_curves"  # in the last info of an episode: the means of its infos' numbers, by tag
 _UNFIT = re.compile(r"[^\w./-]+")  # for a tag
+# Gymnasium's wrappers and this one unpack what reset (2) and step (5) return.
+_OLD_GYM = re.compile(r"unpack \(expected [25]\b|unexpected keyword argument '(seed|options)'")
 
 
 class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -27,6 +30,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     All methods raise WorkbenchError if the environment fails; `reset` and `step` also if an observation or
     a reward isn't finite in float32. The last info of an episode has the means of numbers, see `CURVES`.
+    An environment that declares no `max_episode_steps` is truncated after `LONGEST` steps.
 
     Args:
         env: Its observations are vectors, or a Dict of arrays.
@@ -38,6 +42,8 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         super().__init__(env)
         self._id, self._which, self._begin_step = env_id, which, _begin_method(env)
         self._sums: dict[str, tuple[float, int]] = {}  # and counts, of an episode's info
+        self._length, self._longest = 0, math.inf if _has_limit(env) else LONGEST  # [steps]
+        self._was_cut = False
 
     def begin_step(self, action: Any) -> None:
         """Begins a step, where the environment can. The next `step`, by the same action, waits for it."""
@@ -48,14 +54,20 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         with self._running("reset"):
-            observation, info = self.env.reset(seed=seed, options=options)
-        self._sums = {}
+            found: Any = self.env.reset(seed=seed, options=options)
+            if not isinstance(found, tuple):
+                raise self._old_gym()
+            observation, info = found
+        self._sums, self._length = {}, 0
         self._check(observation)
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         with self._running("step"):
             observation, reward, terminated, truncated, info = self.env.step(action)
+            self._length += 1
+            if self._length >= self._longest and not (terminated or truncated):
+                truncated = self._cut()
             if info:
                 info = self._noted(info, terminated or truncated)
         self._check(observation)
@@ -66,6 +78,16 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         if not size <= LARGEST:  # true for NaN, too
             raise self._not_finite("reward", reward)
         return observation, reward, terminated, truncated, info
+
+    def _cut(self) -> bool:
+        """Says once that episodes are truncated; returns True."""
+        if not self._was_cut:
+            warn(
+                f"{self._which}{self._id} doesn't say when an episode ends: it is truncated after "
+                f"{LONGEST} steps; its option max_episode_steps=N sets another limit"
+            )
+        self._was_cut = True
+        return True
 
     def _noted(self, info: dict[str, Any], is_last: bool) -> dict[str, Any]:
         """Adds the numbers of an info to their sums; returns the info, at the end with the means."""
@@ -131,12 +153,22 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
             yield
         except gymnasium.error.Error as error:  # its text is made for the user
             raise self._error(str(error) or type(error).__name__) from error
+        except WorkbenchError:
+            raise
         except (Exception, SystemExit) as error:
+            if _OLD_GYM.search(str(error)) and not own_frames(error):
+                raise self._old_gym() from error
             raise self._failure(method, error) from error
 
     def _failure(self, method: str, error: BaseException) -> EnvironmentFailure:
         return EnvironmentFailure(
             f"{self._which}{self._id} failed in {method}(): {error_line(error)}"
+        )
+
+    def _old_gym(self) -> WorkbenchError:
+        return self._error(
+            f"{self._id} is written for the old gym: Gymnasium's reset(seed=None, options=None) returns "
+            "(observation, info), and its step() (observation, reward, terminated, truncated, info)"
         )
 
     def _error(self, text: str) -> WorkbenchError:
@@ -173,6 +205,12 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     def _not_finite(self, what: str, value: Any) -> WorkbenchError:
         text = " ".join(str(value).split())
         return self._error(f"the {what} of {self._id} isn't finite in float32: {text}")
+
+
+def _has_limit(env: gymnasium.Env[Any, Any]) -> bool:
+    """Returns whether an environment declares a limit: to Gymnasium, or as its attribute `max_steps`."""
+    is_limited = env.has_wrapper_attr("max_steps") and env.get_wrapper_attr("max_steps")
+    return bool(is_limited or (env.spec and env.spec.max_episode_steps))
 
 
 def _begin_method(env: gymnasium.Env[Any, Any]) -> Callable[[Any], object]:

@@ -6,7 +6,6 @@ import gymnasium
 import numpy as np
 
 from rl_workbench.agents.dqn_agent import DQNAgent, Learned
-from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import mark_random_states, rewind_random_states
 from rl_workbench.training.algorithm import Algorithm, Policy, Say
 from rl_workbench.training.checked import CURVES
@@ -27,11 +26,7 @@ def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> DQNAge
     run = options.run
     actions = discrete_actions(env, run.env_id, "DQN")
     shape = env.observation_space.shape or (0,)
-    try:
-        return DQNAgent(options.hyperparameters, shape[0], actions, run.seed, run.device)
-    except (RuntimeError, AssertionError) as error:
-        text = str(error).splitlines()[0]
-        raise WorkbenchError(f"torch can't use the device {run.device!r}: {text}") from error
+    return DQNAgent(options.hyperparameters, shape[0], actions, run.seed, run.device)
 
 
 def load_policy(

@@ -2,8 +2,9 @@
 
 Environments may have attributes that they are asked for by name: `shares_robot` (true if all copies move the
 same robot), `own_robot_options` (the options by which a copy has a robot of its own), `same_robot_options`
-(the values of options with which a copy moves the same robot, lists by name; without it, any copy does), and
-`side_by_side(count)` (a context manager within which that many start, or close, at the same time).
+(the values of options with which a copy moves the same robot, lists by name; without it, any copy does),
+`side_by_side(count)` (a context manager within which that many start, or close, at the same time), and
+`max_steps` (after how many steps it truncates an episode; None: never).
 """
 
 import hashlib

@@ -56,6 +56,8 @@ def load_policy(
     options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
 ) -> Policy:
     """Makes the policy of a checkpoint; see `algorithm`."""
+    if not isinstance(content["agent"], dict):  # a tensor would be indexed by names
+        raise TypeError("it holds no agent")
     agent = make_agent(options, env)
     agent.load_state_dict(content["agent"])
     return Policy(agent.act_greedily, agent.greedy_network())

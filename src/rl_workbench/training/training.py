@@ -16,7 +16,7 @@ from rl_workbench.starting import Interrupt
 from rl_workbench.states import random_states, restore_random_states, seed_all
 from rl_workbench.storage import read_record
 from rl_workbench.training import folder as run_folder
-from rl_workbench.training.algorithm import Algorithm
+from rl_workbench.training.algorithm import Algorithm, check_device
 from rl_workbench.training.callbacks import (
     Callback,
     CallbackList,
@@ -70,6 +70,7 @@ class Training:
         interrupt: Interrupt,
         callbacks: Sequence[Callback] = (),
     ) -> None:
+        check_device(options.run.device)
         torch.set_num_threads(1)  # for networks this small more threads are slower
         self.options, self._run = options, options.run
         self.folder, self._interrupt = folder, interrupt

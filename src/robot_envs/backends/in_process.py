@@ -125,7 +125,7 @@ class InProcessWorld(RobotBackend):
             self._sim.add_robot(controlled)
             for follower in pid_followers(model, robot.pid_gains):
                 self._sim.listeners.append(follower.update)
-                self._sim.moved.append(follower.moved)
+                self._sim.moves.on_move_of(model, follower.moved)
             manager.switch(loaded, [], STRICT)
         except (ControlError, DescriptionError) as error:
             raise RobotEnvError(f"the robot '{robot.model}': {error}") from error
@@ -163,7 +163,7 @@ class InProcessWorld(RobotBackend):
             models = [(find_model(world, name), at) for name, at in placed.items()]
         except UnknownName as error:
             raise SimulatorError(str(error)) from error
-        with self._sim.one_move():
+        with self._sim.moves.as_one():
             if seed:
                 self._sim.reseed(seed)
             self._sim.reset(everything=False)

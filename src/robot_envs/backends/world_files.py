@@ -19,7 +19,7 @@ from robot_envs.files import Source, is_text, locate, need_file, read_text, reso
 from robot_envs.robot import EMPTY
 from robot_envs.task import Object
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 
 def fill(sim: Simulator, source: Source | None) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bullet_gazebo.control.joint import JointLimits
-from robot_envs.checks import action_reader, checked_goal, observation_reader, set_goal, with_goals
+from robot_envs import checks
 from robot_envs.controllers import TWIST, CommandPort
 from robot_envs.deployment.kinematics import LinkView
 from robot_envs.errors import RobotEnvError
@@ -153,8 +153,10 @@ class Pilot:
         self._judge = task if task.reward_query == StateQuery() else Unjudged()
         self._links, self._model = LinkView(robot, task.query), robot.model
         self._limits = {port.name: CommandLimits(robot, port, way, period) for port in robot.ports}
-        self._read_action = action_reader(task.action_space())
-        self._read = observation_reader(task.observation_space(), type(task).__name__)
+        self._read_action = checks.action_reader(checks.made_space(task, "action_space"))
+        self._read = checks.observation_reader(
+            checks.made_space(task, "observation_space"), type(task).__name__
+        )
         self._generator = np.random.default_rng(seed)
         self._reported: set[str] = set()
         self._held: dict[str, Command] = {}
@@ -170,7 +172,7 @@ class Pilot:
         self.go_on(joints)
         task = self._task
         if isinstance(task, GoalTask):
-            set_goal(task, self._state(0.0, joints, sensors), self._generator, self._goal)
+            checks.set_goal(task, self._state(0.0, joints, sensors), self._generator, self._goal)
         elif self._goal is not None:
             task.aim(self._goal)
 
@@ -178,7 +180,7 @@ class Pilot:
         """Gives the task a goal for all episodes; raises ValueError if it isn't one of its goals."""
         task = self._task
         if isinstance(task, GoalTask):
-            task.desired = self._goal = checked_goal(task, goal)
+            task.desired = self._goal = checks.checked_goal(task, goal)
         else:
             task.aim(goal)
             self._goal = goal
@@ -234,7 +236,7 @@ class Pilot:
 
     def _observation(self, state: WorldState) -> Any:
         seen, task = self._read(self._task.observe(state)), self._task
-        return with_goals(task, seen, state) if isinstance(task, GoalTask) else seen
+        return checks.with_goals(task, seen, state) if isinstance(task, GoalTask) else seen
 
     def stop(self, joints: Joints) -> dict[str, Command]:
         """Commands that stop all joints where they are."""

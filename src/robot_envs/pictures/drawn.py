@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 import numpy as np
 
-from bullet_gazebo.physics.pose import Pose, add
+from bullet_gazebo.physics.pose import Pose, Vector, add
 from bullet_gazebo.pictures.camera import Camera, CameraLike
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.pictures.placement import Placement, Surroundings
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
+from robot_envs.task import Task
 from robot_envs.world_state import InitialState, WorldState
 
 if TYPE_CHECKING:
@@ -108,6 +109,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
 
     scene: Scene
     backend: RobotBackend
+    task: Task
     _initial: InitialState  # of the episode
     _state: WorldState | None
 
@@ -127,7 +129,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
             *size,
             camera=camera,
             base=self._base,
-            beside=Surroundings(self.scene, self._poses),
+            beside=Surroundings(self.scene, self._poses, self._goal),
         )
         self._shown_for = period  # [s] of wall time, of each state in the render mode "human"
         self._page: LivePage | None = None
@@ -164,6 +166,9 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
 
     def _poses(self, links: Sequence[str]) -> Sequence[Pose]:
         return self.backend.poses(links)
+
+    def _goal(self) -> tuple[Vector, float] | None:
+        return self.task.goal_mark()
 
     def render(self) -> np.ndarray | None:
         """Returns a picture of the robot, (height, width, 3) of uint8; None in the render mode "human".

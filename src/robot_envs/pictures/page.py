@@ -23,7 +23,7 @@ WORLD = "/world"  # node
 GAP = 0.15  # between robots, as a share of what one of them can reach
 LOW = 0.9  # of a caption, from the middle of what the camera sees to its lower edge
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 
 class Placed(NamedTuple):

@@ -15,11 +15,16 @@ from robot_envs.backends.world_files import object_model, world_models
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 
+GOAL = "goal of the task"  # model
+PINK = (0.9, 0.1, 0.5, 1.0)
+ABOVE, AMID = -60.0, 4.0 * THIRD  # pitch [degrees] and margin of pictures that show a goal
+THICK, POLE, TALL = 0.01, 0.015, 0.6  # [m] of a goal's disc; radius and height of the pole in it
+
 Shapes = list[tuple[str, Shape]]  # each with its link
 
 
 class Surroundings:
-    """What is visible besides the first robot: other robots, a task's objects, the world file's models.
+    """What is visible besides the first robot: other robots, a task's objects and goal, the world's models.
 
     A backend is asked where they are, and also for the first robot's links if it has joints that a state
     doesn't have.
@@ -27,10 +32,16 @@ class Surroundings:
     Args:
         scene: the robots and objects.
         ask: returns the poses of link frames in the world, each link named model::link.
+        goal: the task's `goal_mark`.
     """
 
-    def __init__(self, scene: Scene, ask: Callable[[Sequence[str]], Sequence[Pose]]) -> None:
-        self._scene, self._ask = scene, ask
+    def __init__(
+        self,
+        scene: Scene,
+        ask: Callable[[Sequence[str]], Sequence[Pose]],
+        goal: Callable[[], tuple[Vector, float] | None],
+    ) -> None:
+        self._scene, self._ask, self._goal = scene, ask, goal
 
     @cached_property
     def shapes(self) -> Mapping[str, Shapes]:
@@ -40,6 +51,8 @@ class Surroundings:
         models |= {each.name: object_model(each) for each in self._scene.objects}
         models |= world_models(first.world)
         shapes = {name: visible_shapes(model) for name, model in models.items()}
+        if (mark := self._goal()) is not None:
+            shapes[GOAL] = _flag(mark[1])
         return {name: seen for name, seen in shapes.items() if seen}
 
     @property
@@ -55,6 +68,8 @@ class Surroundings:
             names = [f"{model}::{link}" for model, link in asked]
             for (model, link), pose in zip(asked, self._ask(names), strict=True):
                 found[model][link] = pose
+        if (mark := self._goal()) is not None:
+            found[GOAL] = {GOAL: Pose(mark[0])}
         return found
 
     @cached_property
@@ -64,8 +79,19 @@ class Surroundings:
         own = list(first.links.links) if moved - set(first.joints) else []
         links = [(first.model, link) for link in own]
         for model, shapes in self.shapes.items():
+            if model == GOAL:  # which isn't in the world
+                continue
             links += [(model, link) for link in dict.fromkeys(link for link, _ in shapes)]
         return links
+
+
+def _flag(radius: float) -> Shapes:
+    """Returns a disc on the floor, as wide as what counts as there [m], and a pole that is seen from afar."""
+    sizes = ((radius, THICK), (POLE, TALL))
+    return [
+        (GOAL, Shape("cylinder", size, Pose((0.0, 0.0, size[1] / 2.0)), rgba=PINK))
+        for size in sizes
+    ]
 
 
 QUARTERS = (0.0, pi / 2.0, pi, -pi / 2.0)  # [rad] of a joint without stops
@@ -130,6 +156,8 @@ class Placement:
     def camera(self, camera: CameraLike, aspect: float) -> Camera:
         """`camera`, or one that sees all that joints can reach, or in which a robot that drives is a third.
 
+        A task's goal on the floor is seen from above, with more around the robot.
+
         Args:
             camera: for the robot as it is spawned, or some of its fields.
             aspect: of the pictures, width to height.
@@ -137,11 +165,13 @@ class Placement:
         if isinstance(camera, Camera):
             return camera
         fields = camera or {}
-        looking = Camera().changed(fields)
+        has_goal = self._beside is not None and GOAL in self._beside.shapes
+        looking = (Camera(pitch=ABOVE) if has_goal else Camera()).changed(fields)
         if self.description.fixed_base:
             seen = overview(self.reach(), aspect, looking)
         else:
-            seen = overview(self._corners([{}]), aspect, looking, THIRD)
+            margin = AMID if has_goal else THIRD
+            seen = overview(self._corners([{}]), aspect, looking, margin)
         return seen.changed(fields)
 
     def travelled(self, positions: Mapping[str, float], base: Pose) -> Vector:

@@ -141,6 +141,9 @@ class DriveToGoal(Task):
             raise ValueError(f"a goal is (x, y) [m], not {tuple(goal)}")
         self.goal = (float(goal[0]), float(goal[1]))
 
+    def goal_mark(self) -> tuple[Vector, float]:
+        return (*self.goal, 0.0), THERE
+
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
         self._before = self.distance(state)
         if self._before <= THERE:
@@ -164,7 +167,7 @@ class DriveToGoal(Task):
         (pose, twist), (fast, round_) = self._motion(state), self.fastest
         x, y, _ = pose.position
         bearing = math.atan2(self.goal[1] - y, self.goal[0] - x) - to_rpy(pose.orientation)[2]
-        ahead = sum(a * b for a, b in zip(heading(pose), twist.linear, strict=True))
+        ahead = math.fsum(a * b for a, b in zip(heading(pose), twist.linear, strict=True))
         return [
             min(self.distance(state) / 4.0, 1.0), math.cos(bearing), math.sin(bearing),
             ahead / fast, twist.angular[2] / round_,

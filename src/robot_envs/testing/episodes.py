@@ -22,7 +22,7 @@ from robot_envs.testing.rollouts import (
     rollout,
     same,
 )
-from robot_envs.world_state import InitialState, LinkQuery, StateQuery
+from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
 LOWER = 0.8  # of the height at which a robot starts: it hasn't sunk
 UPRIGHT = 0.9  # cosine of the largest tilt
@@ -40,23 +40,40 @@ def check_stands(robot: Robot, joints: Mapping[str, float], seconds: float = 5.0
     Raises:
         AssertionError: if it sinks or tilts.
     """
-    root = robot.links.root
+    root, time, fallen = robot.links.root, 0.0, ""
     backend = make_backend(Scene([robot]), None, robot.control_period)
     try:
         backend.look(StateQuery(links=(LinkQuery(root),)))
         state = backend.reset(InitialState(joints=joints))
         start = state.links[root].pose
-        for _ in range(round(seconds / robot.control_period)):
+        up = rotate(conjugate(start.orientation), (0.0, 0.0, 1.0))
+        while time < seconds - robot.control_period / 2.0:
             state = backend.act({})
-        end = state.links[root].pose
+            time += robot.control_period
+            end = state.links[root].pose
+            level = rotate(end.orientation, up)[2]
+            stands = end.position[2] > LOWER * start.position[2] and level > UPRIGHT
+            fallen = fallen or ("" if stands else _yielding(robot, joints, state, time))
     finally:
         backend.close()
-    up = rotate(conjugate(start.orientation), (0.0, 0.0, 1.0))
-    level = rotate(end.orientation, up)[2]
-    height, began = end.position[2], start.position[2]
-    assert height > LOWER * began and level > UPRIGHT, (
-        f"it doesn't stand: after {seconds:g} s '{root}' is at a height of {height:.3f} m, having begun at "
-        f"{began:.3f} m, and tilted by {math.degrees(math.acos(max(-1.0, min(1.0, level)))):.0f} degrees"
+    assert stands, (
+        f"it doesn't stand: after {seconds:g} s '{root}' is at a height of {end.position[2]:.3f} m, having "
+        f"begun at {start.position[2]:.3f} m, and tilted by "
+        f"{math.degrees(math.acos(max(-1.0, min(1.0, level)))):.0f} degrees{fallen}"
+    )
+
+
+def _yielding(robot: Robot, joints: Mapping[str, float], state: WorldState, time: float) -> str:
+    """Returns which joint is farthest from where it starts, and what holds it."""
+    off = {name: abs(each.position - joints.get(name, 0.0)) for name, each in state.joints.items()}
+    name = max(off, key=lambda each: off[each])
+    effort, most = abs(state.joints[name].effort), robot.limits[name].effort
+    of, mend = "", "a higher p would hold it"
+    if most is not None and effort >= 0.99 * most:
+        of, mend = f" of {most:g}", "a higher limit of effort would hold it"
+    return (
+        f"; it fell after {time:.2g} s, '{name}' being {off[name]:.2g} rad or m from its start with an "
+        f"effort of {effort:.3g}{of}: {mend}, or a posture that strains it less"
     )
 
 

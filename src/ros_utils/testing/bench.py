@@ -4,6 +4,7 @@ import contextlib
 import functools
 import os
 import re
+import shlex
 import shutil
 import sys
 import zlib
@@ -53,7 +54,12 @@ def tell(folder: Path, seed: int, failure: str, message: str, again: str) -> str
         message: the same in one line.
         again: that of the second, recorded run; empty if it passed.
     """
-    text = f"recorded in {folder}"
+    folders = filter(None, os.environ.get("CARTPOLE_WITH", "").split(":"))
+    ws = [f"--with {shlex.quote(each)}" for each in folders]
+    if ws or "CARTPOLE_WS_MASTER" in os.environ:
+        ws.insert(0, "./ws")
+    replay = " ".join([*ws, "rosrun cartpole replay.py", shlex.quote(str(folder / BAG))])
+    text = f"recorded in {folder}\nreplayed by: {replay}"
     if _ADDRESS.sub("", again) != _ADDRESS.sub("", message):
         how = f"fails otherwise ({again})" if again else "passes"
         text = f"it {how} when it runs once more: it isn't repeatable; that run is {text}"

@@ -10,6 +10,7 @@ import rosgraph
 from bullet_gazebo_msgs.srv import StepWorldRequest
 from tf.transformations import quaternion_from_euler
 
+from file_access.text import did_you_mean
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils._internal import packages, params
 from ros_utils.testing.lockstep_subscriber import WorldError
@@ -64,30 +65,50 @@ class RobotWorld(SteppedWorld):
         Raises:
             WorldError: if one of these fails; the log says why.
         """
+        if name in ros_gazebo.gazebo_get_model_names():
+            raise WorldError(f"there is a model '{name}' already: give this one another name=...")
         pose = (*xyz, *quaternion_from_euler(*rpy).tolist())
         path = _located(file)
+        if controllers is not None and not ros_params.ros_load_yaml_from_path(
+            _located(controllers), ns
+        ):
+            raise WorldError(f"{controllers} can't be loaded; the log says why")
+        for each in run:
+            _check_described(each, ns)
         if file.endswith(".sdf"):
             done = ros_gazebo.gazebo_spawn_sdf_path(path, name, ns, "world", *pose)
         else:
-            done = ros_urdf.urdf_load_from_path(path, DESCRIPTION, ns, list(arguments)) and bool(
-                ros_gazebo.gazebo_spawn_urdf_param(DESCRIPTION, name, ns, "world", *pose)
-            )
-        if controllers is not None:
-            done = done and ros_params.ros_load_yaml_from_path(_located(controllers), ns)
+            done = ros_urdf.urdf_load_from_path(path, DESCRIPTION, ns, list(arguments))
+            if done:
+                self._check_start(ns, joints or {})
+                done = bool(
+                    ros_gazebo.gazebo_spawn_urdf_param(DESCRIPTION, name, ns, "world", *pose)
+                )
         if run:
-            done = done and bool(ros_controllers.spawn_controllers_srv(run, ns))
+            done = done and ros_controllers.spawn_controllers_srv(run, ns)
         if not done:
             raise WorldError(
                 f"{file} can't be spawned, or not with its controllers; the log says why"
             )
-        if not file.endswith(".sdf"):
-            urdf = ElementTree.fromstring(params.get(rosgraph.names.ns_join(ns, DESCRIPTION)))
-            prismatic = (each for each in urdf.iter("joint") if each.get("type") == "prismatic")
-            self._prismatic |= {str(each.get("name")) for each in prismatic}
         if joints:
             positions = list(joints.values())
             self._client.send(StepWorldRequest(joints=list(joints), positions=positions))
         self._state = self._step(0)
+
+    def _check_start(self, ns: str, joints: Mapping[str, float]) -> None:
+        """Notes which joints of a description are prismatic; raises WorldError for a start beyond stops."""
+        urdf = ElementTree.fromstring(params.get(rosgraph.names.ns_join(ns, DESCRIPTION)))
+        for joint in urdf.iterfind("joint"):
+            name, kind, limit = str(joint.get("name")), joint.get("type"), joint.find("limit")
+            if kind == "prismatic":
+                self._prismatic.add(name)
+            if name not in joints or kind == "continuous" or limit is None:
+                continue
+            low, high = (float(limit.get(each, 0.0)) for each in ("lower", "upper"))
+            if not low <= joints[name] <= high:
+                raise WorldError(
+                    f"joint '{name}' can't start at {joints[name]:g}: its stops are {low:g} and {high:g}"
+                )
 
     def assert_joint(
         self, name: str, position: float, *, within: float, by: float = 0.0, stays: float = 0.0
@@ -215,6 +236,22 @@ def _located(file: str) -> str:
         return packages.file(package, "", path)
     except packages.NotFound as fault:
         raise WorldError(f"{file}: {fault}") from fault
+
+
+def _check_described(controller: str, ns: str) -> None:
+    """Raises WorldError, with the nearest name, if a controller has no parameters in a namespace."""
+    try:
+        known = params.get(ns)
+    except KeyError:
+        known = {}
+    described = [name for name, each in known.items() if isinstance(each, dict) and "type" in each]
+    if controller.partition("/")[0] not in known:
+        near = (
+            did_you_mean(controller, described) or f"; there are {', '.join(described) or 'none'}"
+        )
+        raise WorldError(
+            f"there is no controller '{controller}' among the parameters of '{ns}'{near}"
+        )
 
 
 def _point(position: Sequence[float | None]) -> str:

@@ -1,13 +1,15 @@
 """A world whose time passes on request: its commands and its readings."""
 
+import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from bullet_gazebo_msgs.srv import StepWorldRequest
 
 from file_access.text import did_you_mean
 from ros_utils import ros_gazebo
-from ros_utils.step_client import PreparedSteps, StepAnswer, StepClient, StepNames
+from ros_utils.step_client import PreparedSteps, StepAnswer, StepClient, StepNames, StepRefused
 from ros_utils.testing.followed_node import FollowedNode
 from ros_utils.testing.lockstep_subscriber import WorldError
 
@@ -97,7 +99,7 @@ class SteppedWorld:
         self._state = self._step(self._ticks(duration))
 
     def _ticks(self, duration: float) -> int:
-        ticks = round(duration * NANOSECONDS / self._period)
+        ticks = round(duration * NANOSECONDS / self._period) if math.isfinite(duration) else -1
         if ticks < 0 or abs(ticks * self._period - duration * NANOSECONDS) > 1.0:
             raise WorldError(f"{duration} s isn't a number of steps of {self._period / 1e6:g} ms")
         return ticks
@@ -134,11 +136,26 @@ class SteppedWorld:
             sensors=tuple(self._sensors),
         )
         numbers = [number for values in commands.values() for number in values]
-        self._steps.begin(names, ticks, numbers)
-        answer = self._steps.end()
         if ticks:
-            self._commands.clear()
-        return answer
+            self._commands = {}  # also if they are refused
+        try:
+            self._steps.begin(names, ticks, numbers)
+            return self._steps.end()
+        except StepRefused as fault:
+            for controller in commands:
+                self._repeated.pop(controller, None)
+            given = "; ".join(f"{name}: {', '.join(map(str, commands[name]))}" for name in commands)
+            raise WorldError(f"{fault}" + (f" (commanded: {given})" if given else "")) from fault
+
+    def _look(self, names: dict[Any, None], name: Any) -> None:
+        """Reads more in each step from now on; what is refused isn't kept."""
+        if name not in names:
+            names[name] = None
+            try:
+                self._state = self._step(0)
+            except WorldError:
+                del names[name]
+                raise
 
     def joint(self, name: str) -> float:
         """Returns the position of a joint with a transmission [rad, m]."""
@@ -150,18 +167,14 @@ class SteppedWorld:
 
     def link(self, name: str, frame: str = "") -> Vector:
         """Returns the position of a link [m], or model::link, in the world or in another link's frame."""
-        if (name, frame) not in self._links:
-            self._links[name, frame] = None
-            self._state = self._step(0)
+        self._look(self._links, (name, frame))
         first = 3 * len(self._state.joints) + MOTION * list(self._links).index((name, frame))
         x, y, z = self._state.numbers[first : first + 3]
         return (x, y, z)
 
     def contacts(self, link: str) -> list[str]:
         """Returns the collisions that a link, or model::link, touches, as model::link::collision."""
-        if link not in self._touched:
-            self._touched[link] = None
-            self._state = self._step(0)
+        self._look(self._touched, link)
         found: dict[str, None] = {}
         for each in self._state.contacts:
             pair = each.collision1_name, each.collision2_name
@@ -175,9 +188,7 @@ class SteppedWorld:
 
         A laser has `ranges` [m]. It measures from the first call on.
         """
-        if name not in self._sensors:
-            self._sensors[name] = None
-            self._state = self._step(0)
+        self._look(self._sensors, name)
         reading = self._state.sensors[list(self._sensors).index(name)]
         return {
             each.name: np.frombuffer(bytes(each.data), each.type).reshape(each.shape)

@@ -4,6 +4,7 @@
 import contextlib
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -25,6 +26,15 @@ SCRIPTS = ROOT / "test" / "data" / "scripts"
 EXISTING = Path(__file__).resolve().parents[4] / "shared" / "pg_script" / "launch_robot_test.py"
 SCOUT = SCRIPTS / "scout.launch"
 EPISODES = 10
+KILLING = """
+import os, signal, time, rospy
+from std_srvs.srv import Empty
+rospy.init_node('script')
+rospy.ServiceProxy('/gazebo/unpause_physics', Empty)()
+time.sleep(0.1)
+from ros_calls import master
+os.kill(master.call_node(master.call('lookupNode', '/gazebo'), 'getPid'), signal.SIGKILL)
+"""  # of its simulator
 BOUND = 300  # [s]
 
 
@@ -91,6 +101,8 @@ class LaunchingTest(unittest.TestCase):
     @unittest.skipUnless(EXISTING.is_file(), "the existing script isn't here")
     def test_the_existing_script_is_repeatable_also_on_a_busy_machine(self):
         folders = [tempfile.mkdtemp(prefix="lockstep_test_") for _ in range(2)]
+        for folder in folders:
+            self.addCleanup(shutil.rmtree, folder)
         both = [start("--seed", 0, EXISTING, env=environment(), cwd=each) for each in folders]
         self.assertEqual(*map(self.episodes, both, folders))
 
@@ -155,24 +167,44 @@ class LaunchingTest(unittest.TestCase):
         self.assertIn("runs in real time", err)
         self.assertIn('GZSERVER_ARGS="--lockstep --seed 0"', err)
 
-    def test_a_simulator_that_dies_is_told_of(self):
-        text = (
-            "import os, signal, time, rospy\nfrom std_srvs.srv import Empty\nrospy.init_node('script')\n"
-            "rospy.ServiceProxy('/gazebo/unpause_physics', Empty)()\ntime.sleep(0.1)\n"
-            "from ros_calls import master\n"
-            "pid = master.call_node(master.call('lookupNode', '/gazebo'), 'getPid')\n"
-            "os.kill(pid, signal.SIGKILL)\ntime.sleep(0.1)\nprint('went on')\n"
-        )
-        folder = tempfile.mkdtemp(prefix="lockstep_test_")
-        path = Path(folder, "script.py")
-        path.write_text(text)
-        with Simulation(lockstep=True) as simulation:
+    def run_script(self, text):
+        """Runs a script at a simulator of its own; returns exit code, output and errors."""
+        with tempfile.TemporaryDirectory() as folder, Simulation(lockstep=True) as simulation:
+            path = Path(folder, "script.py")
+            path.write_text(text)
             process = start(path, env=simulation.environment())
             out, err = process.communicate(timeout=BOUND)
-        self.assertEqual(process.returncode, 1, err)
+        return process.returncode, out, err
+
+    def test_a_simulator_that_dies_is_told_of(self):
+        code, out, err = self.run_script(KILLING + "time.sleep(0.1)\nprint('went on')\n")
+        self.assertEqual(code, 1, err)
         self.assertIn("the simulator has died", err)
         self.assertNotIn("Traceback", err)
         self.assertNotIn("went on", out)
+
+    def test_it_ends_a_script_that_catches_everything_and_waits_in_threads(self):
+        text = (
+            "import threading\ndef loop():\n while True: rospy.sleep(0.1)\n"
+            "threading.Thread(target=loop).start()\n"
+            "while True:\n try: rospy.sleep(0.1)\n except: pass\n"
+        )
+        code, _, err = self.run_script(KILLING + text)
+        self.assertEqual(code, 1, err)
+        self.assertEqual(err.count("lockstep: "), 1, err)
+
+    def test_the_end_of_a_script_is_told_once_for_all_nodes_that_follow_it(self):
+        node = "import rospy, sys; rospy.init_node(sys.argv[1])\nwhile True: rospy.sleep(0.1)\n"
+        text = (
+            f"import subprocess, sys, rospy\nfor name in 'abc':\n"
+            f" subprocess.Popen([sys.executable, '-c', {node!r}, name])\n"
+            "rospy.init_node('script')\nrospy.sleep(1.0)\n"
+        )
+        code, _, err = self.run_script(text)
+        self.assertEqual(code, 0, err)
+        said = [line for line in err.splitlines() if line.startswith("lockstep: ")]
+        self.assertEqual(len(said), 1, err)
+        self.assertIn("the nodes that follow its clock: /a, /b, /c", said[0])
 
 
 if __name__ == "__main__":

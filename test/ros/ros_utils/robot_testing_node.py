@@ -51,8 +51,9 @@ class Robots(RobotTestCase):
         self.world.wait(0.123)
         self.world.wait(0.001)
         self.assertEqual(self.world.time, 0.124)
-        with self.assertRaisesRegex(WorldError, r"0\.0005 s isn't a number of steps of 1 ms"):
-            self.world.wait(0.0005)
+        for wrong in (0.0005, float("nan"), float("inf")):
+            with self.assertRaisesRegex(WorldError, f"{wrong} s isn't a number of steps of 1 ms"):
+                self.world.wait(wrong)
 
     def test_time_that_would_never_pass_is_refused(self):
         self.spawn()
@@ -64,6 +65,40 @@ class Robots(RobotTestCase):
         ros_gazebo.gazebo_pause_physics()
         with self.assertRaisesRegex(WorldError, "the world is paused"):
             self.world.wait(1.0)
+
+    def test_a_wrong_name_is_refused_with_its_reason_and_the_world_goes_on(self):
+        self.spawn()
+        for text, call in (
+            ("link.*'pol'.*'pole'", lambda: self.world.link("pol")),
+            ("link.*'pol'", lambda: self.world.contacts("pol")),
+            ("sensor.*'laser'", lambda: self.world.sensor("laser")),
+            ("there is a model 'robot' already", self.spawn),
+        ):
+            with self.subTest(text), self.assertRaisesRegex(WorldError, text):
+                call()
+            self.world.wait(0.01)
+        for text, controller, values in (
+            (f"2 commands where '{CART}' takes 1 .*{CART}: 0.1, 0.2", CART, (0.1, 0.2)),
+            ("'stand_cart'", "stand_cart", (0.1,)),
+        ):
+            self.world.command(controller, *values, every=0.01)
+            with self.subTest(text), self.assertRaisesRegex(WorldError, text):
+                self.world.wait(0.01)
+            self.world.wait(0.1)
+
+    def test_a_spawn_that_fails_says_why(self):
+        for text, run, joints in (
+            (f"no controller '{CART}s' .*did you mean '{CART}'", f"{CART}s", {}),
+            ("'stand_cart' can't start at 45: its stops are -", CART, {"stand_cart": 45.0}),
+        ):
+            with self.subTest(text), self.assertRaisesRegex(WorldError, text):
+                self.world.spawn(
+                    "package://cartpole_gazebo/robots/cartpole_v1.urdf",
+                    self.file("controllers.yaml", CONTROLLERS),
+                    [run],
+                    joints=joints,
+                )
+        self.spawn()
 
     def test_no_world_has_the_physics_of_the_one_before(self):
         first = ros_gazebo.gazebo_get_physics_properties()
@@ -95,7 +130,7 @@ class Robots(RobotTestCase):
         with self.assertRaisesRegex(WorldError, r"'stand_car' .*did you mean 'stand_cart'\?"):
             self.world.joint("stand_car")
         with self.assertRaisesRegex(WorldError, "nowhere.urdf can't be spawned"):
-            self.world.spawn("/nowhere.urdf")
+            self.world.spawn("/nowhere.urdf", name="other")
 
     def test_a_box_falls_touches_the_ground_and_stays_there(self):
         self.spawn_box("0.2 0.2 0.2", xyz=(1.0, 2.0, 0.5), rpy=(0.0, 0.0, math.pi / 2))

@@ -7,11 +7,14 @@ import struct
 import threading
 import time
 from functools import partial
+from itertools import repeat
 from pathlib import Path
 from xmlrpc.server import SimpleXMLRPCServer
 
 import rosgraph
 from std_srvs.srv import SetBool, SetBoolResponse
+
+from ros_calls.service import WORK
 
 LOOPBACK = "127.0.0.1"
 
@@ -25,8 +28,10 @@ class FakeMaster:
         self.params = {}
         self.told = {}  # answers to getName and getMasterUri, as a node's
         self.questions = []
+        self.work = repeat(0)  # as a simulator's that doesn't compute
         self._server = SimpleXMLRPCServer((LOOPBACK, 0), logRequests=False)
         self._server.register_function(lambda caller: [1, "", 1], "getPid")
+        self._server.register_function(lambda caller: [1, "", next(self.work)], WORK)
         for method, known in (
             ("lookupService", self.services),
             ("lookupNode", self.nodes),

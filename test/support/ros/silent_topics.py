@@ -87,5 +87,5 @@ def silence(patch: pytest.MonkeyPatch) -> list[str]:
     patch.setattr(rospy, "set_param", lambda name, value: None)
     for level in ("logerr", "logwarn"):
         patch.setattr(rospy, level, lambda text, *args: lines.append(text % args if args else text))
-        patch.setattr(rospy, f"{level}_throttle", lambda period, text: lines.append(text))
+        patch.setattr(rospy, f"{level}_throttle", lambda period, text, **_: lines.append(text))
     return lines

@@ -30,8 +30,11 @@ def _sends(address, name):
 
     Of one whose subscriber is closed the publisher learns when it sends the next time.
     """
-    with xmlrpc.client.ServerProxy(address) as node:
-        _, _, connections = node.getBusInfo(rospy.get_name())
+    try:
+        with xmlrpc.client.ServerProxy(address) as node:
+            _, _, connections = node.getBusInfo(rospy.get_name())
+    except ConnectionRefusedError:  # the master keeps the name of a node that was killed
+        return True
     subscriber = get_topic_manager().get_subscriber_impl(name)
     ours = {str(each.local_endpoint[1]) for each in subscriber.connections} if subscriber else set()
     return any(

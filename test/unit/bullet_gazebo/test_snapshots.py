@@ -325,8 +325,9 @@ def test_sensors_measure_the_same_with_the_same_noise(sim):
 
 def test_a_sensor_that_is_heard_only_since_measures_at_its_times(sim):
     schedule, seen, heard = Schedule(sim), [], False
+    model = next(iter(sim.world.models.values()))
     with sim.lock:
-        schedule.begin(10.0, seen.append, lambda: heard, at_once=False)
+        schedule.begin(model, 10.0, seen.append, lambda: heard, at_once=False)
     future(sim, 250)
     with sim.lock:
         snapshot = sim.save_state()

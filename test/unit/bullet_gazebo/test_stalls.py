@@ -12,6 +12,7 @@ from bullet_gazebo.physics.pose import Pose
 LENGTH = 0.2  # [m] of a link
 GOALS = (0.2, 0.6, 0.3, 0.6, 0.2, 0.5)  # [rad]
 EFFORT = 50.0  # [N m]
+POSITION = "effort_controllers/JointPositionController"
 BOX = """<sdf version="1.6"><model name="box"><static>1</static><link name="side"><collision name="c">
 <geometry><box><size>0.4 0.4 0.4</size></box></geometry></collision></link></model></sdf>"""
 LINK = """<link name="l{number}"><inertial><origin xyz="0 0 0.1"/><mass value="2"/>
@@ -64,7 +65,7 @@ def test_joints_that_a_contact_stops_stand_still_and_say_so(rig):
     """They jumped by 0.1 rad in each step, and joint states, of every 20th step, told constant velocities."""
     robot = rig("Position")
     command(robot, GOALS)
-    robot.run(2.0)
+    robot.run(4.0)  # with MuJoCo the arm has been pressed into the box; it comes out at 0.01 m/s
     states = np.array(robot.run(0.1))
     assert np.ptp(states[:, :, 0], axis=0).max() < 1e-3
     assert np.abs(states[:, :, 1]).max() < 0.02
@@ -100,3 +101,52 @@ def test_a_stalled_effort_is_told_once(make_world):
     assert text.startswith("joint 'j1' of model 'chain' has been stalled for a second")
     robot.run(1.5)
     assert len(robot.told) == 1
+
+
+FOLDED = (0.0, 2.0, 2.3)  # [rad]: the third link is in the first
+NEAR_UP = (0.0, 0.4, 0.5)
+
+
+def folding(gains, goals, collide="true"):
+    """Three links in a plane that are led to `goals` within a second, by PIDs."""
+    text = chain("Effort", 3).replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"')
+    own = "".join(
+        f'<gazebo reference="l{i}"><selfCollide>{collide}</selfCollide></gazebo>' for i in range(3)
+    )
+
+    def lead(world):
+        robot = Rig(world, text.replace("</robot>", f"{own}</robot>"))
+        loops = [robot.load(POSITION, f"j{i}", gains) for i in range(3)]
+
+        def go(now):
+            for each, goal in zip(loops, goals, strict=True):
+                each.command(goal * min(1.0, now / 1e9))
+
+        robot.sim.listeners.append(go)
+        robot.run(4.0)
+        return robot
+
+    return lead
+
+
+@pytest.mark.parametrize(
+    "gains", [{"p": 60, "d": 3}, {"p": 1000, "d": 50}], ids=["weak", "softened"]
+)
+def test_what_its_own_links_hold_off_its_goal_is_told_below_the_limit_too(make_world, gains):
+    """The motor's effort never got to its limit: p is low, or the effort is softened for the step."""
+    robot = folding(gains, FOLDED)(make_world())
+    told = [text for _, text in robot.told if "stalled" in text]
+    assert len(told) == 2 and told == [text for text in robot.warnings() if "stalled" in text]
+    for joint, text in zip(("j1", "j2"), sorted(told), strict=True):
+        assert text.startswith(
+            f"joint '{joint}' of model 'chain' has been stalled for a second, 0."
+        )
+        assert "rad or m off its goal: link 'l2' touches link 'l0' of its own model" in text
+    assert max(abs(each.effort) for each in robot.hardware.joints.values()) < 0.99 * EFFORT
+
+
+@pytest.mark.parametrize(("goals", "collide"), [(NEAR_UP, "true"), (FOLDED, "false")])
+def test_what_sags_by_its_weight_alone_is_not_told(make_world, goals, collide):
+    robot = folding({"p": 25, "d": 2}, goals, collide)(make_world())
+    assert abs(robot.controller("j1").set_point - robot.model.joint_states()[1][0]) > 0.05
+    assert robot.told == []

@@ -57,5 +57,16 @@ def episode(render_mode, **options):
     return np.array(seen), pictures
 
 
+@pytest.mark.parametrize(
+    "env_id", ["cartpole/Classic-v0", "robot_envs.robots:robot_envs/Hopper-v0"]
+)
+def test_pictures_are_collected_as_gymnasiums_are(env_id):
+    env = gymnasium.make(env_id, render_mode="rgb_array_list", width=32, height=24)
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+    assert [each.shape for each in env.render()] == [(24, 32, 3)] * 2
+    env.close()
+
+
 def test_rendering_between_steps_changes_no_bit():
     assert np.array_equal(episode(None)[0], episode("rgb_array", width=40, height=30)[0])

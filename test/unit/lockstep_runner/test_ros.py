@@ -14,17 +14,19 @@ PLUGIN = "<plugin filename='a.so'><topicName> scan </topicName></plugin>"
 
 
 @pytest.mark.parametrize(
-    ("publishers", "description", "reason"),
+    ("publishers", "description", "spawned", "reason"),
     [
-        ([], "", "it has no publisher"),
-        ([], PLUGIN, "by a sensor or plugin that isn't simulated"),
-        ([["/turtle/scan", ["/driver"]]], PLUGIN, "/driver offers it, and sends nothing"),
+        ([], "", [0, 1], "it has no publisher"),
+        ([], PLUGIN, [0, 1], "by a sensor or plugin that isn't simulated"),
+        ([], PLUGIN, [0, 0], "and no model has been spawned yet"),
+        ([["/turtle/scan", ["/driver"]]], PLUGIN, [0, 1], "/driver offers it, and sends nothing"),
     ],
 )
 @pytest.mark.parametrize("timeout", [4.0, 25.0])
 def test_silence_is_explained_once(
-    runner, monkeypatch, capsys, publishers, description, reason, timeout
+    runner, monkeypatch, capsys, publishers, description, spawned, reason, timeout
 ):
+    monkeypatch.setattr(ros, "spawns", lambda: spawned)
     answers = {
         "getSystemState": [publishers, [], []],
         "getParamNames": ["/turtle/robot_description", "/rate"],

@@ -100,8 +100,38 @@ def test_a_world_that_dies_ends_the_script_also_where_it_catches_everything(
     assert capsys.readouterr().err == "lockstep: the simulator has died\n"
 
 
-def test_a_period_that_is_no_multiple_names_both_numbers(runner, capsys):
-    runner.world.step = 3 * MS
+def test_a_world_that_dies_in_another_thread_ends_the_script(runner, capsys, monkeypatch):
+    """Else the script waits in wall time for what never comes."""
+
+    def died():
+        raise WorldFailed("the simulator has died")
+
+    ended = []
+
+    def leave(code):
+        ended.append(code)
+        raise SystemExit(code)
+
+    monkeypatch.setattr(os, "_exit", leave)
+    runner.world.exchanged = died
+    thread = threading.Thread(target=runner.called, args=("/gazebo/reset_world", bytes))
+    thread.start()
+    originals.join(thread, BOUND)
+    runner.world.exchanged, runner.world.there = lambda: None, False
+    monkeypatch.setattr(rospy.core, "_shutdown_flag", True)
+    runner.before_publishing("/command")
+    with pytest.raises(SystemExit):
+        runner.is_connected()
+    assert ended == []
+    with pytest.raises(SystemExit):  # the script has caught the first one
+        runner.before_call("/gazebo/reset_world")
+    assert ended == [1]
+    assert capsys.readouterr().err == "lockstep: the simulator has died\n"
+
+
+@pytest.mark.parametrize(("step", "passes"), [(3, 9), (10, 10), (8, 8), (1, 8)])
+def test_a_period_is_rounded_up_to_whole_steps_which_is_told_once(runner, capsys, step, passes):
+    runner.world.step = step * MS
     runner.world.there = False
 
     def look():
@@ -110,11 +140,16 @@ def test_a_period_that_is_no_multiple_names_both_numbers(runner, capsys):
 
     runner.world.look = look
     runner.topics.changed = lambda: None
-    with pytest.raises(SystemExit) as ended:
-        runner.is_connected()
-    assert ended.value.code == 2
+    for _ in range(2):
+        runner.world.there = False
+        assert runner.is_connected()
+    runner.triggers = Triggers(["/gazebo/reset_world"])
+    runner.called("/gazebo/reset_world", bytes)
+    assert runner.clock.passed == passes * MS
     said = capsys.readouterr().err
-    assert "--dt 0.008" in said and "0.003 s" in said
+    assert said.count("\n") == (passes != 8)
+    if said:
+        assert f"--dt 0.008 is rounded up to {passes / 1000:g} s" in said
 
 
 def test_who_looks_for_another_node_in_vain_gets_messages_and_then_time(runner):

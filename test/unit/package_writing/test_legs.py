@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from support.robots.new_robots import FIXED
 
+from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from package_writing.survey import feet
+from bullet_gazebo.physics.pose import Pose, rotate
+from package_writing.standing import centre_of_mass, feet
 from robot_envs import LinkQuery, RobotEnv, StateQuery
 from robot_envs.backends import make_backend
 from robot_envs.scene import Scene
@@ -21,7 +23,10 @@ from robot_envs.testing import check_stands
 from robot_envs.world_state import InitialState
 
 QUADRUPED = Path(__file__).resolve().parents[2] / "data/robots/quadruped.urdf"
+BIPED = QUADRUPED.with_name("biped.urdf.xacro")
 LEG, FOOT = 0.2, 0.02  # [m] of thigh and calf; radius
+SOLE = Pose((0.0, 0.0, -LEG))  # of a calf
+BIPED_SOLE = Pose((0.035, 0.0, -0.03))  # seen from a foot
 
 
 def heights(made, angle, seconds):
@@ -83,14 +88,16 @@ def knees(lower, upper):
 
 
 def test_a_quadruped_stands_whose_knees_cannot_be_straight(new):
-    """Knees begin in the middle of their range, and hips put the feet below where they are when straight."""
+    """Knees begin in the middle of their range, and hips put the feet below the centre of mass."""
     folder, made, task, told = new("my_bent", knees(-2.7, -0.9), "--base", "free")
     stance = importlib.import_module("my_bent.robot").STANCE
     assert {value for name, value in stance.items() if "knee" in name} == {-1.8}
-    hips = {value for name, value in stance.items() if "hip" in name}
-    assert hips == {0.899}, "as far as postures to reach go"
+    (hip,) = {value for name, value in stance.items() if "hip" in name}
     height = made.pose.position[2]
-    assert height == pytest.approx(2.0 * LEG * math.cos(0.9) + FOOT, abs=0.002)
+    assert height == pytest.approx(LEG * (math.cos(hip) + math.cos(1.8 - hip)) + FOOT, abs=0.002)
+    poses = link_poses(made.links, Pose(), stance)
+    ahead = np.mean([poses[foot].compose(SOLE).position[0] for foot in feet(made.links)])
+    assert ahead == pytest.approx(centre_of_mass(made.links, poses)[0], abs=0.001)
     assert f"spawned at a height of {height:g} m" in told
     assert task().initial_state(np.random.default_rng(0)).joints == stance
     launch = (folder / "launch/simulation.launch").read_text()
@@ -128,3 +135,45 @@ def test_knees_that_can_be_straight_are(new):
     *_, told = new("my_straight", knees(-2.0, 2.0), "--base", "free")
     assert importlib.import_module("my_straight.robot").STANCE == {}
     assert f"spawned at a height of {2.0 * LEG + FOOT:g} m" in told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("forward", [-0.05, 0.02, 0.06])
+def test_a_humanoid_stands_on_level_soles_below_its_centre_of_mass(new, forward):
+    """Its ankles hold an inverted pendulum, and its sway dies away."""
+    folder, made, _, told = new("my_biped", BIPED, f"forward:={forward}", "--base", "free")
+    assert "stands on its feet: left_foot, right_foot (tried for 5 s with bullet" in told, told
+    stance = importlib.import_module("my_biped.robot").STANCE
+    ranges = importlib.import_module("my_biped.tasks").RANGES
+    assert all(low <= stance.get(name, 0.0) <= high for name, (low, high) in ranges.items())
+    poses = link_poses(made.links, Pose(), stance)
+    soles = [poses[foot].compose(BIPED_SOLE) for foot in ("left_foot", "right_foot")]
+    middle = np.mean([each.position[:2] for each in soles], axis=0)
+    np.testing.assert_allclose(middle, centre_of_mass(made.links, poses)[:2], atol=1e-3)
+    for sole in soles:
+        assert rotate(sole.orientation, (0.0, 0.0, 1.0))[2] > 1.0 - 1e-6, "level"
+        assert rotate(sole.orientation, (1.0, 0.0, 0.0))[0] > 1.0 - 1e-6, "not turned"
+    tipping = 35.2 * 9.81 * (centre_of_mass(made.links, poses)[2] - soles[0].position[2] - 0.045)
+    controllers = made.parameters
+    for side in ("left", "right"):
+        assert controllers[f"{side}_ankle_pitch_controller"]["pid"]["p"] > 1.9 * tipping
+    world = make_backend(Scene([made]), None, made.control_period)
+    try:
+        world.look(StateQuery(links=(LinkQuery("pelvis"),)))
+        world.reset(InitialState(joints=stance))
+        places = [world.act({}).links["pelvis"].pose.position[0] for _ in range(500)]
+    finally:
+        world.close()
+    assert max(places) - min(places) < 0.06
+    assert max(places[400:]) - min(places[400:]) < 0.5 * (max(places[:100]) - min(places[:100]))
+
+
+@pytest.mark.slow
+def test_a_humanoid_that_falls_is_told_with_what_to_change(new):
+    *_, told = new("my_weak", BIPED, "ankle_effort:=5", "--base", "free")
+    (note,) = (line for line in told.splitlines() if "stand" in line and "robot.py" in line)
+    assert note.startswith(
+        "note: it doesn't stand on its feet (left_foot, right_foot): with bullet, "
+    )
+    assert "_ankle_pitch' being" in note and "of 5 of 5: a higher limit of effort" in note
+    assert "Change STANCE in robot.py, the gains in config/controllers.yaml" in note

@@ -32,6 +32,7 @@ MAST = "".join((LINK.format("mast", ""), JOINT.format("diff_drive", "revolute", 
     [
         (robot(*BARE), [], "nothing fixes its link 'base' to the world: --base fixed"),
         (robot(LINK.format("base", "")), ["--base", "fixed"], "nothing in it moves"),
+        (robot(*BARE, JOINT.format("back", "fixed", "rod", "base", "")), [], "['base', 'rod'] form a ring"),
         ("<robot", [], "robot.urdf"),
         ("", [], "robot.urdf"),
         ("<sdf version='1.6'/>", [], "not <robot>"),

@@ -18,7 +18,8 @@ from support.robots.new_robots import (
 from support.robots.vehicles import TRACK, four_wheels, three_wheels, two_wheels, wheel
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from package_writing.survey import look_at, standing_height
+from package_writing.standing import standing_height
+from package_writing.survey import look_at
 from package_writing.vehicle import DRIVE, Base, find_base
 from robot_envs import RobotEnv
 from robot_envs.files import resources

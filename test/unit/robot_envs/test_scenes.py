@@ -50,7 +50,7 @@ def test_a_coarser_physics_step(make) -> None:
     places = [each.state.models["rover"].pose.position for each in (env, fine)]
     assert places[0] == pytest.approx(places[1], abs=0.02) and places[0] != places[1]
     env.close()
-    with pytest.raises(ValueError, match="0.02 s is not a multiple of the physics step 0.003 s"):
+    with pytest.raises(RobotEnvError, match="0.02 s is not a multiple of the physics step 0.003 s"):
         RobotEnv(replace(ROVER, physics_step=0.003), Roll(), "ros-own")
     with pytest.raises(RobotEnvError, match="physics_step must be a time between 1e-06 and 1"):
         RobotEnv(replace(ROVER, physics_step=0.0), Roll())
@@ -235,7 +235,8 @@ def test_the_rover_rolls_to_the_crate_and_pushes_it(make):
         seen.last.models["crate"].pose.position[:2] - np.array([0.4, 0.0])
     )
     steps = [env.step(np.ones(2, np.float32)) for _ in range(50)]
-    assert steps[-1][1] > 1.0  # [m]
+    # With a friction of 1, pushed at half its height, the crate is about to tip over.
+    assert steps[-1][1] > 0.9  # [m]
     assert steps[-1][3]
     assert "crate" in {
         each.second.partition("::")[0] for state in seen.states for each in state.contacts

@@ -1,5 +1,8 @@
 """Snapshots of environments beyond the conformance suite: refusals, users' objects, what stays."""
 
+import copy
+import pickle
+
 import gymnasium
 import pytest
 
@@ -149,6 +152,22 @@ def test_varied_robots_are_varied_as_they_were():
     env.close()
 
 
+def test_environments_and_snapshots_are_neither_copied_nor_pickled(made):
+    env = made()
+    env.reset(seed=0)
+    for each, words in (
+        (env, "environment .* save_state"),
+        (env.save_state(), "snapshot .* restore"),
+    ):
+        for use in (copy.copy, copy.deepcopy, pickle.dumps):
+            with pytest.raises(TypeError, match=f"^an? {words}"):
+                use(each)
+    wrapped = gymnasium.make("cartpole/Balance-v0")
+    with pytest.raises(TypeError, match="^an environment can't be copied or pickled"):
+        copy.deepcopy(wrapped)
+    wrapped.close()
+
+
 def test_refusals_name_the_reason(made):
     env, other = made(), made()
     with pytest.raises(gymnasium.error.ResetNeeded):
@@ -169,3 +188,13 @@ def test_refusals_name_the_reason(made):
     unreadable.reset(seed=1)
     with pytest.raises(SimulatorError, match="Reading.lines.*generator"):
         unreadable.save_state()
+
+
+def test_a_task_with_an_environment_of_another_class_is_refused():
+    """Its save_state() would save the task again, and so on."""
+    env = gymnasium.make("cartpole/Balance-v0", backend="bullet").unwrapped
+    env.reset(seed=1)
+    env.task.env = env
+    with pytest.raises(SimulatorError, match=r"^BalanceTask.env: a snapshot doesn't save an env"):
+        env.save_state()
+    env.close()

@@ -8,7 +8,8 @@ import pytest
 from support.scenes.solo_arm import SOLO, Hold, episode, is_a_line
 from support.scenes.two_arms import LEFT_CONTROLLERS
 
-from robot_envs import Pose, RobotEnv, RobotEnvError
+from robot_envs import InitialState, Pose, Robot, RobotEnv, RobotEnvError
+from robot_envs.scene import Scene
 
 XACRO = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">${nothing}</robot>'
 GROUP = LEFT_CONTROLLERS["pair"]
@@ -30,6 +31,14 @@ def with_pair(**changes):
 ELBOW = {"type": "position_controllers/JointPositionController", "joint": "elbow"}
 ROBOTS = {
     "no time": ({"control_period": 0.0}, "control_period must be a time above 0"),
+    "a text for a time": (
+        {"control_period": "40 ms"},
+        r"must be a time above 0 \[s\], not '40 ms'",
+    ),
+    "half a step": (
+        {"control_period": 0.0005},
+        "0.0005 s is not a multiple of the physics step 0.001 s",
+    ),
     "a world that isn't there": ({"world": "/nowhere/a.world"}, "its world: there is no file"),
     "another namespace than the URDF's": (
         {"namespace": "left", "urdf": SOLO.xml.replace("</robot>", DRIVES)},
@@ -199,3 +208,19 @@ def test_a_description_may_be_files_texts_and_mappings(tmp_path):
     for urdf in (tmp_path / "arm.urdf", str(tmp_path / "arm.urdf"), lambda: tmp_path / "arm.urdf"):
         for controllers in (tmp_path / "arm.yaml", str(tmp_path / "arm.yaml"), text):
             episode(replace(SOLO, urdf=urdf, controllers=controllers))
+
+
+def test_a_misspelt_option_is_told_with_the_nearest():
+    with pytest.raises(TypeError, match="no option 'controler'; did you mean 'controllers'"):
+        Robot(urdf=SOLO.xml, controler={})
+
+
+def test_a_start_beyond_a_stop_is_told_once(caplog):
+    """45 for 0.45 began an episode at the stop."""
+    upper = SOLO.links.joints["elbow"].upper
+    scene = Scene([SOLO])
+    for start in (45.0, 45.0, upper + 0.001):
+        scene.placed_joints(InitialState(joints={"elbow": start}))
+    (record,) = caplog.records
+    wanted = f"an episode puts the joint 'elbow' at 45, beyond its stops: it starts at {upper:g}"
+    assert record.getMessage() == wanted

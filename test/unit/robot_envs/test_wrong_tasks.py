@@ -5,10 +5,10 @@ import math
 import gymnasium
 import numpy as np
 import pytest
-from support.scenes.solo_arm import Hold, Reach, episode, is_a_line
+from support.scenes.solo_arm import SOLO, Hold, Reach, episode, is_a_line
 from support.scenes.two_arms import PLINTH
 
-from robot_envs import InitialState, LinkQuery, Object, Pose, RobotEnvError, StateQuery
+from robot_envs import InitialState, LinkQuery, Object, Pose, RobotEnv, RobotEnvError, StateQuery
 
 NAN = math.nan
 
@@ -182,3 +182,19 @@ def test_a_task_that_cannot_be(case):
 def test_a_tasks_own_error_comes_through_as_it_is(method):
     with pytest.raises(ZeroDivisionError, match="the user's own"):
         episode(task=Hold(**{method: fails}))
+
+
+def test_spaces_may_be_attributes_as_gymnasium_has_them():
+    """They stand for the methods that return them."""
+
+    class Attributes(Hold):
+        action_space = Hold().action_space()
+        observation_space = Hold().observation_space()
+
+    for task in (Attributes(), Hold(action_space=Attributes.action_space)):
+        env = RobotEnv(SOLO, task)
+        assert env.action_space == Attributes.action_space
+        assert env.observation_space == Attributes.observation_space
+        env.close()
+    with pytest.raises(RobotEnvError, match=r"Hold.action_space\(\) returned 2; it must be a gymn"):
+        RobotEnv(SOLO, Hold(action_space=2))

@@ -12,6 +12,7 @@ from std_srvs.srv import Empty, SetBool, SetBoolRequest
 from support.ros.ros_fakes import FakeService, failed, ok
 
 from ros_calls import master as ros_master
+from ros_calls import service as service_module
 from ros_calls.service import (
     LOOK,
     ServiceClient,
@@ -162,6 +163,50 @@ def test_an_answer_that_trickles_in_has_the_same_limit(offer, client):
     offer(trickle)
     with pytest.raises(ServiceHangs):
         client(timeout=LIMIT)(True)
+
+
+@pytest.fixture
+def simulator(offer, master, monkeypatch):
+    """Answers once it is told to; the limits of its clients are over soon."""
+    monkeypatch.setattr(service_module, "WORKING", LIMIT / 5)
+    master.nodes["/fake"] = master.uri
+    ready = threading.Event()
+    offer(lambda request: ready.wait(BOUND) and [ok(True)])
+    return ready
+
+
+def test_while_a_simulator_computes_no_limit_ends_a_call(simulator, client, master):
+    looks = itertools.count()
+
+    def work():
+        for number in looks:
+            if number == 6:
+                simulator.set()
+            yield number
+
+    master.work = work()
+    assert client(timeout=LIMIT / 5)(True).success
+    assert next(looks) > 6
+
+
+def test_what_a_signal_s_handler_raises_ends_a_call(simulator, client, master):
+    def ring(*_):
+        raise TimeoutError("the script's own")
+
+    master.work = itertools.count()
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, LIMIT)
+    with pytest.raises(ServiceHangs) as hangs:
+        client()(True)
+    assert str(hangs.value.__cause__) == "the script's own"
+    signal.signal(signal.SIGALRM, before)
+    simulator.set()
+
+
+def test_a_simulator_that_stands_still_hangs(simulator, client):
+    with pytest.raises(ServiceHangs, match=r"/fake/set: no answer within 0.3 s"):
+        client(timeout=LIMIT)(True)
+    simulator.set()
 
 
 def test_without_a_limit_it_waits_until_the_shutdown(offer, client, monkeypatch):

@@ -114,7 +114,14 @@ def run(folder: Path, *words: str, **variables: str) -> subprocess.CompletedProc
 def test_a_failure_leaves_its_recording_and_seed(tmp_path):
     (tmp_path / "test_cart.py").write_text(FAILING)
     place = tmp_path / "failures"
-    done = run(tmp_path, "-m", "pytest", "test_cart.py", ROS_TEST_FAILURES=str(place))
+    done = run(
+        tmp_path,
+        "-m",
+        "pytest",
+        "test_cart.py",
+        ROS_TEST_FAILURES=str(place),
+        CARTPOLE_WITH="/a b:/c",
+    )
     assert "3 failed" in done.stdout
     assert done.stdout.count("isn't repeatable") == 1
     assert "rad after" not in done.stdout and "m after" in done.stdout
@@ -129,6 +136,8 @@ def test_a_failure_leaves_its_recording_and_seed(tmp_path):
     with rosbag.Bag(str(folder / "world.bag")) as bag:
         seen = [message.position for _, message, _ in bag.read_messages("/joint_states")]
         assert min(seen) != max(seen) and 0.9 < bag.get_end_time() < 2.1
+    line = f"--with '/a b' --with /c rosrun cartpole replay.py {folder / 'world.bag'}\n"
+    assert f"replayed by: ./ws {line}" in (folder / "failure.txt").read_text()
     replay = executable("cartpole", "replay.py")
     again = run(tmp_path, replay, str(folder / "world.bag"))
     assert again.returncode == 0 and "equal to the bit" in again.stdout, again.stdout

@@ -1,7 +1,11 @@
 """Where a page is, and who gets in."""
 
+import asyncio
+import gzip
 import socket
+import threading
 import time
+import urllib.request
 from importlib.metadata import version
 
 import msgspec
@@ -242,3 +246,45 @@ def test_a_page_with_such_a_camera_is_none(page):
             assert time.monotonic() < deadline
             seen |= {tuple(each.camera.position) for each in page.get_clients().values()}
     assert seen <= {(3, 0, 1), (5, 6, 7)}
+
+
+def test_a_drawing_thread_leaves_it_to_the_pages_thread_to_wake_them(page):
+    """asyncio's event, set while its thread removes a page that waits, raises in the thread that draws."""
+    buffer = page._websock_server._broadcast_buffer
+    woken, busy, released = [], threading.Event(), threading.Event()
+
+    async def read(number):
+        async for window in buffer.window_generator(number):
+            woken.append(len(window))
+
+    def block():
+        busy.set()
+        assert released.wait(60.0)
+
+    def wait_until(condition):
+        deadline = time.monotonic() + 60.0
+        while not condition():
+            assert time.monotonic() < deadline
+
+    for number in range(3):
+        asyncio.run_coroutine_threadsafe(read(1000 + number), buffer.event_loop)
+    wait_until(lambda: len(buffer.message_event._waiters) == 3)
+    woken.clear()
+    buffer.event_loop.call_soon_threadsafe(block)
+    assert busy.wait(60.0)
+    page.scene.add_frame("/moved")
+    touched = [each.done() for each in buffer.message_event._waiters]
+    released.set()
+    assert touched == [False] * 3
+    wait_until(lambda: len(woken) >= 3)
+
+
+@pytest.mark.parametrize("encoding", ["gzip", "identity"])
+def test_a_page_says_that_it_is_loading(page, encoding):
+    request = urllib.request.Request(
+        f"http://127.0.0.1:{page.get_port()}/", headers={"Accept-Encoding": encoding}
+    )
+    with urllib.request.urlopen(request, timeout=60.0) as answer:
+        body = answer.read()
+    text = gzip.decompress(body) if encoding == "gzip" else body
+    assert b"The page is loading" in text

@@ -19,7 +19,7 @@ BULLET = ("ode", "bullet", "simbody", "dart")  # Gazebo's names: PyBullet stands
 MUJOCO = "mujoco"
 ENGINES = (*BULLET, MUJOCO)
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 
 class EngineError(ValueError):

@@ -9,6 +9,7 @@ less (`<max_vel>`), as it does where a model has been placed into another one, t
 become hard, with that speed as their target, until the overlap is shallow.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -47,7 +48,8 @@ class Separation:
             model: what it was loaded from.
             links: PyBullet's indices of its links.
         """
-        mass = sum(link.inertia.mass for link in model.links.values() if link.inertia is not None)
+        # Python 3.12 sums floats up in another way than 3.11; their exact sum has the same bits in both.
+        mass = math.fsum(link.inertia.mass for link in model.links.values() if link.inertia)
         stiffness = 0.0 if model.static else max(STIFFNESS, STIFFNESS_OF_A_KILOGRAM * mass)
         for name, index in links.items():
             self._links[body, index] = stiffness, model.links[name].max_vel

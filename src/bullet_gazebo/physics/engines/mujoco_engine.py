@@ -32,7 +32,7 @@ IMPRATIO = 10.0  # how much stiffer friction is than the contact, so that nothin
 
 Joined = tuple[LinkOf, LinkOf, Pose]
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 
 class MujocoEngine(Engine):

@@ -15,7 +15,7 @@ FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
 TENDON = mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON
 ROWS = 3  # constraints of a contact: along its normal, and two across it
-BRAKING = 0.15
+BRAKING = 0.2
 """The most [m/s] by which friction aims to slow in a step what slides. It would aim to stop it, and MuJoCo
 would push the bodies apart to reach that."""
 
@@ -85,7 +85,7 @@ class MujocoState:
         """Bounds the speed [m/s] at which contacts end overlaps, in addition to the geoms' `max_vel`."""
         fastest = np.minimum(self.max_vel, speed)
         equal = np.unique(fastest)
-        self._fastest = equal if equal.size == 1 else fastest
+        self._separation = equal if equal.size == 1 else fastest
 
     def _ease_contacts(self) -> None:
         """Changes the accelerations [m/s²] that contacts aim at: see BRAKING and `set_fastest_separation`."""
@@ -103,7 +103,7 @@ class MujocoState:
 
     def _bound_separation(self, first: int, aims: np.ndarray) -> None:
         """Bounds the speeds at which overlaps end; `aims` are those of the normals, from row `first` on."""
-        data, fastest = self.data, self._fastest
+        data, fastest = self.data, self._separation
         if fastest.size > 1:
             geoms = data.contact.geom[data.contact.efc_address >= 0]
             fastest = fastest[geoms].min(axis=1)

@@ -203,6 +203,15 @@ class MeshFinder:
     reading: Reading
     folder: Path | None = None
     warnings: list[str] = field(default_factory=list)
+    stand_ins: list[str] = field(default_factory=list)  # of models whose meshes aren't there
+
+    def is_missing(self, uri: str) -> bool:
+        """Returns whether there is no file `uri`."""
+        try:
+            self.resources.find(uri, self.folder)
+        except DescriptionError:
+            return True
+        return False
 
     def find(
         self, uri: str, where: str, needed: bool, submesh: Submesh | None = None

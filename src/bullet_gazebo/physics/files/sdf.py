@@ -6,11 +6,9 @@ one, with links and joints named `nested::name`. Links of a static model need no
 
 import re
 from collections.abc import Iterator
-from copy import deepcopy
 from dataclasses import dataclass, field, replace
-from functools import cache
 from pathlib import Path
-from xml.etree.ElementTree import Element, SubElement
+from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import (
     DescriptionError,
@@ -31,6 +29,7 @@ from bullet_gazebo.physics.files.elements import (
     truth,
 )
 from bullet_gazebo.physics.files.mechanisms import add_mechanisms
+from bullet_gazebo.physics.files.own_models import own_models
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
 from bullet_gazebo.physics.files.sdf_parts import (
     WORLD,
@@ -50,7 +49,6 @@ from bullet_gazebo.physics.lumping import (
 )
 from bullet_gazebo.physics.pose import Pose
 
-OWN_MODELS = Path(__file__).with_name("models.sdf")
 OVERRIDES = ("pose", "static")
 MODEL_URI = "model://"
 MAX_NESTING = 10
@@ -89,20 +87,6 @@ def _open(uri: str, context: FileContext) -> tuple[Element, FileContext]:
         if name not in own_models():
             raise
         return own_models()[name], replace(context, version=(1, 6), folder=None)
-
-
-@cache
-def own_models() -> dict[str, Element]:
-    """Returns the models of Gazebo's database that have a simple shape here, by their folders' names."""
-    root = Reading().open(OWN_MODELS)
-    for model in root.iterfind("model[@rgba]"):
-        for link in model.findall("link"):
-            for visual in map(deepcopy, link.findall("collision")):
-                visual.tag = "visual"
-                diffuse = SubElement(SubElement(visual, "material"), "diffuse")
-                diffuse.text = model.get("rgba")
-                link.append(visual)
-    return {element.get("folder", ""): element for element in root}
 
 
 def _open_file(uri: str, context: FileContext) -> tuple[Element, FileContext]:
@@ -351,7 +335,9 @@ def _read_link(
 ) -> Link:
     name = named(element, "link")
     where = f"link '{name}'"
-    meshes = MeshFinder(context.resources, context.reading, context.folder, parts.warnings)
+    meshes = MeshFinder(
+        context.resources, context.reading, context.folder, parts.warnings, parts.stand_ins
+    )
     shapes = ShapeReader(meshes, frames)
     link = Link(name, read_inertia(element, where, static))
     link.collisions = list(shapes.read(element, "collision", where))

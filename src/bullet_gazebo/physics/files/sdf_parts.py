@@ -26,6 +26,7 @@ from bullet_gazebo.physics.files.elements import (
     truth,
 )
 from bullet_gazebo.physics.files.meshes import Submesh
+from bullet_gazebo.physics.files.own_models import model_of_mesh
 from bullet_gazebo.physics.files.reading import MeshFile, MeshFinder
 from bullet_gazebo.physics.pose import (
     Pose,
@@ -158,7 +159,33 @@ class ShapeReader:
                 self.meshes.warnings.append(f"{error}; it is left out")
                 continue
             if shape is not None:
-                yield shape
+                yield from self._simplified(shape)
+
+    def _simplified(self, shape: Shape) -> Iterator[Shape]:
+        """Yields the simple shapes of our own model in place of a mesh of it that isn't there.
+
+        They have its size: Gazebo's models scale their meshes, each by another factor.
+        """
+        model = model_of_mesh(shape.mesh) if shape.kind == "mesh" else None
+        if model is None:
+            yield shape
+            return
+        self.meshes.stand_ins.append(model.get("folder", ""))
+        red, green, blue, alpha = numbers(model.get("rgba", ""), "rgba", 4)
+        rgba = shape.rgba or (red, green, blue, alpha)
+        origin = Pose((0.0, 0.0, -float(model.get("origin", 0.0))))
+        for number, element in enumerate(model.iterfind("link/collision")):
+            part = self._shape(element, "", "")
+            assert part is not None
+            yield replace(
+                shape,
+                kind=part.kind,
+                size=part.size,
+                pose=shape.pose.compose(origin).compose(part.pose),
+                mesh="",
+                rgba=rgba,
+                name=f"{shape.name}_{part.name}" if number else shape.name,
+            )
 
     def _shape(self, element: Element, link: str, where: str) -> Shape | None:
         geometry = element.find("geometry")
@@ -176,7 +203,10 @@ class ShapeReader:
         if solid.tag == "mesh":
             with files_named_by_a_model(where):
                 uri = solid.findtext("uri") or ""
-                found = self.meshes.find(uri, where, collides, _submesh(solid))
+                if model_of_mesh(uri) is not None and self.meshes.is_missing(uri):
+                    found: MeshFile | None = uri, None
+                else:
+                    found = self.meshes.find(uri, where, collides, _submesh(solid))
             if found is None:
                 return None
             mesh = found

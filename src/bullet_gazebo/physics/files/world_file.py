@@ -14,12 +14,12 @@ from bullet_gazebo.physics.description import (
 )
 from bullet_gazebo.physics.files import elements
 from bullet_gazebo.physics.files.elements import named, numbers, read_plugin, shown, truth
+from bullet_gazebo.physics.files.own_models import own_models
 from bullet_gazebo.physics.files.reading import Reading, Resources
 from bullet_gazebo.physics.files.sdf import (
     FileContext,
     first_entity,
     open_include,
-    own_models,
     read_model,
     renamed,
     sdf_version,

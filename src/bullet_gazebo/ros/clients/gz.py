@@ -16,6 +16,17 @@ NODE = "gazebo"
 METHOD = "gazeboWorld"  # of the node's XML-RPC server; `world_services.WorldControl` answers it
 CHUNK = 1000  # steps in one call, so that an interrupted client stops soon
 TIMEOUT = 60.0  # [s] for one call
+INSTEAD = {  # of Gazebo's other tools
+    "camera": "gzclient's page follows a model that is chosen",
+    "joint": "rosservice call /gazebo/apply_joint_effort, or a controller of controller_manager",
+    "log": "rosbag record, or gzserver --video FILE",
+    "model": "rosrun gazebo_ros spawn_model; rosservice call /gazebo/get_model_state, "
+    "/gazebo/set_model_state and /gazebo/delete_model",
+    "physics": "rosservice call /gazebo/get_physics_properties and /gazebo/set_physics_properties",
+    "sdf": "rosrun gazebo_ros spawn_model, which reads URDF and SDF and says what is wrong",
+    "stats": "rosservice call /gazebo/get_world_properties; gzclient's page shows the real-time factor",
+    "topic": "rostopic list, and rostopic echo /gazebo/model_states",
+}
 
 
 class ControlFailed(Exception):
@@ -58,7 +69,11 @@ class RemoteWorld:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit code: 0, 1 if it failed, 2 for a wrong command line."""
-    options = _parse(rosgraph.myargv(sys.argv if argv is None else list(argv))[1:])
+    arguments = rosgraph.myargv(sys.argv if argv is None else list(argv))[1:]
+    if arguments and arguments[0] in INSTEAD:
+        print(f"gz: there is no 'gz {arguments[0]}': {INSTEAD[arguments[0]]}", file=sys.stderr)
+        return 2
+    options = _parse(arguments)
     node = rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(), options.node)
     try:
         _carry_out(RemoteWorld(node, rosgraph.get_master_uri()), options)

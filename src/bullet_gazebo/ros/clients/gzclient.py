@@ -19,7 +19,7 @@ from bullet_gazebo.ros.common.node_process import (
     one_at_a_time,
     wait_for_master,
 )
-from bullet_gazebo.ros.common.rospy_internals import stop_hearing_clock
+from bullet_gazebo.ros.common.rospy_internals import free_polls_at_once, stop_hearing_clock
 from ros_calls.master import NoAnswer, living_address
 from ros_calls.requirements import WINDOW, lack
 from web_viewer.address import PortInUse, add_flags, find_address
@@ -34,6 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     def work() -> int:
         become_node(command_line)
+        free_polls_at_once()  # topics are switched on and off
         stop_hearing_clock()  # the scene's messages carry the time at 30 Hz, /clock at thousands
         if options.ignored:
             rospy.logwarn("Arguments without effect here: %s", " ".join(options.ignored))

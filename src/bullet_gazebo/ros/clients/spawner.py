@@ -23,6 +23,7 @@ from std_msgs.msg import Bool
 from bullet_gazebo.ros.common.node_process import SignalHandler, init_node
 from file_access.content import FileError, read_file
 from file_access.yaml_text import load_parameters
+from ros_calls.absence import spawns
 from ros_calls.service import ServiceClient, ServiceFailed, ServiceGone
 from ros_calls.waiting import service_comes_up, wait_until
 
@@ -125,14 +126,20 @@ def _work(manager: ManagerClient, options: argparse.Namespace) -> int:
 def _find(manager: ManagerClient, timeout: float) -> str | None:
     """Waits for the manager; returns the service still missing at the time limit, or None.
 
-    While simulated time is zero, the simulator isn't ready yet, and the wait starts over.
+    While simulated time is zero, the simulator isn't ready yet, and the wait starts over; also where a model
+    is being spawned, or has been meanwhile.
     """
+    before = spawns()
     while missing := manager.wait(SERVICES, timeout):
-        if not rospy.get_param("/use_sim_time", False) or rospy.get_rostime():
+        now = spawns()
+        if now[:1] > [0] or now != before:
+            reason = "a model is being spawned"
+        elif rospy.get_param("/use_sim_time", False) and not rospy.get_rostime():
+            reason = "simulated time hasn't begun"
+        else:
             return missing
-        rospy.logwarn(
-            "Controller Spawner: still waiting for %s, as simulated time hasn't begun", missing
-        )
+        before = now
+        rospy.logwarn("Controller Spawner: still waiting for %s, as %s", missing, reason)
     return None
 
 

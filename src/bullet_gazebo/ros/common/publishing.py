@@ -17,7 +17,11 @@ from gazebo_msgs.msg import LinkStates, ModelStates
 from rosgraph_msgs.msg import Clock
 
 from bullet_gazebo.ros.common.messages import to_pose_msg, to_time, to_twist_msg
-from bullet_gazebo.ros.common.rospy_internals import set_time, stop_hearing_clock
+from bullet_gazebo.ros.common.rospy_internals import (
+    set_time,
+    stop_hearing_clock,
+    subscribers,
+)
 from bullet_gazebo.simulator import Simulator
 
 PERIOD = 0.001  # [s of wall time] between two messages of a thinned topic
@@ -33,15 +37,15 @@ class SubscriberCount(rospy.SubscribeListener):
         """Calls `changed` after each change, from a thread of rospy's."""
         super().__init__()
         self.size = 0
+        self._guard = threading.Lock()
         self._changed = changed
 
-    def peer_subscribe(self, *_: object) -> None:
-        self.size += 1
+    def peer_subscribe(self, topic_name: str, *_: object) -> None:
+        with self._guard:  # several may come and go at once, each in a thread of its own
+            self.size = len(subscribers(topic_name))
         self._changed()
 
-    def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
-        self.size = num_peers
-        self._changed()
+    peer_unsubscribe = peer_subscribe
 
 
 class ThinnedTopic:

@@ -83,12 +83,16 @@ def divert_messages(sink_of: Callable[[str], Sink | None]) -> None:
     """
     add_connection = _TopicImpl.add_connection
 
+    def divert(topic: _TopicImpl, connection: Any) -> None:
+        sink = sink_of(connection.endpoint_id) if isinstance(topic, _PublisherImpl) else None
+        if sink is not None:
+            connection.write_data = partial(sink, topic.resolved_name)
+
     def diverting(topic: _TopicImpl, connection: Any) -> bool:
-        if isinstance(topic, _PublisherImpl):
-            sink = sink_of(connection.endpoint_id)
-            if sink is not None:
-                connection.write_data = partial(sink, topic.resolved_name)
-        return bool(add_connection(topic, connection))
+        divert(topic, connection)
+        added = bool(add_connection(topic, connection))
+        divert(topic, connection)  # the sink may have come meanwhile: see `divert_connections`
+        return added
 
     add = _PublisherImpl.add_connection
 
@@ -157,6 +161,12 @@ def is_connected(topic: str, node: str, publishes: bool) -> bool | None:
         )
     subscription = _topics().get_subscriber_impl(topic)
     return subscription and any(each.callerid_pub == node for each in subscription.connections)
+
+
+def subscribers(topic: str) -> list[str]:
+    """Returns the nodes that subscribe to a topic of this process, given its resolved name."""
+    publication = _topics().get_publisher_impl(topic)
+    return [each.endpoint_id for each in publication.connections] if publication else []
 
 
 def on_topics_changed(call: Callable[[], None]) -> None:

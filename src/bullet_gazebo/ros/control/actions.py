@@ -50,7 +50,8 @@ class ControllerAction(ABC):
             self._name, self.action, self._pursue, self._cancel, self._clock
         )
         self._server.start()
-        sim.outboxes.append(self)
+        with sim.lock:  # a tick looks through them
+            sim.outboxes.append(self)
         self._thread = threading.Thread(target=self._deliver, name=self._name, daemon=True)
         self._thread.start()
 
@@ -76,7 +77,8 @@ class ControllerAction(ABC):
 
     def shutdown(self) -> None:
         """Publishes the last results, and closes the action; the controller was stopped before."""
-        self._sim.outboxes.remove(self)
+        with self._sim.lock:
+            self._sim.outboxes.remove(self)
         with self._news:
             self._closing = True
             self._news.notify()

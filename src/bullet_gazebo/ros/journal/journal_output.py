@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.pictures.recording import RecordingError
 from bullet_gazebo.ros.common.messages import to_time
-from bullet_gazebo.ros.common.rospy_internals import wait_until_sent
+from bullet_gazebo.ros.common.rospy_internals import subscribers, wait_until_sent
 from bullet_gazebo.ros.journal.journal import WorldJournal
 
 # [s of wall time] between two messages. `rosbag record` keeps 100 of a topic while it is busy: it has 10 s.
@@ -46,6 +46,7 @@ class JournalOutput(rospy.SubscribeListener):
         self._news = threading.Condition()
         self._fresh: Entries = []
         self._newcomers: list[tuple[Publish, Entries]] = []
+        self._one_at_a_time = threading.Lock()  # for those who come and go
         self._ending = self._bag_ends = False
         if self._bag:
             journal.listen(self._take)
@@ -58,7 +59,8 @@ class JournalOutput(rospy.SubscribeListener):
 
     def peer_subscribe(self, _name: str, _all: object, publish: Publish) -> None:
         """Lets a new subscriber have what was before; what comes twice has the same number."""
-        before = self._journal.listen(self._take)
+        with self._one_at_a_time:
+            before = self._journal.listen(self._take)
         if before is None:
             before = [JournalEntry(kind=JournalEntry.GONE)]
             rospy.logwarn(
@@ -68,10 +70,11 @@ class JournalOutput(rospy.SubscribeListener):
             self._newcomers.append((publish, before))
             self._news.notify_all()
 
-    def peer_unsubscribe(self, _name: str, left: int) -> None:
+    def peer_unsubscribe(self, name: str, _left: int) -> None:
         """Ends the work without subscribers."""
-        if not left and not self._bag:
-            self._journal.unlisten(self._take)
+        with self._one_at_a_time:
+            if not subscribers(name) and not self._bag:
+                self._journal.unlisten(self._take)
 
     def _take(self, entries: Entries) -> None:
         with self._news:

@@ -1,6 +1,8 @@
 """The journal in a bag: its entries, in order, and how one differs from another."""
 
 import json
+import os
+import xmlrpc.client
 from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -9,8 +11,15 @@ from typing import Any
 from bullet_gazebo_msgs.msg import Journal, JournalEntry
 from gazebo_msgs.srv import SpawnModel
 
+from bullet_gazebo.control.controllers import BUILT_IN
+from file_access.content import open_file
+from file_access.limited import LimitedProcess, Limits, RequestRefused
 from file_access.text import did_you_mean
 
+LIMITS = Limits(processor_time=600, wall_time=600.0, memory=8 << 30, output=2 << 30)
+LENGTH = 8  # [bytes] of a message's length
+REFUSED = b"!"  # before a reason, in place of messages
+VERSION = b"#ROSBAG V2.0\n"
 MOTION = [
     *(f"position {axis}" for axis in "xyz"),
     *(f"orientation {axis}" for axis in "xyzw"),
@@ -35,11 +44,9 @@ class RecordedJournal:
         self._path = path
         # Behind the count of entries stands the number of the first one.
         self._messages = sorted(_read(path), key=lambda data: int.from_bytes(data[4:12], "little"))
-        if not self._messages:
-            raise NoRecording(
-                f"{path}: no journal is in this bag: record the topic /gazebo/journal of a world in lock-step"
-            )
         self.start = next(self.entries())
+        if self.start.kind != JournalEntry.START:
+            raise NoRecording(f"{path}: damaged: it doesn't begin with the simulator's start")
         self.facts: dict[str, Any] = json.loads(self.start.data)  # of the simulator's start
 
     def entries(self) -> Iterator[JournalEntry]:
@@ -56,6 +63,16 @@ class RecordedJournal:
                 if entry.number == expected:
                     expected += 1
                     yield entry
+
+    def foreign_code(self) -> list[str]:
+        """Returns users' plugins and controllers that the recorded parameters would have imported."""
+        found = {
+            name
+            for entry in self.entries()
+            for place, value in json.loads(entry.parameters or "{}").items()
+            for name in _imported(place.split("/"), *value)
+        }
+        return sorted(found)
 
     def check_changes(self, models: Iterable[str], parameters: Iterable[Mapping[str, Any]]) -> None:
         """Checks that changes change something: a misspelt name would leave all as it was.
@@ -83,6 +100,19 @@ class RecordedJournal:
                 raise NoRecording(f"{self._path}: nothing has read the parameter {first}{near}")
 
 
+def _imported(path: list[str], value: object = None) -> Iterator[str]:
+    """Returns what a parameter, or one in it, would have the simulator import."""
+    if isinstance(value, dict):
+        for name, part in value.items():
+            yield from _imported([*path, *name.split("/")], part)
+        return
+    place = [each for each in path if each]
+    is_controller = place[-1:] == ["type"] and isinstance(value, str) and "/" in value
+    is_plugin = place[:2] == ["gazebo", "plugins"] and value is not None
+    if is_plugin or (is_controller and value not in BUILT_IN):
+        yield str(value)
+
+
 def _overlap(name: str, other: str) -> bool:
     """Returns whether one of two parameters is the other one, or in it."""
     name, other = f"{name.rstrip('/')}/", f"{other.rstrip('/')}/"
@@ -96,22 +126,77 @@ def _missing(expected: int) -> str:
 
 
 def _read(path: Path) -> list[bytes]:
-    import rosbag  # slow
+    """Returns a bag's messages, each checked.
 
+    Raises:
+        NoRecording: if it isn't a bag that can be replayed.
+    """
+    process = LimitedProcess(f"{__name__}:read_journal", LIMITS)
     try:
-        with rosbag.Bag(str(path)) as bag:
-            types, topics = bag.get_type_and_topic_info()
-            if types.get(Journal._type, Journal._md5sum) != Journal._md5sum:
-                raise NoRecording(f"{path}: recorded by another version of cartpole")
-            ours = [name for name, topic in topics.items() if topic.msg_type == Journal._type]
-            found = bag.read_messages(ours, raw=True) if ours else ()
-            return [data for _, (_, data, *_), _ in found]
-    except rosbag.ROSBagUnindexedException as fault:
-        raise NoRecording(f"{path}: not closed properly; try: rosbag reindex {path}") from fault
-    except rosbag.ROSBagException as fault:
-        raise NoRecording(f"{path}: no bag, or damaged: {fault}") from fault
+        open_file(path).close()
+        answer = memoryview(process.ask(os.fsencode(path)))
     except OSError as fault:
         raise NoRecording(f"{path}: {fault.strerror or fault}") from fault
+    except (RequestRefused, ValueError) as fault:
+        raise NoRecording(f"{path}: no bag, or damaged: {fault}") from fault
+    finally:
+        process.close()
+    if answer[:1] == REFUSED:
+        raise NoRecording(f"{path}: {bytes(answer[1:]).decode(errors='replace')}")
+    messages, position = [], 1
+    while position < len(answer):
+        end = position + LENGTH + int.from_bytes(answer[position : position + LENGTH], "little")
+        messages.append(bytes(answer[position + LENGTH : end]))
+        position = end
+    return messages
+
+
+def read_journal(request: bytes) -> bytes:
+    """Answers `_read` in a limited process: over a damaged bag rosbag may do anything."""
+    try:
+        messages = _messages(os.fsdecode(request))
+    except NoRecording as fault:
+        return REFUSED + str(fault).encode(errors="replace")
+    return b" " + b"".join(len(data).to_bytes(LENGTH, "little") + data for data in messages)
+
+
+def _messages(path: str) -> list[bytes]:
+    import rosbag.bag  # slow
+
+    # rosbag would make Python of the definition that stands in the bag, and run it.
+    rosbag.bag._message_types = {Journal._md5sum: Journal}
+    with open(path, "rb") as file:
+        if file.read(len(VERSION)) != VERSION:
+            raise NoRecording("no bag, or damaged: it doesn't begin as one")
+    try:
+        with rosbag.Bag(path) as bag:
+            ours = [each for each in bag._get_connections() if each.datatype == Journal._type]
+            if any(each.md5sum != Journal._md5sum for each in ours):
+                raise NoRecording("recorded by another version of cartpole")
+            topics = [each.topic for each in ours]
+            found = (
+                bag.read_messages(topics, raw=True, connection_filter=_is_journal) if ours else ()
+            )
+            messages = [data for _, (_, data, *_), _ in found]
+    except rosbag.ROSBagUnindexedException as fault:
+        raise NoRecording(f"not closed properly; try: rosbag reindex {path}") from fault
+    if not messages:
+        raise NoRecording(
+            "no journal is in this bag: record the topic /gazebo/journal of a world in lock-step"
+        )
+    for data in messages:
+        for entry in Journal().deserialize(data).entries:
+            values = json.loads(entry.parameters or "{}")
+            xmlrpc.client.loads(xmlrpc.client.dumps((values,)))  # as the master will get them
+            if any(name[:1] != "/" or type(value) is not list for name, value in values.items()):
+                raise ValueError(f"parameters of entry {entry.number}")
+            if not entry.number and entry.kind == JournalEntry.START:
+                json.loads(entry.data)
+    return messages
+
+
+def _is_journal(_topic: str, kind: str, md5sum: str, *_: object) -> bool:
+    return (kind, md5sum) == (Journal._type, Journal._md5sum)
 
 
 def first_difference(recorded: JournalEntry, now: JournalEntry, refusal: str) -> str:

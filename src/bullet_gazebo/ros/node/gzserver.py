@@ -66,6 +66,8 @@ from bullet_gazebo.ros.services.step_service import StepService
 from bullet_gazebo.ros.services.world_services import WorldControl, advertise_world_services
 from bullet_gazebo.simulator import Simulator
 from ros_calls import master
+from ros_calls.absence import SPAWNS
+from ros_calls.service import WORK
 
 NAME = "gazebo"
 EMPTY_WORLD = "empty.world"
@@ -169,6 +171,7 @@ class GazeboNode:
         journal = self.journal if network else None  # without services there is nothing to record
         self.control = WorldControl(self.sim, self._watchdog, shown, journal)
         answer_xmlrpc(METHOD, self.control.answer)
+        answer_xmlrpc(WORK, self._watchdog.work)
         free_polls_at_once()
         bound_messages()
         bound_calls()
@@ -202,9 +205,11 @@ class GazeboNode:
             self.journal.start(facts_of(args, steps.series))
         spawning = threading.Lock()
         with spawning:  # once a model is there, clients use all other services without a wait
+            spawner = SpawnServices(self.sim, plugins, spawning)
+            answer_xmlrpc(SPAWNS, spawner.count)
             self._services = [
                 *stepping,
-                SpawnServices(self.sim, plugins, spawning),
+                spawner,
                 *advertise_world_services(self.sim),
             ]
 

@@ -1,13 +1,16 @@
 """Repeats a recorded run in this process's simulator, entry by entry, and compares (docs/replay.md)."""
 
 import json
+import re
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, wait
 from types import SimpleNamespace
 from typing import Any
 
+import genpy
 import rosparam
+import rospkg
 import rospy
 from bullet_gazebo_msgs.msg import JournalEntry
 from gazebo_msgs.srv import SpawnModel
@@ -19,6 +22,8 @@ from bullet_gazebo.ros.services.advance_service import reseed
 from bullet_gazebo.ros.services.step_requests import SLICE
 from bullet_gazebo.simulator import NANOSECONDS
 
+PACKAGES = re.compile(r"package://(\w+)/")
+LONGEST = 20  # digits of a command's number
 PATIENCE = 60.0  # [s of wall time] for an entry during which no time passes
 
 
@@ -91,7 +96,7 @@ class Replay:
         keeps it from holding up the caller.
 
         Raises:
-            NoRecording: entries are missing in the bag.
+            NoRecording: entries are missing in the bag, or one is damaged.
         """
         outcome: Future[None] = Future()
 
@@ -163,7 +168,7 @@ class Replay:
         elif entry.kind == JournalEntry.MESSAGE:
             self._deliver(entry)
         else:
-            self._command(entry.name, int(entry.data))
+            self._command(entry)
 
     def _call(self, entry: JournalEntry) -> None:
         service = get_service_manager().get_service(entry.name)
@@ -171,7 +176,7 @@ class Replay:
         if kind is None or kind._md5sum != entry.md5sum:
             self._differ(entry, f"there is no service {entry.name} of type {entry.type}")
             return
-        request = service.protocol.recv_data_class().deserialize(entry.data)
+        request = _received(service.protocol.recv_data_class(), entry)
         request._connection_header = {"callerid": entry.caller}
         self._changes.set_parameters(entry, request)
         if entry.type == SpawnModel._type:
@@ -193,7 +198,7 @@ class Replay:
         publisher = SimpleNamespace(callerid_pub=entry.caller, header=header, stat_bytes=0)
         before = subscription.connections
         subscription.connections = [publisher] * entry.publishers  # controllers count them
-        message = subscription.data_class().deserialize(entry.data)
+        message = _received(subscription.data_class(), entry)
         message._connection_header = header
         subscription.receive_callback([message], publisher)
         subscription.connections = before
@@ -201,7 +206,11 @@ class Replay:
     def _differ(self, entry: JournalEntry, text: str) -> None:
         self.difference = self.difference or f"at {entry.elapsed / NANOSECONDS:g} s {text}"
 
-    def _command(self, name: str, count: int) -> None:
+    def _command(self, entry: JournalEntry) -> None:
+        name, number = entry.name, entry.data
+        if not number.isdigit() or len(number) > LONGEST:
+            raise _damaged(entry, f"{name} of {number!r}")
+        count = int(number)
         if name == "advance":
             with self._journal.command(name, count):
                 self._advance(count)
@@ -233,5 +242,30 @@ class Replay:
                 continue
             refusal = self._refusals.pop(entry.number, "")
             self.difference = first_difference(recorded, entry, refusal)
+            if self.difference and recorded.type == SpawnModel._type:
+                _require_packages(recorded)
             self.unknown += not recorded.observed and self.unknown == self.repeated
             self.repeated += not self.difference
+
+
+def _received(message: genpy.Message, entry: JournalEntry) -> Any:
+    """Returns the message that an entry holds."""
+    try:
+        return message.deserialize(entry.data)
+    except genpy.DeserializationError as fault:
+        raise _damaged(entry, str(fault)) from fault
+
+
+def _require_packages(spawn: JournalEntry) -> None:
+    """Raises NoRecording if a package that a spawned model names isn't found here."""
+    for name in sorted(set(PACKAGES.findall(spawn.data.decode(errors="replace")))):
+        try:
+            rospkg.RosPack().get_path(name)
+        except rospkg.ResourceNotFound as fault:
+            raise NoRecording(
+                f"package {name} isn't found: ./ws --with names its folder"
+            ) from fault
+
+
+def _damaged(entry: JournalEntry, fault: str) -> NoRecording:
+    return NoRecording(f"entry {entry.number} is damaged: {fault}")

@@ -18,8 +18,9 @@ from rosmaster.master import Master
 from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal
 from bullet_gazebo.ros.node import gzserver
 from bullet_gazebo.ros.node.replay import Changes, Replay
-from bullet_gazebo.ros.node.start import HASHES, arguments_of
+from bullet_gazebo.ros.node.start import HASHES, arguments_of, check_facts
 from file_access.expansion import CannotExpand, expand
+from file_access.text import one_line
 
 UNUSABLE = 2
 LOOPBACK = "127.0.0.1"
@@ -34,6 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = parse_args(argv)
     try:
         recorded = RecordedJournal(args.bag)
+        _check(recorded, args.bag, args.trust)
         models = {name: expand(path) for name, path in args.model}
         parameters = [
             each for name, path in args.params for each in rosparam.load_file(str(path), name)
@@ -75,6 +77,11 @@ def parse_args(argv: Sequence[str] | None = None) -> argparse.Namespace:
         help="stop after the request with which that much simulated time has passed since the start",
     )
     parser.add_argument(
+        "--trust",
+        action="store_true",
+        help="import the plugins and controllers that the bag names, beside those that come along",
+    )
+    parser.add_argument(
         "--gui", action="store_true", help="open the simulator's page where the replay stops"
     )
     for flag, what, text in (
@@ -114,8 +121,19 @@ def _replay(
         return code
 
     # Warnings have been seen when the run was recorded.
-    logging.getLogger("rosout").addFilter(lambda log: log.levelno >= logging.ERROR)
+    logging.disable(logging.WARNING)
     return gzserver.main(["gzserver", *arguments_of(recorded.facts, folder)], work)
+
+
+def _check(recorded: RecordedJournal, bag: Path, trust: bool) -> None:
+    """Raises NoRecording if facts are wrong, or if foreign code would be imported and isn't trusted."""
+    try:
+        check_facts(recorded.facts)
+    except ValueError as fault:
+        raise NoRecording(f"{bag}: damaged: {fault}") from fault
+    code = [] if trust else recorded.foreign_code()
+    if code:
+        raise NoRecording(f"{bag} would import {', '.join(code)}; if you trust it, add --trust")
 
 
 def _named(values: dict[str, Any], namespace: str) -> dict[str, Any]:
@@ -139,7 +157,7 @@ def _judge(bag: Path, replay: Replay, until: float) -> int:
 
 
 def _tell(text: str, code: int) -> int:
-    print(f"replay.py: {text}", file=sys.stderr, flush=True)
+    print(f"replay.py: {one_line(text)}", file=sys.stderr, flush=True)
     return code
 
 

@@ -15,15 +15,17 @@ from trajectory_msgs.msg import JointTrajectory
 
 from bullet_gazebo.drives.odometry import Period
 from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, rotate, scale, subtract
 from bullet_gazebo.ros.common.dynamic_server import DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import bad_number, from_transform, to_transform, to_vector
-from bullet_gazebo.ros.plugins.drive_topics import advertised
+from bullet_gazebo.ros.plugins.drive_topics import REPEAT, advertised
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, namespace_of, subscribe, topic_in
 
 WORLDS = ("", "world", "map")
+MOST_FRAMES = 10_000  # of tf that are kept
 SLIPS = [
     Parameter(f"slip_compliance_unitless_{way}", "double", 0.0, 0.0, 20.0)
     for way in ("lateral", "longitudinal")
@@ -76,6 +78,12 @@ class HandOfGodPlugin(SensorPlugin):
                     parent, child = (
                         name.lstrip("/") for name in (each.header.frame_id, each.child_frame_id)
                     )
+                    if child not in self._frames and len(self._frames) == MOST_FRAMES:
+                        rospy.logerr_throttle(
+                            REPEAT, f"hand_of_god: tf has more than {MOST_FRAMES} frames: "
+                            f"'{shown(child)}' is ignored",
+                        )  # fmt: skip
+                        continue
                     self._frames[child] = parent, from_transform(each.transform)
 
     def _target(self) -> Pose | None:

@@ -15,19 +15,20 @@ from bullet_gazebo.sensors.laser import Scan
 
 
 class BlockLaserPlugin(SensorPlugin):
-    """Publishes all rays' points and intensities; those out of range are infinite."""
+    """Publishes all rays' points and intensities; a ray that meets nothing ends at the largest range."""
 
     def __init__(self, context: PluginContext) -> None:
         self._topic = LaserTopic(context, PointCloud, self._message, "/world", empty="/")
         self._deviation = context.deviation()
 
     def _message(self, scan: Scan, now: int, random: np.random.Generator) -> PointCloud:
-        ranges, intensities = scan.ranges.ravel(), scan.intensities.ravel()
+        furthest = self._topic.laser.high
+        ranges, intensities = np.minimum(scan.ranges, furthest).ravel(), scan.intensities.ravel()
         with np.errstate(invalid="ignore"):  # inf * 0
             points = ranges[:, None] * self._topic.laser.directions.reshape(-1, 3)
         if self._deviation:
             draws = random.normal(0.0, self._deviation, (len(ranges), 4))
-            draws[~np.isfinite(ranges)] = 0.0
+            draws[~np.isfinite(ranges) | (ranges == furthest)] = 0.0
             points, intensities = points + draws[:, :3], intensities + draws[:, 3]
         return PointCloud(
             header=Header(stamp=to_time(now), frame_id=self._topic.frame),

@@ -159,7 +159,8 @@ class DrivePlugin(SensorPlugin):
     def _receive(self, message: Twist) -> None:
         fault = bad_number(message)
         if fault:
-            rospy.logerr_throttle(REPEAT, f"Model '{self.model.name}': cmd_vel is ignored: {fault}")
+            text = f"Model '{self.model.name}': cmd_vel is ignored: {fault}"
+            rospy.logerr_throttle(REPEAT, text, logger_name=self.model.name)
             return
         with self.sim.lock:
             self.take((message.linear.x, message.linear.y, message.angular.z))

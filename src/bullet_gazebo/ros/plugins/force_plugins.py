@@ -46,7 +46,8 @@ class ForcePlugin(SensorPlugin):
         self._topic = SensorTopic(context, full, WrenchStamped, rate, self._measure, at_once=False)
 
     def _look(self, now: int) -> None:
-        self._meter.look(now, self._context.sensing.schedule.moves)
+        moves, _ = self._context.sensing.schedule.last_move(self._context.model)
+        self._meter.look(now, moves)
 
     def _forces(self) -> Forces | None:
         raise NotImplementedError
@@ -54,7 +55,7 @@ class ForcePlugin(SensorPlugin):
     def _measure(self, now: int) -> WrenchStamped | None:
         found = self._forces()
         if found is None:
-            if now != self._context.sensing.schedule.moved_at:
+            if now != self._context.sensing.schedule.last_move(self._context.model).at:
                 return None
             found = (ZERO, ZERO)
         values = [*found[0], *found[1]]

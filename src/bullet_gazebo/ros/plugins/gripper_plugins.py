@@ -64,7 +64,6 @@ class LinkAttacher:
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
-        self._attached: dict[tuple[str, ...], Attachment] = {}
         self._services = [
             rospy.Service("/link_attacher_node/attach", Attach, self._attach),
             rospy.Service("/link_attacher_node/detach", Attach, self._detach),
@@ -78,7 +77,7 @@ class LinkAttacher:
                 rospy.logerr("attach: there are no two links '%s::%s' and '%s::%s'", *key)
                 return AttachResponse(ok=False)
             self._release(key)
-            self._attached[key] = self._sim.world.attach(first, second)
+            self._sim.world.attach(first, second)
         return AttachResponse(ok=True)
 
     def _detach(self, request: AttachRequest) -> AttachResponse:
@@ -87,15 +86,20 @@ class LinkAttacher:
         return AttachResponse(ok=released)
 
     def _release(self, key: tuple[str, ...]) -> bool:
-        attachment = self._attached.pop(key, None)
-        if attachment not in self._sim.world.attachments:
-            return False
-        self._sim.world.detach(attachment)
-        return True
+        """Ends what joins these links; the world forgets what a deletion or a reset ends."""
+        found = [each for each in self._sim.world.attachments if _ends(each) == key]
+        for attachment in found:
+            self._sim.world.detach(attachment)
+        return bool(found)
 
     def _link(self, model: str, link: str) -> tuple[Model, str] | None:
         found = self._sim.world.models.get(model)
         return (found, link) if found is not None and link in found.link_names else None
+
+
+def _ends(attachment: Attachment) -> tuple[str, ...]:
+    (first, link), (second, its) = attachment.first, attachment.second
+    return first.name, link, second.name, its
 
 
 def _names(request: AttachRequest) -> tuple[str, ...]:
@@ -148,7 +152,13 @@ class VacuumPlugin(SensorPlugin):
         topic = topic_in(namespace, context.required("topicName"))
         SensorTopic(context, topic, Bool, 0.0, self._held)
         for name, act in (("on", self._turn_on), ("off", self._turn_off)):
-            service = rospy.Service(topic_in(namespace, name), Empty, act)
+            place = topic_in(namespace, name)
+            try:
+                service = rospy.Service(place, Empty, act)
+            except rospy.service.ServiceException as error:
+                raise DescriptionError(
+                    f"there is a service {place} already: give each gripper a <robotNamespace>"
+                ) from error
             context.closing(service.shutdown)
         context.on_update(self._suction.update)
         context.closing(self._let_go)

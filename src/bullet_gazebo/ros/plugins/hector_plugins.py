@@ -172,7 +172,8 @@ class HectorImuPlugin(SensorPlugin):
         return wanted
 
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
-        sim, moves = self._context.sim, self._context.sensing.schedule.moves
+        sim, model = self._context.sim, self._context.model
+        moves, _ = self._context.sensing.schedule.last_move(model)
         sample = self._imu.measure(now, moves, motion, sim.world.gravity)
         if sample is None:
             return

@@ -83,7 +83,7 @@ class PluginContext(Mount):
                 self.sensing.schedule.fail(clock)
 
         clock = self.sensing.schedule.add(
-            rate, guarded, lambda: self._is_made.is_set() and listens(), at_once
+            self.model, rate, guarded, lambda: self._is_made.is_set() and listens(), at_once
         )
         self._clocks.append(clock)
         return clock
@@ -143,22 +143,24 @@ class PluginContext(Mount):
             self.sim.listeners = [*self.sim.listeners, guarded]
 
     def on_move(self, moved: Callable[[], None]) -> None:
-        """Calls `moved`, as `on_update` its update, after a service has moved bodies or reset time."""
+        """Calls `moved`, as `on_update` its update, when a service has moved the model, or what is attached
+        to it, or reset world or time.
+        """
 
         def guarded() -> None:
             try:
                 moved()
             except BaseException:  # noqa: BLE001 - a user's code must not stop the world
                 self.report("is not told of moves any more, because it raised")
-                self._forget(guarded)
+                self.sim.moves.forget(listener)
+
+        def close() -> None:
+            with self.sim.lock:
+                self.sim.moves.forget(listener)
 
         with self.sim.lock:
-            self.sim.moved = [*self.sim.moved, guarded]
-        self.closing(partial(self._forget, guarded))
-
-    def _forget(self, moved: Callable[[], None]) -> None:
-        with self.sim.lock:
-            self.sim.moved = [each for each in self.sim.moved if each is not moved]
+            listener = self.sim.moves.on_move_of(self.model, guarded)
+        self.closing(close)
 
     def release(self) -> None:
         """Ends the updates and clocks, and closes what was opened."""

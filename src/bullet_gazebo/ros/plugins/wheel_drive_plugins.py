@@ -42,7 +42,8 @@ class DiffDrivePlugin(WheeledPlugin):
         self.measure_by(self._separation, [(each, each.child) for each in self._joints])
         level = LEVELS.get(context.text("rosDebugLevel", "").lower())
         if level is not None:
-            logging.getLogger("rosout").setLevel(level)
+            # rospy's own debug lines are in the log that all share.
+            logging.getLogger(f"rosout.{self.model.name}").setLevel(level)
         published = truth(context.text("publishTf", "true"))
         self.begin(odometry=published, tf=published and choice(context, "publishOdomTF", True))
 

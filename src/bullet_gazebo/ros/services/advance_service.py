@@ -20,6 +20,7 @@ from bullet_gazebo.ros.common.rospy_internals import (
     is_connected,
     on_topics_changed,
     publish_without_yielding,
+    subscribers,
 )
 from bullet_gazebo.ros.journal.journal import WorldJournal
 from bullet_gazebo.ros.services.step_requests import MAX_TICKS, SLICE
@@ -70,6 +71,8 @@ class Mailboxes:
 
     def __init__(self) -> None:
         self.changes = 0  # of the topics that this process publishes or subscribes to
+        self._guard = threading.Lock()
+        # Replaced, never changed: ticks and other nodes' handlers iterate it when a node comes.
         self._boxes: dict[str, Mailbox] = {}
         divert_messages(self._sink)
         publish_without_yielding()
@@ -77,10 +80,12 @@ class Mailboxes:
 
     def of(self, node: str) -> Mailbox:
         """Returns the mailbox of a node; its messages go there from the first call on."""
-        box = self._boxes.get(node)
-        if box is None:
-            box = self._boxes[node] = Mailbox()
-            divert_connections(node, box.put)
+        with self._guard:
+            box = self._boxes.get(node)
+            if box is None:
+                box = Mailbox()
+                self._boxes = {**self._boxes, node: box}
+                divert_connections(node, box.put)
         return box
 
     @property
@@ -94,7 +99,7 @@ class Mailboxes:
 
     def any_hears(self, topic: str) -> bool:
         """Whether one of the nodes is connected to a topic that this process publishes."""
-        return any(is_connected(topic, node, publishes=True) for node in self._boxes)
+        return not self._boxes.keys().isdisjoint(subscribers(topic))
 
     def connect(
         self, node: str, subscriptions: Sequence[str], publications: Sequence[str]

@@ -14,6 +14,7 @@ from bullet_gazebo.ros.common.messages import to_vector
 from bullet_gazebo.ros.services import ServiceRefused, check_message, offer
 from bullet_gazebo.simulator import Simulator
 
+BEYOND = 0.01  # [rad, m] of a stop, as a moving joint may be
 INFINITE = 1.7e308  # ODE's users write 1e16 and beyond for a joint without stops
 
 
@@ -73,7 +74,15 @@ class JointServices:
             if not all(math.isfinite(position) for position in positions):
                 raise ServiceRefused(f"joint positions must be finite, not {list(positions)}")
             plain = [name.removeprefix(f"{model.name}::") for name in names]
-            self._sim.set_joint_positions(model, dict(zip(plain, positions, strict=True)))
+            wanted = dict(zip(plain, positions, strict=True))
+            self._sim.set_joint_positions(model, wanted)
+            for name in wanted.keys() & set(model.joint_names):
+                stop = model.clamped(name, wanted[name])
+                if abs(stop - wanted[name]) > BEYOND:
+                    rospy.logwarn(
+                        "SetModelConfiguration: joint '%s' of '%s' can't be at %g: it is at its stop, %g",
+                        name, model.name, wanted[name], stop,
+                    )  # fmt: skip
         unknown = sorted(set(plain) - set(model.joint_names))
         if unknown:  # Gazebo ignores them silently
             names = shown(", ".join(unknown))

@@ -53,6 +53,7 @@ RESOURCES = "GAZEBO_RESOURCE_PATH"
 MODELS = "GAZEBO_MODEL_PATH"
 EXPORT = "gazebo_model_path"
 HOME_MODELS = "~/.gazebo/models"
+Spawn = Callable[[srv.SpawnModelRequest], srv.SpawnModelResponse]
 
 
 class SpawnServices:
@@ -67,11 +68,34 @@ class SpawnServices:
         # Spawning and deleting take several steps, with plugins between them: one at a time, as Gazebo
         # serialises all its services (docs/contract/gazebo.md 1.1).
         self._one_at_a_time = one_at_a_time
+        self._counting = threading.Lock()
+        self._under_way = self._spawned = 0
         self._services = [
-            rospy.Service("~spawn_urdf_model", srv.SpawnModel, self._spawn_urdf),
-            rospy.Service("~spawn_sdf_model", srv.SpawnModel, self._spawn_sdf),
+            rospy.Service("~spawn_urdf_model", srv.SpawnModel, self._counted(self._spawn_urdf)),
+            rospy.Service("~spawn_sdf_model", srv.SpawnModel, self._counted(self._spawn_sdf)),
             offer("~delete_model", srv.DeleteModel, self._delete),
         ]
+
+    def count(self, *_: object) -> tuple[int, str, list[int]]:
+        """Answers by XML-RPC how many models are being spawned, and how many have been."""
+        with self._counting:
+            return 1, "", [self._under_way, self._spawned]
+
+    def _counted(self, spawn: Spawn) -> Spawn:
+        def handle(request: srv.SpawnModelRequest) -> srv.SpawnModelResponse:
+            done = False
+            with self._counting:
+                self._under_way += 1
+            try:
+                answer = spawn(request)
+                done = answer.success
+                return answer
+            finally:
+                with self._counting:
+                    self._under_way -= 1
+                    self._spawned += done
+
+        return handle
 
     def _spawn_sdf(self, request: srv.SpawnModelRequest) -> srv.SpawnModelResponse:
         return self._spawn(request, request.model_xml)

@@ -30,6 +30,8 @@ from file_access.text import did_you_mean
 
 MAX_TICKS = 1_000_000  # more than this is a mistake and would take minutes
 SLICE = 500  # ticks between which other services get their turn
+MOST_NAMES = 10_000  # that a request asks about in one list: each takes time in each step
+NAMES = ("link_states_of", "model_states_of", "contacts_of", "sensors")
 COMMANDS = (("command", "Float64"), ("command", "Float64MultiArray"), ("cmd_vel", "Twist"))
 COUNTS: dict[str | type, int] = {"Float64": 1, "Twist": 3}  # of others one for each joint
 Placing = tuple[dict[str, float], dict[str, float]]
@@ -231,6 +233,10 @@ class StepPlan:
 def query_of(request: StepWorldRequest | PrepareStepRequest) -> StateQuery:
     """Returns what a request asks for besides the joints."""
     links, frames = request.link_states_of, request.link_frames
+    for what in NAMES:
+        count = len(getattr(request, what, ()))
+        if count > MOST_NAMES:
+            raise ControlError(f"{what} has {count} names; up to {MOST_NAMES} are answered")
     if frames and len(links) != len(frames):
         raise ControlError(f"{len(links)} link_states_of but {len(frames)} link_frames")
     query = StateQuery(

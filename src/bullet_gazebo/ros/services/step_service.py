@@ -64,11 +64,12 @@ class _Prepared:
     def __init__(
         self, sim: Simulator, sensing: Sensing, addresses: Addresses, request: PrepareStepRequest
     ) -> None:
+        query = query_of(request)
         for name in request.sensors:
             find_sensor(sim, sensing, name)
         self.addresses = addresses
         self.commanded = addresses.commanded(request.controllers, request.commanded_joints)
-        self.reader = StateReader(sim.world, query_of(request))
+        self.reader = StateReader(sim.world, query)
         self.models = list(self.reader.read(stepped=False).models)
         self.sensors = tuple(request.sensors)
 
@@ -78,9 +79,13 @@ class _Prepared:
         if not 0 <= request.ticks <= MAX_TICKS:
             raise ControlError(f"ticks is {request.ticks}: it is 0 to {MAX_TICKS}")
         if commanded.size + len(commanded.joints) != len(commands):
+            wanted = [
+                f"'{each.name}' takes {1 if isinstance(at, int) else at.stop - at.start}"
+                for each, (_, at) in zip(commanded.controllers, commanded.ports, strict=True)
+            ]
+            wanted += [f"joint '{each.name}' takes 1" for each in commanded.joints]
             raise ControlError(
-                f"{len(commands)} commands where {len(commanded.controllers)} controllers take "
-                f"{commanded.size} and {len(commanded.joints)} joints one each"
+                f"{len(commands)} commands where {', '.join(wanted) or 'none is taken'}"
             )
         check_numbers("commands", commands)
 
@@ -269,7 +274,7 @@ class StepService:
         sim = self._sim
         if request.reset != StepWorldRequest.NONE or plan.placed_models or plan.placed_joints:
             self._knows_contacts = False
-            with sim.one_move():
+            with sim.moves.as_one():
                 self._place(request, plan)
         plan.commanded.send(list(request.commands))
         plan.commanded.hold(request.joint_commands)

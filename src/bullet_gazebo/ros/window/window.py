@@ -189,9 +189,13 @@ class Window:
         if client is None:
             return
         camera = client.camera
-        picture = client.get_render(
-            camera.image_height, camera.image_width, transport_format="png", timeout=RENDERING
-        )
+        try:
+            picture = client.get_render(
+                camera.image_height, camera.image_width, transport_format="png", timeout=RENDERING
+            )
+        except (TimeoutError, RuntimeError) as fault:  # the page has gone, or hangs
+            rospy.logwarn("The window: no screenshot: %s", fault)
+            return
         seen, content = Image.fromarray(picture), io.BytesIO()
         paper = Image.new("RGBA", seen.size, "white")  # the background is transparent
         Image.alpha_composite(paper, seen).convert("RGB").save(content, "PNG")

@@ -141,7 +141,6 @@ def _model_in(
     if isinstance(arguments.get("train_freq"), list):  # a number and a unit
         arguments["train_freq"] = tuple(arguments["train_freq"])
     try:
-        torch.empty(0, device=run.device)  # where there is none, the model would take the CPU
         model = made_class(
             _policy(options, vector.observation_space), vector, seed=run.seed, device=run.device,
             policy_kwargs=network or None, **arguments,

@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-import rospy
-
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.simulator import NANOSECONDS
 from robot_envs.backends import backend
@@ -29,7 +27,7 @@ DEADLINE = (
 BOUND = 1e9  # [rad, m, rad/s, m/s, N m, N]; no joint of a world of metres and seconds gets there
 SEED = 0  # of the simulator's own random numbers, as for the backend "ros"
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 Result = TypeVar("Result")
 
 
@@ -258,9 +256,7 @@ class OwnWorld(RobotBackend):
                     self._journal.forget_episode()
                     raise SimulatorError("; before that ".join(reversed(failures))) from error
             self.restarts += 1
-            # A node's rospy has taken over Python's logging.
-            warn = rospy.logwarn if rospy.core.is_initialized() else logger.warning
-            warn("%s; another one takes its place", failures[0])
+            logger.warning("%s; another one takes its place", failures[0])
 
     def _connect(self) -> LockstepWorld:
         """Waits for the simulator, starting another one if it has failed, and replays the journal."""

@@ -14,6 +14,7 @@ from gazebo_msgs.msg import ContactsState, LinkState, ModelState
 from gazebo_msgs.srv import GetLinkState, SetLinkState
 from geometry_msgs.msg import Point, Pose, WrenchStamped
 from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Log
 from sensor_case import MS, UPRIGHT, SensorCase
 from sensor_msgs.msg import CameraInfo, Image, Imu, LaserScan, PointCloud, PointCloud2, Range
 from std_srvs.srv import Empty
@@ -105,7 +106,8 @@ class Contract(SensorCase):
             angle = math.radians(number)
             expected = 1.0 / max(abs(math.cos(angle)), abs(math.sin(angle)))
             if math.cos(angle) > 0.0 and abs(math.tan(angle)) < 0.19:
-                self.assertEqual((found, point.x), (math.inf, math.inf))
+                self.assertEqual(found, math.inf)
+                self.assertAlmostEqual(math.hypot(point.x, point.y), 8.0, delta=1e-5)
             elif math.cos(angle) < 0.0 or abs(math.tan(angle)) > 0.21:
                 self.assertAlmostEqual(found, expected, delta=1e-3)
                 self.assertAlmostEqual(math.hypot(point.x, point.y), expected, delta=1e-3)
@@ -160,6 +162,13 @@ class Contract(SensorCase):
         self.assertAlmostEqual(float(np.mean(forces)), 10 * G, delta=0.1)
         self.put(z=5.0)
         self.assertEqual(self.newest("/bumper_states", ContactsState, 20).states, [])
+
+    def test_a_wrong_collision_of_a_bumper_is_a_warning_in_rosout(self):
+        heard = self.hear("/rosout", Log)
+        self.spawn("wrong", LUMPED.replace("pad_collision", "nonsense"), x=-5.0, z=5.0, kind="urdf")
+        self.assertTrue(heard.wait_for(lambda got: any("nonsense" in each.msg for each in got)))
+        [told] = [each for each in heard.messages if "nonsense" in each.msg]
+        self.assertEqual((told.level, told.name), (Log.WARN, "/gazebo"))
 
     def test_a_wrist_bears_what_hangs_on_it(self):
         """A mass of 1 kg hangs 0.1 m beside it."""
@@ -243,6 +252,14 @@ class Contract(SensorCase):
             message = heard.after(count + 1)[count]
             self.assertEqual(stamp(message), 150 * MS)
             self.assertAlmostEqual(message.ranges[0], expected, delta=0.05)
+
+    def test_moves_of_an_obstacle_leave_the_rate_as_it_is(self):
+        heard = self.hear("/scan", LaserScan)
+        self.step(150)
+        for number in range(5):
+            self.put(x=2.0 + 0.1 * number, z=0.5, name="wall")
+            self.step(30)
+        self.assertEqual(heard.stamps(4), [0, 100 * MS, 200 * MS, 300 * MS])
 
 
 def simulator():

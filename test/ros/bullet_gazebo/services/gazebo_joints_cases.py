@@ -6,7 +6,7 @@ import rospy
 from gazebo_msgs.msg import LinkState, LinkStates, ModelState, ODEJointProperties
 from gazebo_world import BOX, INF, NAN, GazeboTest, call, now, run
 from geometry_msgs.msg import Point, Pose, Twist, Vector3
-from rosgraph_msgs.msg import Clock
+from rosgraph_msgs.msg import Clock, Log
 from support.ros.calls import BOUND, wait_until
 from support.ros.subscribed import wait_until_heard
 
@@ -46,6 +46,16 @@ class JointsTest(GazeboTest):
         self.succeeds("SetModelConfiguration: success", "set_model_configuration", "cartpole", "",
                       ["cartpole::stand_cart", "cart_pole", "cart_pole"], [0.3, 0.1, 0.2])  # fmt: skip
         self.assertEqual((self.joint("stand_cart")[0], self.joint("cart_pole")[0]), (0.3, 0.2))
+
+    def test_configuration_beyond_a_stop_is_logged(self):
+        heard = []
+        rosout = rospy.Subscriber("/rosout", Log, lambda log: heard.append(log.msg))
+        wait_until(lambda: rosout.get_num_connections() > 0)
+        call("set_model_configuration", "cartpole", "", ["stand_cart"], [45.0])
+        stop = self.joint("stand_cart")[0]
+        text = f"joint 'stand_cart' of 'cartpole' can't be at 45: it is at its stop, {stop:g}"
+        self.assertTrue(wait_until(lambda: any(text in each for each in heard)), heard)
+        rosout.unregister()
 
     def test_configuration_stops_what_the_joint_carries_and_nothing_else(self):
         twist = Twist(Vector3(0.5, 0, 0), Vector3(0, 1.0, 0))

@@ -7,6 +7,7 @@ import unittest
 import rospy
 import rostest
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
+from crowd_cases import CrowdTest
 from gazebo_msgs.srv import GetWorldProperties
 from rosgraph_msgs.msg import Clock
 from snapshots_cases import SnapshotsTest
@@ -15,7 +16,7 @@ from support.ros.calls import BOUND, spawn_model
 from support.ros.manager import Manager
 from support.ros.subscribed import wait_until_heard
 
-__all__ = ["LockstepTest", "SnapshotsTest"]
+__all__ = ["CrowdTest", "LockstepTest", "SnapshotsTest"]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"
 
 

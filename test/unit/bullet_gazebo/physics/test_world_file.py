@@ -70,6 +70,31 @@ DATABASE = {  # of Gazebo: mass [kg] if it moves, height [m]
 }  # fmt: skip
 
 
+MESH = "<geometry><mesh><uri>model://{0}/meshes/{0}.dae</uri></mesh></geometry>"
+
+
+@pytest.mark.parametrize(
+    ("folder", "low", "high"),
+    [("fire_hydrant", 0.952, 1.7685), ("cardboard_box", 1.0, 1.3), ("cube_20k", 0.5, 1.5)],
+)
+def test_a_mesh_of_gazebos_database_inside_a_world_file_becomes_simple_shapes(folder, low, high):
+    shape = "<{0} name='s'><pose>1 0 1 0 0 0</pose>" + MESH.format(folder) + "</{0}>"
+    link = f"<link name='l'>{shape.format('collision')}{shape.format('visual')}</link>"
+    model = world(f"<model name='m'><static>1</static>{link}</model>").models["m"]
+    assert model.warnings == []
+    assert set(model.stand_ins) == {folder}
+    for shapes in (model.links["l"].collisions, model.links["l"].visuals):
+        heights = [
+            (each.pose.position[2], (each.size[2:] or each.size[1:])[0] / 2) for each in shapes
+        ]
+        assert min(middle - half for middle, half in heights) == pytest.approx(low, abs=1e-3)
+        assert max(middle + half for middle, half in heights) == pytest.approx(high, abs=1e-3)
+        assert all(each.kind in ("box", "cylinder") and each.rgba for each in shapes)
+        assert len({each.name for each in shapes}) == len(shapes)
+    link = link.replace(folder, "robot")
+    assert world(f"<model name='m'><static>1</static>{link}</model>").models == {}
+
+
 @pytest.mark.parametrize("folder", DATABASE)
 def test_a_model_of_gazebos_database_has_its_size_and_mass(make_world, folder):
     ((name, model),) = world(INCLUDE.format(folder)).models.items()

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import gc
 import math
-from typing import Any
+import weakref
+from typing import Any, NamedTuple
 
 import pytest
 import rospy
 from geometry_msgs.msg import Vector3, Wrench
+from support.robots.grippers import cube
 from support.ros.silent_topics import SilentPublisher, SilentSubscriber, silence
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, from_rpy, to_rpy
 from bullet_gazebo.ros.common.messages import to_transform
-from bullet_gazebo.ros.plugins import acting_plugins
+from bullet_gazebo.ros.plugins import acting_plugins, gripper_plugins
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.simulator import Simulator
 
@@ -32,12 +35,12 @@ class Free:
     def __init__(self, world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         self.logged = silence(monkeypatch)
         self.sim = Simulator(world, lockstep=True)
-        self._plugins = PluginRegistry(self.sim, None)
+        self.plugins = PluginRegistry(self.sim, None)
 
     def spawn(self, library: str, elements: str) -> Any:
         text = MODEL.format(links=LINKS, library=library, elements=elements)
         self.model = self.sim.world.spawn("m", parse_urdf(text), Pose((0.0, 0.0, 1.0)))
-        self._plugins.load(self.model, "/")
+        self.plugins.load(self.model, "/")
         return self.model
 
     def model_topic(self, name: str) -> SilentPublisher:
@@ -83,6 +86,61 @@ def test_a_hand_of_god_pulls_a_link_to_a_frame_of_tf(free):
     sent = SilentPublisher.messages["/tf"][-1].transforms[0]
     assert (sent.header.frame_id, sent.child_frame_id) == ("world", "hand_actual")
     assert sent.transform.translation.x == pytest.approx(pose.position[0], abs=1e-3)
+
+
+def test_a_hand_of_god_keeps_a_bounded_number_of_frames(free, monkeypatch):
+    monkeypatch.setattr(acting_plugins, "MOST_FRAMES", 10)
+    free.spawn("hand_of_god", "<linkName>body</linkName>")
+    for number in range(9):
+        SilentSubscriber.send("/tf", to_transform(0, "world", f"other{number}", Pose()))
+    SilentSubscriber.send("/tf", to_transform(0, "world", "hog_desired", Pose((1.0, 0.0, 1.0))))
+    assert not free.logged
+    SilentSubscriber.send("/tf", to_transform(0, "world", "one_more", Pose()))
+    assert "more than 10 frames: 'one_more' is ignored" in free.logged[-1]
+    SilentSubscriber.send("/tf", to_transform(0, "world", "hog_desired", Pose((0.5, 0.0, 1.0))))
+    free.advance(3000)
+    assert free.model.link_state("body")[0].position[0] == pytest.approx(0.5, abs=1e-2)
+
+
+class Attaching(NamedTuple):
+    """An attach request."""
+
+    model_name_1: str
+    link_name_1: str
+    model_name_2: str
+    link_name_2: str
+
+
+def test_a_link_attacher_keeps_nothing_of_models_that_are_gone(make_world, monkeypatch):
+    world = make_world()
+    monkeypatch.setattr(gripper_plugins.rospy, "Service", lambda *arguments: None)
+    sim = Simulator(world, lockstep=True)
+    attacher, gone = gripper_plugins.LinkAttacher(sim), []
+    for number in range(3):
+        names = f"first{number}", f"second{number}"
+        request = Attaching(names[0], "cube_link", names[1], "cube_link")
+        for place, name in enumerate(names):
+            gone.append(weakref.ref(world.spawn(name, parse_urdf(cube()), Pose((place, 0.0, 1.0)))))
+        assert attacher._attach(request).ok
+        assert attacher._detach(request).ok
+        assert not attacher._detach(request).ok
+        assert attacher._attach(request).ok
+        for name in names:
+            world.delete(name)
+        assert not attacher._detach(request).ok
+    gc.collect()
+    assert [each() for each in gone] == [None] * 6
+
+
+def test_a_second_vacuum_gripper_in_a_namespace_is_told_in_a_line(free):
+    elements = "<bodyName>body</bodyName><topicName>held</topicName>"
+    first = free.spawn("vacuum_gripper", elements)
+    text = MODEL.format(links=LINKS, library="vacuum_gripper", elements=elements)
+    second = free.sim.world.spawn("other", parse_urdf(text), Pose((2.0, 0.0, 1.0)))
+    free.plugins.load(second, "/")
+    [line] = free.logged
+    assert "there is a service /on already: give each gripper a <robotNamespace>" in line
+    free.sim.delete_model(first)
 
 
 def test_a_hand_of_god_that_only_hears_itself_sends_nothing(free):
@@ -141,5 +199,5 @@ def test_wheel_slip_is_accepted(free, monkeypatch):
     ways = ("lateral", "longitudinal")
     assert offered == [("/m/wheel_slip", [f"slip_compliance_unitless_{way}" for way in ways])]
     assert not free.logged
-    free._plugins.unload(free.model)
+    free.plugins.unload(free.model)
     assert not offered

@@ -1,6 +1,9 @@
 """What is kept for nodes in lock-step until they ask for it."""
 
+import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from rospy.impl import tcpros_pubsub
@@ -20,9 +23,19 @@ def boxes(monkeypatch):
     )
     monkeypatch.setattr(module, "on_topics_changed", lambda call: diverted.update(changed=call))
     monkeypatch.setattr(module, "publish_without_yielding", lambda: None)
+    monkeypatch.setattr(module, "subscribers", lambda topic: ["/script"])
     made = Mailboxes()
     made.diverted = diverted
     return made
+
+
+@pytest.fixture
+def switch_often():
+    """Lets threads take turns at almost every instruction."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    yield
+    sys.setswitchinterval(before)
 
 
 def contents(box):
@@ -109,3 +122,33 @@ def test_publishing_gives_the_processor_away_no_more(monkeypatch):
     tcpros_pubsub.time.sleep(0)
     tcpros_pubsub.time.sleep(0.25)
     assert slept == [0.25]
+
+
+def test_clients_may_come_while_others_ask_and_time_passes(boxes, switch_often):
+    """Each of 20 threads comes as 100 clients, of which every second one asks twice at once."""
+    finished = threading.Event()
+
+    def come(thread):
+        for number in range(100):
+            box = boxes.of(f"/client_{thread}_{number}")
+            shared = boxes.of(f"/shared_{number}")
+            box.awaited = frozenset([f"/{thread}"])
+            box.put(f"/{thread}", b"1")
+            shared.put("/a", b"1")
+            boxes.nodes_to_wake()
+            assert contents(box) == [(f"/{thread}", b"1")]
+
+    def tick():
+        while not finished.is_set():
+            boxes.has_awaited  # noqa: B018
+            boxes.any_hears("/a")
+
+    with ThreadPoolExecutor(21) as pool:
+        ticks = pool.submit(tick)
+        try:
+            list(pool.map(come, range(20)))
+        finally:
+            finished.set()
+        ticks.result()
+    # Two boxes for one node would each have a part of its messages.
+    assert [len(boxes.of(f"/shared_{number}").take()) for number in range(100)] == [20] * 100

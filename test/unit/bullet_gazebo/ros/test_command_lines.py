@@ -76,6 +76,14 @@ def test_a_wrong_command_line_of_gz(line):
     assert end.value.code == 2
 
 
+@pytest.mark.parametrize("line", ["gz sdf -p robot.urdf", "gz model -m bot -i", "gz stats"])
+def test_another_tool_of_gz_says_what_there_is(line, capsys):
+    assert gz.main(line.split()) == 2
+    told = capsys.readouterr().err
+    assert f"there is no '{' '.join(line.split()[:2])}': " in told
+    assert told.count("\n") == 1
+
+
 def test_gz_without_a_master(monkeypatch, capsys):
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
     assert gz.main(["gz", "world", "-s"]) == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 
 import pytest
@@ -167,6 +168,12 @@ def test_topics_lie_where_the_file_says(track):
     track.spawn(diff_drive(robotNamespace="", publishTf="false", rosDebugLevel="na"), "")
     assert set(track.topics) == {"/bot/cmd_vel"}
     assert track.messages == {}
+
+
+def test_a_plugins_log_level_is_its_own(track):
+    track.spawn(diff_drive(rosDebugLevel="Debug"))
+    levels = [logging.getLogger(name).getEffectiveLevel() for name in ("rosout.bot", "rosout")]
+    assert levels[0] == logging.DEBUG < levels[1]
 
 
 @pytest.mark.parametrize(

@@ -40,10 +40,12 @@ def test_no_model_is_spawned_before_all_services_are_there(monkeypatch):
         assert gates[0].locked()
         return ["all others"]
 
-    monkeypatch.setattr(gzserver, "SpawnServices", lambda sim, plugins, gate: gates.append(gate))
+    monkeypatch.setattr(
+        gzserver, "SpawnServices", lambda sim, plugins, gate: gates.append(gate) or Mock()
+    )
     monkeypatch.setattr(gzserver, "advertise_world_services", others)
     node = gzserver.GazeboNode.__new__(gzserver.GazeboNode)
-    node.sim, node._watchdog, node.journal = SimpleNamespace(lockstep=False), None, None
+    node.sim, node._watchdog, node.journal = SimpleNamespace(lockstep=False), Mock(), None
     node._advertise(True, argparse.Namespace(seed=0), of_world=[])
     assert node._services[-1] == "all others" and not gates[0].locked()
 

@@ -13,10 +13,11 @@ import rosbag
 import rospy
 from bullet_gazebo_msgs.msg import Journal as JournalMessage
 from bullet_gazebo_msgs.msg import JournalEntry
-from gazebo_msgs.srv import SpawnModel, SpawnModelRequest
+from gazebo_msgs.srv import SpawnModel, SpawnModelRequest, SpawnModelResponse
 from genpy import Time
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
+from support.ros.journal_bags import FACTS, START, entry, written
 
 from bullet_gazebo.pictures.recording import RecordingError
 from bullet_gazebo.ros.journal import journal_output
@@ -24,7 +25,6 @@ from bullet_gazebo.ros.journal.journal import Entry, WorldJournal
 from bullet_gazebo.ros.journal.journal_output import JournalBag
 from bullet_gazebo.ros.journal.recorded import NoRecording, RecordedJournal, first_difference
 from bullet_gazebo.ros.node import replay, replay_command
-from bullet_gazebo.ros.node.start import arguments_of
 from bullet_gazebo.timing import FairLock, Holds
 
 MS = 1_000_000  # [ns]
@@ -129,21 +129,6 @@ def test_beyond_its_bound_nothing_is_kept(sim):
     assert entries(journal) is None
 
 
-def written(path, *made):
-    """A bag with these entries, in two messages that are in the wrong order."""
-    with rosbag.Bag(str(path), "w") as bag:
-        for number, part in enumerate((made[1:], made[:2])):  # one of them comes twice
-            bag.write("/gazebo/journal", JournalMessage(list(part)), Time(1 + number))
-    return path
-
-
-def entry(number, **fields):
-    return JournalEntry(number=number, **fields)
-
-
-START = {"data": json.dumps({"series": 1}).encode()}
-
-
 def test_entries_are_read_in_their_order_and_once(tmp_path):
     path = written(tmp_path / "run.bag", entry(0, **START), entry(1), entry(2))
     assert [each.number for each in RecordedJournal(path).entries()] == [0, 1, 2]
@@ -221,12 +206,12 @@ def test_changes_that_change_nothing_are_refused(models, parameters, reason, tmp
     SpawnModelRequest(model_name="arm").serialize(request)
     spawn = entry(1, type=SpawnModel._type, data=request.getvalue())
     load = entry(2, parameters='{"/elbow": [{"pid": {"p": 2.0}}]}')
-    recorded = RecordedJournal(written(tmp_path / "run.bag", entry(0, **START), spawn, load))
+    found = RecordedJournal(written(tmp_path / "run.bag", entry(0, **START), spawn, load))
     if not reason:
-        recorded.check_changes(models, parameters)
+        found.check_changes(models, parameters)
         return
     with pytest.raises(NoRecording, match=reason):
-        recorded.check_changes(models, parameters)
+        found.check_changes(models, parameters)
 
 
 def moving(joint=0.0, velocity=0.0, model=MODEL, **fields):
@@ -342,9 +327,37 @@ def test_a_handler_that_waits_for_what_comes_later_ends_the_replay(
     assert "/hand/close was done, and now waits" in repeated.difference
 
 
+def test_a_difference_for_want_of_a_package_is_none(sim, journal, tmp_path, monkeypatch):
+    request = io.BytesIO()
+    SpawnModelRequest(model_xml="<mesh filename='package://my_arm/a.stl'/>").serialize(request)
+    call = entry(
+        1, kind=JournalEntry.SERVICE, name="/gazebo/spawn_urdf_model", type=SpawnModel._type
+    )
+    call.md5sum, call.data, call.answer = SpawnModel._md5sum, request.getvalue(), 7
+    path = written(tmp_path / "run.bag", entry(0, **START), call)
+
+    def refuse(_):
+        with journal.command("spawn") as made:
+            made.kind, made.name = JournalEntry.SERVICE, call.name
+        return SpawnModelResponse(False, "there is no package my_arm")
+
+    service = SimpleNamespace(
+        service_class=SpawnModel,
+        protocol=SimpleNamespace(recv_data_class=SpawnModelRequest),
+        handler=refuse,
+    )
+    monkeypatch.setattr(
+        replay, "get_service_manager", lambda: SimpleNamespace(get_service=lambda _: service)
+    )
+    node = SimpleNamespace(sim=sim, journal=journal, control=None, steps=SimpleNamespace(series=0))
+    repeated = replay.Replay(RecordedJournal(path), node, replay.Changes({}, ()), 9.0)
+    with pytest.raises(NoRecording, match="package my_arm isn't found: ./ws --with"):
+        repeated.run()
+
+
 def test_a_replay_has_the_hashes_of_the_recorded_run(tmp_path, monkeypatch):
     """They decide the order of sets, as in users' plugins, and Python takes them at its start."""
-    facts = json.dumps({"hashes": "7"}).encode()
+    facts = json.dumps(FACTS | {"hashes": "7"}).encode()
     path = written(tmp_path / "run.bag", entry(0, data=facts), entry(1))
     started = []
 
@@ -357,17 +370,3 @@ def test_a_replay_has_the_hashes_of_the_recorded_run(tmp_path, monkeypatch):
     with pytest.raises(SystemExit):
         replay_command.main([str(path)])
     assert started == ["7"]
-
-
-def test_a_world_file_that_has_gone_is_written_again(tmp_path):
-    facts = {
-        "physics": "mujoco",
-        "paused": True,
-        "seed": 3,
-        "world": "/gone/small.world",
-        "world_text": "<sdf/>",
-    }
-    *options, path = arguments_of(facts, tmp_path)
-    assert options == ["--lockstep", "-e", "mujoco", "-u", "--seed", "3"]
-    assert path == str(tmp_path / "small.world")
-    assert (tmp_path / "small.world").read_text() == "<sdf/>"

@@ -53,6 +53,14 @@ def test_a_prepared_step_has_the_numbers_of_step_world(objects):
     assert objects.prepared(prepared, 0, 1.0, 2.0, -1.0, 0.3).numbers == numbers
 
 
+@pytest.mark.parametrize("what", ["link_states_of", "model_states_of", "contacts_of", "sensors"])
+def test_names_without_end_are_refused(objects, what):
+    request = PrepareStepRequest(**{what: ["crate"] * 100_000})
+    assert objects.service._prepare(request).status_message == (
+        f"PrepareStep: {what} has 100000 names; up to 10000 are answered"
+    )
+
+
 def test_a_handle_is_stale_once_its_names_may_mean_something_else(world):
     world.add("left", "effort_joint")
     names = {"controllers": ["/left/effort_joint"], "commanded_joints": ["left::position_a"]}
@@ -93,7 +101,7 @@ def test_an_unknown_handle_is_stale_and_handles_are_bounded(world):
 @pytest.mark.parametrize(
     ("ticks", "commands", "text"),
     [
-        (1, [1.0], "1 commands where 1 controllers take 1 and 1 joints one each"),
+        (1, [1.0], "1 commands where 'effort_joint' takes 1, joint 'position_a' takes 1"),
         (1, [1.0, float("nan")], "commands has nan"),
         (1, [1e300, 0.0], "commands has 1e+300"),
         (-1, [1.0, 0.0], "ticks is -1"),

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from bullet_gazebo.ros.common import publishing
-from bullet_gazebo.ros.common.publishing import ThinnedTopic, Thinner
+from bullet_gazebo.ros.common.publishing import SubscriberCount, ThinnedTopic, Thinner
 
 BOUND = 60.0  # [s]
 
@@ -107,3 +107,12 @@ def test_a_topic_whose_message_can_not_be_sent_silences_no_other(
     for sample in range(1000):
         topic.send(sample)
     assert reader.wait_for(999)
+
+
+def test_a_subscriber_that_comes_while_the_last_one_goes_is_counted(monkeypatch):
+    """rospy counts who is left first, and tells it later."""
+    monkeypatch.setattr(publishing, "subscribers", lambda topic: ["/script"])
+    count = SubscriberCount()
+    count.peer_subscribe("/a", None, None)
+    count.peer_unsubscribe("/a", 0)
+    assert count.size == 1

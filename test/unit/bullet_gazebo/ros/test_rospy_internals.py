@@ -120,6 +120,21 @@ def test_services_are_registered_together(monkeypatch) -> None:
     fake.close()
 
 
+def test_a_connection_that_comes_while_its_node_does_is_diverted(monkeypatch) -> None:
+    """The node comes right after the connection has been looked at, and before the topic has it."""
+    for kind in (_TopicImpl, _PublisherImpl):
+        monkeypatch.setattr(kind, "add_connection", kind.add_connection)  # so that it is put back
+    got: list[object] = []
+    sinks = iter([None, lambda *message: got.append(message)])
+    rospy_internals.divert_messages(lambda node: next(sinks))
+    node = SimpleNamespace(
+        endpoint_id="/script", cleanup_cb=None, fileno=lambda: None, set_cleanup_callback=print
+    )
+    _PublisherImpl("/scan", String).add_connection(node)
+    node.write_data(b"1")
+    assert got == [("/scan", b"1")]
+
+
 def test_a_node_is_connected_once_the_topic_s_listeners_know_of_it(monkeypatch) -> None:
     """Else what a sensor measures for it comes before or after the messages of the same request."""
     for kind in (_TopicImpl, _PublisherImpl):

@@ -152,6 +152,13 @@ def test_rates_that_are_nearly_none_measure_only_for_a_listener_that_comes(node)
     assert times == [0, 3_000_000]  # and after a reset
 
 
+def test_no_noise_may_be_written_with_a_sign(node):
+    own = "<bodyName>l</bodyName><topicName>t</topicName><gaussianNoise>-0.0</gaussianNoise>"
+    plugin = of_model("gazebo_ros_p3d", own)
+    assert not node.spawn(MODEL.format(laser(more=NOISE.format("-0.0")), plugin))
+    assert len(published(LaserScan)) > 1
+
+
 def test_errors_of_an_imu_that_cannot_be_are_refused(node):
     plugin = of_model("hector_gazebo_ros_imu", "<bodyName>l</bodyName><topicName>felt</topicName>")
     model = node.sim.world.spawn("m", parse_sdf(MODEL.format("", plugin)), Pose())

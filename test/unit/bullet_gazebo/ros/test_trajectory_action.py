@@ -7,11 +7,12 @@ from unittest.mock import MagicMock
 from bullet_gazebo.control.trajectory_goals import SUCCEEDED, GoalOutcome, TrajectorySample
 from bullet_gazebo.ros.control import actions
 from bullet_gazebo.ros.control.trajectory_action import TrajectoryAction
+from bullet_gazebo.timing import FairLock
 
 
 def test_only_the_newest_feedback_of_a_goal_waits_for_its_delivery(monkeypatch) -> None:
     monkeypatch.setattr(actions, "SteadyActionServer", MagicMock())
-    sim = SimpleNamespace(outboxes=[], deliver_with_steps=True, sim_time=0.0)
+    sim = SimpleNamespace(lock=FairLock(), outboxes=[], deliver_with_steps=True, sim_time=0.0)
     action, goals = TrajectoryAction(sim, MagicMock(), "/arm"), (MagicMock(), MagicMock())
     for goal in goals:
         for second in range(100):
@@ -28,7 +29,7 @@ def test_only_the_newest_feedback_of_a_goal_waits_for_its_delivery(monkeypatch) 
 
 def test_an_action_is_closed_after_the_result_that_a_step_delivers(monkeypatch) -> None:
     monkeypatch.setattr(actions, "SteadyActionServer", MagicMock())
-    sim = SimpleNamespace(outboxes=[], deliver_with_steps=True, sim_time=0.0)
+    sim = SimpleNamespace(lock=FairLock(), outboxes=[], deliver_with_steps=True, sim_time=0.0)
     action, order = TrajectoryAction(sim, MagicMock(), "/arm"), []
     action._server.stop.side_effect = lambda: order.append("closed")
     closer = threading.Thread(target=action.shutdown)

@@ -291,3 +291,30 @@ def test_in_a_world_plugin_and_controller_are_named_and_the_end_does_not_wait_fo
     watchdog._thread.join(BOUND)
     assert name in told[0] and "in thread 'simulation'" in told[0] and "in update" in told[0]
     assert hanging is not None and name in hanging
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_it_says_that_the_world_computes_and_not_that_it_waits(lockstep: bool) -> None:
+    sim = FakeSimulator()
+    sim.lockstep = lockstep
+    watchdog, stage, done = Watchdog(sim), threading.Barrier(2), threading.Event()
+
+    def work() -> None:
+        with sim.lock:
+            stage.wait(BOUND)
+            stage.wait(BOUND)  # until it has been seen to wait
+            while not done.is_set():
+                pass
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    stage.wait(BOUND)
+    first = watchdog.work()
+    assert watchdog.work() == first
+    stage.wait(BOUND)
+    deadline = time.monotonic() + (BOUND if lockstep else 0.1)
+    while watchdog.work() == first and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert (watchdog.work() != first) == lockstep
+    done.set()
+    thread.join()

@@ -17,12 +17,12 @@ BALL = """<robot name="ball"><link name="b"><inertial><mass value="1"/>
 class Sensor:
     """A sensor with listeners, and the times of its measurements."""
 
-    def __init__(self, sim, schedule, rate, measure=None, **options):
+    def __init__(self, sim, schedule, model, rate, measure=None, **options):
         self._sim, self._schedule = sim, schedule
         self.times = []
         self.listeners = 0
         measure = measure or self.times.append
-        self.clock = schedule.add(rate, measure, lambda: self.listeners > 0, **options)
+        self.clock = schedule.add(model, rate, measure, lambda: self.listeners > 0, **options)
 
     def come(self):
         self.listeners += 1
@@ -43,9 +43,20 @@ def schedule(sim):
     return Schedule(sim)
 
 
+def spawn(sim, name):
+    with sim.lock:
+        return sim.world.spawn(name, parse_urdf(BALL), Pose())
+
+
 @pytest.fixture
-def make(sim, schedule):
-    return lambda *args, **options: Sensor(sim, schedule, *args, **options)
+def model(sim):
+    return spawn(sim, "ball")
+
+
+@pytest.fixture
+def make(sim, schedule, model):
+    """Makes a sensor that the ball carries, or another model `on`."""
+    return lambda *args, on=model, **options: Sensor(sim, schedule, on, *args, **options)
 
 
 def advance(sim, ticks):
@@ -113,9 +124,7 @@ def test_sensors_measure_in_the_order_in_which_they_were_added(sim, make):
     assert order == ["second", "first", "second"]
 
 
-def test_resets_and_moves_measure_at_once_what_is_heard(sim, make):
-    with sim.lock:
-        model = sim.world.spawn("ball", parse_urdf(BALL), Pose())
+def test_resets_and_moves_measure_at_once_what_is_heard(sim, make, model):
     sensor = make(100.0, at_once=False)
     sensor.come()
     advance(sim, 15)
@@ -128,12 +137,29 @@ def test_resets_and_moves_measure_at_once_what_is_heard(sim, make):
     assert sensor.times[3:] == [0, 10 * MS]
 
 
-def test_several_moves_of_one_request_measure_once(sim, make):
+def test_a_move_of_a_model_measures_what_it_carries_and_nothing_else(sim, schedule, make, model):
+    """Else a laser of 5 Hz measures as often as an obstacle is moved, and a learner steps too early."""
+    obstacle, attached = spawn(sim, "obstacle"), spawn(sim, "attached")
+    own, other, far = make(5.0), make(5.0, on=obstacle), make(5.0, on=attached)
+    for each in (own, other, far):
+        each.come()
+    for _ in range(10):
+        advance(sim, 100)
+        with sim.lock:
+            sim.place_model(obstacle, Pose((5.0, 0.0, 1.0)), AT_REST)
+    assert own.times == far.times == [n * 200 * MS for n in range(6)]
+    assert len(other.times) == 16
+    assert schedule.last_move(model).number == 0 < schedule.last_move(obstacle).number
     with sim.lock:
-        model = sim.world.spawn("ball", parse_urdf(BALL), Pose())
+        sim.world.attach((obstacle, "b"), (attached, "b"))
+        sim.place_link(obstacle, "b", Pose((5.0, 0.0, 1.0)), AT_REST)
+    assert (len(own.times), len(other.times), len(far.times)) == (6, 17, 7)
+
+
+def test_several_moves_of_one_request_measure_once(sim, make, model):
     sensor = make(100.0, at_once=False)
     sensor.come()
-    with sim.lock, sim.one_move():
+    with sim.lock, sim.moves.as_one():
         sim.reset(everything=False)
         sim.place_model(model, Pose((0.0, 0.0, 1.0)), AT_REST)
     assert sensor.times == [0]
@@ -213,7 +239,7 @@ def test_a_reset_with_a_seed_begins_the_clocks_anew(sim, make):
     sensor = make(100.0)
     sensor.come()
     advance(sim, 13)
-    with sim.lock, sim.one_move():
+    with sim.lock, sim.moves.as_one():
         sim.reseed(5)
         sim.reset(everything=False)
     advance(sim, 20)

@@ -137,8 +137,14 @@ def test_another_wish_ends_the_episode_before(run, make_recorder, monkeypatch) -
     begun(second)
 
 
+def registered(name: str, kind: type) -> None:
+    """Registers an environment, also in place of another test's."""
+    gymnasium.registry.pop(name, None)
+    gymnasium.register(name, kind)
+
+
 def endless(place: Path) -> Path:
-    gymnasium.register("Endless-v0", Endless)
+    registered("Endless-v0", Endless)
     folder = place / "endless"
     return folder if folder.exists() else record(folder, [1.0], env_id="Endless-v0")
 
@@ -184,7 +190,7 @@ def test_what_cant_be_shown_is_said_and_may_come_later(run, tmp_path, make_recor
 
 
 def test_an_environment_that_draws_nothing_is_said(tmp_path, make_recorder) -> None:
-    gymnasium.register("Blind-v0", Blind)
+    registered("Blind-v0", Blind)
     recorder = make_recorder(record(tmp_path / "blind", [1.0], env_id="Blind-v0"))
     assert "the environment draws no pictures" in whole(recorder.play("random", 0)).note
     recorder = make_recorder(record(tmp_path / "none", [1.0], env_id="NoSuch-v0"))
@@ -219,7 +225,7 @@ def test_the_robot_of_a_training_isnt_moved(
 ) -> None:
     monkeypatch.setattr(recording, "MAX_STEPS", 5)
     monkeypatch.setattr(Shared, "made", [])
-    gymnasium.register("Shared-v0", Shared)
+    registered("Shared-v0", Shared)
     given = {"env_kwargs": {"backend": "ros"}}
     folder = record(tmp_path / "shared", [1.0], env_id="Shared-v0", **given)
     content = json.loads((folder / "config.json").read_text())
@@ -266,7 +272,7 @@ def test_one_that_fails_while_it_is_drawn_is_said_and_made_anew(
     tmp_path, make_recorder, monkeypatch, kind, trouble
 ) -> None:
     monkeypatch.setattr(recording, "MAX_STEPS", 5)
-    gymnasium.register("Broken-v0", kind)
+    registered("Broken-v0", kind)
     monkeypatch.setattr(kind, "trouble", trouble)
     recorder = make_recorder(record(tmp_path / "broken", [1.0], env_id="Broken-v0"))
     assert "it is gone" in whole(recorder.play("random", 0)).note
@@ -276,7 +282,7 @@ def test_one_that_fails_while_it_is_drawn_is_said_and_made_anew(
 
 def test_record_says_it_in_one_line(tmp_path, monkeypatch, capsys) -> None:
     """As with MuJoCo's environments where there is no OpenGL."""
-    gymnasium.register("Broken-v0", Broken)
+    registered("Broken-v0", Broken)
     monkeypatch.setattr(Broken, "trouble", RuntimeError("no\nOpenGL here"))
     folder = record(tmp_path / "broken", [1.0], env_id="Broken-v0")
     flags = ["--checkpoint", "random", "--out", str(tmp_path / "a.gif")]

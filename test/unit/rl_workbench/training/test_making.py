@@ -5,7 +5,7 @@ import math
 import gymnasium
 import numpy as np
 import pytest
-from support.training.learning_fakes import POLE, SPOILT, Died
+from support.training.learning_fakes import POLE, SPOILT, Died, register_with
 
 from rl_workbench import errors
 from rl_workbench.errors import WorkbenchError
@@ -55,6 +55,65 @@ def test_options_change_no_code_of_a_registration(monkeypatch) -> None:
 def test_a_wrapper_of_another_kind_is_not_called() -> None:
     with pytest.raises(WorkbenchError, match="--wrapper subprocess:Popen: it is no gymnasium.Wrap"):
         make_environment(POLE, wrapper="subprocess:Popen")
+
+
+class Endless(gymnasium.Env):
+    """Nothing ends its episodes."""
+
+    observation_space = gymnasium.spaces.Box(-9, 9, (2,), np.float32)
+    action_space = gymnasium.spaces.Discrete(2)
+    render_mode = None
+    max_steps = None
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return np.zeros(2, np.float32), {}
+
+    def step(self, action):
+        return np.zeros(2, np.float32), 1.0, False, False, {}
+
+
+class OldGym(Endless):
+    """As one wrote them for gym before 0.26."""
+
+    def reset(self, seed=None, options=None):
+        return np.zeros(2, np.float32)
+
+
+class OldStep(Endless):
+    def step(self, action):
+        return np.zeros(2, np.float32), 1.0, False, {}
+
+
+class Unseeded(Endless):
+    def reset(self):
+        return np.zeros(2, np.float32)
+
+
+def length(env: gymnasium.Env, most: int = 20_000) -> int:
+    """Of an episode [steps]."""
+    env.reset(seed=0)
+    return next((n for n in range(1, most) if any(env.step(0)[2:4])), most)
+
+
+def test_an_episode_without_an_end_is_truncated_and_said_once(monkeypatch, capsys) -> None:
+    env_id = register_with(monkeypatch, Endless)
+    env = make_environment(env_id)
+    assert length(env) == length(env) == 10_000
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "max_episode_steps=N" in said and env_id in said
+    assert length(make_environment(env_id, {"max_episode_steps": 10_007})) == 10_007
+    monkeypatch.setattr(Endless, "max_steps", 12_000)  # it says so itself
+    assert length(make_environment(env_id)) == 20_000
+    assert not capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", [OldGym, OldStep, Unseeded])
+@pytest.mark.parametrize("limit", [{}, {"max_episode_steps": 9}])
+def test_what_was_written_for_the_old_gym_is_named(monkeypatch, kind, limit: dict) -> None:
+    env = make_environment(register_with(monkeypatch, kind), limit)
+    with pytest.raises(WorkbenchError, match=r"written for the old gym: Gymnasium's reset\(seed"):
+        length(env)
 
 
 @pytest.mark.extras("Box2D")

@@ -196,7 +196,10 @@ def test_the_document_needs_its_own_observations(capsys) -> None:
 
 
 def test_a_device_that_is_not_there(capsys) -> None:
-    assert "torch can't use the device 'cda'" in failed(capsys, *DQN, "--device=cda")
+    said = failed(capsys, *DQN, "--device=cda")
+    assert (
+        "torch can't use the device 'cda' (Expected one of" in said and "); here it has cpu" in said
+    )
 
 
 def test_a_run_folder_in_use(capsys, tmp_path: Path) -> None:

@@ -193,3 +193,38 @@ def test_a_wrong_goal_a_wrong_world_and_a_robot_without_cmd_vel_are_refused() ->
 
     with pytest.raises(TaskError, match="needs one controller with cmd_vel"):
         _ = DriveToGoal(FURUTA, None).port
+
+
+def pink(picture: np.ndarray) -> np.ndarray | None:
+    """Where a picture shows the goal: the middle of its pixels, row and column."""
+    red, green, blue = np.moveaxis(picture.astype(int), -1, 0)
+    seen = np.argwhere((red > 2 * green) & (blue > 2 * green))
+    return seen.mean(axis=0) if len(seen) > 10 else None
+
+
+def test_pictures_show_the_goal_of_each_episode() -> None:
+    """It was nowhere to be seen in a recording."""
+    env: Any = gymnasium.make("robot_envs/Navigate-v0", render_mode="rgb_array").unwrapped
+    try:
+        for seed in range(6):
+            env.reset(seed=seed)
+            before = pink(env.render())
+            assert before is not None, seed
+            env.task.aim((env.task.goal[0] + 0.3, env.task.goal[1]))
+            after = pink(env.render())
+            assert after is not None and after[1] > before[1] + 3.0, "to the right"
+    finally:
+        env.close()
+
+
+def test_a_page_moves_the_goal(server: Any) -> None:
+    env: Any = gymnasium.make("robot_envs/Navigate-v0").unwrapped
+    try:
+        env.reset(seed=0)
+        shown = env.draw_on(server)
+        for seed in range(2):
+            env.reset(seed=seed)
+            shown()
+            assert tuple(shown.look().links[-1][:2]) == pytest.approx(env.task.goal)
+    finally:
+        env.close()

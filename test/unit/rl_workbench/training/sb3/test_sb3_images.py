@@ -25,7 +25,6 @@ from rl_workbench.tools.policies import load_learned
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training.environments import make_environment
 from rl_workbench.training.options import RunOptions
-from rl_workbench.training.sb3.models import make_learning_model
 
 pytestmark = pytest.mark.extras("stable_baselines3")
 
@@ -88,6 +87,8 @@ WRAPPER = f"{__name__}:brighten"
 
 
 def policy_of(monkeypatch: pytest.MonkeyPatch, kind: type[Dot], **changed: object):
+    from rl_workbench.training.sb3.models import make_learning_model
+
     options = options_of("ppo", SMALL | {"env_id": register_with(monkeypatch, kind)} | changed)
     env = make_environment(options.run.env_id, keep_dict=True, wrapper=options.run.wrapper)
     return make_learning_model(options, [env]).policy

@@ -1,0 +1,27 @@
+"""Bags with a journal, for tests of replays."""
+
+import json
+
+import rosbag
+from bullet_gazebo_msgs.msg import Journal as JournalMessage
+from bullet_gazebo_msgs.msg import JournalEntry
+from genpy import Time
+
+
+def written(path, *made):
+    """A bag with these entries, in two messages that are in the wrong order."""
+    with rosbag.Bag(str(path), "w") as bag:
+        for number, part in enumerate((made[1:], made[:2])):  # one of them comes twice
+            bag.write("/gazebo/journal", JournalMessage(list(part)), Time(1 + number))
+    return path
+
+
+def entry(number, **fields):
+    return JournalEntry(number=number, **fields)
+
+
+FACTS = {
+    "physics": "ode", "paused": False, "seed": None, "hashes": None, "world": "/gone/small.world",
+    "world_text": None, "series": 1,
+}  # fmt: skip
+START = {"data": json.dumps(FACTS).encode()}
