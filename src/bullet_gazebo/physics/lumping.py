@@ -82,21 +82,20 @@ def _children(links: dict[str, Link], joints: dict[str, Joint]) -> dict[str, lis
 def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
     """Lumps fixed joints and drops massless links, in place; returns `model`.
 
-    Links and joints are in sdformat's order afterwards: depth first, children by the names of their joints, and
-    what hung from a lumped child behind what its parent has itself.
+    Links and joints are in sdformat's order afterwards: depth first, children by the names of their joints.
     """
     model.joints = dict(sorted(model.joints.items()))
     detach_from_world(model)
+    order = _depth_first(model)
     above = {joint.child: joint for joint in model.joints.values()}
     for child in reversed(_depth_first(model, backwards=True)):
         if child in above and above[child].kind == "fixed" and not above[child].kept:
             _lump(model, above[child].name)
     _drop_free_joints(model)
     drop_massless(model)
-    order = _depth_first(model)
-    model.links = {name: model.links[name] for name in order}
-    above = {joint.child: joint for joint in model.joints.values()}
-    model.joints = {above[name].name: above[name] for name in order if name in above}
+    model.links = {name: model.links[name] for name in order if name in model.links}
+    left = (above[name].name for name in order if name in above)
+    model.joints = {name: model.joints[name] for name in left if name in model.joints}
     model.lumped = {name: at for name, at in model.lumped.items() if at[0] in model.links}
     moved = [_lumped_sensor(model, sensor) for sensor in model.sensors]
     model.sensors = [sensor for sensor in moved if sensor.link in model.links]
@@ -152,9 +151,9 @@ def _lump(model: ModelDescription, name: str) -> None:
     parent.inertia = combine(parent.inertia, _moved(child.inertia, joint.pose))
     parent.collisions += [_lumped(shape, joint.pose, child.name) for shape in child.collisions]
     parent.visuals += [_lumped(shape, joint.pose, child.name) for shape in child.visuals]
-    for other in [other for other in model.joints.values() if other.parent == child.name]:
-        other.parent, other.pose = parent.name, joint.pose.compose(other.pose)
-        model.joints[other.name] = model.joints.pop(other.name)  # behind the parent's own
+    for other in model.joints.values():
+        if other.parent == child.name:
+            other.parent, other.pose = parent.name, joint.pose.compose(other.pose)
     for name, (link, pose) in model.lumped.items():
         if link == child.name:
             model.lumped[name] = parent.name, joint.pose.compose(pose)
