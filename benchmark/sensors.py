@@ -208,8 +208,9 @@ def unheard(results: dict[str, float], rounds: int) -> None:
         sim.world.spawn("ground", ground_plane(), Pose())
         text = MODEL.format(static=0, shape=SHELL, sensor="")
         robot = sim.world.spawn("robot", parse_sdf(text), Pose((0.0, 0.0, 0.05)))
-    for _ in range(UNHEARD):
-        sensing.schedule.add(robot, 10.0, lambda _: None, lambda: False)
+    with sims[1].lock:
+        for _ in range(UNHEARD):
+            sensing.schedule.begin(robot, 10.0, lambda _: None, lambda: False)
 
     def ticks(sim: Simulator) -> float:
         with sim.lock:

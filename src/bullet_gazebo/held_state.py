@@ -24,7 +24,7 @@ from decimal import Decimal
 from enum import Enum
 from functools import partial
 from itertools import chain
-from operator import attrgetter, itemgetter
+from operator import attrgetter, itemgetter, methodcaller
 from typing import Any
 
 import numpy as np
@@ -143,20 +143,19 @@ def _into_tuple(state: HeldState, each: Iterable[Any]) -> Iterable[Any]:
     return each
 
 
-def _into_list(state: HeldState, each: list[Any]) -> Iterable[Any]:
-    held = each.copy()
-    state.note(_put_list, each, held)
-    return held
+def _copying(take: Callable[[Any], Any], put: Put, refers: bool = True) -> Look:
+    """Returns how to look into what is saved as a whole; with `refers`, it refers to what is in it."""
+
+    def look(state: HeldState, each: Any) -> Iterable[Any]:
+        held = take(each)
+        state.note(put, each, held)
+        return held if refers else ()
+
+    return look
 
 
 def _put_list(target: list[Any], held: list[Any]) -> None:
     target[:] = held
-
-
-def _into_deque(state: HeldState, each: deque[Any]) -> Iterable[Any]:
-    held = tuple(each)
-    state.note(_put_deque, each, held)
-    return held
 
 
 def _put_deque(target: deque[Any], held: tuple[Any, ...]) -> None:
@@ -205,16 +204,6 @@ def _put_generator(target: Any, held: tuple[Any, Any]) -> None:
             n_children_spawned=spawned,
         )  # fmt: skip
         target.__setstate__((numbers, again))
-
-
-def _into_random(state: HeldState, each: random.Random) -> Iterable[Any]:
-    state.note(random.Random.setstate, each, each.getstate())
-    return ()
-
-
-def _into_old_generator(state: HeldState, each: np.random.RandomState) -> Iterable[Any]:
-    state.note(np.random.RandomState.set_state, each, each.get_state(legacy=False))
-    return ()
 
 
 def _into_function(state: HeldState, each: types.FunctionType) -> Iterable[Any]:
@@ -269,16 +258,18 @@ def _unreadable(state: HeldState, each: Any) -> Iterable[Any]:
 _LOOKS: dict[type, Look] = {
     tuple: _into_tuple,
     frozenset: _into_tuple,
-    list: _into_list,
+    list: _copying(list, _put_list),
     dict: _into_dict,
     OrderedDict: _into_dict,
     defaultdict: _into_dict,
     set: _into_set,
-    deque: _into_deque,
+    deque: _copying(tuple, _put_deque),
     np.ndarray: _into_array,
     np.random.Generator: _into_generator,
-    np.random.RandomState: _into_old_generator,
-    random.Random: _into_random,
+    np.random.RandomState: _copying(
+        methodcaller("get_state", legacy=False), np.random.RandomState.set_state, refers=False
+    ),
+    random.Random: _copying(methodcaller("getstate"), random.Random.setstate, refers=False),
     types.FunctionType: _into_function,
     types.CellType: _into_cell,
     types.MethodType: _into_method,

@@ -83,9 +83,7 @@ class ControlledRobot:
         self._watched = [index for name, index in indices.items() if name not in moved]
         self._others = [index for name, index in indices.items() if name not in hardware.joints]
         self.watch = StabilityWatch(model, hardware, manager, log)
-        self._read_ahead = (
-            False  # whether the handles hold the state that the next tick begins with
-        )
+        self._read_ahead = False  # whether the handles hold what the next tick begins with
         self.review_gains()
         manager.on_change = self.review_gains
         self.read()

@@ -92,7 +92,7 @@ class Simulator:
         self.outboxes: list[Outbox] = []
         self.deliver_with_steps = False
         self._period = round(world.time_step * NANOSECONDS)
-        self._paused = False
+        self.paused = False  # by `pause` and `unpause` alone
         self._flowing = threading.Event()  # set while time runs by itself
         self._stopping = threading.Event()
         self.holds = Holds(self.lock, self._update_flow)
@@ -110,25 +110,21 @@ class Simulator:
         return self.world.version, self._robots_version, controllers
 
     @property
-    def paused(self) -> bool:
-        return self._paused
-
-    @property
     def outruns_the_clock(self) -> bool:
         """Whether ticks may come faster than real time: in lock-step, by step(), and beyond factor 1."""
         rate = self.max_update_rate
-        return self.lockstep or self._paused or rate <= 0.0 or rate * self.world.time_step > 1.0001
+        return self.lockstep or self.paused or rate <= 0.0 or rate * self.world.time_step > 1.0001
 
     def pause(self) -> None:
         """Stops time; no step is in progress once this returns."""
         with self.lock:
-            self._paused = True
+            self.paused = True
             self._update_flow()
 
     def unpause(self) -> None:
         """Lets time run, unless it runs in lock-step."""
         with self.lock:
-            self._paused = False
+            self.paused = False
             self._update_flow()
 
     def run(self) -> None:
@@ -356,7 +352,7 @@ class Simulator:
         self.moves.tell(None)
 
     def _update_flow(self) -> None:
-        if self._paused or self.lockstep or self.holds:
+        if self.paused or self.lockstep or self.holds:
             self._flowing.clear()
         else:
             self._flowing.set()

@@ -26,13 +26,13 @@ class FairLock:
     """
 
     # A snapshot of a plugin that refers to it keeps out of who holds it, and of the journal.
-    of_the_present = ("_waiting", "_held", "_holder", "turns", "taken", "leaving", "between")
+    of_the_present = ("_waiting", "held", "holder", "turns", "taken", "leaving", "between")
 
     def __init__(self) -> None:
         self._guard = threading.Lock()
         self._waiting: deque[threading.Lock] = deque()
-        self._held = False
-        self._holder: int | None = None  # the thread
+        self.held = False
+        self.holder: int | None = None  # the thread; None also at the moment when it is handed over
         self.turns = 0  # how often it was acquired
         # For the journal. The holder calls the first two, and `between` is called in the middle of long work,
         # while the lock is free.
@@ -40,21 +40,12 @@ class FairLock:
         self.leaving: Callable[[], None] = _nothing
         self.between: Callable[[], None] = _nothing
 
-    @property
-    def held(self) -> bool:
-        return self._held
-
-    @property
-    def holder(self) -> int | None:
-        """The thread that holds it; None also at the moment when it is handed over."""
-        return self._holder
-
     def __enter__(self) -> None:
         thread = threading.get_ident()
-        if self._holder == thread:
+        if self.holder == thread:
             raise RuntimeError("this thread holds the simulator's lock already")
         self._take()
-        self._holder = thread
+        self.holder = thread
         self.turns += 1
         self.taken()
 
@@ -62,7 +53,7 @@ class FairLock:
     def glance(self) -> Iterator[None]:
         """Holds the lock for a look that decides nothing: `taken` and `leaving` aren't called."""
         self._take()
-        self._holder = threading.get_ident()
+        self.holder = threading.get_ident()
         try:
             yield
         finally:
@@ -70,8 +61,8 @@ class FairLock:
 
     def _take(self) -> None:
         with self._guard:
-            if not self._held:
-                self._held = True
+            if not self.held:
+                self.held = True
                 return
             turn = threading.Lock()
             turn.acquire()
@@ -97,12 +88,12 @@ class FairLock:
             self._release()
 
     def _release(self) -> None:
-        self._holder = None
+        self.holder = None
         with self._guard:
             if self._waiting:
                 self._waiting.popleft().release()  # the lock stays held: it is handed over
             else:
-                self._held = False
+                self.held = False
 
 
 class Holds:

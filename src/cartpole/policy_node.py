@@ -104,13 +104,8 @@ def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:
         "(default 1; 0: no limit)")  # fmt: skip
     add("--goal", type=_numbers, metavar="X,Y,...",
         help="goal of a task with goals (default: drawn); the topic ~goal takes others")  # fmt: skip
-    add(
-        "--seed",
-        type=number(0),
-        default=0,
-        metavar="N",
-        help="seed of what the task draws (default 0)",
-    )
+    add("--seed", type=number(0), default=0, metavar="N",
+        help="seed of what the task draws (default 0)")  # fmt: skip
     add("--env-kwargs", nargs="+", default=[], metavar="KEY=VALUE",
         help="options of the environment, such as the task's; separate several by commas")  # fmt: skip
     named = [f"--{name.replace('_', '-')}={_text(value)}" for name, value in parameters.items()]

@@ -18,3 +18,9 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     names = sorted(set(known))
     near = get_close_matches(name, names, 1) if len(names) <= MOST_COMPARED else []
     return f"; did you mean '{near[0]}'?" if near else ""
+
+
+def nearest_or_all(name: str, known: Iterable[str]) -> str:
+    """Returns the same, with all known names if none is similar."""
+    names = list(known)
+    return did_you_mean(name, names) or f"; there are {', '.join(names) or 'none'}"

@@ -151,9 +151,8 @@ class ScriptRunner:
     @_ends_with_the_world(None)
     def before_publishing(self, topic: str) -> None:
         """Lets time pass before a message is published, if its topic triggers that."""
-        if (
-            not self._failed and self.is_connected()
-        ):  # a script may still say at its end what is to stop
+        # A script that fails may still say at its end what is to stop.
+        if not self._failed and self.is_connected():
             self._settle()
             if self._may_step() and self.triggers.before(topic, topic in self.topics.commands):
                 self._pass_period()

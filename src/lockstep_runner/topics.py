@@ -53,11 +53,7 @@ class Callbacks:
         A callback that commands the robot must do so before the next tick; stopping for one that only
         stores its message would cost speed for nothing.
         """
-        acting = [
-            name
-            for name, topic in list(_topics().subs.items())
-            if topic.callbacks and self._quiet[name] < QUIET_CALLBACKS
-        ]
+        acting = [name for name in self.heard() if self._quiet[name] < QUIET_CALLBACKS]
         return [*{*acting, *topics}]
 
     def heard(self) -> list[str]:

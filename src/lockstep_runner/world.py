@@ -13,7 +13,7 @@ from lockstep_runner import originals
 from lockstep_runner.line import Line, LineEnded
 from ros_calls import master
 from ros_calls.absence import is_offered
-from ros_calls.service import ServiceClient, ServiceGone, ServiceHangs
+from ros_calls.service import ServiceClient, ServiceGone, ServiceHangs, raised_in
 
 NODE = "/gazebo"
 SERVICE = f"{NODE}/advance_world"
@@ -215,26 +215,17 @@ def _raised_elsewhere(fault: BaseException) -> BaseException | None:
     """Returns the OSError that a signal handler raised during a call; None if it is the connection's own."""
     cause: BaseException | None = fault
     while cause is not None:
-        if isinstance(cause, OSError) and _raised_in(cause) not in CALLING:
+        if isinstance(cause, OSError) and raised_in(cause).partition(".")[0] not in CALLING:
             return cause
         cause = cause.__cause__
     return None
 
 
-def _raised_in(fault: BaseException) -> str:
-    """Returns the name of the top-level package that raised an exception."""
-    place = fault.__traceback__
-    while place is not None and place.tb_next is not None:
-        place = place.tb_next
-    name = "" if place is None else place.tb_frame.f_globals.get("__name__", "")
-    return str(name.partition(".")[0])
-
-
 def is_running() -> bool:
     """Returns whether a simulator in lock-step answers; raises RunsByItself if one in real time does."""
     if _is_registered(SERVICE):
-        return _lives()
-    if _is_registered(f"{NODE}/pause_physics") and _lives():
+        return master.lives(NODE)
+    if _is_registered(f"{NODE}/pause_physics") and master.lives(NODE):
         raise RunsByItself(
             f"the simulator under {master.uri()} runs in real time: end it, so that the script starts its"
             ' own, or start it with GZSERVER_ARGS="--lockstep --seed 0" in its environment'
@@ -248,12 +239,3 @@ def _is_registered(service: str) -> bool:
         return is_offered(service)
     except master.NoAnswer:
         return False
-
-
-def _lives() -> bool:
-    """Returns whether the simulator's node answers; a killed one stays registered."""
-    try:
-        master.call_node(master.call("lookupNode", NODE), "getPid")
-    except (master.Refused, master.NoAnswer):
-        return False
-    return True

@@ -12,11 +12,7 @@ from xml.sax.saxutils import escape
 import yaml
 
 from bullet_gazebo.physics.description import ModelDescription
-from bullet_gazebo.physics.dynamics import (
-    effective_inertias,
-    most_inertias,
-    poses_at_zero,
-)
+from bullet_gazebo.physics.dynamics import effective_inertias, most_inertias, poses_at_zero
 from bullet_gazebo.physics.pose import rotate
 from package_writing import CannotWrite
 from package_writing.standing import centre_of_mass, feet
@@ -227,17 +223,14 @@ def controllers_text(survey: Survey, base: Base | None) -> str:
         elif motor.interface != POSITION and not motor.wheel:
             lines.append(f"  pid: {_inline({'p': VELOCITY})}  # [1/s]")
         lines.append("")
-    unlimited = [motor.joint for motor in survey.motors if not motor.limited]
-    if unlimited:
+    if unlimited := [motor.joint for motor in survey.motors if not motor.limited]:
+        none = "{has_effort_limits: false, has_velocity_limits: false}"
         lines += [
             "# The URDF's limits of effort and velocity are 0, which holds a joint.",
             "joint_limits:",
+            *(f"  {literal(joint)}: {none}" for joint in unlimited),
+            "",
         ]
-        lines += [
-            f"  {literal(joint)}: {{has_effort_limits: false, has_velocity_limits: false}}"
-            for joint in unlimited
-        ]
-        lines.append("")
     return "\n".join(lines)
 
 
@@ -259,11 +252,11 @@ def held_motors(survey: Survey, base: Base | None) -> list[Motor]:
 
 def base_text(package: str, survey: Survey, base: Base | None) -> dict[str, str]:
     """Returns the template's values about a base that drives."""
-    if base is None:
-        return {"task": "Reach", "run_python": "tuple(CONTROLLERS.values())", "base": "", "rviz": "",
-                "world": "worlds/empty.world"}  # fmt: skip
-    lines = [f'    odometry="{DRIVE}/odom",']
     rviz, world = "", "worlds/empty.world"
+    if base is None:
+        run = "tuple(CONTROLLERS.values())"
+        return {"task": "Reach", "run_python": run, "base": "", "rviz": rviz, "world": world}
+    lines = [f'    odometry="{DRIVE}/odom",']
     if base.world:
         lines.append(f'    world="{PACKAGE}cartpole/{base.world}",')
         world = f"$(find cartpole)/{base.world}"
@@ -285,15 +278,14 @@ def base_text(package: str, survey: Survey, base: Base | None) -> dict[str, str]
 
 def ranges_text(survey: Survey, starts: Mapping[str, float]) -> str:
     """Returns the ranges of the postures to reach, the stance included, as the inside of a Python dict."""
-    lines = []
-    for each in survey.motors:
-        start = 0.0 if each.wheel else starts.get(each.joint, 0.0)
-        low, high = min(each.low, start), max(each.high, start)
-        lines.append(f"    {literal(each.joint)}: ({low}, {high}),\n")
-    return "".join(lines)
+    starting = [(each, starts.get(each.joint, 0.0)) for each in survey.motors]  # wheels at 0
+    return "".join(
+        f"    {literal(each.joint)}: ({min(each.low, start)}, {max(each.high, start)}),\n"
+        for each, start in starting
+    )
 
 
-def goals_text(survey: Survey, base: Base | None, starts: Mapping[str, float]) -> str:
+def goals_text(survey: Survey, starts: Mapping[str, float]) -> str:
     """Returns where a test moves joints, and how near, as the inside of a Python dict.
 
     It goes a quarter of the way up from where a joint starts; on a free base, which might fall, nowhere. The
@@ -302,12 +294,11 @@ def goals_text(survey: Survey, base: Base | None, starts: Mapping[str, float]) -
     least = SAG / 2.0 if 0 < len(feet(survey.model)) < TRIPOD else 0.0
     share = 0.25 if survey.model.fixed_base else 0.0
     lines = []
-    for motor in held_motors(survey, base):
-        if not motor.wheel:
-            start = starts.get(motor.joint, 0.0)
-            goal, near = start + share * (motor.high - start), 0.025 * (motor.high - motor.low)
-            near = max(near, least)
-            lines.append(f"    {literal(motor.joint)}: ({goal:.3g}, {near:.3g}),\n")
+    for motor in (each for each in survey.motors if not each.wheel):
+        start = starts.get(motor.joint, 0.0)
+        goal = start + share * (motor.high - start)
+        near = max(0.025 * (motor.high - motor.low), least)
+        lines.append(f"    {literal(motor.joint)}: ({goal:.3g}, {near:.3g}),\n")
     return "".join(lines)
 
 
@@ -322,12 +313,6 @@ def stance_text(package: str, survey: Survey, starts: Mapping[str, float]) -> di
         "stands_checked": ", check_stands" if stands else "",
         "stands_imported": f"\nfrom {package}.robot import ROBOT, STANCE" if stands else "",
     }
-
-
-def folder_text(needed: Sequence[str]) -> str:
-    """Returns the README's line on the packages that a robot needs; "" for none."""
-    names = ", ".join(f"`{each}`" for each in needed)
-    return f"`FOLDER` has what the robot needs of other packages: {names}.\n\n" if needed else ""
 
 
 def wheels_text(survey: Survey) -> dict[str, str]:

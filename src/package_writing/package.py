@@ -90,7 +90,12 @@ def write(request: PackageRequest, made: Path) -> list[str]:
         raise CannotWrite(
             f"rename the file {copied.place!r}: letters, digits, blanks and . + @ , = - only"
         )
-    _check_packages(copied)
+    for name in copied.packages:
+        if _package(name) is None:
+            raise CannotWrite(
+                f"it names the package '{name}', which isn't found: ./ws --with FOLDER rosrun cartpole "
+                "new_robot.py ..., where FOLDER has that package"
+            )
     loose = _loose_link(request, root_link(copied.xml), request.urdf or ARM)
     urdf, xml, survey, lacks = _completed(request, copied, made, loose)
     base = find_base(survey)
@@ -165,15 +170,6 @@ def _loose_link(request: PackageRequest, root: str, source: Path) -> str:
     )
 
 
-def _check_packages(copied: Copied) -> None:
-    for name in copied.packages:
-        if _package(name) is None:
-            raise CannotWrite(
-                f"it names the package '{name}', which isn't found: ./ws --with FOLDER rosrun cartpole "
-                "new_robot.py ..., where FOLDER has that package"
-            )
-
-
 def _package(name: str) -> Path | None:
     try:
         return files.locate(f"{files.PACKAGE}{name}/package.xml").parent
@@ -193,10 +189,10 @@ def _values(
     held = contents.held_motors(survey, base)
     pairs = [f"{name}:={value}" for name, value in request.arguments.items()]
     units = {"rad/s" if each.wheel else "m" if each.linear else "rad" for each in survey.motors}
-    namespace = f'\n    namespace="{survey.namespace}",' if survey.namespace else ""
-    arguments = (
-        f"\n    arguments={json.dumps(request.arguments, ensure_ascii=False)}," if pairs else ""
-    )
+    given = json.dumps(request.arguments, ensure_ascii=False)
+    others = ", ".join(f"`{each}`" for each in needed)
+    if others:
+        others = f"`FOLDER` has what the robot needs of other packages: {others}.\n\n"
     return {
         "name": request.name,
         "urdf": urdf,
@@ -207,23 +203,23 @@ def _values(
         "controllers_yaml": contents.controllers_text(survey, base),
         **contents.base_text(request.name, survey, base),
         "ranges": contents.ranges_text(survey, starts),
-        "goals": contents.goals_text(survey, base, starts),
+        "goals": contents.goals_text(survey, starts),
         **contents.stance_text(request.name, survey, starts),
         "units": ", ".join(each for each in ("rad", "m", "rad/s") if each in units),
         **contents.wheels_text(survey),
         "run": " ".join([DRIVE] * bool(base) + list(map(contents.controller, held))),
-        "arguments": arguments,
+        "arguments": f"\n    arguments={given}," if pairs else "",
         "launch_arguments": "".join(
             f" {escape(shlex.quote(each), contents.QUOTE)}" for each in pairs
         ),
-        "namespace": namespace,
-        "ns": survey.namespace,
+        "namespace": f'\n    namespace="{ns}",' if (ns := survey.namespace) else "",
+        "ns": ns,
         "height": str(request.height),
         "period": str(contents.DRIVE_PERIOD if base else contents.PERIOD),
         "commands": "\n".join(
             _commands(request.name, base, f"../{request.name}", ["FOLDER"] * bool(needed))
         ),
-        "folder": contents.folder_text(needed),
+        "folder": others,
     }
 
 
@@ -255,7 +251,17 @@ def _report(
     yield f"joints with a motor and a controller: {joints}{hint}"
     wheels = [each.joint for each in survey.motors if each.wheel]
     if base:
-        yield from _of_base(base)
+        yield (
+            f"{', '.join(base.left)} on the left and {', '.join(base.right)} on the right get a {DRIVE}: "
+            f"wheels of {base.radius:g} m, {base.separation:g} m apart"
+        )
+        if base.note:
+            yield f"note: the task uses no laser: {base.note}"
+        elif base.laser:
+            yield (
+                f"the task uses its laser '{base.laser.name}': what is nearer than {base.touch:g} m is "
+                "touched"
+            )
     elif wheels:
         yield f"continuous joints of a free base get a velocity controller, as wheels: {', '.join(wheels)}"
         yield (
@@ -291,17 +297,6 @@ def _report(
     here = os.path.relpath(request.folder, TREE) if near else str(request.folder)
     commands = _commands(request.name, base, shlex.quote(here), list(_others(copied)))
     yield from (f"  {each}" for each in commands)
-
-
-def _of_base(base: Base) -> Iterator[str]:
-    yield (
-        f"{', '.join(base.left)} on the left and {', '.join(base.right)} on the right get a {DRIVE}: "
-        f"wheels of {base.radius:g} m, {base.separation:g} m apart"
-    )
-    if base.note:
-        yield f"note: the task uses no laser: {base.note}"
-    elif base.laser:
-        yield f"the task uses its laser '{base.laser.name}': what is nearer than {base.touch:g} m is touched"
 
 
 def _commands(name: str, base: Base | None, here: str, others: Sequence[str]) -> list[str]:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bullet_gazebo.physics.description import ModelDescription, Shape
+from bullet_gazebo.physics.description import Joint, ModelDescription, Shape
 from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.pose import Pose, Vector, conjugate, multiply, rotate
 
@@ -27,28 +27,25 @@ def stance(model: ModelDescription) -> dict[str, float]:
     A joint whose range excludes 0 starts in its middle. The other joints of legs put the feet as they are
     with all joints at 0, flat soles level, with the centre of mass above their middle.
     """
-    stops = {
-        each.name: (each.lower, each.upper) if each.bounded else (-math.inf, math.inf)
-        for each in model.movable_joints
-    }
     starts = {
-        name: 0.0 if low <= 0.0 <= high else (low + high) / 2.0
-        for name, (low, high) in stops.items()
+        each.name: (each.lower + each.upper) / 2.0
+        if each.bounded and not each.lower <= 0.0 <= each.upper
+        else 0.0
+        for each in model.movable_joints
     }
     on = feet(model)
     legs = (each for foot in on for each in model.carriers(foot) if each.movable)
-    turned = list(dict.fromkeys(each.name for each in legs if not starts[each.name]))
+    turned = {each.name: each for each in legs if not starts[each.name]}
     if turned:
-        _stand(model, on, turned, starts, stops)
+        _stand(model, on, turned, starts)
     return {name: round(start, 3) for name, start in starts.items() if round(start, 3)}
 
 
 def _stand(
     model: ModelDescription,
     on: Sequence[str],
-    turned: Sequence[str],
-    positions: dict[str, float],
-    stops: Mapping[str, tuple[float, float]],
+    turned: Mapping[str, Joint],
+    starts: dict[str, float],
 ) -> None:
     """Moves the joints `turned`, as little as it takes and within their stops, so that the feet carry it."""
     zero = link_poses(model, Pose(), {})
@@ -60,17 +57,15 @@ def _stand(
         if size > FLAT and sum(each.movable for each in model.carriers(foot)) >= STEERED:
             flat[foot] = zero[foot].inverse().compose(Pose(middle))
 
-    def wrong(changed: Mapping[str, float]) -> np.ndarray:
-        poses = link_poses(model, Pose(), changed)
-        here = np.array(
-            [
-                poses[foot].compose(flat[foot]).position
-                if foot in flat
-                else _sole(model, foot, poses[foot])[0]
-                for foot in on
-            ]
-        )
-        moved = here - first
+    def wrong(at: np.ndarray) -> np.ndarray:
+        poses = link_poses(model, Pose(), {**starts, **dict(zip(turned, at.tolist(), strict=True))})
+        here = [
+            poses[foot].compose(flat[foot]).position
+            if foot in flat
+            else _sole(model, foot, poses[foot])[0]
+            for foot in on
+        ]
+        moved = np.array(here) - first
         moved[:, :2] -= centre_of_mass(model, poses)[:2] - first[:, :2].mean(axis=0)
         moved[:, 2] -= moved[:, 2].mean()
         turns = [
@@ -78,31 +73,29 @@ def _stand(
         ]
         return np.concatenate([moved.ravel(), *(2.0 * np.array(each[:3]) for each in turns)])
 
+    low, high = np.array(
+        [
+            (each.lower, each.upper) if each.bounded else (-math.inf, math.inf)
+            for each in turned.values()
+        ]
+    ).T
+    at = np.zeros(len(turned))
     for _ in range(TURNS):
-        here = wrong(positions)
+        here = wrong(at)
         if np.linalg.norm(here) < NEAR:
-            return
-        free = list(turned)
-        while free:  # a joint at its stop stays there
-            changed = [{**positions, name: positions[name] + SMALL} for name in free]
-            slopes = np.array([(wrong(each) - here) / SMALL for each in changed]).T
-            steps = np.clip(-np.linalg.pinv(slopes, rcond=0.02) @ here, -STRIDE, STRIDE)
-            wanted = {
-                name: positions[name] + float(step) for name, step in zip(free, steps, strict=True)
-            }
-            held = [
-                name for name, at in wanted.items()
-                if not stops[name][0] <= at <= stops[name][1] and positions[name] in stops[name]
-            ]  # fmt: skip
-            if not held:
-                positions.update(
-                    {
-                        name: min(max(at, stops[name][0]), stops[name][1])
-                        for name, at in wanted.items()
-                    }
-                )
+            break
+        slopes = np.array([(wrong(at + each) - here) / SMALL for each in SMALL * np.eye(len(at))]).T
+        free = np.full(len(at), True)
+        while True:  # a joint at its stop stays there
+            steps = -np.linalg.pinv(slopes[:, free], rcond=0.02) @ here
+            wanted = at.copy()
+            wanted[free] += np.clip(steps, -STRIDE, STRIDE)
+            held = free & ((wanted < low) & (at == low) | (wanted > high) & (at == high))
+            if not held.any():
                 break
-            free = [name for name in free if name not in held]
+            free &= ~held
+        at = np.clip(wanted, low, high)
+    starts.update(zip(turned, at.tolist(), strict=True))
 
 
 def _sole(model: ModelDescription, foot: str, pose: Pose) -> tuple[Vector, float]:

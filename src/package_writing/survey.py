@@ -4,18 +4,13 @@ import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from xml.etree.ElementTree import Element
 
 import yaml
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.transmissions import RobotDescription, read_description
-from bullet_gazebo.physics.description import (
-    DescriptionError,
-    ModelDescription,
-    is_control_plugin,
-)
+from bullet_gazebo.physics.description import DescriptionError, ModelDescription, is_control_plugin
 from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.urdf import parse_urdf
@@ -94,7 +89,15 @@ def look_at(
             raise CannotWrite(f"rename the joint {name!r}: YAML can't hold its control characters")
     driven = {each.joint: each.interface for each in control.transmissions}
     added = not driven
-    _check_passive(passive, movable, driven)
+    for name in passive:
+        if name not in movable:
+            near = did_you_mean(name, movable)
+            raise CannotWrite(f"--passive: it has no joint '{name}' that moves{near}")
+        if driven:
+            raise CannotWrite(
+                "--passive is for files without transmissions; this one has some: remove the transmission "
+                "of a joint that is to have no motor"
+            )
     endless = {each.name for each in model.movable_joints if each.kind == "continuous"}
     wheels = endless if free and not model.fixed_base else set()
     mimics = {e.get("name") for e in robot.findall("joint") if e.find("mimic") is not None}
@@ -107,7 +110,8 @@ def look_at(
         raise CannotWrite(
             "nothing in it moves by a motor: it needs a joint that is revolute, continuous or prismatic"
         )
-    plugin = next(_plugins(robot), None)
+    plugins = robot.iterfind("gazebo/plugin")
+    plugin = next((each for each in plugins if is_control_plugin(each.get("filename", ""))), None)
     namespace = "" if plugin is None else (plugin.findtext("robotNamespace") or "")
     without = tuple(name for name in movable if name not in driven)
     namespace = namespace.strip().strip("/")
@@ -133,18 +137,6 @@ def root_link(xml: str) -> str:
             f"links {links[:10]} form a ring: each is a joint's child, so none is the root"
         )
     return roots[0] if roots else ""
-
-
-def _check_passive(passive: Sequence[str], movable: list[str], driven: dict[str, str]) -> None:
-    for name in passive:
-        if name not in movable:
-            near = did_you_mean(name, movable)
-            raise CannotWrite(f"--passive: it has no joint '{name}' that moves{near}")
-        if driven:
-            raise CannotWrite(
-                "--passive is for files without transmissions; this one has some: remove the transmission "
-                "of a joint that is to have no motor"
-            )
 
 
 def _motors(
@@ -209,13 +201,6 @@ def _range(joint: JointHandle) -> tuple[float, float]:
 def _inwards(bound: float, rounded: Callable[[float], int]) -> float:
     """Rounds a bound to three decimals, inwards."""
     return rounded(bound * 1000.0) / 1000.0
-
-
-def _plugins(robot: Element) -> Iterator[Element]:
-    for block in robot.findall("gazebo"):
-        for plugin in block.findall("plugin"):
-            if is_control_plugin(plugin.get("filename", "")):
-                yield plugin
 
 
 def height_note(height: float, stands: float | None) -> str:

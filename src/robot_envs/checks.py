@@ -230,10 +230,7 @@ def set_goal(task: GoalTask, state: WorldState, rng: np.random.Generator, goal: 
 def checked_goal(task: GoalTask, given: Any) -> np.ndarray:
     """Returns a goal in the form of the task's space of goals; raises TaskError if it isn't in it."""
     space = task.goals()
-    try:
-        goal = np.asarray(given, space.dtype)
-    except (TypeError, ValueError):  # no numbers
-        goal = np.array(math.nan)
+    goal = _array(given, space.dtype)
     if not space.contains(goal):
         raise TaskError(f"the goal {given} isn't one of {type(task).__name__}'s goals: {space}")
     return goal
@@ -251,15 +248,15 @@ def with_goals(task: GoalTask, observation: Any, state: WorldState) -> dict[str,
         TaskError: if `achieved` returns another shape than the goal's, or numbers that aren't finite.
     """
     given, desired = task.achieved(state), task.desired
-    try:
-        achieved = np.asarray(given, desired.dtype)
-    except (TypeError, ValueError):
-        achieved = np.array(math.nan)
+    achieved = _array(given, desired.dtype)
     if achieved.shape != desired.shape or not math.isfinite(achieved.sum()):
-        wanted = f"finite numbers of the shape {desired.shape}"
-        raise _wrong(task, "achieved", given, wanted)
-    return {
-        "observation": observation,
-        "achieved_goal": achieved,
-        "desired_goal": desired.copy(),
-    }
+        raise _wrong(task, "achieved", given, f"finite numbers of the shape {desired.shape}")
+    return {"observation": observation, "achieved_goal": achieved, "desired_goal": desired.copy()}
+
+
+def _array(given: Any, dtype: Any) -> np.ndarray:
+    """Returns NaN for what holds no numbers."""
+    try:
+        return np.asarray(given, dtype)
+    except (TypeError, ValueError):
+        return np.array(math.nan)

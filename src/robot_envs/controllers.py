@@ -10,7 +10,7 @@ from bullet_gazebo.control.controllers.vehicle import VehicleController
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from file_access.text import did_you_mean
+from file_access.text import did_you_mean, nearest_or_all
 
 KINDS = ("Float64", "Float64MultiArray", "Twist")  # of command topics that take numbers
 QUANTITIES = ("position", "velocity", "effort")  # that they command
@@ -163,5 +163,5 @@ def _unknown_joints(
         if joint in movable:
             yield f"controller '{name}': joint '{joint}' has no <transmission> in the URDF"
         else:
-            near = did_you_mean(str(joint), movable) or f"; there are {', '.join(movable)}"
+            near = nearest_or_all(str(joint), movable)
             yield f"controller '{name}': there is no joint '{joint}'{near}"

@@ -5,7 +5,7 @@ import inspect
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
-from file_access.text import did_you_mean
+from file_access.text import did_you_mean, nearest_or_all
 from robot_envs.checks import short
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError
@@ -101,7 +101,7 @@ def check_options(given: Iterable[str], known: Iterable[str] = ()) -> None:
     names = [*option_names(RobotEnv), *known]
     for name in given:
         if name not in names:
-            near = did_you_mean(name, names) or f"; there are {', '.join(names)}"
+            near = nearest_or_all(name, names)
             raise RobotEnvError(f"this environment has no option '{name}'{near}")
 
 

@@ -9,12 +9,7 @@ VECTOR_ENTRY_POINT = "robot_envs.making:make_vector"
 
 
 def register(
-    identifier: str,
-    robot: str,
-    task: str,
-    *,
-    reward_threshold: float | None = None,
-    **options: Any,
+    identifier: str, robot: str, task: str, *, reward_threshold: float | None = None, **options: Any
 ) -> None:
     """Registers an environment with Gymnasium; registering it again with other options replaces it.
 

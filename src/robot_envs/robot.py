@@ -12,16 +12,12 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointLimits
 from bullet_gazebo.control.transmissions import RobotDescription, read_description
-from bullet_gazebo.physics.description import (
-    DescriptionError,
-    ModelDescription,
-    is_control_plugin,
-)
+from bullet_gazebo.physics.description import DescriptionError, ModelDescription, is_control_plugin
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import TIME_STEP
 from bullet_gazebo.robot import control_period_of
-from file_access.text import did_you_mean
+from file_access.text import did_you_mean, nearest_or_all
 from robot_envs import controllers, files
 from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError
@@ -88,8 +84,7 @@ class Robot:
         known = [each.name for each in fields(cls)]
         for name in options:
             if name not in known:
-                near = did_you_mean(name, known) or f"; there are {', '.join(known)}"
-                raise TypeError(f"a Robot has no option '{name}'{near}")
+                raise TypeError(f"a Robot has no option '{name}'{nearest_or_all(name, known)}")
         return super().__new__(cls)
 
     @cached_property
@@ -238,13 +233,10 @@ class Robot:
             for name in named if isinstance(named, Mapping) else ():
                 if name not in self.control.joints:
                     near = did_you_mean(str(name), self.control.joints)
-                    logger.warning(
-                        "the robot '%s' has no joint '%s', which %s names%s",
-                        self.model,
-                        name,
-                        what,
-                        near,
+                    text = (
+                        f"the robot '{self.model}' has no joint '{name}', which {what} names{near}"
                     )
+                    logger.warning("%s", text)
 
     @cached_property
     def ports(self) -> tuple[CommandPort, ...]:

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-from bullet_gazebo.physics.description import Joint
-from file_access.text import did_you_mean
+from file_access.text import nearest_or_all
 from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError, TaskError
 from robot_envs.robot import Robot, unfit_pose
@@ -16,7 +15,7 @@ from robot_envs.world_state import Commands, InitialState, JointState, Motion, P
 
 BEYOND = 0.01  # [rad, m] of a joint's stop, as a moving joint may be
 
-logger = logging.getLogger(__name__)
+logger = logging.getLogger(f"rosout.{__name__}")
 
 Placed = dict[str, tuple[float, float]]
 """Position and velocity of joints, by name."""
@@ -111,13 +110,10 @@ class Scene:
         return found
 
     def _port(self, name: str) -> CommandPort:
-        found = self.ports.get(name)
-        if found is None:
-            near = (
-                did_you_mean(name, self.ports) or f"; there are {', '.join(self.ports) or 'none'}"
-            )
+        if name not in self.ports:
+            near = nearest_or_all(name, self.ports)
             raise TaskError(f"no controller '{name}' takes commands{near}")
-        return found[1]
+        return self.ports[name][1]
 
     def placed_joints(self, initial: InitialState) -> Placed:
         """Returns all movable joints' position and velocity; raises TaskError for an unknown or wrong one."""
@@ -126,23 +122,18 @@ class Scene:
         found: Placed = dict.fromkeys(self.moved, (0.0, 0.0))
         for name, given in initial.joints.items():
             if name not in found:
-                near = did_you_mean(name, found) or f"; there are {', '.join(found)}"
+                near = nearest_or_all(name, found)
                 raise TaskError(f"there is no joint '{name}' to place{near}")
             found[name] = _place(name, given)
             robot, own = self.moved[name]
-            self._warn_of_stops(name, robot.links.joints[own], found[name][0])
+            joint, position = robot.links.joints[own], found[name][0]
+            stop = min(max(position, joint.lower), joint.upper)
+            # The backend moves it to the nearer stop; once for each joint that is worth a line.
+            if joint.bounded and abs(position - stop) > BEYOND and name not in self._warned:
+                self._warned.add(name)
+                text = f"an episode puts the joint '{name}' at {position:g}, beyond its stops"
+                logger.warning("%s: it starts at %g", text, stop)
         return found
-
-    def _warn_of_stops(self, name: str, joint: Joint, position: float) -> None:
-        """Warns, once for each joint, of a start beyond its stops, which is moved to the nearer one."""
-        low, high = joint.lower, joint.upper
-        beyond = joint.bounded and not low - BEYOND <= position <= high + BEYOND
-        if beyond and name not in self._warned:
-            self._warned.add(name)
-            logger.warning(
-                "an episode puts the joint '%s' at %g, beyond its stops: it starts at %g",
-                name, position, min(max(position, low), high),
-            )  # fmt: skip
 
     def placed_models(self, initial: InitialState) -> dict[str, Motion]:
         """Returns the models to place; raises TaskError for an impossible pose."""

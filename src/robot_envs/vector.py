@@ -57,7 +57,14 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
     ) -> None:
         self.closed = True  # until there is something to close
         mode = AutoresetMode(autoreset_mode)
-        _check(num_envs, backend, options.get("render_mode"))
+        if type(num_envs) is not int or num_envs < 1:
+            raise ValueError(f"num_envs must be a whole number, at least 1, not {num_envs!r}")
+        if backend == REALTIME:
+            raise ValueError(
+                f"many robots need the backend 'ros', or one in this process; {REALTIME!r} has a single robot"
+            )
+        if options.get("render_mode") == "human":
+            raise ValueError("many robots can't be shown on one page; use render_mode 'rgb_array'")
         if backend == LOCKSTEP:
             backend = OWN
         self._robots: list[RobotEnv] = []
@@ -163,14 +170,3 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
         with side_by_side(len(self._robots)), contextlib.ExitStack() as closing:
             for robot in self._robots:
                 closing.callback(robot.close)
-
-
-def _check(num_envs: Any, backend: str | None, render_mode: str | None) -> None:
-    if type(num_envs) is not int or num_envs < 1:
-        raise ValueError(f"num_envs must be a whole number, at least 1, not {num_envs!r}")
-    if backend == REALTIME:
-        raise ValueError(
-            f"many robots need the backend 'ros', or one in this process; {REALTIME!r} has a single robot"
-        )
-    if render_mode == "human":
-        raise ValueError("many robots can't be shown on one page; use render_mode 'rgb_array'")

@@ -240,6 +240,14 @@ def living_address(name: str, timeout: float = TIMEOUT) -> str | None:
     return address if theirs is None or is_at(theirs) else None
 
 
+def lives(name: str) -> bool:
+    """Returns whether a node answers; a killed one stays registered."""
+    try:
+        return living_address(name) is not None
+    except NoAnswer:  # of the master
+        return False
+
+
 def _answer(address: str, question: str, timeout: float) -> Any:
     """Returns a node's answer, or None; roscpp nodes answer only getPid."""
     try:

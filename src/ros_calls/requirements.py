@@ -17,18 +17,11 @@ PAGE = "docs/catkin.md"
 # For the simulator (physics, meshes of all kinds), for its window, and for all programs. Elsewhere PyBullet
 # and embreex have no wheels.
 PHYSICS = ("embreex", "pybullet") if platform.machine() == "x86_64" else ("mujoco",)
-SIMULATOR = (*PHYSICS, "collada", "manifold3d", "numpy", "trimesh", "vhacdx", "xacro", "yaml")
+SIMULATOR = (
+    *PHYSICS, "collada", "manifold3d", "numpy", "psutil", "trimesh", "vhacdx", "xacro", "yaml",
+)  # fmt: skip
 WINDOW = (*SIMULATOR, "PIL", "viser", "websockets")
-ALL = (
-    *WINDOW,
-    "gymnasium",
-    "matplotlib",
-    "psutil",
-    "pygame",
-    "tensorboard",
-    "torch",
-    "tqdm",
-)
+ALL = (*WINDOW, "gymnasium", "matplotlib", "pygame", "tensorboard", "torch", "tqdm")
 
 
 def require(modules: tuple[str, ...]) -> None:

@@ -10,6 +10,7 @@ import select
 import socket
 import struct
 import time
+import traceback
 from typing import Any
 
 import genpy
@@ -287,7 +288,8 @@ class Connection:
                     self._await_data(deadline)
                 data += self._part()
             except TimeoutError as fault:
-                if timeout == math.inf or not _is_own(fault) or not self._computes():
+                ours = raised_in(fault) == __name__  # not in a signal's handler in the middle of it
+                if timeout == math.inf or not ours or not self._computes():
                     raise
                 deadline = time.monotonic() + timeout
         return bool(data[0]), bytes(data[HEAD.size :])
@@ -340,12 +342,10 @@ def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
         raise CallFailed(f"the request can't be sent: {fault}") from fault
 
 
-def _is_own(fault: BaseException) -> bool:
-    """Returns whether this module has raised a fault, rather than a signal's handler in the middle of it."""
-    place = fault.__traceback__
-    while place is not None and place.tb_next is not None:
-        place = place.tb_next
-    return place is not None and place.tb_frame.f_globals is globals()
+def raised_in(fault: BaseException) -> str:
+    """Returns the name of the module that has raised an exception."""
+    frames = [frame for frame, _ in traceback.walk_tb(fault.__traceback__)]
+    return str(frames[-1].f_globals.get("__name__", "")) if frames else ""
 
 
 def _finite(timeout: float) -> float:

@@ -6,7 +6,7 @@ nothing). Every function takes the keyword `service_timeout`: the limit for a se
 again for its answer [s]. Failures are logged, never raised.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from controller_manager_msgs.srv import (
@@ -59,21 +59,12 @@ class ListResult(int):
         return f"<ListResult: failed {self.failed}>"
 
 
-def _names(controllers: Sequence[str]) -> str:
-    return ", ".join(controllers) or "none"
-
-
 def _service_name(ns: str | None, service: str) -> str:
     return f"{(ns or '').rstrip('/')}/controller_manager/{service}"
 
 
 def _until_ok(
-    kind: Any,
-    request: tuple[Any, ...],
-    what: str,
-    ns: str | None,
-    max_retries: int,
-    timeout: float,
+    kind: Any, request: tuple[Any, ...], what: str, ns: str | None, max_retries: int, timeout: float
 ) -> bool:
     """Calls a service until its answer is ok, at most `max_retries` times; gives up after a failed call."""
     service = SERVICES[kind]
@@ -88,6 +79,14 @@ def _until_ok(
         f"{service} ({what}): refused {max_retries} times; the controller manager's log says why"
     )
     return False
+
+
+def _each(
+    load: Callable[..., bool], names: Sequence[str], ns: str | None, retries: int, timeout: float
+) -> ListResult:
+    return ListResult(
+        [name for name in names if not load(name, ns, retries, service_timeout=timeout)]
+    )
 
 
 def load_controller_srv(
@@ -119,13 +118,7 @@ def load_controller_list_srv(
     Returns:
         True if every one was loaded; its `failed` names those that were not.
     """
-    return ListResult(
-        [
-            name
-            for name in controller_list
-            if not load_controller_srv(name, ns, max_retries, service_timeout=service_timeout)
-        ]
-    )
+    return _each(load_controller_srv, controller_list, ns, max_retries, service_timeout)
 
 
 def unload_controller_srv(
@@ -156,13 +149,7 @@ def unload_controller_list_srv(
     Returns:
         True if every one was unloaded; its `failed` names those that were not.
     """
-    return ListResult(
-        [
-            name
-            for name in controller_list
-            if not unload_controller_srv(name, ns, max_retries, service_timeout=service_timeout)
-        ]
-    )
+    return _each(unload_controller_srv, controller_list, ns, max_retries, service_timeout)
 
 
 def switch_controllers_srv(
@@ -192,7 +179,8 @@ def switch_controllers_srv(
         True if the manager has switched; with BEST_EFFORT some controllers may still not run.
     """
     request = (list(start_controllers), list(stop_controllers), strictness, start_asap, timeout)
-    what = f"start {_names(start_controllers)}, stop {_names(stop_controllers)}"
+    to_start, to_stop = (", ".join(each) or "none" for each in request[:2])
+    what = f"start {to_start}, stop {to_stop}"
     patience = max(service_timeout, timeout + 2.0)  # the manager gives up after timeout + 1 s
     return _until_ok(SwitchController, request, what, ns, max_retries, patience)
 
@@ -244,19 +232,10 @@ def reset_controllers_srv(
     Returns:
         True if both steps succeeded.
     """
-    stopped = switch_controllers_srv(
-        [],
-        reset_controllers,
-        ns,
-        strictness,
-        start_asap,
-        timeout,
-        max_retries,
-        service_timeout=service_timeout,
-    )
-    return stopped and start_controllers_srv(
-        reset_controllers, ns, strictness, start_asap, timeout, service_timeout=service_timeout
-    )
+    how = (ns, strictness, start_asap, timeout)
+    return switch_controllers_srv(
+        [], reset_controllers, *how, max_retries, service_timeout=service_timeout
+    ) and start_controllers_srv(reset_controllers, *how, service_timeout=service_timeout)
 
 
 def spawn_controllers_srv(
@@ -278,11 +257,7 @@ def spawn_controllers_srv(
     if known is None:
         return False
     missing = [name for name in spawn_controllers if name not in known]
-    failed = [
-        name
-        for name in missing
-        if not load_controller_srv(name, ns, service_timeout=service_timeout)
-    ]
+    failed = load_controller_list_srv(missing, ns, service_timeout=service_timeout).failed
     to_start = [
         name for name in spawn_controllers if name not in failed and known.get(name) != "running"
     ]
@@ -318,23 +293,21 @@ def list_controllers_srv(
 
     None, with an error in the log, if the manager doesn't answer.
     """
-    name = _service_name(ns, "list_controllers")
-    try:
-        answer = wait_and_call(name, ListControllers, timeout=service_timeout)
-    except ServiceFailed as fault:
-        _log.error(str(fault))
-        return None
-    return {controller.name: controller.state for controller in answer.controller}
+    answer = _listed(ns, "list_controllers", ListControllers, service_timeout)
+    return answer and {controller.name: controller.state for controller in answer.controller}
 
 
 def list_controller_types_srv(
     ns: str | None = None, *, service_timeout: float = TIMEOUT
 ) -> list[str] | None:
     """Returns the controller types that can be loaded, or None. See `list_controllers_srv`."""
-    name = _service_name(ns, "list_controller_types")
+    answer = _listed(ns, "list_controller_types", ListControllerTypes, service_timeout)
+    return answer and list(answer.types)
+
+
+def _listed(ns: str | None, service: str, kind: Any, timeout: float) -> Any:
     try:
-        answer = wait_and_call(name, ListControllerTypes, timeout=service_timeout)
+        return wait_and_call(_service_name(ns, service), kind, timeout=timeout)
     except ServiceFailed as fault:
         _log.error(str(fault))
         return None
-    return list(answer.types)

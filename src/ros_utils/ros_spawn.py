@@ -117,12 +117,9 @@ def spawn_model_in_gazebo(
         if not ros_controllers.spawn_controllers_srv(controllers_list, ns, service_timeout=timeout):
             return False
         running = controllers_list
-    return not ready or _is_ready(Ready([gazebo_name], running, ns, gazebo_ns), timeout)
-
-
-def _is_ready(ready: Ready, timeout: float) -> bool:
     try:
-        ready.wait(timeout)
+        if ready:
+            Ready([gazebo_name], running, ns, gazebo_ns).wait(timeout)
     except NotReady as fault:
         _log.error(f"spawn_model_in_gazebo: {fault}")
         return False

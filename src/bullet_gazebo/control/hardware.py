@@ -49,9 +49,13 @@ class Drive(ABC):
         speed = joint.limits.velocity
         self._fastest = UNLIMITED if speed is None else speed
 
-    @abstractmethod
+    _limiter: PositionLimiter | VelocityLimiter
+
     def relatch(self) -> None:
         """Makes the joint's present state the command, and forgets the past."""
+        self._limiter.forget()
+        if self.pid is not None:
+            self.pid.clear()
 
     def joints_moved(self) -> None:
         """Called when something other than time has moved the joint."""
@@ -105,9 +109,7 @@ class PositionDrive(Drive):
     def relatch(self) -> None:
         self.joints_moved()
         self._held = self._good = self.joint.command = self.joint.position
-        self._limiter.forget()
-        if self.pid is not None:
-            self.pid.clear()
+        super().relatch()
 
     def begin_hold(self) -> None:
         self._held = self.joint.position
@@ -145,9 +147,7 @@ class VelocityDrive(Drive):
 
     def relatch(self) -> None:
         self.joint.command = 0.0
-        self._limiter.forget()
-        if self.pid is not None:
-            self.pid.clear()
+        super().relatch()
 
     def hold(self) -> None:
         self.joint.command = 0.0

@@ -170,17 +170,16 @@ class ControllerManager:
             for controller in self._running:
                 self._start(controller)
         self._running = [c for c in self._controllers.values() if c.state == RUNNING]
-        for controller in self._running:
-            try:
-                controller.joints_moved(now)
-            except faults() as error:  # a user's code must not stop the world
-                self._fail(controller, error)
+        self._tell(lambda controller: controller.joints_moved(now))
 
     def restored(self) -> None:
         """Tells the running controllers that the world has returned to a snapshot."""
+        self._tell(lambda controller: controller.restored())
+
+    def _tell(self, call: Callable[[Controller], None]) -> None:
         for controller in self._running:
             try:
-                controller.restored()
+                call(controller)
             except faults() as error:  # a user's code must not stop the world
                 self._fail(controller, error)
 

@@ -6,7 +6,7 @@ See docs/contract/ros_control.md 3.5. What can't be followed raises TrajectoryRe
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.trajectory import NANOSECONDS, Axis, Waypoint
@@ -14,11 +14,7 @@ from bullet_gazebo.control.trajectory import NANOSECONDS, Axis, Waypoint
 SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS = 0, -1, -2  # control_msgs/FollowJointTrajectoryResult
 PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = -4, -5
 MOST_NAMED = 10  # joints of the client in an error text
-LARGEST = (
-    1e12  # of a position and its derivatives: the coefficients of a spline would overflow beyond it
-)
-
-
+LARGEST = 1e12  # of a position and its derivatives: a spline's coefficients would overflow
 SUCCEEDED, ABORTED, CANCELED = "succeeded", "aborted", "canceled"
 
 
@@ -169,10 +165,10 @@ class TrajectorySample(NamedTuple):
 class GoalObserver(Protocol):
     """Follows a goal. It is called within a control tick, so it must not wait for anything."""
 
-    def feedback(self, sample: TrajectorySample) -> None:
-        """Takes the state of the joints, at action_monitor_rate."""
+    def feedback(self, sample: Any) -> None:
+        """Takes the state that the controller reports, at action_monitor_rate."""
 
-    def finished(self, outcome: GoalOutcome) -> None:
+    def finished(self, outcome: Any) -> None:
         """Takes the outcome; it is the last call."""
 
 

@@ -148,7 +148,9 @@ def background(camera: Camera, width: int, height: int) -> Background:
         for tile in TILES
     )
     colours = np.where(odd[..., np.newaxis], odd_rows[:, np.newaxis], even_rows[:, np.newaxis])
-    return Background(colours, np.where(seen, _depth(reach, camera), 1.0).astype(np.float32))
+    near, far = camera.near, camera.far
+    depth = far * (reach - near) / (np.maximum(reach, near) * (far - near))
+    return Background(colours, np.where(seen, depth, 1.0).astype(np.float32))
 
 
 def _tile(distance: float) -> float:
@@ -156,8 +158,3 @@ def _tile(distance: float) -> float:
     wanted = distance / TILES_IN_SIGHT
     power = 10.0 ** math.floor(math.log10(wanted))
     return power * next(step for step in (5.0, 2.0, 1.0) if step * power <= wanted)
-
-
-def _depth(reach: np.ndarray, camera: Camera) -> np.ndarray:
-    near, far = camera.near, camera.far
-    return far * (reach - near) / (np.maximum(reach, near) * (far - near))

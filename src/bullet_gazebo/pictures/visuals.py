@@ -107,9 +107,8 @@ def visible_shapes(model: ModelDescription) -> list[tuple[str, Shape]]:
         (link.name, shape) for link in model.links.values() for shape in link.collisions
     ]
     seen = [(link, shape) for link, shape in found if shape.rgba is None or shape.rgba[3] > 0.0]
-    return [
-        (link, shape) for link, shape in seen if shape.kind != "plane"
-    ]  # the renderer draws the ground
+    # The renderer draws the ground.
+    return [(link, shape) for link, shape in seen if shape.kind != "plane"]
 
 
 def solid_of(shape: Shape) -> Solid:

@@ -104,10 +104,6 @@ class SceneServer:
         """Returns the world's version or a model's number as clients see it."""
         return (self._first + number) % 2**32
 
-    @property
-    def _watched(self) -> bool:
-        return bool(self._poses[1].size or self._contacts[1].size)
-
     def _run(self) -> None:
         while not self._ending.is_set():
             self._news.wait()
@@ -116,7 +112,9 @@ class SceneServer:
 
     def _publish_until_unwatched(self) -> None:
         due = time.monotonic()
-        while self._watched and not self._ending.wait(max(0.0, due - time.monotonic())):
+        while self._poses[1].size or self._contacts[1].size:
+            if self._ending.wait(max(0.0, due - time.monotonic())):
+                return
             try:
                 with self._sim.lock:
                     copies = self._copy()

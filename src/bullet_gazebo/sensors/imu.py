@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.elements import numbers, truth
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import (
@@ -119,15 +118,7 @@ class ModelImu:
         self._imu = Imu(self.feels_gravity, self.rate)
 
     def _place(self, mount: Mount) -> tuple[Model, str, Pose]:
-        name = mount.text("bodyName", "")
-        if not name:
-            raise DescriptionError("<bodyName> is missing")
-        if own := mount.among("bodyName", mount.model.link_names):
-            return mount.model, own, HERE
-        found = mount.sim.world.link(name)
-        if found is None:
-            raise DescriptionError(f"<bodyName>: there is no link '{name}'")
-        return (*found, HERE)
+        return (*mount.link_in_world("bodyName"), HERE)
 
     def _rate(self, mount: Mount) -> float:
         return mount.rate()

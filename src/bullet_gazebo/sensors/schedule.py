@@ -8,6 +8,7 @@ See docs/contract/sensors.md 0.4.
 
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from bullet_gazebo.moves import Moved
@@ -29,32 +30,20 @@ class Move(NamedTuple):
 NEVER = Move(0, LONG_AGO)
 
 
+@dataclass(eq=False)
 class SensorClock:
-    """The clock of one sensor. `Schedule.add` makes it."""
+    """The clock of one sensor. `Schedule.begin` makes it."""
 
     of_the_present = ("has_newcomer", "heard")
 
-    def __init__(
-        self,
-        schedule: "Schedule",
-        model: Model,
-        rate: float,
-        measure: Measure,
-        listens: Callable[[], bool],
-        at_once: bool,
-        now: int,
-    ) -> None:
-        self._schedule = schedule
-        self.model = model
-        self.measure = measure
-        self.listens = listens
-        self.at_once = at_once
-        self.last: int | None = (
-            None  # time of the last measurement [ns], if nothing was moved since
-        )
-        self.heard = False
-        self.has_newcomer = False
-        self.set_rate(rate, now, now)
+    schedule: "Schedule"
+    model: Model
+    measure: Measure
+    listens: Callable[[], bool]
+    at_once: bool
+    last: int | None = None  # time of the last measurement [ns], if nothing was moved since
+    heard: bool = False
+    has_newcomer: bool = False
 
     def set_rate(self, rate: float, begin: int, now: int) -> None:
         """Measures at whole periods of a rate [Hz] after `begin`, from `now` on [ns]; 0 is every step."""
@@ -65,11 +54,11 @@ class SensorClock:
     def look(self, somebody_came: bool = False) -> None:
         """Says that listeners may have come or gone. It takes no lock, so rospy's callbacks may call it."""
         self.has_newcomer = self.has_newcomer or somebody_came
-        self._schedule.look()
+        self.schedule.look()
 
     def end(self) -> None:
         """Ends the measurements. The caller doesn't hold the simulator's lock."""
-        self._schedule.end(self)
+        self.schedule.end(self)
 
     def plan(self, now: int) -> None:
         """Finds the first due time after `now` [ns]."""
@@ -99,7 +88,7 @@ class Schedule:
         sim.reseeded.append(self._reseeded)
         sim.restored.append(self._restored)
 
-    def add(
+    def begin(
         self,
         model: Model,
         rate: float,
@@ -107,7 +96,7 @@ class Schedule:
         listens: Callable[[], bool],
         at_once: bool = True,
     ) -> SensorClock:
-        """Returns a clock that calls `measure` with the time [ns], under the simulator's lock.
+        """Returns a clock that calls `measure` with the time [ns]; the caller holds the simulator's lock.
 
         Args:
             model: that carries the sensor.
@@ -117,19 +106,8 @@ class Schedule:
             at_once: whether it measures as soon as somebody listens, if a period has passed since the last
                 measurement or something was moved.
         """
-        with self._sim.lock:
-            return self.begin(model, rate, measure, listens, at_once)
-
-    def begin(
-        self,
-        model: Model,
-        rate: float,
-        measure: Measure,
-        listens: Callable[[], bool],
-        at_once: bool = True,
-    ) -> SensorClock:
-        """As `add`; the caller holds the simulator's lock."""
-        clock = SensorClock(self, model, rate, measure, listens, at_once, self._sim.now)
+        clock = SensorClock(self, model, measure, listens, at_once)
+        clock.set_rate(rate, self._sim.now, self._sim.now)
         self._clocks.append(clock)
         self._sim.parts.append(clock)
         return clock

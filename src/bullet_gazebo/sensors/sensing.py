@@ -136,6 +136,18 @@ class Mount:
             )
         return found
 
+    def link_in_world(self, tag: str) -> tuple[Model, str]:
+        """Returns the link that the element `tag` names: of its own model, or else of the world.
+
+        Raises:
+            DescriptionError: if there is none.
+        """
+        name, own = self.required(tag), self.among(tag, self.model.link_names)
+        found = (self.model, own) if own else self.sim.world.link(name)
+        if found is None:
+            raise DescriptionError(f"<{tag}>: there is no link '{name}'")
+        return found
+
     def random(self, now: int, part: str = "") -> np.random.Generator:
         """Returns what draws the noise of the measurement at `now` [ns]."""
         return self.sensing.noise(self.model, self.key + part, now)

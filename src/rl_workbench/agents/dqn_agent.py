@@ -59,7 +59,9 @@ class DQNAgent:
         self._epsilon = Epsilon(settings)
         self._explore, self._draw = (np.random.default_rng([seed, use]) for use in (0, 1))
         self._before_action = self._explore.bit_generator.state
-        self._values = self._fast_values()
+        self._values: Callable[[np.ndarray], np.ndarray] = fast_values(self.q_net)
+        if self._device.type != "cpu":
+            self._values = lambda observation: self.q_values(observation[None])[0]
         self.steps = 0  # environment steps
         self.gradient_steps = 0
 
@@ -69,11 +71,6 @@ class DQNAgent:
             torch.manual_seed(seed)
             network = kind(observation_size, self.actions, self.settings.hidden_sizes)
         return network.to(self._device)
-
-    def _fast_values(self) -> Callable[[np.ndarray], np.ndarray]:
-        if self._device.type == "cpu":
-            return fast_values(self.q_net)
-        return lambda observation: self.q_values(observation[None])[0]
 
     @property
     def epsilon(self) -> float:

@@ -193,10 +193,7 @@ class GaussianActor:
     """Acts with a copy of a network's weights; see `Actor`."""
 
     def __init__(
-        self,
-        network: GaussianNetwork,
-        bounds: Bounds,
-        prepare: Callable[[np.ndarray], np.ndarray],
+        self, network: GaussianNetwork, bounds: Bounds, prepare: Callable[[np.ndarray], np.ndarray]
     ) -> None:
         self._prepare, self._outputs, self._bounds = prepare, network.in_numpy(), bounds
         self._middle, self._half = bounds.middle, bounds.half

@@ -2,6 +2,7 @@
 
 import argparse
 import datetime
+import itertools
 import os
 import platform
 import re
@@ -102,11 +103,11 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
             raise WorkbenchError(f"{folder} holds something else; name another folder with --out")
         variants = [asdict(each) for each in suite.variants]
         claim(folder, SUITE_RECORD, variants, "runs with other options")
-        planned = [
-            _Planned(variant.name, seed, _job(variant, seed, folder))
-            for variant in suite.variants
-            for seed in seeds
-        ]
+        planned = []
+        for variant, seed in itertools.product(suite.variants, seeds):
+            name, own = f"{variant.name}, seed {seed}", folder / variant.name / f"seed_{seed}"
+            job = Job(name, own, tuple(training_flags(variant, seed)))
+            planned.append(_Planned(variant.name, seed, job))
         jobs = [each.job for each in planned]
         with job_pool(arguments, folder, interrupt, jobs) as pool:
             interrupt.defer()
@@ -116,11 +117,6 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
             return
         interrupt.at_once()  # the report takes minutes and can be repeated
         _report(folder, suite, planned, arguments.episodes, pool.where)
-
-
-def _job(variant: Variant, seed: int, folder: Path) -> Job:
-    own = folder / variant.name / f"seed_{seed}"
-    return Job(f"{variant.name}, seed {seed}", own, tuple(training_flags(variant, seed)))
 
 
 def _suite(arguments: argparse.Namespace) -> Suite:
@@ -239,11 +235,18 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
     every = figures.table(results, figures.RESULTS)
     costs = figures.summary_table(groups, figures.COSTS_SUMMARY)
     costs += f"\n\n{figures.table(results, figures.COSTS)}"
+    content = {
+        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "versions": run_folder.versions(),
+        "episodes": episodes,
+        "where": where,
+        "runs": figures.rows(results, {**figures.RESULTS, **figures.COSTS}),
+    }
     about = f"{suite.about}\n\n{_measured(episodes, {threshold(run.env_id) for run in runs})}"
     for name, write in (
         ("results.md", as_text(f"# {suite.name}\n\n{about}\n\n{summary}\n\n{every}\n")),
         ("costs.md", as_text(f"# {suite.name}: costs\n\n{_machine()}, {where}.\n\n{costs}\n")),
-        ("results.json", as_json(_figures(results, episodes, where))),
+        ("results.json", as_json(content)),
     ):
         write_file(folder / name, write)
     _draw(folder, runs)
@@ -253,19 +256,6 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
         raise WorkbenchError(
             f"{len(failed)} of {len(results)} trainings failed; the first one: {failed[0].fault}"
         )
-
-
-def _figures(results: "list[RunResult]", episodes: int, where: str) -> dict[str, Any]:
-    """Returns the content of results.json."""
-    from rl_workbench.tools.results import COSTS, RESULTS, rows
-
-    return {
-        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "versions": run_folder.versions(),
-        "episodes": episodes,
-        "where": where,
-        "runs": rows(results, {**RESULTS, **COSTS}),
-    }
 
 
 def _machine() -> str:

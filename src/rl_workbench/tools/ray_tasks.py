@@ -20,15 +20,7 @@ from typing import Any
 from file_access.locks import scratch_folder
 from rl_workbench.errors import WorkbenchError, need
 from rl_workbench.storage import as_text, write_file
-from rl_workbench.tools.job import (
-    POLL,
-    Ending,
-    Job,
-    Program,
-    StopWithin,
-    is_hopeless,
-    run_attempt,
-)
+from rl_workbench.tools.job import POLL, Ending, Job, Program, StopWithin, is_hopeless, run_attempt
 from rl_workbench.training.folder import library_versions
 
 TOKEN = ".seen_by_nodes"
@@ -73,11 +65,8 @@ def train(
             f"{node} doesn't see {folder}: --out has to be a folder that all nodes share"
         )
     found = library_versions()
-    others = [
-        f"{name} {found.get(name)}, not {its}"
-        for name, its in wanted.items()
-        if found.get(name) != its
-    ]
+    wrong = [name for name, its in wanted.items() if found.get(name) != its]
+    others = [f"{name} {found.get(name)}, not {wanted[name]}" for name in wrong]
     if others:
         raise NodeUnusable(f"{node} would come to other bits: it has {', '.join(others)}")
     if is_hopeless(job, since):

@@ -4,7 +4,7 @@ import argparse
 import base64
 import contextlib
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from io import BytesIO
 from itertools import accumulate, pairwise, zip_longest
 from pathlib import Path
@@ -76,7 +76,7 @@ def _rate(text: str) -> float:
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """Records an episode of each policy, and writes the file."""
     from rl_workbench.storage import check_writable
-    from rl_workbench.tools.recording import draw_without_display, draws_itself
+    from rl_workbench.tools.recording import PictureView, draw_without_display, draws_itself
     from rl_workbench.tools.runs import open_run
 
     out, run = arguments.out, open_run(arguments.run)
@@ -99,7 +99,10 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         if suffix == ".html" and draws_itself(policies[arguments.checkpoint[0]].env):
             films = _write_scene(arguments, policies, rate)
         else:
-            films = list(_pictures(arguments, policies, rate))
+            views = {
+                name: PictureView(policies[name].env, size=arguments.size) for name in policies
+            }
+            films = [_record(arguments, name, policies[name], views[name], rate) for name in views]
             write_video(out, SideBySide(films, not arguments.no_captions), films[0].rate)
     for film in films:
         title, end = f"{film.title}: " if film.title else "", film.frames[-1]
@@ -137,16 +140,6 @@ def _record(arguments: argparse.Namespace, which: str, policy: Any, view: Any, r
                             stride=stride, max_steps=arguments.max_steps)  # fmt: skip
     title = which if len(arguments.checkpoint) > 1 else ""
     return Film(title, list(frames), steps / stride)
-
-
-def _pictures(
-    arguments: argparse.Namespace, policies: dict[str, Any], rate: float
-) -> Iterator[Film]:
-    from rl_workbench.tools.recording import PictureView
-
-    for which, policy in policies.items():
-        view = PictureView(policy.env, size=arguments.size)
-        yield _record(arguments, which, policy, view, rate)
 
 
 def _write_scene(

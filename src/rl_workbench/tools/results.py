@@ -73,8 +73,9 @@ def examine(
     if not summary.get("complete"):
         faults.append(str(summary.get("failure") or "not complete"))
     returns, steps = np.array(summary.get("returns") or []), summary.get("steps")
-    if "returns" not in summary:
-        returns, steps = attempt(lambda: _trained_so_far(run)) or (returns, steps)
+    curve = None if "returns" in summary else attempt(lambda: training_curve(run))
+    if curve is not None:  # so far
+        returns, steps = curve.values, int(curve.steps[-1])
     trained = float(returns[-LAST:].mean()) if len(returns) else None
     score, success = trained, summary.get(f"success_rate_last_{LAST}")
     if episodes:
@@ -82,30 +83,22 @@ def examine(
         score, success = (played.mean_return, played.success_rate) if played else (None, None)
     last = attempt(lambda: _greedy(run, episodes, "last", warn)) if also_last else None
     solved_step, solved_seconds = attempt(lambda: _solved(run)) or (None, None)
+    evaluated = attempt(lambda: curve_of(run, EVALUATION).values)
     return RunResult(
         group=group, seed=run.seed, run=run.name, score=score, success=success,
         final=last.mean_return if last else None, training_mean=trained,
-        evaluations=attempt(lambda: _mean_evaluation(run)), avg20=_largest_mean(returns),
+        evaluations=None if evaluated is None or not len(evaluated) else float(evaluated.mean()),
+        avg20=_largest_mean(returns),
         solved_step=solved_step, solved_seconds=solved_seconds, steps=steps,
         episodes=summary.get("episodes") or len(returns) or None, seconds=summary.get("seconds"),
         cpu_seconds=cost_of(run.folder).get("cpu_seconds"), fault="; ".join(dict.fromkeys(faults)),
     )  # fmt: skip
 
 
-def _trained_so_far(run: Run) -> tuple[np.ndarray, int]:
-    curve = training_curve(run)
-    return curve.values, int(curve.steps[-1])
-
-
 def _greedy(run: Run, episodes: int, which: str, warn: Callable[[str], None]) -> Evaluation:
     policy = load_learned(run, which, say=warn)
     with closing(policy.env):
         return play(policy, episodes, run.seed)
-
-
-def _mean_evaluation(run: Run) -> float | None:
-    values = curve_of(run, EVALUATION).values
-    return float(values.mean()) if len(values) else None
 
 
 def _largest_mean(returns: np.ndarray) -> float | None:

@@ -43,12 +43,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of the command."""
     add = parser.add_argument
     add("--algo", choices=tuple(ALGORITHMS), default="dqn", help="the algorithm (default dqn)")
-    add(
-        "--env-id",
-        default="CartPole-v1",
-        metavar="ID",
-        help="the environment (default CartPole-v1)",
-    )
+    add("--env-id", default="CartPole-v1", metavar="ID",
+        help="the environment (default CartPole-v1)")  # fmt: skip
     add("--params", nargs="+", default=[], metavar="KEY=VALUE",
         help="fixed options of every training, excluded from the search")  # fmt: skip
     add("--ranges", type=Path, metavar="FILE", help="ranges to search (default config/sweep.yaml)")

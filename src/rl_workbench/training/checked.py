@@ -42,7 +42,10 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         super().__init__(env)
         self._id, self._which, self._begin_step = env_id, which, _begin_method(env)
         self._sums: dict[str, tuple[float, int]] = {}  # and counts, of an episode's info
-        self._length, self._longest = 0, math.inf if _has_limit(env) else LONGEST  # [steps]
+        # An environment declares a limit to Gymnasium, or as its attribute `max_steps`.
+        is_limited = env.has_wrapper_attr("max_steps") and env.get_wrapper_attr("max_steps")
+        is_limited = is_limited or (env.spec and env.spec.max_episode_steps)
+        self._length, self._longest = 0, math.inf if is_limited else LONGEST  # [steps]
         self._was_cut = False
 
     def begin_step(self, action: Any) -> None:
@@ -55,9 +58,9 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     ) -> tuple[Any, dict[str, Any]]:
         with self._running("reset"):
             found: Any = self.env.reset(seed=seed, options=options)
-            if not isinstance(found, tuple):
-                raise self._old_gym()
-            observation, info = found
+        if not isinstance(found, tuple) or len(found) != 2:
+            raise self._old_gym()
+        observation, info = found
         self._sums, self._length = {}, 0
         self._check(observation)
         return observation, info
@@ -67,7 +70,13 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
             observation, reward, terminated, truncated, info = self.env.step(action)
             self._length += 1
             if self._length >= self._longest and not (terminated or truncated):
-                truncated = self._cut()
+                truncated = True
+                if not self._was_cut:
+                    self._was_cut = True
+                    warn(
+                        f"{self._which}{self._id} doesn't say when an episode ends: it is truncated after "
+                        f"{LONGEST} steps; its option max_episode_steps=N sets another limit"
+                    )
             if info:
                 info = self._noted(info, terminated or truncated)
         self._check(observation)
@@ -78,16 +87,6 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         if not size <= LARGEST:  # true for NaN, too
             raise self._not_finite("reward", reward)
         return observation, reward, terminated, truncated, info
-
-    def _cut(self) -> bool:
-        """Says once that episodes are truncated; returns True."""
-        if not self._was_cut:
-            warn(
-                f"{self._which}{self._id} doesn't say when an episode ends: it is truncated after "
-                f"{LONGEST} steps; its option max_episode_steps=N sets another limit"
-            )
-        self._was_cut = True
-        return True
 
     def _noted(self, info: dict[str, Any], is_last: bool) -> dict[str, Any]:
         """Adds the numbers of an info to their sums; returns the info, at the end with the means."""
@@ -153,8 +152,6 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
             yield
         except gymnasium.error.Error as error:  # its text is made for the user
             raise self._error(str(error) or type(error).__name__) from error
-        except WorkbenchError:
-            raise
         except (Exception, SystemExit) as error:
             if _OLD_GYM.search(str(error)) and not own_frames(error):
                 raise self._old_gym() from error
@@ -205,12 +202,6 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     def _not_finite(self, what: str, value: Any) -> WorkbenchError:
         text = " ".join(str(value).split())
         return self._error(f"the {what} of {self._id} isn't finite in float32: {text}")
-
-
-def _has_limit(env: gymnasium.Env[Any, Any]) -> bool:
-    """Returns whether an environment declares a limit: to Gymnasium, or as its attribute `max_steps`."""
-    is_limited = env.has_wrapper_attr("max_steps") and env.get_wrapper_attr("max_steps")
-    return bool(is_limited or (env.spec and env.spec.max_episode_steps))
 
 
 def _begin_method(env: gymnasium.Env[Any, Any]) -> Callable[[Any], object]:

@@ -56,7 +56,9 @@ def make_environment(
     """
     import_module_of(env_id)
     _check_names(env_id, options or {})
-    wrap = _wrapper(wrapper) if wrapper else lambda env: env
+    wrap: Any = imported(wrapper, "--wrapper") if wrapper else lambda env: env
+    if isinstance(wrap, type) and not issubclass(wrap, gymnasium.Env):
+        raise WorkbenchError(f"--wrapper {wrapper}: it is no gymnasium.Wrapper")
     with ExitStack() as refused:
         try:
             env: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **(options or {}))
@@ -92,14 +94,6 @@ def _check_names(env_id: str, options: Mapping[str, Any]) -> None:
             raise WorkbenchError(
                 f"can't make {env_id}: its {name} is {value}; no option changes it"
             )
-
-
-def _wrapper(name: str) -> Any:
-    """Returns what wraps environments: a function, or a class of environments."""
-    found = imported(name, "--wrapper")
-    if isinstance(found, type) and not issubclass(found, gymnasium.Env):
-        raise WorkbenchError(f"--wrapper {name}: it is no gymnasium.Wrapper")
-    return found
 
 
 def _suited(env: gymnasium.Env[Any, Any], env_id: str, keep_dict: bool) -> gymnasium.Env[Any, Any]:

@@ -98,7 +98,10 @@ class Training:
         self._evaluation: Evaluation | None = None  # the last one
         self._began, self._first_step = time.monotonic(), self._algorithm.steps
         self._seconds_before = self.history.seconds
-        self._progress = self._make_progress()
+        if self._run.total_timesteps:
+            self._progress = Progress(self._run.total_timesteps, "step", self.steps)
+        else:
+            self._progress = Progress(self._run.episodes, "episode", len(self.history.returns))
         own = (ScalarLogger(), self._progress, CurvesPicture())
         self._callbacks = CallbackList(own, callbacks)
 
@@ -144,11 +147,6 @@ class Training:
             return None
         return int(content["steps"]), score.confirmed
 
-    def _make_progress(self) -> Progress:
-        if self._run.total_timesteps:
-            return Progress(self._run.total_timesteps, "step", self.steps)
-        return Progress(self._run.episodes, "episode", len(self.history.returns))
-
     # --- the course of a training ---------------------------------------------------------------
 
     def run(self) -> None:
@@ -172,11 +170,8 @@ class Training:
         self._checkpoints.remove_leftovers()
         record = self.options.record()
         shared = robot_options(self._envs[0], self._run.training_environment)
-        run_folder.write_record(
-            self.folder,
-            {**record, "shared_robot": shared, "task": self._task},
-            bool(self._resumed),
-        )
+        config = {**record, "shared_robot": shared, "task": self._task}
+        run_folder.write_record(self.folder, config, bool(self._resumed))
         settings = {**record["run"], **record["hyperparameters"]}
         self.log = ScalarLog(self.folder, settings, self._log_bytes, tell)
         try:

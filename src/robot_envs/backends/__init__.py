@@ -48,14 +48,13 @@ def make_backend(
         ValueError: for an unknown backend, or a control period that isn't a whole number of physics steps.
         RobotEnvError: if ROS isn't installed, or the robots can't be brought up.
     """
-    from file_access.text import did_you_mean
+    from file_access.text import nearest_or_all
     from robot_envs.backends.backend import PHYSICS_STEP, ticks_per_action
     from robot_envs.robot import EMPTY
 
     name = scene.robots[0].engine if backend is None else backend
     if name not in BACKENDS:
-        near = did_you_mean(str(name), BACKENDS) or f"; there are {', '.join(BACKENDS)}"
-        raise ValueError(f"there is no backend {name!r}{near}")
+        raise ValueError(f"there is no backend {name!r}{nearest_or_all(str(name), BACKENDS)}")
     if deadline is not None and not (isinstance(deadline, (int, float)) and deadline > 0.0):
         raise ValueError(f"deadline is a time above 0 [s], not {deadline!r}")
     step = scene.robots[0].physics_step

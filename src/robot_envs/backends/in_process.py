@@ -1,7 +1,8 @@
 """Robots in a physics world of this process: no ROS, and bit-identical to a simulator in lock-step."""
 
+import contextlib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import starmap
 from typing import Any
 
@@ -55,6 +56,14 @@ from robot_envs.world_state import (
     WorldState,
     link_keys,
 )
+
+
+@contextlib.contextmanager
+def _refusals() -> Iterator[None]:
+    try:
+        yield
+    except (SnapshotError, UnknownName, UnknownState) as error:
+        raise SimulatorError(str(error)) from error
 
 
 class InProcessWorld(RobotBackend):
@@ -137,12 +146,10 @@ class InProcessWorld(RobotBackend):
 
     def look(self, query: StateQuery) -> None:
         links = link_keys(query)
-        try:
+        with _refusals():
             reader = StateReader(self._sim.world, query)
             if query.sensors or self._readers:
                 self._sense(query.sensors)
-        except UnknownName as error:
-            raise SimulatorError(str(error)) from error
         self._reader = reader
         self._links, self._reads_more = links, query != NOTHING
 
@@ -159,10 +166,8 @@ class InProcessWorld(RobotBackend):
         """See `RobotBackend.reset`; the state reached is the one asked for, within the joints' stops."""
         joints, world = self.scene.placed_joints(initial), self._sim.world
         placed = self.scene.placed_models(initial)
-        try:
+        with _refusals():
             models = [(find_model(world, name), at) for name, at in placed.items()]
-        except UnknownName as error:
-            raise SimulatorError(str(error)) from error
         with self._sim.moves.as_one():
             if seed:
                 self._sim.reseed(seed)
@@ -174,16 +179,10 @@ class InProcessWorld(RobotBackend):
             for owner, joint in self._loose:
                 self._sim.set_joint_states(world.models[owner], {joint: 0.0}, {joint: 0.0})
             for robot in self.scene.robots:
-                own = [
-                    (name, joints[key])
-                    for key, (of, name) in self.scene.moved.items()
-                    if of is robot
-                ]
-                self._sim.set_joint_states(
-                    self._robots[robot.model][0],
-                    {name: position for name, (position, _) in own},
-                    {name: velocity for name, (_, velocity) in own},
-                )
+                moved = self.scene.moved.items()
+                own = {name: joints[key] for key, (of, name) in moved if of is robot}
+                at, speeds = ({name: each[i] for name, each in own.items()} for i in (0, 1))
+                self._sim.set_joint_states(self._robots[robot.model][0], at, speeds)
         state = self._state()
         self._held = self.scene.starting_commands(state.joints)
         return state._replace(commands=self._held)
@@ -233,24 +232,18 @@ class InProcessWorld(RobotBackend):
         self._apply(variation)
 
     def save_state(self) -> Any:
-        try:
+        with _refusals():
             return self._sim.save_state(), self._held, self._begin
-        except UnknownState as error:
-            raise SimulatorError(str(error)) from error
 
     def restore_state(self, state: Any) -> None:
         snapshot, held, begin = state
-        try:
+        with _refusals():
             self._sim.restore_state(snapshot)
-        except (SnapshotError, UnknownState) as error:
-            raise SimulatorError(str(error)) from error
         self._held, self._begin = held, begin
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
-        try:
+        with _refusals():
             found = [find_link(self._sim.world, name) for name in links]
-        except UnknownName as error:
-            raise SimulatorError(str(error)) from error
         return [model.link_state(link)[0] for model, link in found]
 
     def close(self) -> None:

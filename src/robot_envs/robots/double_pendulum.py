@@ -11,6 +11,7 @@ from robot_envs.robots import actions, numbers
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, WorldState
 
+JOINTS = ("cart_joint", "lower_joint", "upper_joint")
 STRONGEST = 15.0  # [N] that an action asks for
 LEAN = 0.5  # [rad] of a rod from the vertical, at which it counts as fallen
 EDGE = 0.95  # [m] of the cart from the rail's middle
@@ -67,27 +68,15 @@ class Balance(Task):
         return numbers(6)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
-        names = ("cart_joint", "lower_joint", "upper_joint")
         off = rng.uniform(-self.noise, self.noise, (3, 2)).tolist()
-        return InitialState(
-            joints={
-                name: (position, speed) for name, (position, speed) in zip(names, off, strict=True)
-            }
-        )
+        return InitialState(joints=dict(zip(JOINTS, map(tuple, off), strict=True)))
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, float]:
         return {"cart_controller": STRONGEST * float(action[0])}
 
     def observe(self, state: WorldState) -> np.ndarray:
         cart, lower, upper = rods(state)
-        seen = [
-            cart[0],
-            cart[1],
-            lower[0] / 0.2,
-            lower[1] / 2.0,
-            upper[0] / 0.2,
-            upper[1] / 2.0,
-        ]
+        seen = [*cart, lower[0] / 0.2, lower[1] / 2.0, upper[0] / 0.2, upper[1] / 2.0]
         return np.array(seen, np.float32)
 
     def reward(self, state: WorldState, action: np.ndarray) -> float:
@@ -102,9 +91,7 @@ class Balance(Task):
 
 def rods(state: WorldState) -> list[tuple[float, float]]:
     """Returns position and speed: the cart's [m, m/s], and both rods' from the vertical [rad, rad/s]."""
-    cart, lower, upper = (
-        state.joints[name] for name in ("cart_joint", "lower_joint", "upper_joint")
-    )
+    cart, lower, upper = (state.joints[name] for name in JOINTS)
     return [
         (cart.position, cart.velocity),
         (lower.position, lower.velocity),

@@ -79,13 +79,8 @@ class HopForward(Task):
         return InitialState(joints={**leg, "pitch": off[3], "up": 0.01 - bent}, commands=commands)
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
-        moves = action.tolist()
-        return {
-            "leg_controller": tuple(
-                stance + swing * move
-                for stance, swing, move in zip(STANCE, SWING, moves, strict=True)
-            )
-        }
+        moves = zip(STANCE, SWING, action.tolist(), strict=True)
+        return {"leg_controller": tuple(stance + swing * move for stance, swing, move in moves)}
 
     def observe(self, state: WorldState) -> np.ndarray:
         each = state.joints

@@ -81,12 +81,8 @@ class ReachInSpace(Task):
             for middle, half in zip(CENTRE, HALF, strict=True)
         )
         self.target = (x, y, z)
-        off = rng.uniform(-0.3, 0.3, 6)
-        return InitialState(
-            joints={
-                name: float(home + each) for name, home, each in zip(JOINTS, HOME, off, strict=True)
-            }
-        )
+        pose = np.add(HOME, rng.uniform(-0.3, 0.3, 6)).tolist()
+        return InitialState(joints=dict(zip(JOINTS, pose, strict=True)))
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
         """Moves the set-points, within the joints' ranges."""

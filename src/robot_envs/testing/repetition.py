@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -10,14 +11,7 @@ from gymnasium.vector import SyncVectorEnv, VectorEnv
 
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import SimulatorError
-from robot_envs.testing.rollouts import (
-    Given,
-    Subject,
-    differences,
-    expect_error,
-    rollout,
-    same,
-)
+from robot_envs.testing.rollouts import Given, Subject, differences, expect_error, rollout, same
 
 WORLDS, SEED = 3, 11
 TRIES = 20  # actions, to find another one
@@ -148,26 +142,15 @@ def vectors(subject: Subject) -> None:
 
 
 def _vectors(subject: Subject) -> list[tuple[VectorEnv, str]]:
-    options = subject.options
     if subject.identifier is None:
-
-        def one() -> gymnasium.Env[Any, Any]:
-            return subject.make(**options)
-
+        one = partial(subject.make, **subject.options)
         return [(SyncVectorEnv([one] * WORLDS), "SyncVectorEnv")]
     kinds = ["sync"]
     plain = subject.identifier.rpartition(":")[2]  # its module has been imported to make it
     if gymnasium.spec(plain).vector_entry_point is not None:
         kinds.append("vector_entry_point")
-    return [
-        (
-            gymnasium.make_vec(
-                subject.identifier, num_envs=WORLDS, vectorization_mode=kind, **options
-            ),
-            f"make_vec, {kind}",
-        )
-        for kind in kinds
-    ]
+    make = partial(gymnasium.make_vec, subject.identifier, WORLDS, **subject.options)
+    return [(make(vectorization_mode=kind), f"make_vec, {kind}") for kind in kinds]
 
 
 def _run(env: gymnasium.Env[Any, Any], index: int, steps: int) -> list[Any]:
@@ -195,15 +178,9 @@ def _run_all(vector: VectorEnv, steps: int) -> list[list[Any]]:
     for _ in range(steps):
         actions = np.stack([space.sample() for _ in range(WORLDS)])
         seen, rewards, terminated, truncated, _ = vector.step(actions)
-        for index in range(WORLDS):
-            given[index].append(
-                (
-                    _row(seen, index),
-                    float(rewards[index]),
-                    bool(terminated[index]),
-                    bool(truncated[index]),
-                )
-            )
+        ended = zip(rewards.tolist(), terminated.tolist(), truncated.tolist(), strict=True)
+        for index, row in enumerate(ended):
+            given[index].append((_row(seen, index), *row))
     return given
 
 

@@ -27,16 +27,13 @@ class Subject:
     @contextlib.contextmanager
     def made(self, **options: Any) -> Iterator[RobotEnv]:
         """Makes one without wrappers, and closes it in the end."""
-        env = self.make(**{**self._all_options, **options}).unwrapped
+        backend = {} if self.backend is None else {"backend": self.backend}
+        env = self.make(**{**self.options, **backend, **options}).unwrapped
         try:
             assert isinstance(env, RobotEnv), f"it is {env!r}, and no robot_envs.RobotEnv"
             yield env
         finally:
             env.close()
-
-    @property
-    def _all_options(self) -> dict[str, Any]:
-        return self.options if self.backend is None else {**self.options, "backend": self.backend}
 
     def over(self, backend: str | None) -> "Subject":
         """Returns the same over another backend."""

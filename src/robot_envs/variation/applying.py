@@ -80,31 +80,26 @@ class Applier:
                 self._links[name] = self._world.link(links[name])
             self._world.set_link(links[name], scaled(self._links[name], difference))
         for name, joint in joints.items():
-            self._set_friction(name, joint, variation)
+            own = joint.robot.links.joints[joint.name]  # Gazebo's services don't report it
+            damping, friction = variation.damping.get(name), variation.friction.get(name)
+            self._world.set_joint(
+                joint,
+                None if damping is None else own.damping + damping,
+                None if friction is None else own.friction + friction,
+            )
         for name, factor in variation.surfaces.items():
             self._world.set_surface(links[name], factor)
         for name, controller in controllers.items():
-            self._scale_gains(name, controller, variation.gains[name])
+            if name not in self._pids:
+                self._pids[name] = self._world.pids(controller)
+            factor = variation.gains[name]
+            for place, now in self._pids[name].items():
+                wanted = replace(now, p=factor * now.p, i=factor * now.i, d=factor * now.d)
+                self._world.set_pid(controller, place, wanted)
         if variation.gravity is not None:
             if self._gravity is None:
                 self._gravity = self._world.gravity()
             self._world.set_gravity(scale(self._gravity, variation.gravity))
-
-    def _set_friction(self, name: str, joint: RobotPart, variation: Variation) -> None:
-        own = joint.robot.links.joints[joint.name]  # Gazebo's services don't report it
-        damping, friction = variation.damping.get(name), variation.friction.get(name)
-        self._world.set_joint(
-            joint,
-            None if damping is None else own.damping + damping,
-            None if friction is None else own.friction + friction,
-        )
-
-    def _scale_gains(self, name: str, controller: RobotPart, factor: float) -> None:
-        if name not in self._pids:
-            self._pids[name] = self._world.pids(controller)
-        for place, now in self._pids[name].items():
-            wanted = replace(now, p=factor * now.p, i=factor * now.i, d=factor * now.d)
-            self._world.set_pid(controller, place, wanted)
 
     def undo(self) -> None:
         """Restores the robots as they were found; raises SimulatorError if the world refuses."""

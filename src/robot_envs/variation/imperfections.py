@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from file_access.text import did_you_mean
+from file_access.text import nearest_or_all
 from robot_envs.world_state import Joints, JointState, Reading, Sensors, WorldState
 
 
@@ -40,7 +40,7 @@ def by_name(
         return dict.fromkeys(names, given)
     for name in given:
         if name not in names:
-            hint = did_you_mean(str(name), names) or f"; there are {', '.join(names) or 'none'}"
+            hint = nearest_or_all(str(name), names)
             raise ValueError(f"{option}: there is no {kind} {name!r}{which and ' '}{which}{hint}")
     return dict(given)
 
@@ -179,7 +179,11 @@ class Sensor:
             return noisy
         values = dict(reading.values)
         for part in [each for each in values if each in sizes]:
-            values[part] = _noisy(values[part], sizes[part], rng)
+            exact = values[part]
+            found = exact + rng.normal(0.0, sizes[part], exact.shape)
+            if exact.dtype == np.uint8:
+                found = np.rint(np.clip(found, 0.0, 255.0))
+            values[part] = found.astype(exact.dtype)
         noisy = Reading(reading.time, values)
         self._readings[name] = (reading.time, noisy)
         return noisy
@@ -200,13 +204,6 @@ def _by_part(given: Any) -> dict[str, float]:
     """Returns the standard deviations of what a sensor measures, by attribute of its `Reading`."""
     sizes = by_name("sensor_noise", given, NOISY, "attribute of a reading")
     return {name: at_least_zero("sensor_noise", size) for name, size in sizes.items()}
-
-
-def _noisy(values: np.ndarray, size: float, rng: np.random.Generator) -> np.ndarray:
-    noisy = values + rng.normal(0.0, size, values.shape)
-    if values.dtype == np.uint8:
-        noisy = np.rint(np.clip(noisy, 0.0, 255.0))
-    return noisy.astype(values.dtype)
 
 
 def _pair(option: str, given: Any) -> tuple[float, float]:

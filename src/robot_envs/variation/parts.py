@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.pid import Gains
-from file_access.text import did_you_mean
+from file_access.text import nearest_or_all
 from robot_envs.controllers import load
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot
@@ -74,7 +74,7 @@ def varied(parts: Mapping[str, RobotPart], kind: str, names: Iterable[str]) -> d
     found = {}
     for name in names:
         if name not in parts:
-            hint = did_you_mean(name, parts) or f"; there are {', '.join(parts) or 'none'}"
+            hint = nearest_or_all(name, parts)
             raise SimulatorError(f"there is no {kind} '{name}' to vary{hint}")
         found[name] = parts[name]
     return found

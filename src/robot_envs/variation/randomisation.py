@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from file_access.text import did_you_mean
+from file_access.text import nearest_or_all
 from robot_envs.scene import Scene
 from robot_envs.variation.imperfections import by_name, is_number
 from robot_envs.variation.parts import Parts, check_tunable
@@ -68,7 +68,7 @@ def check_names(given: Iterable[str]) -> None:
     known = [option.name for option in OPTIONS]
     for name in given:
         if name not in known:
-            hint = did_you_mean(str(name), known) or f"; there are {', '.join(known)}"
+            hint = nearest_or_all(str(name), known)
             raise ValueError(f"randomisation has no option {name!r}{hint}")
 
 
@@ -162,9 +162,8 @@ class UniformRandomisation:
             CONTROLLERS: parts.controllers, WORLD: (WORLD.name,),
         }  # fmt: skip
         self._ranges: dict[str, dict[str, UniformRange]] = {}
-        self._places: dict[
-            str, dict[str, int]
-        ] = {}  # indices of an option's numbers among those drawn
+        # Indices of an option's numbers among those drawn.
+        self._places: dict[str, dict[str, int]] = {}
         self._count = 0
         for option in OPTIONS:
             names = list(drawn_for[option.of])

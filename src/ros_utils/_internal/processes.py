@@ -182,10 +182,7 @@ def _end_wave(
 
 
 def _end_with(
-    number: signal.Signals,
-    grace: float,
-    starts: Sequence[Start],
-    reap: Callable[[set[str]], bool],
+    number: signal.Signals, grace: float, starts: Sequence[Start], reap: Callable[[set[str]], bool]
 ) -> bool:
     """Sends one signal and waits; returns whether something still runs after `grace` [s]."""
     deadline = time.monotonic() + grace

@@ -105,7 +105,6 @@ def _warn(handle: Handle, text: str) -> None:
 
 def _own_nodes(handle: Handle) -> int:
     """Returns the number of registered nodes that belong to the launch."""
-    nodes = [
-        address for name, address in _nodes.node_uris().items() if name not in _nodes.CORE_NODES
-    ]
-    return sum(handle.owns(_nodes.node_pid(address)) for address in nodes)
+    nodes = _nodes.node_uris().items()
+    own = (address for name, address in nodes if name not in _nodes.CORE_NODES)
+    return sum(handle.owns(_nodes.node_pid(address)) for address in own)

@@ -107,7 +107,11 @@ class Bench:
                 ending.callback(_await_recordings, recorded)
             before = _parameters()
             ending.callback(_forget_parameters, before)
-            _set_physics(self._physics)
+            usual = self._physics
+            gravity = usual.gravity.x, usual.gravity.y, usual.gravity.z
+            properties = usual.time_step, usual.max_update_rate, gravity, usual.ode_config
+            ros_gazebo.gazebo_set_physics_properties(*properties)
+            ros_gazebo.gazebo_unpause_physics()
             world = RobotWorld(seed)
             ending.callback(world.close)
             yield world
@@ -137,14 +141,6 @@ class Bench:
 def process_bench() -> Bench:
     """Returns the bench of this process; its programs end with the process."""
     return Bench()
-
-
-def _set_physics(wanted: Any) -> None:
-    """Gives back a world its gravity, its step and its solver, and lets its time pass."""
-    gravity = wanted.gravity.x, wanted.gravity.y, wanted.gravity.z
-    properties = wanted.time_step, wanted.max_update_rate, gravity, wanted.ode_config
-    ros_gazebo.gazebo_set_physics_properties(*properties)
-    ros_gazebo.gazebo_unpause_physics()
 
 
 def _parameters() -> set[str]:

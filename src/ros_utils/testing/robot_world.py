@@ -1,8 +1,9 @@
 """A world for one test: robots are spawned in it, and assertions let its time pass."""
 
+import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 from xml.etree import ElementTree
 
 import numpy as np
@@ -10,7 +11,7 @@ import rosgraph
 from bullet_gazebo_msgs.srv import StepWorldRequest
 from tf.transformations import quaternion_from_euler
 
-from file_access.text import did_you_mean
+from file_access.text import nearest_or_all
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils._internal import packages, params
 from ros_utils.testing.lockstep_subscriber import WorldError
@@ -69,24 +70,18 @@ class RobotWorld(SteppedWorld):
             raise WorldError(f"there is a model '{name}' already: give this one another name=...")
         pose = (*xyz, *quaternion_from_euler(*rpy).tolist())
         path = _located(file)
-        if controllers is not None and not ros_params.ros_load_yaml_from_path(
-            _located(controllers), ns
-        ):
+        load = ros_params.ros_load_yaml_from_path
+        if controllers is not None and not load(_located(controllers), ns):
             raise WorldError(f"{controllers} can't be loaded; the log says why")
         for each in run:
             _check_described(each, ns)
+        place = (name, ns, "world", *pose)
         if file.endswith(".sdf"):
-            done = ros_gazebo.gazebo_spawn_sdf_path(path, name, ns, "world", *pose)
-        else:
-            done = ros_urdf.urdf_load_from_path(path, DESCRIPTION, ns, list(arguments))
-            if done:
-                self._check_start(ns, joints or {})
-                done = bool(
-                    ros_gazebo.gazebo_spawn_urdf_param(DESCRIPTION, name, ns, "world", *pose)
-                )
-        if run:
-            done = done and ros_controllers.spawn_controllers_srv(run, ns)
-        if not done:
+            done = ros_gazebo.gazebo_spawn_sdf_path(path, *place)
+        elif done := ros_urdf.urdf_load_from_path(path, DESCRIPTION, ns, list(arguments)):
+            self._check_start(ns, joints or {})
+            done = bool(ros_gazebo.gazebo_spawn_urdf_param(DESCRIPTION, *place))
+        if not done or (run and not ros_controllers.spawn_controllers_srv(run, ns)):
             raise WorldError(
                 f"{file} can't be spawned, or not with its controllers; the log says why"
             )
@@ -185,11 +180,7 @@ class RobotWorld(SteppedWorld):
         self.assert_that(look, f"{distance:g} ± {within:g} m", by, stays)
 
     def assert_that(
-        self,
-        look: Callable[[], str],
-        wanted: str,
-        by: float = 0.0,
-        stays: float = 0.0,
+        self, look: Callable[[], str], wanted: str, by: float = 0.0, stays: float = 0.0
     ) -> None:
         """Asserts a condition of your own, looked at after each physics step.
 
@@ -240,15 +231,12 @@ def _located(file: str) -> str:
 
 def _check_described(controller: str, ns: str) -> None:
     """Raises WorldError, with the nearest name, if a controller has no parameters in a namespace."""
-    try:
+    known: dict[str, Any] = {}
+    with contextlib.suppress(KeyError):
         known = params.get(ns)
-    except KeyError:
-        known = {}
     described = [name for name, each in known.items() if isinstance(each, dict) and "type" in each]
     if controller.partition("/")[0] not in known:
-        near = (
-            did_you_mean(controller, described) or f"; there are {', '.join(described) or 'none'}"
-        )
+        near = nearest_or_all(controller, described)
         raise WorldError(
             f"there is no controller '{controller}' among the parameters of '{ns}'{near}"
         )

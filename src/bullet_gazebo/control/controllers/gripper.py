@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol, Self
+from typing import NamedTuple, Self
 
 from bullet_gazebo.control.controllers.base import Controller, joint_param, option
 from bullet_gazebo.control.errors import ControlError
@@ -11,7 +11,7 @@ from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.limits import clamp
 from bullet_gazebo.control.pid import Loop, Pid
 from bullet_gazebo.control.trajectory import NANOSECONDS
-from bullet_gazebo.control.trajectory_goals import ABORTED, CANCELED, SUCCEEDED
+from bullet_gazebo.control.trajectory_goals import ABORTED, CANCELED, SUCCEEDED, GoalObserver
 
 
 class GripperSample(NamedTuple):
@@ -29,16 +29,6 @@ class GripperOutcome(NamedTuple):
     kind: str
     text: str
     sample: GripperSample
-
-
-class GripperObserver(Protocol):
-    """Follows a goal. It is called within a control tick, so it must not wait for anything."""
-
-    def feedback(self, sample: GripperSample) -> None:
-        """Takes the gripper's state, at action_monitor_rate."""
-
-    def finished(self, outcome: GripperOutcome) -> None:
-        """Takes the outcome; it is the last call."""
 
 
 class GripperSettings(NamedTuple):
@@ -68,7 +58,7 @@ class GripperActionController(Controller):
         if pid is not None:
             self.pids = {f"gains/{joint.name}": pid}
             self.loops = [Loop(joint.name, pid)]
-        self._goal: tuple[str, GripperObserver] | None = None
+        self._goal: tuple[str, GoalObserver] | None = None
         self._position, self._most = joint.position, settings.max_effort
         self._uptime = self._moved = self._next_report = 0
 
@@ -111,7 +101,7 @@ class GripperActionController(Controller):
             effort = self._pid.compute_with_rate(error, -self._joint.velocity, dt)
             self._joint.command = clamp(effort, -abs(self._most), abs(self._most))
 
-    def pursue(self, key: str, position: float, effort: float, observer: GripperObserver) -> None:
+    def pursue(self, key: str, position: float, effort: float, observer: GoalObserver) -> None:
         """Goes to `position` [rad, m] with at most `effort` [N m, N].
 
         Raises:
@@ -140,7 +130,7 @@ class GripperActionController(Controller):
     def _hold(self) -> None:
         self._position, self._most = self._joint.position, self._settings.max_effort
 
-    def _monitor(self, observer: GripperObserver, error: float) -> None:
+    def _monitor(self, observer: GoalObserver, error: float) -> None:
         if abs(error) < self._settings.goal_tolerance:
             self._end(SUCCEEDED, "")
             return

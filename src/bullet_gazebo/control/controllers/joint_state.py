@@ -13,7 +13,7 @@ from bullet_gazebo.control.joint import JointHandle
 
 NANOSECONDS = 1_000_000_000
 SLOWEST = 1e-6  # [Hz]; below it, as at 0, nothing is ever published
-Extra = tuple[str, float, float, float]  # a constant joint: name, position, velocity, effort
+Extra = tuple[str, tuple[float, ...]]  # a constant joint: name; position, velocity, effort
 EXTRA_FIELDS = ("position", "velocity", "effort")
 
 
@@ -41,11 +41,7 @@ class JointStateController(Controller):
         self._period = round(NANOSECONDS / rate) if rate > SLOWEST else None
         self._last = 0
         self._names = tuple(j.name for j in joints) + tuple(e[0] for e in extra)
-        self._extra = (
-            tuple(e[1] for e in extra),
-            tuple(e[2] for e in extra),
-            tuple(e[3] for e in extra),
-        )
+        self._extra = [tuple(values[part] for _, values in extra) for part in range(3)]
         self._output = Output("joint_states", "JointState", shared=True)
         self.outputs = [self._output]
 
@@ -104,5 +100,5 @@ def _extra_joints(entries: object, names: list[str]) -> list[Extra]:
             continue
         if isinstance(entry.get("name"), str) and entry["name"] not in seen:
             seen.add(entry["name"])
-            extra.append((entry["name"], *values))
+            extra.append((entry["name"], tuple(values)))
     return extra

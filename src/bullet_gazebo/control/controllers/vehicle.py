@@ -175,15 +175,12 @@ class VehicleController(Controller):
         self.place.move_on_arc(ahead, turn, left)
         if self.period.is_over(now):
             self.report(now)
-        linear, _, angular = self.wanted(now)
+        # The last command may be too old.
+        linear, _, angular = REST if self.is_late(now) else self._wanted
         limited = self._limit(linear, angular, dt)
         if self._cmd_out.wanted:
             self._cmd_out.send(TwistSample(now, *limited))
         self.drive(*limited)
-
-    def wanted(self, now: int) -> Triple:
-        """Returns the command in force: rest if the last one is too old."""
-        return REST if self.is_late(now) else self._wanted
 
     def is_late(self, now: int) -> bool:
         """Whether the last command is too old at a time [ns]."""

@@ -272,6 +272,8 @@ class BulletBody(Body):
             self.id, index, mass=new.mass, localInertiaDiagonal=_moments(new),
             physicsClientId=self._client,
         )  # fmt: skip
+        self._description.links[link].inertia = new
+        self._separation.add(self.id, self._description, self._links)
         return True
 
     def set_damping(self, index: int, damping: float) -> None:

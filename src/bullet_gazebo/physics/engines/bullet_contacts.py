@@ -16,11 +16,11 @@ from typing import Any
 from bullet_gazebo.physics.description import ModelDescription
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 
-RELAXATION = 0.03  # [s]
-STIFFNESS = 3e5  # [N/m] of the contact points of a light model
+RELAXATION = 0.02  # [s]
+STIFFNESS = 1e6  # [N/m] of the contact points of a light model
 STIFFNESS_OF_A_KILOGRAM = 6e4  # [N/m]; a weight on a single point sinks 0.16 mm
 HARD = 1e9  # [N s/m] of contacts at a given speed: much more than mass / time step
-SHALLOW = 0.0003  # [m]; at the file format's usual 0.01 m/s, what ends within RELAXATION anyway
+SHALLOW = 0.0002  # [m]; at the file format's usual 0.01 m/s, what ends within RELAXATION anyway
 
 LinkIndex = tuple[int, int]
 """PyBullet's numbers of a body and a link of it."""

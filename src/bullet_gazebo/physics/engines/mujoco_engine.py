@@ -23,9 +23,8 @@ from bullet_gazebo.physics.pose import ZERO, Pose, Vector
 MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
 DEFAULT_STEP = 0.001  # [s]
 STIFFEST = 2.0  # steps: MuJoCo's shortest time constant of a constraint
-GRIPPED = (
-    2.0  # of critical damping: what slides hops, and light objects rattle between fingers, at 1
-)
+# Of contacts: [s] and of critical damping. Stiffer ones throw what slides into the air, and rattle.
+CONTACT = (0.035, 1.2)
 # Constraints yield to a ten-thousandth of what acts against them, MuJoCo's minimum.
 IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 IMPRATIO = 10.0  # how much stiffer friction is than the contact, so that nothing at rest creeps
@@ -200,7 +199,7 @@ class MujocoEngine(Engine):
             model.eq_solref,
         ):
             reference[:] = (STIFFEST * self._time_step, 1.0)
-        model.geom_solref[:, 1] = GRIPPED
+        model.geom_solref[:] = (max(CONTACT[0], STIFFEST * self._time_step), CONTACT[1])
         for impedance in (
             model.jnt_solimp,
             model.dof_solimp,

@@ -15,9 +15,6 @@ FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
 TENDON = mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON
 ROWS = 3  # constraints of a contact: along its normal, and two across it
-BRAKING = 0.2
-"""The most [m/s] by which friction aims to slow in a step what slides. It would aim to stop it, and MuJoCo
-would push the bodies apart to reach that."""
 
 
 @dataclass
@@ -50,14 +47,14 @@ class MujocoState:
     def step(self) -> None:
         """Integrates by one time step; efforts and wrenches end with it."""
         np.copyto(self._before, self._positions)
-        if self.whole_steps:
-            mujoco.mj_step(self.model, self.data)
-        else:
+        if self.speeds or self.gears or (self.placed and not self.whole_steps):
             mujoco.mj_step1(self.model, self.data)
-            if self.speeds or self.gears:
-                self._drive()
-            self._ease_contacts()
+            self._drive()
+            if self.placed:
+                self._ease_contacts()
             mujoco.mj_step2(self.model, self.data)
+        else:
+            mujoco.mj_step(self.model, self.data)
         self.stale = True
         if not hypot(*self._speeds()) < self._fast:  # also if one of them is NaN
             self._slow_down()
@@ -88,28 +85,22 @@ class MujocoState:
         self._separation = equal if equal.size == 1 else fastest
 
     def _ease_contacts(self) -> None:
-        """Changes the accelerations [m/s²] that contacts aim at: see BRAKING and `set_fastest_separation`."""
+        """Bounds the speeds at which contacts separate what has been placed into something else."""
         data = self.data
         first = data.ne + data.nf + data.nl  # contacts are the last constraints
         aims = data.efc_aref[first:]
-        if not aims.size:
-            return
-        if self.placed:
-            self._bound_separation(first, aims[::ROWS])
-        most = BRAKING / self.model.opt.timestep
-        across = aims.reshape(-1, ROWS)[:, 1:]
-        squares = np.einsum("ij,ij->i", across, across)
-        across *= (most / np.sqrt(np.maximum(squares, most**2)))[:, np.newaxis]
+        self.placed = bool(aims.size) and self._bound_separation(first, aims[::ROWS])
 
-    def _bound_separation(self, first: int, aims: np.ndarray) -> None:
-        """Bounds the speeds at which overlaps end; `aims` are those of the normals, from row `first` on."""
+    def _bound_separation(self, first: int, aims: np.ndarray) -> bool:
+        """Bounds the accelerations [m/s²] that normals aim at, from row `first` on; returns whether any was above."""
         data, fastest = self.data, self._separation
         if fastest.size > 1:
             geoms = data.contact.geom[data.contact.efc_address >= 0]
             fastest = fastest[geoms].min(axis=1)
         most = data.efc_KBIP[first, 1] * (fastest - data.efc_vel[first::ROWS])
-        self.placed = bool((most < aims).any())
+        above = bool((most < aims).any())
         np.minimum(aims, most, out=aims)
+        return above
 
     def _slow_down(self) -> None:
         """Limits speeds, and integrates the positions again.

@@ -20,7 +20,7 @@ from bullet_gazebo.ros.common.node_process import (
     wait_for_master,
 )
 from bullet_gazebo.ros.common.rospy_internals import free_polls_at_once, stop_hearing_clock
-from ros_calls.master import NoAnswer, living_address
+from ros_calls.master import lives
 from ros_calls.requirements import WINDOW, lack
 from web_viewer.address import PortInUse, add_flags, find_address
 
@@ -65,14 +65,7 @@ def become_node(command_line: Sequence[str]) -> None:
     name = full_name(command_line, NAME)
     with one_at_a_time(name):
         is_given = "__name" in rosgraph.names.load_mappings(list(command_line))
-        init_node(NAME, command_line, anonymous=not is_given and _lives(name))
-
-
-def _lives(name: str) -> bool:
-    try:
-        return living_address(name) is not None
-    except NoAnswer:  # the master has gone meanwhile; rospy waits for it
-        return False
+        init_node(NAME, command_line, anonymous=not is_given and lives(name))
 
 
 def parse_args(arguments: Sequence[str]) -> argparse.Namespace:

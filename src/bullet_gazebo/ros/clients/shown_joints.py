@@ -56,7 +56,8 @@ class ShownJoints:
         positions: Sequence[float] = [0.0] * len(names)
         while not rospy.is_shutdown():
             # Also without news: RViz, or the node that makes tf of them, may have come just now.
-            self._publish(names, positions)
+            state = JointState(header=_now(), name=names, position=positions)
+            self._publisher.publish(state)
             time.sleep(PERIOD)  # no more often; only the newest state counts
             if self._news.wait(ASKING if self._newest is None else PATIENCE):
                 self._news.clear()
@@ -75,10 +76,6 @@ class ShownJoints:
                     return []
                 positions.append(answer.position[0])
         return positions if len(positions) == len(names) else []
-
-    def _publish(self, names: Sequence[str], positions: Sequence[float]) -> None:
-        """Stamps with the time that tf and RViz use here."""
-        self._publisher.publish(JointState(header=_now(), name=names, position=positions))
 
 
 class ShownBase:

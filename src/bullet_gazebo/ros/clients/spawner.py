@@ -245,27 +245,21 @@ class _Spawner:
             return
         rospy.loginfo("Shutting down spawner. Stopping and unloading controllers...")
         try:
-            self._stop()
+            rospy.loginfo("Stopping all controllers...")
+            # Someone else may have stopped one: a strict request that names it would stop none.
+            running = [name for name in self._manager.running(FAREWELL) if name in self._loaded]
+            self._manager.switch([], running, STRICT, FAREWELL)
             rospy.loginfo("Unloading all loaded controllers...")
             for name in reversed(self._loaded):
-                self._unload(name)
+                rospy.loginfo("Trying to unload %s", name)
+                if self._manager.unload(name, FAREWELL):
+                    rospy.loginfo("Succeeded in unloading %s", name)
+                else:
+                    rospy.logerr("Failed to unload %s", name)
         except ServiceGone:  # roslaunch ends the simulator at the same time
             rospy.loginfo("The controller manager has ended, and its controllers with it")
         except ServiceFailed as fault:
             rospy.logwarn("Controller Spawner error while taking down controllers: %s", fault)
-
-    def _stop(self) -> None:
-        rospy.loginfo("Stopping all controllers...")
-        # Someone else may have stopped one: a strict request that names it would stop none.
-        running = [name for name in self._manager.running(FAREWELL) if name in self._loaded]
-        self._manager.switch([], running, STRICT, FAREWELL)
-
-    def _unload(self, name: str) -> None:
-        rospy.loginfo("Trying to unload %s", name)
-        if self._manager.unload(name, FAREWELL):
-            rospy.loginfo("Succeeded in unloading %s", name)
-        else:
-            rospy.logerr("Failed to unload %s", name)
 
 
 def unspawner_main(argv: Sequence[str] | None = None) -> int:

@@ -57,9 +57,7 @@ class DynamicServer(Server):
         changes = {name: given[kind, name] for kind, name in self._kinds if (kind, name) in given}
         try:
             return ReconfigureResponse(encode_config(self.update_configuration(changes)))
-        except (
-            rospy.ROSException
-        ) as fault:  # a client's connection outlives the service and its topics
+        except rospy.ROSException as fault:  # a client's connection outlives service and topics
             raise rospy.ServiceException(GONE) from fault
 
 

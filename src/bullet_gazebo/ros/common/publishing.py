@@ -17,11 +17,7 @@ from gazebo_msgs.msg import LinkStates, ModelStates
 from rosgraph_msgs.msg import Clock
 
 from bullet_gazebo.ros.common.messages import to_pose_msg, to_time, to_twist_msg
-from bullet_gazebo.ros.common.rospy_internals import (
-    set_time,
-    stop_hearing_clock,
-    subscribers,
-)
+from bullet_gazebo.ros.common.rospy_internals import set_time, stop_hearing_clock, subscribers
 from bullet_gazebo.simulator import Simulator
 
 PERIOD = 0.001  # [s of wall time] between two messages of a thinned topic
@@ -208,11 +204,8 @@ def advertise_states(
     """Publishes /clock and, with `network`, the state topics, on the simulation's ticks."""
     topics: list[Callable[[int], None]] = [ClockTopic(sim, thinner, clock_frequency)]
     if network:
-        for name, kind, make in (
-            ("~link_states", LinkStates, _link_states),
-            ("~model_states", ModelStates, _model_states),
-        ):
-            topics.append(StateTopic(name, kind, sim, thinner, partial(make, sim)))
+        for name, kind in (("~link_states", LinkStates), ("~model_states", ModelStates)):
+            topics.append(StateTopic(name, kind, sim, thinner, partial(_states, sim, kind)))
     sim.listeners += topics
 
     def restored() -> None:
@@ -222,22 +215,17 @@ def advertise_states(
     sim.restored.append(restored)
 
 
-def _model_states(sim: Simulator) -> ModelStates:
-    states = [(model.name, *model.state()) for model in sim.world.models.values()]
-    return ModelStates(
-        name=[name for name, _, _ in states],
-        pose=[to_pose_msg(pose) for _, pose, _ in states],
-        twist=[to_twist_msg(twist) for _, _, twist in states],
-    )
-
-
-def _link_states(sim: Simulator) -> LinkStates:
-    states = [
-        (f"{model.name}::{link}", *model.link_state(link))
-        for model in sim.world.models.values()
-        for link in model.link_names
-    ]
-    return LinkStates(
+def _states(sim: Simulator, kind: type[ModelStates | LinkStates]) -> ModelStates | LinkStates:
+    models = sim.world.models.values()
+    if kind is ModelStates:
+        states = [(model.name, *model.state()) for model in models]
+    else:
+        states = [
+            (f"{model.name}::{link}", *model.link_state(link))
+            for model in models
+            for link in model.link_names
+        ]
+    return kind(
         name=[name for name, _, _ in states],
         pose=[to_pose_msg(pose) for _, pose, _ in states],
         twist=[to_twist_msg(twist) for _, _, twist in states],

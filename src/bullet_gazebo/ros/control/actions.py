@@ -37,15 +37,16 @@ class ControllerAction(ABC):
 
     action: ClassVar[type]
 
-    def __init__(self, sim: Simulator, name: str) -> None:
-        """`name` is the action's, in full."""
+    def __init__(self, sim: Simulator, controller: Any, namespace: str, name: str) -> None:
+        """`namespace` is the controller's, `name` the action's in it."""
         self._sim = sim
+        self._controller = controller
         self._news = threading.Condition()
         self._delivery = threading.Lock()  # held while news is published
         self._kept: list[tuple[ServerGoalHandle, Any, bool]] = []
         self._closing = self._closed = False
         self._status_due = 0.0  # [s]
-        self._name = name
+        self._name = rospy.names.ns_join(namespace, name)
         self._server = SteadyActionServer(
             self._name, self.action, self._pursue, self._cancel, self._clock
         )
@@ -62,10 +63,6 @@ class ControllerAction(ABC):
         Raises:
             ControlError: if it is refused.
         """
-
-    @abstractmethod
-    def cancel(self, key: str) -> None:
-        """Ends the goal if it is the active one, under the simulator's lock."""
 
     @abstractmethod
     def feedback(self, sample: Any) -> Any:
@@ -111,7 +108,7 @@ class ControllerAction(ABC):
 
     def _cancel(self, handle: ServerGoalHandle) -> None:
         with self._sim.lock:
-            self.cancel(handle.get_goal_id().id)
+            self._controller.cancel(handle.get_goal_id().id)
 
     def has_messages(self) -> bool:
         """Returns whether there is something to publish; called within a tick."""

@@ -62,7 +62,11 @@ class ControllerServices:
             with self._one_at_a_time:
                 if self._gone:  # rospy keeps persistent connections to a service that is shut down
                     raise rospy.ServiceException("the model was deleted")
-                return handler(request)
+                try:
+                    return handler(request)
+                except ControlError as error:  # the answer is just ok=false: ros_control.md 1.3
+                    rospy.logerr("Controller manager: %s", error)
+                    return False
 
         full = rospy.names.ns_join(self._namespace, f"controller_manager/{name}")
         self._services.append(rospy.Service(full, kind, handle))
@@ -81,15 +85,12 @@ class ControllerServices:
     def _load(self, request: srv.LoadControllerRequest) -> bool:
         # An empty name would fetch the whole namespace, and resolve to it.
         if not rosgraph.names.is_legal_name(request.name):
-            return _refused(ControlError(f"'{request.name}' is not a legal name of a controller"))
+            raise ControlError(f"'{request.name}' is not a legal name of a controller")
         params = rospy.get_param(rospy.names.ns_join(self._namespace, request.name), None)
-        try:
-            self._know_type(params)
-            with self._sim.lock:
-                controller = self._manager.load(request.name, params)
-            self._topics[request.name] = self._open(controller)
-        except ControlError as error:
-            return _refused(error)
+        self._know_type(params)
+        with self._sim.lock:
+            controller = self._manager.load(request.name, params)
+        self._topics[request.name] = self._open(controller)
         return True
 
     def _know_type(self, params: object) -> None:
@@ -111,33 +112,25 @@ class ControllerServices:
             raise ControlError(f"the topics of '{controller.name}': {error!r}") from error
 
     def _unload(self, request: srv.UnloadControllerRequest) -> bool:
-        try:
-            with self._sim.lock:
-                self._manager.unload(request.name)
-        except ControlError as error:
-            return _refused(error)
+        with self._sim.lock:
+            self._manager.unload(request.name)
         self._topics.pop(request.name).shutdown()
         return True
 
     def _switch(self, request: srv.SwitchControllerRequest) -> bool:
         if request.strictness == 0:
             rospy.logwarn("Controller manager: strictness was not set, best effort is used.")
-        try:
-            with self._sim.lock:
-                self._manager.switch(
-                    request.start_controllers, request.stop_controllers, request.strictness
-                )
-        except ControlError as error:
-            return _refused(error)
+        with self._sim.lock:
+            self._manager.switch(
+                request.start_controllers, request.stop_controllers, request.strictness
+            )
         return True
 
     def _reload(self, request: srv.ReloadControllerLibrariesRequest) -> bool:
         with self._sim.lock:
             loaded = [entry.name for entry in self._manager.listed()]
         if loaded and not request.force_kill:
-            return _refused(
-                ControlError(f"Controllers {loaded} are loaded and force_kill is not set.")
-            )
+            raise ControlError(f"Controllers {loaded} are loaded and force_kill is not set.")
         self._close_all()
         return True
 
@@ -147,12 +140,6 @@ class ControllerServices:
         for topics in self._topics.values():
             topics.shutdown()
         self._topics.clear()
-
-
-def _refused(error: ControlError) -> bool:
-    """Logs why a request is refused; the answer is just ok=false (docs/contract/ros_control.md 1.3)."""
-    rospy.logerr("Controller manager: %s", error)
-    return False
 
 
 def _report_fault(controller: Controller, error: BaseException) -> None:

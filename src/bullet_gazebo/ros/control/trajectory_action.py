@@ -77,14 +77,16 @@ class TrajectoryAction(ControllerAction):
     def __init__(
         self, sim: Simulator, controller: JointTrajectoryController, namespace: str
     ) -> None:
-        self._controller = controller
-        super().__init__(sim, rospy.names.ns_join(namespace, "follow_joint_trajectory"))
+        super().__init__(sim, controller, namespace, "follow_joint_trajectory")
 
     def pursue(self, key: str, goal: msg.FollowJointTrajectoryGoal, listener: GoalObserver) -> str:
-        return self._controller.pursue(key, _to_request(goal), listener)
-
-    def cancel(self, key: str) -> None:
-        self._controller.cancel(key)
+        request = GoalRequest(
+            _to_trajectory(goal.trajectory),
+            _tolerances(goal.path_tolerance),
+            _tolerances(goal.goal_tolerance),
+            goal.goal_time_tolerance.to_nsec(),
+        )
+        return str(self._controller.pursue(key, request, listener))
 
     def feedback(self, sample: TrajectorySample) -> msg.FollowJointTrajectoryFeedback:
         return msg.FollowJointTrajectoryFeedback(*_fields(sample))
@@ -116,15 +118,6 @@ def _to_trajectory(message: JointTrajectory) -> Trajectory:
         for p in message.points
     )
     return Trajectory(tuple(message.joint_names), points, message.header.stamp.to_nsec())
-
-
-def _to_request(goal: msg.FollowJointTrajectoryGoal) -> GoalRequest:
-    return GoalRequest(
-        _to_trajectory(goal.trajectory),
-        _tolerances(goal.path_tolerance),
-        _tolerances(goal.goal_tolerance),
-        goal.goal_time_tolerance.to_nsec(),
-    )
 
 
 def _tolerances(tolerances: Iterable[msg.JointTolerance]) -> dict[str, Tolerance]:

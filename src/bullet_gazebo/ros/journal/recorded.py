@@ -173,9 +173,8 @@ def _messages(path: str) -> list[bytes]:
             ours = [each for each in bag._get_connections() if each.datatype == Journal._type]
             if any(each.md5sum != Journal._md5sum for each in ours):
                 raise NoRecording("recorded by another version of cartpole")
-            topics = [each.topic for each in ours]
-            found = (
-                bag.read_messages(topics, raw=True, connection_filter=_is_journal) if ours else ()
+            found = bag.read_messages(
+                raw=True, connection_filter=lambda _, kind, *more: kind == Journal._type
             )
             messages = [data for _, (_, data, *_), _ in found]
     except rosbag.ROSBagUnindexedException as fault:
@@ -193,10 +192,6 @@ def _messages(path: str) -> list[bytes]:
             if not entry.number and entry.kind == JournalEntry.START:
                 json.loads(entry.data)
     return messages
-
-
-def _is_journal(_topic: str, kind: str, md5sum: str, *_: object) -> bool:
-    return (kind, md5sum) == (Journal._type, Journal._md5sum)
 
 
 def first_difference(recorded: JournalEntry, now: JournalEntry, refusal: str) -> str:

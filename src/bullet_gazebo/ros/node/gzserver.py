@@ -307,7 +307,11 @@ def main(argv: list[str] | None = None, work: Work | None = None) -> int:
     args = parse_args([*more, *rospy.myargv(command_line)[1:]])
     name = full_name(command_line, NAME)
     try:
-        _register(name, command_line, args.replace)
+        wait_for_master(NAME)
+        with one_at_a_time(name):
+            if not args.replace:
+                refuse_twin(name)
+            init_node(NAME, command_line, anonymous=False)
     except NodeNameTaken as error:
         print(f"gzserver: {error}", file=sys.stderr)
         return 1
@@ -334,15 +338,6 @@ def main(argv: list[str] | None = None, work: Work | None = None) -> int:
         code = code or 1
     end_within(EXIT_TIMEOUT, code)
     return code
-
-
-def _register(name: str, command_line: Sequence[str], replace: bool) -> None:
-    """Becomes the node; raises NodeNameTaken if there is one already that isn't to be replaced."""
-    wait_for_master(NAME)
-    with one_at_a_time(name):
-        if not replace:
-            refuse_twin(name)
-        init_node(NAME, command_line, anonymous=False)
 
 
 def main_with_window(argv: Sequence[str] | None = None) -> int:

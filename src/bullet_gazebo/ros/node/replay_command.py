@@ -9,7 +9,6 @@ import tempfile
 import threading
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import rosparam
 import rospy
@@ -41,7 +40,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             each for name, path in args.params for each in rosparam.load_file(str(path), name)
         ]
         if models or parameters:
-            recorded.check_changes(models, [_named(*each) for each in parameters])
+            ns_join = rospy.names.ns_join
+            named = [
+                {ns_join(space, each): values[each] for each in values}
+                for values, space in parameters
+            ]
+            recorded.check_changes(models, named)
     except (NoRecording, CannotExpand, rosparam.RosParamException, OSError) as fault:
         return _tell(str(fault), UNUSABLE)
     hashes = recorded.facts["hashes"]
@@ -134,11 +138,6 @@ def _check(recorded: RecordedJournal, bag: Path, trust: bool) -> None:
     code = [] if trust else recorded.foreign_code()
     if code:
         raise NoRecording(f"{bag} would import {', '.join(code)}; if you trust it, add --trust")
-
-
-def _named(values: dict[str, Any], namespace: str) -> dict[str, Any]:
-    """Returns parameters by their full names."""
-    return {rospy.names.ns_join(namespace, name): value for name, value in values.items()}
 
 
 def _judge(bag: Path, replay: Replay, until: float) -> int:

@@ -20,9 +20,15 @@ from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, rotate, scale, subtract
 from bullet_gazebo.ros.common.dynamic_server import DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import bad_number, from_transform, to_transform, to_vector
-from bullet_gazebo.ros.plugins.drive_topics import REPEAT, advertised
+from bullet_gazebo.ros.plugins.drive_topics import REPEAT
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, namespace_of, subscribe, topic_in
+from bullet_gazebo.ros.plugins.sensor_topics import (
+    SensorPlugin,
+    advertised,
+    namespace_of,
+    subscribe,
+    topic_in,
+)
 
 WORLDS = ("", "world", "map")
 MOST_FRAMES = 10_000  # of tf that are kept

@@ -20,6 +20,7 @@ from bullet_gazebo.ros.plugins.sensor_topics import (
     SensorTopics,
     frame_of,
     namespace_of,
+    offer_shared,
     topic_in,
 )
 from bullet_gazebo.sensors.pinhole import CameraView, PinholeCamera, with_noise
@@ -76,11 +77,9 @@ class CameraTopics:
         self._jpeg = topics.advertise(f"{image}/compressed", CompressedImage, QUEUE)
         show_camera(context, f"{image}/compressed", CompressedImage, camera)
         self._info = topics.advertise(topic_in(scope, names[1]), CameraInfo, QUEUE)
-        service = topic_in(scope, f"{own}set_camera_info")
         self._own = own
-        with suppress(rospy.ServiceException):  # another camera below the same name offers it
-            offered = rospy.Service(service, SetCameraInfo, self._set)
-            context.closing(offered.shutdown)
+        service = topic_in(scope, f"{own}set_camera_info")
+        offer_shared(context, service, SetCameraInfo, self._set)
 
     @property
     def wants_colour(self) -> bool:
@@ -120,12 +119,8 @@ def show_camera(context: PluginContext, topic: str, kind: type, camera: PinholeC
 
 def scope_of(context: PluginContext) -> str:
     """Returns the full name that a camera's topics are in: its namespace and `<cameraName>`."""
-    namespace = namespace_of(context, absent="", empty=MODEL)
-    return (
-        topic_in(namespace, context.text("cameraName", ""))
-        if context.text("cameraName", "")
-        else namespace
-    )
+    namespace, name = namespace_of(context, absent="", empty=MODEL), context.text("cameraName", "")
+    return topic_in(namespace, name) if name else namespace
 
 
 def offer_rate(context: PluginContext, topics: SensorTopics, scope: str) -> None:

@@ -30,8 +30,8 @@ from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
     SensorPlugin,
     Topic,
+    advertised,
     frame_of,
-    queue_of,
     subscribe,
     topic_in,
 )
@@ -59,13 +59,6 @@ def length(context: PluginContext, tag: str, default: float) -> float:
     if found <= 0.0:
         raise DescriptionError(f"<{tag}> must be above 0, not {found}")
     return found
-
-
-def advertised(context: PluginContext, name: str, kind: type, queue: int) -> Topic:
-    """Returns a topic that is closed with the plugin."""
-    topic = Topic(name, kind, queue_of(context, queue))
-    context.closing(topic.close)
-    return topic
 
 
 class DrivePlugin(SensorPlugin):

@@ -5,11 +5,12 @@ What the elements of mimic joints and of disable_link say is in the model itself
 """
 
 import math
+from functools import partial
 
 import rospy
 from gazebo_ros_link_attacher.srv import Attach, AttachRequest, AttachResponse
 from std_msgs.msg import Bool
-from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
+from std_srvs.srv import Empty, EmptyResponse
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import GAINS
@@ -151,34 +152,27 @@ class VacuumPlugin(SensorPlugin):
         self._suction = Suction(context.sim.world, context.model, context.link("bodyName"))
         topic = topic_in(namespace, context.required("topicName"))
         SensorTopic(context, topic, Bool, 0.0, self._held)
-        for name, act in (("on", self._turn_on), ("off", self._turn_off)):
+        for name, on in (("on", True), ("off", False)):
             place = topic_in(namespace, name)
             try:
-                service = rospy.Service(place, Empty, act)
+                service = rospy.Service(place, Empty, partial(self._turn, on))
             except rospy.service.ServiceException as error:
                 raise DescriptionError(
                     f"there is a service {place} already: give each gripper a <robotNamespace>"
                 ) from error
             context.closing(service.shutdown)
         context.on_update(self._suction.update)
-        context.closing(self._let_go)
+        context.closing(partial(self._turn, False))
 
     def _held(self, now: int) -> Bool:
         return Bool(self._suction.holds())
 
-    def _turn_on(self, request: EmptyRequest) -> EmptyResponse:
+    def _turn(self, on: bool, *_: object) -> EmptyResponse:
         with self._context.sim.lock:
-            self._suction.on = True
+            self._suction.on = on
+            if not on:  # it lets go at once
+                self._suction.update(self._context.sim.now)
         return EmptyResponse()
-
-    def _turn_off(self, request: EmptyRequest) -> EmptyResponse:
-        self._let_go()
-        return EmptyResponse()
-
-    def _let_go(self) -> None:
-        with self._context.sim.lock:
-            self._suction.on = False
-            self._suction.update(self._context.sim.now)
 
 
 LIBRARIES = dict.fromkeys(MIMIC_LIBRARIES, MimicPlugin) | {

@@ -27,8 +27,9 @@ from bullet_gazebo.ros.common.messages import NANOSECONDS, to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
     SensorPlugin,
-    always_heard,
+    advertised,
     namespace_of,
+    offer_shared,
     topic_in,
 )
 from bullet_gazebo.sensors.drift import DriftingError
@@ -134,7 +135,7 @@ class HectorImuPlugin(SensorPlugin):
         topic = topic_in(sensor.namespace, context.text("topicName", "imu"))
         bias = topic_in(sensor.namespace, context.text("biasTopicName", f"{topic}/bias"))
         self._publisher, self._bias = (
-            always_heard(context, name, ImuMsg, 10) for name in (topic, bias)
+            advertised(context, name, ImuMsg, 10) for name in (topic, bias)
         )
         calibrate = context.text("serviceName", f"{topic}/calibrate")
         self._offer(topic_in(sensor.namespace, calibrate), Empty, self._rate)
@@ -157,9 +158,7 @@ class HectorImuPlugin(SensorPlugin):
                 error.restart(bias)
             return kind._response_class()
 
-        with suppress(rospy.ServiceException):  # another robot's has the name
-            offered = rospy.Service(name, kind, answer)
-            self._context.closing(offered.shutdown)
+        offer_shared(self._context, name, kind, answer)
 
     def _configure(self, error: DriftingError, wanted: Config, level: int) -> Config:
         """Sets an error model; the first call asks for the file's, a number that isn't finite is left out."""
@@ -186,7 +185,7 @@ class HectorImuPlugin(SensorPlugin):
         turned = multiply(from_rpy(0.0, 0.0, yaw), sample.orientation)
         tilt = self._accel.noise[:2] ** 2 / GRAVITY**2
         header = Header(stamp=to_time(now), frame_id=self._frame)
-        if self._bias.get_num_connections():
+        if self._bias.is_heard:
             drifts = (Vector3(*error.bias) for error in (self._rate, self._accel))
             bias = ImuMsg(header=header, orientation=Quaternion(w=1.0))
             bias.angular_velocity, bias.linear_acceleration = drifts
@@ -227,9 +226,9 @@ class HectorGpsPlugin(SensorPlugin):
         )
         self._frame = context.text("frameId", "/world")
         fix = topic_in(sensor.namespace, context.text("topicName", "fix"))
-        self._fix = always_heard(context, fix, NavSatFix, 10)
+        self._fix = advertised(context, fix, NavSatFix, 10)
         velocity = topic_in(sensor.namespace, context.text("velocityTopicName", "fix_velocity"))
-        self._velocity = always_heard(context, velocity, Vector3Stamped, 10)
+        self._velocity = advertised(context, velocity, Vector3Stamped, 10)
 
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
         random = self._sensor.random(now)
@@ -278,7 +277,7 @@ class HectorMagneticPlugin(SensorPlugin):
         self._is_field = truth(context.text("useMagneticFieldMsgs", "false"))
         topic = topic_in(sensor.namespace, context.text("topicName", "magnetic"))
         kind = MagneticField if self._is_field else Vector3Stamped
-        self._publisher = always_heard(context, topic, kind, 1)
+        self._publisher = advertised(context, topic, kind, 1)
 
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
         field = rotate(conjugate(motion.pose.orientation), self._field)
@@ -301,7 +300,7 @@ class HectorSonarPlugin(SensorPlugin):
         self._timer = timer = HectorTimer(context, SONAR_RATE, (self._error,), self._publish)
         self._frame = context.text("frameId", "/sonar_link")
         topic = topic_in(timer.namespace, context.text("topicName", "sonar"))
-        self._publisher = always_heard(context, topic, Range, 1)
+        self._publisher = advertised(context, topic, Range, 1)
         context.show(topic, Range, self._sensor.sensor.link, self._sensor.sensor.pose)
 
     def _publish(self, now: int, seconds: float) -> None:

@@ -12,12 +12,13 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.ros.common.messages import NANOSECONDS, to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
+from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, advertised
 
 QUEUE = 1000
 RATE = "100.0"  # [Hz]
 
 
-class JointStatePlugin:
+class JointStatePlugin(SensorPlugin):
     """Publishes position [rad, m] and velocity of the named joints, in the order of the list."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -27,11 +28,8 @@ class JointStatePlugin:
         self._last = context.sim.now
         namespace = rospy.names.ns_join(rospy.get_namespace(), context.namespace)
         topic = rospy.names.ns_join(namespace, "joint_states")
-        self._publisher = rospy.Publisher(topic, JointState, queue_size=QUEUE, tcp_nodelay=True)
+        self._topic = advertised(context, topic, JointState, QUEUE)
         context.on_update(self._update)
-
-    def shutdown(self) -> None:
-        self._publisher.unregister()
 
     def _update(self, now: int) -> None:
         if now < self._last:  # time was reset: the next state is due now
@@ -40,7 +38,7 @@ class JointStatePlugin:
             return
         # The next one is due a period after this one was due, however late this one is.
         self._last = max(self._last + self._period, now - self._period)
-        if not self._publisher.get_num_connections():
+        if not self._topic.is_heard:
             return
         states = [self._model.joint_state(name) for name in self._names]
         message = JointState(
@@ -49,7 +47,7 @@ class JointStatePlugin:
             position=[position for position, _ in states],
             velocity=[velocity for _, velocity in states],
         )
-        self._publisher.publish(message)
+        self._topic.publish(message)
 
 
 def _joints(context: PluginContext) -> list[str]:

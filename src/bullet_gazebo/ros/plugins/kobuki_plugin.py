@@ -22,7 +22,6 @@ from bullet_gazebo.ros.plugins.drive_topics import (
     REST,
     DrivePlugin,
     Wheels,
-    advertised,
     choice,
     length,
 )
@@ -30,6 +29,7 @@ from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
     MODEL,
     SensorTopic,
+    advertised,
     namespace_of,
     subscribe,
     topic_in,

@@ -1,17 +1,42 @@
-"""libgazebo_ros_laser.so and libgazebo_ros_gpu_laser.so: LaserScans (docs/contract/sensors.md 2).
+"""Plugins of lasers (docs/contract/sensors.md 2, 2b, 6a and 6f). The sensor says what isn't read here.
 
-`topicName` (/world) and `frameName` (/world) are read; the sensor says the rest. A laser meets collisions,
-a gpu laser visuals.
+`topicName` and `frameName` (/world) are read, and `gaussianNoise` (0) but for LaserScans. A laser meets
+collisions, a gpu laser visuals.
+
+- libgazebo_ros_laser.so, libgazebo_ros_gpu_laser.so: LaserScans; `topicName` is /world by default.
+- libgazebo_ros_block_laser.so: a PointCloud; /world.
+- libgazebo_ros_range.so: the nearest ray; /range. It reads `updateRate` (0), `radiation` (ultrasound, else
+  infrared) and `fov` (0.05 rad).
+- libgazebo_ros_velodyne_laser.so, ..._gpu_laser.so: a PointCloud2 of 22 bytes a point, as
+  upstream since 1.0.10; /points. They read `min_range` (0), `max_range` (none) and `min_intensity` (none).
 """
 
+import math
+
 import numpy as np
-from sensor_msgs.msg import LaserScan
+from geometry_msgs.msg import Point32
+from sensor_msgs.msg import (
+    ChannelFloat32,
+    LaserScan,
+    PointCloud,
+    PointCloud2,
+    PointField,
+    Range,
+)
 from std_msgs.msg import Header
 
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import MODEL, LaserTopic, SensorPlugin
-from bullet_gazebo.sensors.laser import Scan
+from bullet_gazebo.sensors.laser import Scan, nearest
+
+KINDS = {"<f4": PointField.FLOAT32, "<u2": PointField.UINT16}
+LAYOUT = {"x": "<f4", "y": "<f4", "z": "<f4", "intensity": "<f4", "ring": "<u2", "time": "<f4"}
+POINT = np.dtype([*LAYOUT.items()])
+FIELDS = [
+    PointField(name, POINT.fields[name][1], KINDS[kind], 1)  # type: ignore[index]
+    for name, kind in LAYOUT.items()
+]
 
 
 class LaserPlugin(SensorPlugin):
@@ -34,4 +59,97 @@ class LaserPlugin(SensorPlugin):
         )
 
 
-LIBRARIES = dict.fromkeys(("libgazebo_ros_laser.so", "libgazebo_ros_gpu_laser.so"), LaserPlugin)
+class BlockLaserPlugin(SensorPlugin):
+    """Publishes all rays' points and intensities; a ray that meets nothing ends at the largest range."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self._topic = LaserTopic(context, PointCloud, self._message, "/world", empty="/")
+        self._deviation = context.deviation()
+
+    def _message(self, scan: Scan, now: int, random: np.random.Generator) -> PointCloud:
+        furthest = self._topic.laser.high
+        ranges, intensities = np.minimum(scan.ranges, furthest).ravel(), scan.intensities.ravel()
+        with np.errstate(invalid="ignore"):  # inf * 0
+            points = ranges[:, None] * self._topic.laser.directions.reshape(-1, 3)
+        if self._deviation:
+            draws = random.normal(0.0, self._deviation, (len(ranges), 4))
+            draws[~np.isfinite(ranges) | (ranges == furthest)] = 0.0
+            points, intensities = points + draws[:, :3], intensities + draws[:, 3]
+        return PointCloud(
+            header=Header(stamp=to_time(now), frame_id=self._topic.frame),
+            points=[Point32(*point) for point in points.tolist()],
+            channels=[ChannelFloat32("", intensities.tolist())],
+        )
+
+
+class RangePlugin(SensorPlugin):
+    """Publishes the smallest range, at most the largest that the sensor measures."""
+
+    def __init__(self, context: PluginContext) -> None:
+        own = context.rate()
+        self._topic = LaserTopic(context, Range, self._message, "/range", empty="/", own_rate=own)
+        self._deviation = context.deviation()
+        self._is_sound = context.text("radiation", "infrared") == "ultrasound"
+        self._field_of_view = context.number("fov", 0.05)
+
+    def _message(self, scan: Scan, now: int, random: np.random.Generator) -> Range:
+        laser = self._topic.laser
+        return Range(
+            header=Header(stamp=to_time(now), frame_id=self._topic.frame),
+            radiation_type=Range.ULTRASOUND if self._is_sound else Range.INFRARED,
+            field_of_view=self._field_of_view,
+            min_range=laser.low,
+            max_range=laser.high,
+            range=nearest(scan, laser, self._deviation, random),
+        )
+
+
+class VelodynePlugin(SensorPlugin):
+    """Publishes the points that lie within the range, column by column, the lowest ring first."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self._topic = topic = LaserTopic(context, PointCloud2, self._message, "/points", empty="")
+        laser = topic.laser
+        self._low = max(context.number("min_range", 0.0), laser.low)
+        self._high = min(context.number("max_range", math.inf), laser.high)
+        self._least = context.number("min_intensity", -math.inf)
+        self._deviation = context.deviation()
+        self._rings = np.broadcast_to(
+            np.arange(laser.vertical.readings),
+            (laser.horizontal.readings, laser.vertical.readings),
+        )
+
+    def _message(self, scan: Scan, now: int, random: np.random.Generator) -> PointCloud2:
+        ranges, intensities = scan.ranges.T, scan.intensities.T
+        seen = self._within(ranges) & (intensities >= self._least)
+        if self._deviation:
+            ranges = ranges + random.normal(0.0, self._deviation, ranges.shape)
+            seen &= self._within(ranges)
+        points = np.zeros(int(seen.sum()), POINT)
+        directions = self._topic.laser.directions.transpose(1, 0, 2)
+        places = ranges[seen][:, None] * directions[seen]
+        points["x"], points["y"], points["z"] = places.T
+        points["intensity"], points["ring"] = intensities[seen], self._rings[seen]
+        return PointCloud2(
+            header=Header(stamp=to_time(now), frame_id=self._topic.frame),
+            height=1,
+            width=len(points),
+            fields=FIELDS,
+            point_step=POINT.itemsize,
+            row_step=points.nbytes,
+            data=points.tobytes(),
+            is_dense=True,
+        )
+
+    def _within(self, ranges: np.ndarray) -> np.ndarray:
+        return (self._low < ranges) & (ranges < self._high)
+
+
+LIBRARIES = {
+    "libgazebo_ros_laser.so": LaserPlugin,
+    "libgazebo_ros_gpu_laser.so": LaserPlugin,
+    "libgazebo_ros_block_laser.so": BlockLaserPlugin,
+    "libgazebo_ros_range.so": RangePlugin,
+    "libgazebo_ros_velodyne_laser.so": VelodynePlugin,
+    "libgazebo_ros_velodyne_gpu_laser.so": VelodynePlugin,
+}

@@ -9,17 +9,8 @@ from geometry_msgs.msg import Pose as PoseMsg
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Header
 
-from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.elements import numbers
-from bullet_gazebo.physics.model import Model
-from bullet_gazebo.physics.pose import (
-    add,
-    conjugate,
-    from_rpy,
-    multiply,
-    rotate,
-    subtract,
-)
+from bullet_gazebo.physics.pose import add, conjugate, from_rpy, multiply, rotate, subtract
 from bullet_gazebo.ros.common.messages import to_time, to_twist_msg
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
@@ -42,7 +33,7 @@ class P3dPlugin(SensorPlugin):
         self._link, self._child = context.link("bodyName"), context.text("bodyName", "")
         topic = context.required("topicName")
         frame = context.text("frameName", "world")
-        self._reference = None if frame in WORLDS else _link_of(context, frame)
+        self._reference = None if frame in WORLDS else context.link_in_world("frameName")
         self._xyz = numbers(context.text("xyzOffset", "0 0 0"), "<xyzOffset>", 3)
         self._turn = from_rpy(*numbers(context.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
         self._deviation = context.deviation()
@@ -82,15 +73,6 @@ class P3dPlugin(SensorPlugin):
         turn = frame.pose.orientation
         linear = rotate(turn, subtract(motion.linear, frame.linear))
         return LinkMotion(pose, linear, rotate(turn, subtract(motion.angular, frame.angular)))
-
-
-def _link_of(context: PluginContext, frame: str) -> tuple[Model, str]:
-    """Returns the link `frameName`: of its own model, or else of the world."""
-    own = context.among("frameName", context.model.link_names)
-    found = (context.model, own) if own else context.sim.world.link(frame)
-    if found is None:
-        raise DescriptionError(f"<frameName>: there is no link '{frame}'")
-    return found
 
 
 LIBRARIES = {"libgazebo_ros_p3d.so": P3dPlugin}

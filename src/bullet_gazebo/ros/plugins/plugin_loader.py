@@ -72,7 +72,7 @@ class PluginContext(Mount):
     ) -> SensorClock:
         """Calls `measure` with the simulated time [ns], at a rate in Hz, while somebody listens.
 
-        It begins when the plugin is made. See `Schedule.add` for the arguments, and else `on_update`.
+        It begins when the plugin is made. See `Schedule.begin` for the arguments, and else `on_update`.
         """
 
         def guarded(now: int) -> None:
@@ -82,9 +82,10 @@ class PluginContext(Mount):
                 self.report("measures no more, because it raised")
                 self.sensing.schedule.fail(clock)
 
-        clock = self.sensing.schedule.add(
-            self.model, rate, guarded, lambda: self._is_made.is_set() and listens(), at_once
-        )
+        with self.sim.lock:
+            clock = self.sensing.schedule.begin(
+                self.model, rate, guarded, lambda: self._is_made.is_set() and listens(), at_once
+            )
         self._clocks.append(clock)
         return clock
 

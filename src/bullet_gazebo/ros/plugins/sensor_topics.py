@@ -1,6 +1,7 @@
 """Names, frames and topics of sensors' plugins (docs/contract/sensors.md 0.2 to 0.4)."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -61,20 +62,20 @@ def queue_of(context: PluginContext, size: int, content: int = 0) -> int:
     return max(size, most) if context.sim.lockstep else size
 
 
-def always_heard(context: PluginContext, name: str, kind: type, queue: int = 1) -> rospy.Publisher:
-    """Returns the topic of a sensor that measures without subscribers; the context closes it."""
-    size = queue_of(context, queue)
-    publisher = rospy.Publisher(name, kind, queue_size=size, tcp_nodelay=True)
-    context.closing(publisher.unregister)
-    return publisher
-
-
 def subscribe(
     context: PluginContext, name: str, kind: type, receive: Callable[[Any], None], queue: int
 ) -> None:
     """Has `receive` get a topic's messages until the plugin ends."""
     subscriber = rospy.Subscriber(name, kind, receive, queue_size=queue, tcp_nodelay=True)
     context.closing(subscriber.unregister)
+
+
+def offer_shared(
+    context: PluginContext, name: str, kind: Any, answer: Callable[[Any], Any]
+) -> None:
+    """Offers a service until the plugin ends, unless another robot's plugin offers that name."""
+    with suppress(rospy.ServiceException):
+        context.closing(rospy.Service(name, kind, answer).shutdown)
 
 
 class SensorPlugin:
@@ -121,6 +122,13 @@ class Topic:
 
     def close(self) -> None:
         self._publisher.unregister()
+
+
+def advertised(context: PluginContext, name: str, kind: type, queue: int) -> Topic:
+    """Returns a topic that is closed with the plugin."""
+    topic = Topic(name, kind, queue_of(context, queue))
+    context.closing(topic.close)
+    return topic
 
 
 class Newcomers(rospy.SubscribeListener):

@@ -1,16 +1,28 @@
 """Gazebo's services, and those of a world in lock-step."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import genpy
 import rospy
 
 from bullet_gazebo.ros.common.messages import LARGEST, bad_number
 
+NO_MODEL = "model does not exist"
+SCOPE = "did you forget to scope the link by model name?"
+NO_LINK = f"link not found, {SCOPE}"
+Found = TypeVar("Found")
+
 
 class ServiceRefused(Exception):
     """A request can't be carried out, and nothing has changed; the text says why."""
+
+
+def existing(found: Found | None, fault: str) -> Found:
+    """Returns what a name was looked up as; raises ServiceRefused with that text if there is none."""
+    if found is None:
+        raise ServiceRefused(fault)
+    return found
 
 
 def offer(name: str, kind: Any, act: Callable[[Any], str | genpy.Message]) -> rospy.Service:

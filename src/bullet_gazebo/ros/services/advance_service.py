@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 
 import genpy
-import rospy
 from bullet_gazebo_msgs.msg import TopicMessage
 from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldRequest, AdvanceWorldResponse
 
@@ -23,6 +22,7 @@ from bullet_gazebo.ros.common.rospy_internals import (
     subscribers,
 )
 from bullet_gazebo.ros.journal.journal import WorldJournal
+from bullet_gazebo.ros.services import ServiceRefused, offer
 from bullet_gazebo.ros.services.step_requests import MAX_TICKS, SLICE
 from bullet_gazebo.sensors.sensing import Sensing
 from bullet_gazebo.simulator import Simulator
@@ -154,13 +154,15 @@ class AdvanceService:
         self._one_at_a_time = one_at_a_time
         self._mailboxes = Mailboxes()
         thinner.is_whole = self._mailboxes.any_hears
-        self._service = rospy.Service("~advance_world", AdvanceWorld, self._serve)
+        self._service = offer("~advance_world", AdvanceWorld, self._serve)
 
     def _serve(self, request: AdvanceWorldRequest) -> AdvanceWorldResponse:
         if not 0 <= request.ticks <= MAX_TICKS:
-            return _refused(f"ticks is {request.ticks}: 0 to {MAX_TICKS} can be done in one call")
+            raise ServiceRefused(
+                f"ticks is {request.ticks}: 0 to {MAX_TICKS} can be done in one call"
+            )
         if not request.node.startswith("/"):
-            return _refused(f"node is '{request.node}': a node's full name is needed")
+            raise ServiceRefused(f"node is '{request.node}': a node's full name is needed")
         mailbox = self._mailboxes.of(request.node)
         mailbox.awaited = frozenset(request.until)
         changes = self._mailboxes.changes
@@ -246,7 +248,3 @@ def reseed(sim: Simulator, seed: int) -> None:
     seed_random_numbers(seed, tell=False)
     with sim.lock:
         sim.reseed(seed)
-
-
-def _refused(fault: str) -> AdvanceWorldResponse:
-    return AdvanceWorldResponse(success=False, status_message=f"AdvanceWorld: {fault}")

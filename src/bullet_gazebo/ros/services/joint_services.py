@@ -8,12 +8,12 @@ from gazebo_msgs import srv
 
 from bullet_gazebo.applied_forces import ActingTime, AppliedEffort, AppliedWrench, in_world
 from bullet_gazebo.physics.files.elements import shown
-from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.properties import JointProperties, PropertyError, set_joint_properties
 from bullet_gazebo.ros.common.messages import to_vector
-from bullet_gazebo.ros.services import ServiceRefused, check_message, offer
+from bullet_gazebo.ros.services import NO_MODEL, ServiceRefused, check_message, existing, offer
 from bullet_gazebo.simulator import Simulator
 
+NO_JOINT = "joint not found"
 BEYOND = 0.01  # [rad, m] of a stop, as a moving joint may be
 INFINITE = 1.7e308  # ODE's users write 1e16 and beyond for a joint without stops
 
@@ -33,7 +33,7 @@ class JointServices:
         self, request: srv.GetJointPropertiesRequest
     ) -> srv.GetJointPropertiesResponse:
         with self._sim.lock:
-            model, name = _find_joint(self._sim, request.joint_name)
+            model, name = existing(self._sim.world.joint(request.joint_name), NO_JOINT)
             position, rate = model.joint_state(name)
         # Gazebo answers REVOLUTE and no damping whatever the joint is.
         return srv.GetJointPropertiesResponse(
@@ -46,7 +46,7 @@ class JointServices:
 
     def _set_properties(self, request: srv.SetJointPropertiesRequest) -> str:
         with self._sim.lock:
-            found = _find_joint(self._sim, request.joint_name)
+            found = existing(self._sim.world.joint(request.joint_name), NO_JOINT)
             ode = request.ode_joint_config
             check_message(ode, INFINITE)
             # Element i is for axis i, and no joint here has a second one. An empty list changes nothing.
@@ -66,9 +66,7 @@ class JointServices:
     def _set_configuration(self, request: srv.SetModelConfigurationRequest) -> str:
         names, positions = request.joint_names, request.joint_positions
         with self._sim.lock:
-            model = self._sim.world.model(request.model_name)
-            if model is None:
-                raise ServiceRefused("model does not exist")
+            model = existing(self._sim.world.model(request.model_name), NO_MODEL)
             if len(names) != len(positions):
                 raise ServiceRefused("joint name and position list have different lengths")
             if not all(math.isfinite(position) for position in positions):
@@ -104,7 +102,7 @@ class ForceServices:
 
     def _apply_effort(self, request: srv.ApplyJointEffortRequest) -> str:
         with self._sim.lock:
-            found = _find_joint(self._sim, request.joint_name)
+            found = existing(self._sim.world.joint(request.joint_name), NO_JOINT)
             check_message(request)
             interval = self._interval(request.start_time, request.duration)
             self._sim.applied.efforts.append(AppliedEffort(*found, request.effort, interval))
@@ -113,12 +111,8 @@ class ForceServices:
     def _apply_wrench(self, request: srv.ApplyBodyWrenchRequest) -> str:
         with self._sim.lock:
             world = self._sim.world
-            found = world.link(request.body_name)
-            if found is None:
-                raise ServiceRefused("body does not exist")
-            frame = world.frame(request.reference_frame)
-            if frame is None:
-                raise ServiceRefused("reference_frame not found")
+            found = existing(world.link(request.body_name), "body does not exist")
+            frame = existing(world.frame(request.reference_frame), "reference_frame not found")
             check_message(request)
             wrench = in_world(
                 (to_vector(request.wrench.force), to_vector(request.wrench.torque)),
@@ -143,11 +137,3 @@ class ForceServices:
         with self._sim.lock:
             self._sim.applied.clear_wrenches(request.body_name)
         return srv.BodyRequestResponse()
-
-
-def _find_joint(sim: Simulator, name: str) -> tuple[Model, str]:
-    """Returns the model and plain name of a joint; raises ServiceRefused if there is none."""
-    found = sim.world.joint(name)
-    if found is None:
-        raise ServiceRefused("joint not found")
-    return found

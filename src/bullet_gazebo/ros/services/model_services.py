@@ -23,11 +23,18 @@ from bullet_gazebo.ros.common.messages import (
     to_twist_msg,
     to_vector,
 )
-from bullet_gazebo.ros.services import ServiceRefused, check_message, offer
+from bullet_gazebo.ros.services import (
+    NO_LINK,
+    NO_MODEL,
+    SCOPE,
+    ServiceRefused,
+    check_message,
+    existing,
+    offer,
+)
 from bullet_gazebo.simulator import Simulator
 
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-SCOPE = "did you forget to scope the link by model name?"
 QUEUE = 10
 
 
@@ -54,9 +61,7 @@ class ModelServices:
         self, request: srv.GetModelPropertiesRequest
     ) -> srv.GetModelPropertiesResponse:
         with self._sim.lock:
-            model = self._sim.world.model(request.model_name)
-            if model is None:
-                raise ServiceRefused("model does not exist")
+            model = existing(self._sim.world.model(request.model_name), NO_MODEL)
             # All names are unscoped, and canonical_body_name is never filled.
             return srv.GetModelPropertiesResponse(
                 body_names=model.link_names,
@@ -101,12 +106,11 @@ class ModelServices:
     def _set_state(self, request: srv.SetModelStateRequest) -> str:
         wanted = request.model_state
         with self._sim.lock:
-            model = self._sim.world.model(wanted.model_name)
-            if model is None:
-                raise ServiceRefused("model does not exist")
-            frame = self._sim.world.frame(wanted.reference_frame)
-            if frame is None:
-                raise ServiceRefused("specified reference frame entity does not exist")
+            model = existing(self._sim.world.model(wanted.model_name), NO_MODEL)
+            frame = existing(
+                self._sim.world.frame(wanted.reference_frame),
+                "specified reference frame entity does not exist",
+            )
             check_message(wanted)
             # The twist is turned with the frame; the frame's own velocity is not added.
             linear, angular = (
@@ -134,9 +138,7 @@ class LinkServices:
         self, request: srv.GetLinkPropertiesRequest
     ) -> srv.GetLinkPropertiesResponse:
         with self._sim.lock:
-            found = self._sim.world.link(request.link_name)
-            if found is None:
-                raise ServiceRefused(f"link not found, {SCOPE}")
+            found = existing(self._sim.world.link(request.link_name), NO_LINK)
             inertia, gravity = link_inertia(*found), found[0].body.link_gravity(found[1])
         return srv.GetLinkPropertiesResponse(
             com=to_pose_msg(Pose(inertia.com.position)),  # never its orientation
@@ -149,9 +151,7 @@ class LinkServices:
 
     def _set_properties(self, request: srv.SetLinkPropertiesRequest) -> str:
         with self._sim.lock:
-            found = self._sim.world.link(request.link_name)
-            if found is None:
-                raise ServiceRefused(f"link not found, {SCOPE}")
+            found = existing(self._sim.world.link(request.link_name), NO_LINK)
             check_message(request)
             old = link_inertia(*found)
             inertia = replace(
@@ -169,12 +169,9 @@ class LinkServices:
     def _get_state(self, request: srv.GetLinkStateRequest) -> srv.GetLinkStateResponse:
         with self._sim.lock:
             world = self._sim.world
-            found = world.link(request.link_name)
-            if found is None:
-                raise ServiceRefused(f"link not found, {SCOPE}")
-            frame = world.frame(request.reference_frame)
-            if frame is None:
-                raise ServiceRefused(f"reference reference_frame not found, {SCOPE}")
+            found = existing(world.link(request.link_name), NO_LINK)
+            fault = f"reference reference_frame not found, {SCOPE}"
+            frame = existing(world.frame(request.reference_frame), fault)
             pose, twist = seen_from(found[0].link_state(found[1]), frame)
         state = LinkState(
             request.link_name, to_pose_msg(pose), to_twist_msg(twist), request.reference_frame
@@ -188,12 +185,8 @@ class LinkServices:
     def _set_state(self, request: srv.SetLinkStateRequest) -> str:
         wanted = request.link_state
         with self._sim.lock:
-            found = self._sim.world.link(wanted.link_name)
-            if found is None:
-                raise ServiceRefused("link does not exist")
-            frame = self._frame(wanted.reference_frame)
-            if frame is None:
-                raise ServiceRefused("failed")
+            found = existing(self._sim.world.link(wanted.link_name), "link does not exist")
+            frame = existing(self._frame(wanted.reference_frame), "failed")
             check_message(wanted)
             linear, angular = from_twist_msg(wanted.twist)
             # Gazebo subtracts the frame's velocity, and doesn't turn the request's.

@@ -35,7 +35,7 @@ from bullet_gazebo.physics.pose import Pose, is_finite
 from bullet_gazebo.physics.world import NameTaken
 from bullet_gazebo.ros.common.messages import from_pose_msg
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
-from bullet_gazebo.ros.services import ServiceRefused, offer
+from bullet_gazebo.ros.services import NO_MODEL, existing, offer
 from bullet_gazebo.simulator import Simulator
 from file_access.content import MAX_BYTES, FileError, read_file
 from file_access.xml_text import decode, parse
@@ -53,7 +53,6 @@ RESOURCES = "GAZEBO_RESOURCE_PATH"
 MODELS = "GAZEBO_MODEL_PATH"
 EXPORT = "gazebo_model_path"
 HOME_MODELS = "~/.gazebo/models"
-Spawn = Callable[[srv.SpawnModelRequest], srv.SpawnModelResponse]
 
 
 class SpawnServices:
@@ -68,34 +67,17 @@ class SpawnServices:
         # Spawning and deleting take several steps, with plugins between them: one at a time, as Gazebo
         # serialises all its services (docs/contract/gazebo.md 1.1).
         self._one_at_a_time = one_at_a_time
-        self._counting = threading.Lock()
-        self._under_way = self._spawned = 0
+        self._under_way: list[srv.SpawnModelRequest] = []
+        self._spawned = 0
         self._services = [
-            rospy.Service("~spawn_urdf_model", srv.SpawnModel, self._counted(self._spawn_urdf)),
-            rospy.Service("~spawn_sdf_model", srv.SpawnModel, self._counted(self._spawn_sdf)),
+            rospy.Service("~spawn_urdf_model", srv.SpawnModel, self._spawn_urdf),
+            rospy.Service("~spawn_sdf_model", srv.SpawnModel, self._spawn_sdf),
             offer("~delete_model", srv.DeleteModel, self._delete),
         ]
 
     def count(self, *_: object) -> tuple[int, str, list[int]]:
         """Answers by XML-RPC how many models are being spawned, and how many have been."""
-        with self._counting:
-            return 1, "", [self._under_way, self._spawned]
-
-    def _counted(self, spawn: Spawn) -> Spawn:
-        def handle(request: srv.SpawnModelRequest) -> srv.SpawnModelResponse:
-            done = False
-            with self._counting:
-                self._under_way += 1
-            try:
-                answer = spawn(request)
-                done = answer.success
-                return answer
-            finally:
-                with self._counting:
-                    self._under_way -= 1
-                    self._spawned += done
-
-        return handle
+        return 1, "", [len(self._under_way), self._spawned]
 
     def _spawn_sdf(self, request: srv.SpawnModelRequest) -> srv.SpawnModelResponse:
         return self._spawn(request, request.model_xml)
@@ -111,6 +93,7 @@ class SpawnServices:
         return self._spawn(request, _with_package_paths(text))
 
     def _spawn(self, request: srv.SpawnModelRequest, text: str) -> srv.SpawnModelResponse:
+        self._under_way.append(request)
         try:
             self._checked_pose(request)  # before anything takes time
             # Reading may take long; others spawn meanwhile.
@@ -119,6 +102,7 @@ class SpawnServices:
             own = entity.pose if isinstance(entity, Light) else entity.initial_pose
             with self._one_at_a_time:
                 self._add(request, entity, self._checked_pose(request).compose(own))
+                self._spawned += 1
         except NameTaken:
             return srv.SpawnModelResponse(False, TAKEN)
         except UnknownFormat as error:
@@ -127,6 +111,8 @@ class SpawnServices:
         except (DescriptionError, LookupError) as error:
             rospy.logerr("SpawnModel: %s", error)
             return srv.SpawnModelResponse(False, f"SpawnModel: {error}")
+        finally:
+            self._under_way.pop()
         return srv.SpawnModelResponse(True, "SpawnModel: Successfully spawned entity")
 
     def _checked_pose(self, request: srv.SpawnModelRequest) -> Pose:
@@ -169,9 +155,7 @@ class SpawnServices:
     def _delete(self, request: srv.DeleteModelRequest) -> str:
         with self._one_at_a_time:
             with self._sim.lock.glance():
-                model = self._sim.world.model(request.model_name)
-            if model is None:
-                raise ServiceRefused("model does not exist")
+                model = existing(self._sim.world.model(request.model_name), NO_MODEL)
             with self._plugins.time_held(f"model '{shown(model.name)}'"):
                 self._plugins.unload(model)
                 with self._sim.lock:

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 
 import rospy
-from bullet_gazebo_msgs.msg import SensorReading
 from bullet_gazebo_msgs.srv import (
     PreparedStep,
     PreparedStepRequest,
@@ -40,7 +39,7 @@ from bullet_gazebo.ros.common.messages import (
     to_twist_msg,
 )
 from bullet_gazebo.ros.common.node_process import seed_random_numbers
-from bullet_gazebo.ros.services import ServiceRefused, offer
+from bullet_gazebo.ros.services import NO_LINK, ServiceRefused, existing, offer
 from bullet_gazebo.ros.services.step_requests import (
     MAX_TICKS,
     SLICE,
@@ -187,7 +186,8 @@ class StepService:
                 numbers, contacts = prepared.read(self._knows_contacts)
             except UnknownName as error:
                 return self._refused(f"the ticks are done, but meanwhile {error}")
-            sensors = self._sensed() if prepared.sensors else []
+            readers = self._readers if prepared.sensors else None
+            sensors = [to_reading(*taken) for taken in readers.read()] if readers else []
             return PreparedStepResponse(True, False, sim.now, "", numbers, contacts, sensors)
 
     def _sense(self, names: tuple[str, ...]) -> None:
@@ -217,10 +217,6 @@ class StepService:
         if self._readers:
             self._readers.end()
         self._readers = None
-
-    def _sensed(self) -> list[SensorReading]:
-        assert self._readers is not None  # the step has asked for them
-        return [to_reading(now, values) for now, values in self._readers.read()]
 
     def _check_layout(self, prepared: _Prepared) -> None:
         """Raises UnknownName if the numbers would belong to other names now."""
@@ -337,11 +333,7 @@ class StepService:
 
     def _set_friction(self, request: SetLinkFrictionRequest) -> str:
         with self._sim.lock:
-            found = self._sim.world.link(request.link_name)
-            if found is None:
-                raise ServiceRefused(
-                    "link not found, did you forget to scope the link by model name?"
-                )
+            found = existing(self._sim.world.link(request.link_name), NO_LINK)
             try:
                 set_link_friction(*found, request.factor)
             except PropertyError as error:

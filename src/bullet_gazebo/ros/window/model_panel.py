@@ -54,9 +54,8 @@ class ModelPanel:
         self._start: np.ndarray | None = None  # [m] where the followed model was at first
         self._followed = ""
         self._turn = threading.Lock()
-        self._wanted: dict[
-            tuple[str, str], float
-        ] = {}  # [rad, m] by model and joint, not yet carried out
+        # [rad, m] by model and joint, not yet carried out
+        self._wanted: dict[tuple[str, str], float] = {}
         self._touched: dict[str, float] = {}  # [s] when someone moved a joint's slider
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._choice = server.gui.add_dropdown("Model", [NONE], initial_value=NONE)

@@ -32,11 +32,8 @@ ONLY_STEPS = "a world in lock-step moves only by steps: a client's, or these her
 
 
 MANAGER = "controller_manager"
-SINGLE, GROUP, TRAJECTORY = (
-    "JointPositionController",
-    "JointGroupPositionController",
-    "JointTrajectoryController",
-)
+SINGLE, GROUP = "JointPositionController", "JointGroupPositionController"
+TRAJECTORY = "JointTrajectoryController"
 MESSAGES = {SINGLE: Float64, GROUP: Float64MultiArray, TRAJECTORY: JointTrajectory}
 MOVE_TIME = 0.5  # [s of simulated time] that a trajectory to the slider's position takes
 CONNECTING = 5.0  # [s]

@@ -5,6 +5,7 @@ import io
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,11 +37,7 @@ ADVICE = "~window"  # parameter: the lines that say where the page is
 CURVES = "~curves"  # parameter: a run folder, or the table of one
 TRAINED = "/gazebo_gui/curves"  # the same; a training sets it, for windows of any name
 WAIT = 0.5  # [s] for a message
-OFTEN, SELDOM, CURVES_PERIOD = (
-    0.25,
-    2.0,
-    1.0,
-)  # [s] between two updates of texts, controllers, curves
+OFTEN, SELDOM, CURVES_PERIOD = 0.25, 2.0, 1.0  # [s] between updates of texts, controllers, curves
 NOTICE = 8.0  # [s] that a fault is shown
 RENDERING = 30.0  # [s] for a browser to draw a screenshot
 WORLD = "/world"  # the scene node above all models
@@ -250,18 +247,13 @@ def show(address: Address, browser: bool) -> None:
         advice = address.advice("the window", "moves the simulation")
         for line in advice:
             print(f"gzclient: {line}", flush=True)
-        if (
-            not address.token
-        ):  # a token is for no one else; without one other programs may show the lines
+        if not address.token:  # which is for no one else; other programs may show the lines
             rospy.set_param(ADVICE, advice)
         if browser:  # may block until its user closes it
-            threading.Thread(target=open_browser, args=(address, _warn), daemon=True).start()
+            warn = partial(rospy.logwarn, "gazebo_gui: %s")
+            threading.Thread(target=open_browser, args=(address, warn), daemon=True).start()
         window.run()
     finally:
         stop(server)
         with contextlib.suppress(KeyError, OSError, rospy.ROSException):  # the master has gone
             rospy.delete_param(ADVICE)
-
-
-def _warn(text: str) -> None:
-    rospy.logwarn("gazebo_gui: %s", text)

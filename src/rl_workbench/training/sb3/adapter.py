@@ -23,12 +23,7 @@ from rl_workbench.training.environments import succeeded
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.sb3.acting import load_policy
 from rl_workbench.training.sb3.models import make_learning_model
-from rl_workbench.training.sb3.positions import (
-    ModelMark,
-    Positions,
-    buffer_state,
-    restore_buffer,
-)
+from rl_workbench.training.sb3.positions import ModelMark, Positions, buffer_state, restore_buffer
 from rl_workbench.training.training import Training
 
 __all__ = ["load_policy", "make"]

@@ -17,12 +17,7 @@ from std_srvs.srv import Empty
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.backend import RobotBackend
-from robot_envs.backends.ros.bringup import (
-    command_message,
-    command_publisher,
-    full_name,
-    ready,
-)
+from robot_envs.backends.ros.bringup import command_message, command_publisher, full_name, ready
 from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.backends.ros.running import (
     JointStateReader,

@@ -86,10 +86,17 @@ class RosSession:
         if self._started_simulator:
             say("starting the simulator")
             self._start_simulator()
-        self._become_node()
+        if not rospy.core.is_initialized():  # the training handles signals itself
+            node.refuse_twin(self._name)
+            own = os.path.basename(self._name)
+            rospy.init_node(own, argv=["", *self._argv], disable_signals=True)
+            self._node.callback(rospy.signal_shutdown, "training ended")
         self._check_mode()
         running.check_world(robot)
-        self._set_physics_step(robot.physics_step)
+        if robot.physics_step:
+            restore = partial(running.physics_step, running.physics_step())
+            self._undo.callback(_undo_if_running, RunningSimulator(), restore)
+            running.physics_step(robot.physics_step)
         if self._curves is not None:
             self._undo.callback(windows.show_curves(self._curves))
         changes = bring_up(self._scene, say)
@@ -104,12 +111,6 @@ class RosSession:
             self._undo.callback(windows.open_rviz(robot))
         _sessions.append(self)
         self._undo.callback(_sessions.remove, self)
-
-    def _set_physics_step(self, step: float | None) -> None:
-        if step:
-            restore = partial(running.physics_step, running.physics_step())
-            self._undo.callback(_undo_if_running, RunningSimulator(), restore)
-            running.physics_step(step)
 
     def _start_simulator(self) -> None:
         """Starts the simulator, and the master if there is none."""
@@ -130,14 +131,6 @@ class RosSession:
                 started.close()
 
         self._undo.callback(end)
-
-    def _become_node(self) -> None:
-        """Makes this process a node, unless it is one; the training handles signals itself."""
-        if rospy.core.is_initialized():
-            return
-        node.refuse_twin(self._name)
-        rospy.init_node(os.path.basename(self._name), argv=["", *self._argv], disable_signals=True)
-        self._node.callback(rospy.signal_shutdown, "training ended")
 
     def _check_mode(self) -> None:
         """Raises RobotEnvError if the running simulator doesn't move as the environments need it."""

@@ -84,6 +84,11 @@ def call(service: str, kind: Any, *request: Any, timeout: float, gazebo_ns: str)
     return answer
 
 
+def done(service: str, kind: Any, *request: Any, timeout: float, gazebo_ns: str) -> bool:
+    """Calls the simulator; returns whether it reports success."""
+    return succeeded(call(service, kind, *request, timeout=timeout, gazebo_ns=gazebo_ns))
+
+
 def succeeded(answer: Any) -> bool:
     """Returns True if there is an answer and it reports success."""
     return answer is not None and bool(answer.success)

@@ -12,13 +12,7 @@ from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import packages as _packages
 from ros_utils._internal import programs as _programs
 from ros_utils._internal import roslaunch as _roslaunch
-from ros_utils._internal.programs import (
-    CannotStart,
-    Handle,
-    Started,
-    await_start,
-    wait_for_world,
-)
+from ros_utils._internal.programs import CannotStart, Handle, Started, await_start, wait_for_world
 from ros_utils.readiness import Ready
 
 __all__ = [
@@ -177,13 +171,9 @@ def _world(path: str | None, package: str | None, name: str | None) -> str | Non
     """Returns the world file, or None for the launch file's own; raises NotFound if there is no such file."""
     if path:
         # The simulator may find a relative path on its own resource path.
-        return (
-            os.path.abspath(path)
-            if os.path.isfile(path)
-            else _packages.existing(path)
-            if os.path.isabs(path)
-            else path
-        )
+        if os.path.isfile(path):
+            return os.path.abspath(path)
+        return _packages.existing(path) if os.path.isabs(path) else path
     if package and name:
         return _packages.file(package, "worlds", name)
     if package or name:

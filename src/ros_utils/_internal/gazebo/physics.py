@@ -16,6 +16,7 @@ from ros_utils._internal.gazebo.calls import (
     GAZEBO,
     TIMEOUT,
     call,
+    done,
     empty_call,
     not_finite,
     succeeded,
@@ -171,9 +172,7 @@ def gazebo_set_physics_properties(
         now.ode_config if ode_config is None else ode_config,
     )
     kind = srv.SetPhysicsProperties
-    return succeeded(
-        call("set_physics_properties", kind, *request, timeout=timeout, gazebo_ns=gazebo_ns)
-    )
+    return done("set_physics_properties", kind, *request, timeout=timeout, gazebo_ns=gazebo_ns)
 
 
 def gazebo_set_max_update_rate(
@@ -259,17 +258,9 @@ def gazebo_set_ODE_physics(
         True if the simulator did it.
     """
     config = ODEPhysics(
-        auto_disable_bodies=auto_disable_bodies,
-        sor_pgs_precon_iters=sor_pgs_precon_iters,
-        sor_pgs_iters=sor_pgs_iters,
-        sor_pgs_w=sor_pgs_w,
-        sor_pgs_rms_error_tol=sor_pgs_rms_error_tol,
-        contact_surface_layer=contact_surface_layer,
-        contact_max_correcting_vel=contact_max_correcting_vel,
-        cfm=cfm,
-        erp=erp,
-        max_contacts=max_contacts,
-    )
+        auto_disable_bodies, sor_pgs_precon_iters, sor_pgs_iters, sor_pgs_w, sor_pgs_rms_error_tol,
+        contact_surface_layer, contact_max_correcting_vel, cfm, erp, max_contacts,
+    )  # fmt: skip
     return gazebo_set_physics_properties(ode_config=config, timeout=timeout, gazebo_ns=gazebo_ns)
 
 
@@ -285,11 +276,5 @@ def gazebo_set_default_properties(*, timeout: float = TIMEOUT, gazebo_ns: str = 
     Returns:
         True if the simulator did it.
     """
-    return gazebo_set_physics_properties(
-        TIME_STEP,
-        1.0 / TIME_STEP,
-        GRAVITY,
-        ODEPhysics(**ODE),
-        timeout=timeout,
-        gazebo_ns=gazebo_ns,
-    )
+    usual = (TIME_STEP, 1.0 / TIME_STEP, GRAVITY, ODEPhysics(**ODE))
+    return gazebo_set_physics_properties(*usual, timeout=timeout, gazebo_ns=gazebo_ns)

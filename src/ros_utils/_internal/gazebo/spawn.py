@@ -19,9 +19,9 @@ from ros_utils._internal.gazebo.calls import (
     TIMEOUT,
     SpawnResult,
     call,
+    done,
     make_pose,
     not_finite,
-    succeeded,
 )
 from ros_utils._internal.packages import urdf_parse_from_path, urdf_parse_from_pkg
 
@@ -94,11 +94,7 @@ def spawn_param(
 
 
 def gazebo_delete_model(
-    model_name: str,
-    *,
-    timeout: float = TIMEOUT,
-    gazebo_ns: str = GAZEBO,
-    verify: bool = False,
+    model_name: str, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False
 ) -> bool:
     """Deletes a model.
 
@@ -110,10 +106,10 @@ def gazebo_delete_model(
     Returns:
         True if the model existed and is gone.
     """
-    answer = call("delete_model", srv.DeleteModel, model_name, timeout=timeout, gazebo_ns=gazebo_ns)
-    if not succeeded(answer):
-        return False
-    return not verify or _appears(model_name, False, timeout, gazebo_ns)
+    deleted = done(
+        "delete_model", srv.DeleteModel, model_name, timeout=timeout, gazebo_ns=gazebo_ns
+    )
+    return deleted and (not verify or _appears(model_name, False, timeout, gazebo_ns))
 
 
 def _appears(name: str, wanted: bool, timeout: float, gazebo_ns: str) -> bool:
@@ -272,8 +268,10 @@ def gazebo_spawn_sdf_path(
     verify: bool = False,
 ) -> bool:
     """Spawns an SDF file, given by its path. See `gazebo_spawn_sdf_string`."""
-    xml = _read_sdf(model_path)
-    if xml is None:
+    try:
+        xml = decode(read_file(Path(_packages.existing(model_path))))
+    except (_packages.NotFound, FileError) as fault:
+        _log.error(f"sdf: {model_path}: {fault}")
         return False
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     place = (robot_namespace, reference_frame, pose)
@@ -301,15 +299,13 @@ def gazebo_spawn_sdf_pkg(
 ) -> bool:
     """Spawns the SDF file ``<pkg_name><file_folder>/<file_name>``. See `gazebo_spawn_sdf_string`."""
     try:
-        xml = _read_sdf(_packages.file(pkg_name, file_folder, file_name))
+        path = _packages.file(pkg_name, file_folder, file_name)
     except _packages.NotFound as fault:
         _log.error(f"gazebo_spawn_sdf_pkg: {fault}")
         return False
-    if xml is None:
-        return False
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = (robot_namespace, reference_frame, pose)
-    return spawn("sdf", xml, model_name, *place, timeout, gazebo_ns, verify).success
+    place = (model_name, robot_namespace, reference_frame, *pose)
+    return gazebo_spawn_sdf_path(path, *place, timeout=timeout, gazebo_ns=gazebo_ns, verify=verify)
 
 
 def gazebo_spawn_sdf_string(
@@ -360,12 +356,3 @@ def gazebo_spawn_sdf_param(
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     place = (robot_namespace, reference_frame, pose)
     return spawn_param("sdf", param_name, model_name, *place, timeout, gazebo_ns, verify).success
-
-
-def _read_sdf(path: str) -> str | None:
-    """Returns a file's text, or None with an error in the log."""
-    try:
-        return decode(read_file(Path(_packages.existing(path))))
-    except (_packages.NotFound, FileError) as fault:
-        _log.error(f"sdf: {path}: {fault}")
-        return None

@@ -20,6 +20,7 @@ from ros_utils._internal.gazebo.calls import (
     ModelStateResult,
     WorldPropertiesResult,
     call,
+    done,
     make_pose,
     not_finite,
     pose_numbers,
@@ -51,14 +52,9 @@ def gazebo_get_model_state(
     Returns:
         Header, pose, twist, and whether it succeeded; all zeros if not.
     """
-    answer = call(
-        "get_model_state",
-        srv.GetModelState,
-        model_name,
-        relative_entity_name,
-        timeout=timeout,
-        gazebo_ns=gazebo_ns,
-    )
+    request = (model_name, relative_entity_name)
+    kind = srv.GetModelState
+    answer = call("get_model_state", kind, *request, timeout=timeout, gazebo_ns=gazebo_ns)
     if answer is None:
         return ModelStateResult(Header(), Pose(), Twist(), False)
     return ModelStateResult(answer.header, answer.pose, answer.twist, bool(answer.success))
@@ -105,9 +101,9 @@ def gazebo_set_model_state(
     twist = Twist(Vector3(*linear), Vector3(*angular))
     state = ModelState(model_name, pose, twist, ref_frame)
     numbers = (*pose_numbers(pose), *linear, *angular)
-    done = _set("set_model_state", srv.SetModelState, state, numbers, timeout, gazebo_ns)
+    was_set = _set("set_model_state", srv.SetModelState, state, numbers, timeout, gazebo_ns)
     time.sleep(max(0.0, sleep_time))
-    return done
+    return was_set
 
 
 def gazebo_get_link_state(
@@ -123,9 +119,8 @@ def gazebo_get_link_state(
         Pose, twist, and whether it succeeded; all zeros if not.
     """
     request = (link_name, reference_frame)
-    answer = call(
-        "get_link_state", srv.GetLinkState, *request, timeout=timeout, gazebo_ns=gazebo_ns
-    )
+    kind = srv.GetLinkState
+    answer = call("get_link_state", kind, *request, timeout=timeout, gazebo_ns=gazebo_ns)
     if answer is None:
         return LinkStateResult(Pose(), Twist(), False)
     state = answer.link_state
@@ -142,11 +137,8 @@ def gazebo_set_link_state(
     gazebo_ns: str = GAZEBO,
 ) -> bool:
     """Moves a link; without `twist` it is then at rest. See `gazebo_get_link_state`."""
-    orientation = pose.orientation
-    turn = (orientation.x, orientation.y, orientation.z, orientation.w)
-    pose = make_pose(pose.position.x, pose.position.y, pose.position.z, *turn)
-    state = LinkState(link_name, pose, twist or Twist(), reference_frame)
     numbers = pose_numbers(pose)
+    state = LinkState(link_name, make_pose(*numbers), twist or Twist(), reference_frame)
     return _set("set_link_state", srv.SetLinkState, state, numbers, timeout, gazebo_ns)
 
 
@@ -174,7 +166,7 @@ def gazebo_set_model_configuration(
     request = (model_name, urdf_param_name, list(joint_names), list(joint_positions))
     service = "set_model_configuration"
     kind = srv.SetModelConfiguration
-    return succeeded(call(service, kind, *request, timeout=timeout, gazebo_ns=gazebo_ns))
+    return done(service, kind, *request, timeout=timeout, gazebo_ns=gazebo_ns)
 
 
 def gazebo_get_joint_properties(
@@ -214,9 +206,7 @@ def gazebo_apply_joint_effort(
     begin, length = RosTime.from_sec(max(0.0, start_time)), Duration.from_sec(duration)
     request = (joint_name, effort, begin, length)
     kind = srv.ApplyJointEffort
-    return succeeded(
-        call("apply_joint_effort", kind, *request, timeout=timeout, gazebo_ns=gazebo_ns)
-    )
+    return done("apply_joint_effort", kind, *request, timeout=timeout, gazebo_ns=gazebo_ns)
 
 
 def gazebo_get_world_properties(
@@ -251,4 +241,4 @@ def _set(
     if fault := not_finite(service, *numbers):
         _log.error(fault)
         return False
-    return succeeded(call(service, kind, state, timeout=timeout, gazebo_ns=gazebo_ns))
+    return done(service, kind, state, timeout=timeout, gazebo_ns=gazebo_ns)

@@ -22,7 +22,8 @@ class Sensor:
         self.times = []
         self.listeners = 0
         measure = measure or self.times.append
-        self.clock = schedule.add(model, rate, measure, lambda: self.listeners > 0, **options)
+        with sim.lock:
+            self.clock = schedule.begin(model, rate, measure, lambda: self.listeners > 0, **options)
 
     def come(self):
         self.listeners += 1
