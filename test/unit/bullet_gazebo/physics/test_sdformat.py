@@ -80,6 +80,11 @@ def assert_same(model: ModelDescription, lines: list[list[str]]) -> None:
         turns = slice(3, 7)
         if wanted[turns] @ numbers[turns] < 0.0:
             wanted[turns] = -wanted[turns]
+        x, y, z, w = numbers[turns]
+        if abs(2.0 * (w * y - z * x)) > 0.999:
+            # Its turns pass through roll, pitch and yaw, which lose digits near a pitch of 90 degrees.
+            assert numbers[turns] == pytest.approx(wanted[turns], abs=2e-3), mine
+            numbers[turns] = wanted[turns]
         assert numbers == pytest.approx(wanted, abs=CLOSE, rel=CLOSE), mine
 
 
