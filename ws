@@ -166,6 +166,7 @@ main() {
         test)
             steps=(debian venv test_tools companions build)
             [[ " $* " == *" --fast "* ]] || steps+=(compiler extras)
+            [[ " $* " == *" --fast "* || $SYSTEM != "debian 12" ]] || steps+=(oracle)
             ;;
         check)
             look_for_checks "${@:2}"

@@ -10,6 +10,7 @@ declare -A TITLE=(
     [debian]="Debian packages"
     [checkers]="Debian packages for ws check"
     [compiler]="Debian packages that compile"
+    [oracle]="Debian packages that tests compare with"
     [rviz]="Debian packages for RViz"
     [foreign]="Debian packages that others build against"
     [venv]="Python packages"
@@ -24,7 +25,7 @@ COMPILER="mend what the compiler or CMake complains of; if that is nothing of yo
 # shellcheck disable=SC2034
 declare -A REMEDY=(
     [debian]="$NETWORK; on other systems than Debian 12 and 13 see docs/catkin.md"
-    [checkers]=$NETWORK [compiler]=$NETWORK [rviz]=$NETWORK [foreign]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [doc_tools]=$NETWORK [extras]=$NETWORK
+    [checkers]=$NETWORK [compiler]=$NETWORK [oracle]=$NETWORK [rviz]=$NETWORK [foreign]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [doc_tools]=$NETWORK [extras]=$NETWORK
     [companions]=$COMPILER [build]=$COMPILER
 )
 
@@ -75,6 +76,7 @@ debian_missing() {  # file
 key_debian() { debian_missing debian.txt; }
 key_checkers() { debian_missing check.txt; }
 key_compiler() { debian_missing compiler.txt; }
+key_oracle() { debian_missing oracle.txt; }
 key_rviz() { debian_missing rviz.txt; }
 key_foreign() { debian_missing foreign.txt; }
 
@@ -93,6 +95,7 @@ apt() {
 plan_debian() { plan_packages debian.txt; }
 plan_checkers() { plan_packages check.txt; }
 plan_compiler() { plan_packages compiler.txt; }
+plan_oracle() { plan_packages oracle.txt; }
 plan_rviz() { plan_packages rviz.txt; }
 plan_foreign() { plan_packages foreign.txt; }
 plan_packages() {  # file
@@ -124,6 +127,7 @@ sizes_of_debian() {  # package...
 make_debian() { make_packages debian.txt; }
 make_checkers() { make_packages check.txt; }
 make_compiler() { make_packages compiler.txt; }
+make_oracle() { make_packages oracle.txt; }
 make_rviz() { make_packages rviz.txt; }
 make_foreign() { make_packages foreign.txt; }
 make_packages() {  # file

@@ -80,13 +80,22 @@ def _children(links: dict[str, Link], joints: dict[str, Joint]) -> dict[str, lis
 
 
 def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
-    """Lumps fixed joints and drops massless links, in place; returns `model`."""
+    """Lumps fixed joints and drops massless links, in place; returns `model`.
+
+    Links and joints are in sdformat's order afterwards: depth first, children by the names of their joints.
+    """
+    model.joints = dict(sorted(model.joints.items()))
     detach_from_world(model)
-    lumped = [j.name for j in model.joints.values() if j.kind == "fixed" and not j.kept]
-    for name in lumped[::-1]:
-        _lump(model, name)
+    order = _depth_first(model)
+    above = {joint.child: joint for joint in model.joints.values()}
+    for child in reversed(_depth_first(model, backwards=True)):
+        if child in above and above[child].kind == "fixed" and not above[child].kept:
+            _lump(model, above[child].name)
     _drop_free_joints(model)
     drop_massless(model)
+    model.links = {name: model.links[name] for name in order if name in model.links}
+    left = (above[name].name for name in order if name in above)
+    model.joints = {name: model.joints[name] for name in left if name in model.joints}
     model.lumped = {name: at for name, at in model.lumped.items() if at[0] in model.links}
     moved = [_lumped_sensor(model, sensor) for sensor in model.sensors]
     model.sensors = [sensor for sensor in moved if sensor.link in model.links]
@@ -97,11 +106,26 @@ def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
     return model
 
 
+def _depth_first(model: ModelDescription, backwards: bool = False) -> list[str]:
+    """Returns the links below the root, each before its children; with `backwards` the last child first."""
+    below = model.joints_by_parent()
+    order, todo = [], [model.root]
+    while todo:
+        order.append(todo.pop())
+        joints = below[order[-1]]
+        todo += [joint.child for joint in (joints if backwards else reversed(joints))]
+    return order
+
+
 def _named(link: Link, shapes: list[Shape], suffix: str) -> list[Shape]:
-    """Names shapes as sdformat does: by their own or their link's name, numbered from the second one on."""
+    """Names shapes as sdformat does: after the link, numbered from the second one on.
+
+    A name of their own, or the lumped link's that they come from, is added, unless it begins as the link's.
+    """
     names = []
     for count, shape in enumerate(shapes):
-        stem = link.name + shape.name if shape.name.startswith(LUMPED) else shape.name or link.name
+        own = shape.name or link.name
+        stem = own if own.startswith(link.name) else link.name + LUMPED + own
         names.append(f"{stem}{suffix}_{count}" if count else f"{stem}{suffix}")
     return [replace(shape, name=name) for shape, name in zip(shapes, names, strict=True)]
 
@@ -141,8 +165,7 @@ def _moved(inertia: Inertia | None, pose: Pose) -> Inertia | None:
 
 
 def _lumped(shape: Shape, pose: Pose, link: str) -> Shape:
-    name = shape.name if shape.name.startswith(LUMPED) else LUMPED + (shape.name or link)
-    return replace(shape, pose=pose.compose(shape.pose), name=name)
+    return replace(shape, pose=pose.compose(shape.pose), name=shape.name or link)
 
 
 def _lumped_sensor(model: ModelDescription, sensor: Sensor) -> Sensor:

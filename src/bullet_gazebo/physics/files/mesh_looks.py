@@ -23,10 +23,6 @@ LARGEST_IMAGE = 1024  # [pixels] a side, for pictures
 STOPGAP = 2  # [pixels] a side of the image by which trimesh replaces a missing one
 WHITE = (255, 255, 255, 255)
 NONE = np.zeros(0)
-UP_AXES = {  # turned so that z is up
-    "X_UP": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
-    "Y_UP": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
-}
 
 
 def read_glb(path: Path) -> bytes:
@@ -64,31 +60,29 @@ def read_parts(path: Path) -> Iterator[np.ndarray]:
 
 
 def _scene(path: Path) -> "trimesh.Scene | None":
-    """Returns the file's scene (z up, in metres) with its materials, or None if it has none."""
+    """Returns the file's scene (in metres) with its materials, or None if it has none."""
     import trimesh
 
     scene = trimesh.load_scene(str(path))
     if not any(_has_look(part) for part in scene.geometry.values()):
         return None
     if path.suffix.lower() == ".dae":
-        axes = np.eye(4)
         root = parse(path.read_bytes())
         for element in root.iter():
             element.tag = element.tag.rpartition("}")[2]
-        axes[:3, :3] = axes_of(root)
-        scene.apply_transform(axes)
+        scene.apply_scale(meters_of(root))
     for part in scene.geometry.values():
         _brighten(getattr(getattr(part, "visual", None), "material", None))
     return scene
 
 
-def axes_of(root: Element) -> np.ndarray:
-    """Returns the matrix (3, 3) that takes a COLLADA file's coordinates to [m], z up."""
+def meters_of(root: Element) -> float:
+    """Returns the unit [m] of a COLLADA file. Its `<up_axis>` is not applied, as in Gazebo and RViz."""
     unit = root.find("asset/unit")
     meters = 1.0 if unit is None else finite(unit.get("meter", "1"), "<unit meter>")
     if not meters > 0.0:
         raise DescriptionError(f"<unit meter>: a unit of {meters} m has no length")
-    return meters * UP_AXES.get(root.findtext("asset/up_axis", "").strip(), np.eye(3))
+    return meters
 
 
 def _has_look(part: object) -> bool:

@@ -19,7 +19,7 @@ import numpy as np
 from bullet_gazebo.physics.description import DescriptionError, Mesh
 from bullet_gazebo.physics.files.elements import numbers, place, shown
 from bullet_gazebo.physics.files.hull import convex_pieces, hull_points
-from bullet_gazebo.physics.files.mesh_looks import axes_of, read_glb, read_parts
+from bullet_gazebo.physics.files.mesh_looks import meters_of, read_glb, read_parts
 from bullet_gazebo.physics.files.meshes import Submesh, read_arrays, written
 from file_access.content import FileError, read_file
 from file_access.xml_text import parse
@@ -266,7 +266,7 @@ def _obj_index(word: str, count: int, number: int) -> int:
 
 
 def _read_collada(data: bytes, only: str) -> list[Part]:
-    """Returns all that the scene shows, or its nodes named `only`, as one part [m], z up."""
+    """Returns all that the scene shows, or its nodes named `only`, as one part [m]."""
     from trimesh.exchange.dae import load_collada
 
     try:
@@ -277,7 +277,7 @@ def _read_collada(data: bytes, only: str) -> list[Part]:
         element.tag = element.tag.rpartition("}")[2]
     if root.tag != "COLLADA":
         raise DescriptionError("it is not COLLADA")
-    axes = axes_of(root)
+    meters = meters_of(root)
     _leave_shapes(root)
     if only:
         _leave_node(root, only)
@@ -287,7 +287,7 @@ def _read_collada(data: bytes, only: str) -> list[Part]:
     for instance in loaded["graph"]:
         part, frame = loaded["geometry"][instance["geometry"]], instance["matrix"]
         points = part["vertices"].astype(float)
-        vertices.append((points @ frame[:3, :3].T + frame[:3, 3]) @ axes.T)
+        vertices.append((points @ frame[:3, :3].T + frame[:3, 3]) * meters)
         faces.append(part["faces"] + count)
         count += len(points)
     return [(np.concatenate(vertices), np.concatenate(faces))]

@@ -51,10 +51,13 @@ MOMENTS = {"ixx": 1.0, "ixy": 0.0, "ixz": 0.0, "iyy": 1.0, "iyz": 0.0, "izz": 1.
 def read_pose(parent: Element, where: str) -> tuple[Pose, str]:
     """Returns the `<pose>` of `parent`, and the frame that it is relative to ('' for the default)."""
     element = parent.find("pose")
-    if element is None or not (element.text or "").strip():
-        return Pose(), "" if element is None else element.get("relative_to", "")
+    if element is None:
+        return Pose(), ""
+    relative_to = element.get("relative_to", element.get("frame", ""))  # SDF 1.7; 1.5 and 1.6
+    if not (element.text or "").strip():
+        return Pose(), relative_to
     x, y, z, roll, pitch, yaw = numbers(element.text, f"{where}: <pose>", 6)
-    return Pose((x, y, z), from_rpy(roll, pitch, yaw)), element.get("relative_to", "")
+    return Pose((x, y, z), from_rpy(roll, pitch, yaw)), relative_to
 
 
 class Frames:

@@ -49,6 +49,7 @@ MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 Part = TypeVar("Part")
 YES = ("true", "yes", "1")
 NO = ("false", "no", "0")
+TINY = 1e-12  # [kg m²]; what rounding leaves of a moment of 0, with any sign
 SURFACE = {"mu1": "mu", "maxVel": "max_vel", "laserRetro": "retro"}  # of shapes, by element
 
 
@@ -168,7 +169,7 @@ class LinkReader:
         if inertial is not None:
             link.inertia = found = self._or_none(_inertia, inertial, f"{place}, inertial")
             # Gazebo's engine crashes over it.
-            if found is not None and min(found.mass, found.ixx, found.iyy, found.izz) < 0.0:
+            if found is not None and min(found.mass, found.ixx, found.iyy, found.izz) < -TINY:
                 raise DescriptionError(
                     f"{place}, inertial: mass and moments of inertia can't be negative"
                 )
@@ -226,6 +227,7 @@ def _inertia(inertial: Element, place: str) -> Inertia:
     if tensor is None:
         raise DescriptionError(f"{place}: <inertia> is missing")
     moments = {key: read_number(tensor, key, place) for key in MOMENTS}
+    moments |= {key: 0.0 for key in ("ixx", "iyy", "izz") if -TINY <= moments[key] < 0.0}
     value = read_number(mass, "value", place, required=True)
     return Inertia(mass=value, com=read_origin(inertial, place), **moments)
 

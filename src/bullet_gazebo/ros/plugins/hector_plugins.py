@@ -173,15 +173,16 @@ class HectorImuPlugin(SensorPlugin):
     def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
         sim, model = self._context.sim, self._context.model
         moves, _ = self._context.sensing.schedule.last_move(model)
-        sample = self._imu.measure(now, moves, motion, sim.world.gravity)
+        # The offset turns the axes of all that is measured, not just the orientation.
+        pose = motion.pose._replace(orientation=multiply(self._turn, motion.pose.orientation))
+        sample = self._imu.measure(now, moves, motion._replace(pose=pose), sim.world.gravity)
         if sample is None:
             return
         random = self._sensor.random(now)
         acceleration = self._accel.applied(np.array(sample.linear_acceleration), seconds, random)
         rate = self._rate.applied(np.array(sample.angular_velocity), seconds, random)
         yaw = float(self._yaw.applied(np.zeros(3), seconds, random)[2])
-        turned = multiply(self._turn, sample.orientation)
-        turned = multiply(from_rpy(0.0, 0.0, yaw), turned)
+        turned = multiply(from_rpy(0.0, 0.0, yaw), sample.orientation)
         tilt = self._accel.noise[:2] ** 2 / GRAVITY**2
         header = Header(stamp=to_time(now), frame_id=self._frame)
         if self._bias.is_heard:

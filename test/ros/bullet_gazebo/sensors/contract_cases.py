@@ -42,7 +42,9 @@ STEADY = """<sdf version="1.6"><model name="steady"><static>1</static>
 <frameName>f</frameName><updateRateHZ>100</updateRateHZ></plugin></sensor></link>
 <plugin name="f" filename="libgazebo_ros_imu.so"><bodyName>tilted</bodyName><topicName>tilted_old</topicName>
 </plugin><plugin name="g" filename="libhector_gazebo_ros_imu.so"><bodyName>tilted</bodyName>
-<topicName>tilted_hector</topicName></plugin></model></sdf>"""
+<topicName>tilted_hector</topicName></plugin><plugin name="h" filename="libhector_gazebo_ros_imu.so">
+<bodyName>l</bodyName><rpyOffset>0 -0.5235987755982988 0</rpyOffset><topicName>turned_hector</topicName>
+</plugin></model></sdf>"""
 NOISE = "<noise><type>gaussian</type><mean>0.02</mean><stddev>0.01</stddev></noise>"
 TURN = 2.0 * math.pi * 359 / 360
 LUMPED = """<robot name="r"><link name="base"><inertial><mass value="9"/>
@@ -138,7 +140,8 @@ class Contract(SensorCase):
     def test_a_tilted_imu_and_one_that_turns_and_falls(self):
         self.steady()
         expected = np.array([math.sin(math.radians(30.0)), 0.0, math.cos(math.radians(30.0))])
-        for topic, share in (("/tilted", G), ("/tilted_hector", G), ("/tilted_old", 0.0)):
+        topics = {"/tilted": G, "/tilted_hector": G, "/turned_hector": G, "/tilted_old": 0.0}
+        for topic, share in topics.items():
             felt = self.newest(topic, Imu).linear_acceleration
             np.testing.assert_allclose((felt.x, felt.y, felt.z), share * expected, atol=1e-6)
         self.spawn("top", TOP, x=-5.0, z=50.0)

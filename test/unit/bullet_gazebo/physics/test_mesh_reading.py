@@ -135,9 +135,10 @@ def test_what_is_damaged_is_named_in_one_line(tmp_path, name):
     assert "\n" not in str(raised.value)
 
 
-def test_collada_follows_its_nodes_unit_and_axes(tmp_path):
-    # (2 0 0) turns to (0 2 0), (0 4 0) to (-4 0 0); then y is up, and a unit is half a metre.
-    wanted = [(0.5, 0, 0), (0.5, 0, 1), (-1.5, 0, 0), (0.5, -6, 0)]
+def test_collada_follows_its_nodes_and_unit_but_not_its_axis(tmp_path):
+    """As Gazebo and RViz do: the file says that y is up."""
+    # (2 0 0) turns to (0 2 0), (0 4 0) to (-4 0 0), (0 0 6) is twice as high; a unit is half a metre.
+    wanted = [(0.5, 0, 0), (0.5, 1, 0), (-1.5, 0, 0), (0.5, 0, 6)]
     mesh = read_mesh(written(tmp_path, "a.dae", NODES))
     assert np.unique(mesh.vertices.round(6), axis=0) == pytest.approx(np.array(sorted(wanted)))
 

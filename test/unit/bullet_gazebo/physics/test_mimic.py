@@ -52,7 +52,7 @@ def test_a_joint_follows_another_one_under_load(world, kind, multiplier, offset)
     text = row(("b", kind, mimic), ("a", "revolute", ""))
     model = world.spawn("row", parse_urdf(text), Pose((0.0, 0.0, 2.0)))
     assert model.joint_state("b")[0] == offset
-    assert shake(world, model, [0.3, 0.02]) < CLOSE
+    assert shake(world, model, [0.02, 0.3]) < CLOSE
     assert abs(model.joint_state("a")[0]) > 0.01
 
 
@@ -60,14 +60,14 @@ def test_it_follows_at_once_when_a_service_moves_joints_and_after_resets(world):
     text = row(("b", "prismatic", '<mimic joint="a" offset="0.1"/>'), ("a", "revolute", ""))
     model = world.spawn("row", parse_urdf(text), Pose((0.0, 0.0, 2.0)))
     model.set_joint_positions({"a": 0.4, "b": -0.4})
-    assert model.joint_states()[0] == (pytest.approx(0.5), 0.0)
+    assert model.joint_states()[1] == (pytest.approx(0.5), 0.0)
     model.set_joint_velocities({"a": 0.2})
-    assert model.joint_states()[0] == pytest.approx((0.5, 0.2))
+    assert model.joint_states()[1] == pytest.approx((0.5, 0.2))
     run(world, 50)
     world.reset(joints=False)
     assert off(model, "b", model.description.mimics["b"]) < CLOSE
     world.reset(joints=True)
-    assert model.joint_states() == [(0.1, 0.0), (0.0, 0.0)]
+    assert model.joint_states() == [(0.0, 0.0), (0.1, 0.0)]
 
 
 def test_followers_of_followers(world):
@@ -78,8 +78,8 @@ def test_followers_of_followers(world):
     )
     model = world.spawn("row", parse_urdf(text), Pose((0.0, 0.0, 2.0)))
     model.set_joint_positions({"a": 0.1})
-    assert [each[0] for each in model.joint_states()] == pytest.approx([0.4, 0.2, 0.1])
-    assert shake(world, model, [0.01, 0.01, 0.02]) < CLOSE
+    assert [each[0] for each in model.joint_states()] == pytest.approx([0.1, 0.2, 0.4])
+    assert shake(world, model, [0.02, 0.01, 0.01]) < CLOSE
 
 
 def test_it_gives_way_to_more_than_its_effort(world):
@@ -90,7 +90,7 @@ def test_it_gives_way_to_more_than_its_effort(world):
     model.set_motor("a", 0.0, 1e6)
     for effort, moves in ((1.9, False), (2.5, True)):
         for _ in range(300):
-            model.body.add_effort(0, effort)
+            model.body.add_effort(model.joint_index("b"), effort)
             world.step()
         assert (model.joint_state("b")[0] > CLOSE) == moves
     run(world, 2000)

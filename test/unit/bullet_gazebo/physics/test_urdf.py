@@ -180,8 +180,8 @@ def test_links_may_come_before_the_ones_that_carry_them(space):
     text = robot(link("c"), link("b"), link("a"), joint("k", "revolute", "b", "c", "0 0 1"),
                  joint("j", "revolute", "a", "b", "0 0 1"))  # fmt: skip
     model = space.spawn("r", parse_urdf(text), Pose())
-    assert model.link_names == ["c", "b", "a"]
-    assert model.joint_names == ("k", "j")
+    assert model.link_names == ["a", "b", "c"]
+    assert model.joint_names == ("j", "k")
     assert model.link_state("c")[0].position == pytest.approx((0.0, 0.0, 2.0), abs=1e-6)
 
 
@@ -227,7 +227,7 @@ def test_collisions_are_named_as_sdformat_names_them():
         )
     )  # fmt: skip
     assert [shape.name for shape in model.links["base"].collisions] == [
-        "base_collision", "base_collision_1", "knob_collision_2",
+        "base_collision", "base_collision_1", "base_fixed_joint_lump__knob_collision_2",
         "base_fixed_joint_lump__plate_collision_3", "base_fixed_joint_lump__knob_collision_4",
     ]  # fmt: skip
 

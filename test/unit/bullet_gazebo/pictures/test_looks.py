@@ -137,7 +137,7 @@ def test_the_colours_of_a_collada_file(scene, tmp_path):
     plain = tmp_path / "plain.dae"
     put(scene, "it", mesh(plain, mesh_files.dae("0.5", "Y_UP").decode(), rgba=(0, 0, 1, 1)))
     other = seen(scene)
-    assert np.array_equal(blue, other[..., 2] > 2 * other[..., 0])  # unit and axes
+    assert np.array_equal(blue, other[..., 2] > 2 * other[..., 0])  # the unit
 
 
 @pytest.mark.parametrize("size", [(-1.0, 1.0, 1.0), (1.0, 1.0, -1.0), (-0.5, -1.0, -1.0)])
