@@ -10,7 +10,7 @@ from bullet_gazebo.physics.description import Inertia, Joint, Link, Mesh, ModelD
 from bullet_gazebo.physics.pose import Pose, to_rpy
 
 TURNING = ("revolute", "continuous")
-TREAD = 5e-6  # [m]; much less than contacts yield, so the whole line carries
+TREAD = 1e-6  # [m]; much less than contacts yield, so the whole line carries
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of STL
 
 
