@@ -18,11 +18,11 @@ FILES = Path(__file__).resolve().parents[3] / "data/robots"
 SCENE = Scene([RIG])
 BOTH = Scene([RIG, SLEDGE])
 NAMES = {
-    "mass": ["cart", "weight", "wheel"],
-    "length": ["cart", "weight", "wheel"],
-    "com": ["cart", "weight", "wheel"],
-    "damping": ["rail", "drop", "servo"],
-    "friction": ["rail", "drop", "servo"],
+    "mass": ["weight", "cart", "wheel"],
+    "length": ["weight", "cart", "wheel"],
+    "com": ["weight", "cart", "wheel"],
+    "damping": ["drop", "rail", "servo"],
+    "friction": ["drop", "rail", "servo"],
     "gains": ["servo_position"],
 }
 FACTORS = ("mass", "length", "gains")
@@ -129,7 +129,7 @@ def test_options_may_be_what_a_command_line_makes_of_them():
         ),
         (
             {"mass": {"world": 0.1}},
-            "there is no link 'world' that moves and has a mass; there are cart,",
+            "there is no link 'world' that moves and has a mass; there are weight,",
         ),
         ({"mass": {"cart": -1}}, "of mass of 'cart' is one number"),
         ({"damping": {"rial": 0.1}}, "there is no joint 'rial' that moves; did you mean 'rail'?"),
