@@ -77,20 +77,25 @@ def test_a_world_that_ends_at_ctrl_c_isn_t_worth_a_line(runner, capsys, monkeypa
     assert capsys.readouterr().err == ""
 
 
-def test_a_world_that_dies_ends_the_script_also_where_it_catches_everything(
-    runner, capsys, monkeypatch
-):
+@pytest.fixture
+def ended(runner, monkeypatch):
+    """Exit codes of a script whose simulator has died."""
+
     def died():
         raise WorldFailed("the simulator has died")
 
-    ended = []
+    codes = []
 
     def leave(code):
-        ended.append(code)
+        codes.append(code)
         raise SystemExit(code)
 
     monkeypatch.setattr(os, "_exit", leave)
     runner.world.exchanged = died
+    return codes
+
+
+def test_a_world_that_dies_ends_the_script_also_where_it_catches_everything(runner, capsys, ended):
     with pytest.raises(SystemExit):
         runner.wait(1.0)
     assert ended == []
@@ -100,20 +105,8 @@ def test_a_world_that_dies_ends_the_script_also_where_it_catches_everything(
     assert capsys.readouterr().err == "lockstep: the simulator has died\n"
 
 
-def test_a_world_that_dies_in_another_thread_ends_the_script(runner, capsys, monkeypatch):
+def test_a_world_that_dies_in_another_thread_ends_the_script(runner, capsys, monkeypatch, ended):
     """Else the script waits in wall time for what never comes."""
-
-    def died():
-        raise WorldFailed("the simulator has died")
-
-    ended = []
-
-    def leave(code):
-        ended.append(code)
-        raise SystemExit(code)
-
-    monkeypatch.setattr(os, "_exit", leave)
-    runner.world.exchanged = died
     thread = threading.Thread(target=runner.called, args=("/gazebo/reset_world", bytes))
     thread.start()
     originals.join(thread, BOUND)

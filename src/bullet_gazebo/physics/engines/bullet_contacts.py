@@ -66,10 +66,9 @@ class Separation:
         """Bounds the speeds of the next step; called while `placed`."""
         pybullet.performCollisionDetection(self._client)
         found = pybullet.getContactPoints(physicsClientId=self._client)
-        alone: dict[
-            LinkIndex, float
-        ] = {}  # shares of the overlap to end in a step, of links on static ones
-        mutual: dict[LinkIndex, float] = {}  # and of those that push each other
+        # Shares of the overlap to end in a step, of links on static ones, and of those that push each other.
+        alone: dict[LinkIndex, float] = {}
+        mutual: dict[LinkIndex, float] = {}
         for contact in found:
             if contact[8] < -SHALLOW:
                 self._ease_pair(contact, time_step, alone, mutual)
