@@ -99,6 +99,7 @@ class Link:
     visuals: list[Shape] = field(default_factory=list)
     gravity: bool = True  # whether gravity acts on it
     self_collide: bool = False  # also with links of its own model that it isn't joined to
+    decay: tuple[float, float] | None = None  # of linear and angular velocity, the share of a step
     part_of: str = ""  # of a helper link for the engine: the link that it was split from
 
     @property
@@ -133,6 +134,8 @@ class Joint:
     velocity: float = -1.0
     damping: float = 0.0
     friction: float = 0.0
+    spring_stiffness: float = 0.0  # [N m/rad, N/m]
+    spring_reference: float = 0.0  # [rad, m]; where the spring is at rest
     kept: bool = False  # whether a fixed joint is not lumped
 
     @property

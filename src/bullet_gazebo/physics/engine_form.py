@@ -19,7 +19,7 @@ MOST_SHAPES = 5000  # beyond that, PyBullet takes seconds to load a model
 FURTHEST = 1e7  # [m]; no length in a model may be larger
 MASSES = (1e-9, 1e9)  # [kg]
 LARGEST_MOMENT = 1e15  # [kg m²]
-STRONGEST = 1e12  # damping [N m s/rad, N s/m] and friction [N m, N]
+STRONGEST = 1e12  # damping [N m s/rad, N s/m], friction [N m, N], stiffness [N m/rad, N/m]
 
 
 def check_bounds(model: ModelDescription) -> None:
@@ -90,7 +90,12 @@ def _check_joint(joint: Joint) -> None:
     for length in (*joint.pose.position, *joint.anchor.position):
         if not abs(length) <= FURTHEST:
             raise DescriptionError(f"joint '{joint.name}': {length} m is beyond {FURTHEST:g} m")
-    for what, value in (("damping", joint.damping), ("friction", joint.friction)):
+    if not abs(joint.spring_reference) <= FURTHEST:
+        raise DescriptionError(
+            f"joint '{joint.name}': a spring_reference of {joint.spring_reference} is beyond {FURTHEST:g}"
+        )
+    for what in ("damping", "friction", "spring_stiffness"):
+        value = getattr(joint, what)
         if not 0.0 <= value <= STRONGEST:
             raise DescriptionError(
                 f"joint '{joint.name}': a {what} of {value} is not between 0 and {STRONGEST:g}"

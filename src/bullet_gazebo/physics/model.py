@@ -1,17 +1,19 @@
 """A model in the world: its description, its body in the engine, and its state."""
 
 from collections.abc import Mapping
-from math import isfinite
+from math import hypot, isfinite
 from typing import Any, NamedTuple
 
 from bullet_gazebo.physics.description import ModelDescription, Shape
-from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero
+from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero, tensor_in
 from bullet_gazebo.physics.engine import FASTEST, Body, Twist
 from bullet_gazebo.physics.lumping import WORLD
-from bullet_gazebo.physics.pose import ZERO, Pose
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, rotate, scale
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit
 GENTLEST = 0.5  # of the damping that would stop a joint in one step
+SOFTEST = 0.25  # of inertia / step²; a stiffer spring swings faster than steps can follow
+SLOWEST = 0.01  # [m/s, rad/s]; ODE lets no slower velocity decay
 SPINNING = 0.1  # [rad] in a step: no base of a robot turns that fast by itself
 AT_REST: Twist = (ZERO, ZERO)
 
@@ -38,6 +40,9 @@ class Model:
         self.placed = pose  # where it was put last: a static model stays there
         self.time_step = 0.0  # [s], the world's
         self._damped: dict[str, float] = {}  # the engine's damping [N m s/rad, N s/m] by joint
+        self._springs: dict[str, float] = {}  # stiffness [N m/rad, N/m] by joint
+        decaying = [name for name, link in description.links.items() if any(link.decay or ())]
+        self._decaying = [] if description.static else decaying  # links
         self.damping_added: Mapping[str, float] = {}  # [N m s/rad, N s/m] in addition to the file's
         self._motors: dict[str, tuple[float, float]] = {}  # speed [rad/s, m/s] and effort [N m, N]
         self._grip: dict[str, float] = {}  # factors of the friction of links
@@ -171,21 +176,70 @@ class Model:
     def apply_damping(self, time_step: float) -> None:
         """Sets the joints' damping in the engine, cut where a step of `time_step` [s] couldn't follow it.
 
-        The bound is that with all joints at zero, so that it doesn't depend on the history.
+        A spring that is too stiff acts implicitly: on the position after the step, by a damping of
+        stiffness · step. Where damping is explicit, its stiffness is cut. The bounds are those with all
+        joints at zero, so that they don't depend on the history.
         """
         self.time_step = time_step
         joints = self.description.joints
         dampings = {
             name: joints[name].damping + self.damping_added.get(name, 0.0) for name in self._joints
         }
-        damped = {name for name, damping in dampings.items() if damping > 0.0}
+        sprung = {name for name in self._joints if joints[name].spring_stiffness > 0.0}
+        damped = {name for name, damping in dampings.items() if damping > 0.0} | sprung
         if not damped | set(self._damped):
             return
         inertias = effective_inertias(self.description, poses_at_zero(self.description))
         for name in damped | set(self._damped):
-            most = GENTLEST * inertias[name] / time_step
-            self._damped[name] = min(dampings[name], most)
+            damping = min(dampings[name], GENTLEST * inertias[name] / time_step)
+            if name in sprung:
+                stiffness, most = (
+                    joints[name].spring_stiffness,
+                    SOFTEST * inertias[name] / time_step**2,
+                )
+                if stiffness > most:
+                    stiffness = stiffness if self.body.implicit_damping else most
+                    damping += time_step * stiffness
+                self._springs[name] = stiffness
+            self._damped[name] = damping
             self.body.set_damping(self._joints[name], self._damped[name])
+
+    @property
+    def has_passive_forces(self) -> bool:
+        """Whether springs or decay act on it."""
+        return bool(self._springs or self._decaying)
+
+    def apply_passive_forces(self) -> None:
+        """Adds the forces of springs, and those by which velocities decay, to the next step's."""
+        if self._springs:
+            states = self.body.joint_states()
+            for name, stiffness in self._springs.items():
+                index, reference = (
+                    self._joints[name],
+                    self.description.joints[name].spring_reference,
+                )
+                self.body.add_effort(index, stiffness * (reference - states[index][0]))
+        wrenches = [(link, self.decay_wrench(link)) for link in self._decaying]
+        for link, (force, torque) in wrenches:
+            self.body.add_wrench(link, force, torque)
+
+    def decay_wrench(self, name: str) -> tuple[Vector, Vector]:
+        """Returns the force [N] at the centre of mass and the torque [N m] by which a link's velocity decays.
+
+        In a step they take a share of the momentum that it has before, as ODE takes it after each step.
+        """
+        link = self.description.links[name]
+        if name not in self._decaying or link.decay is None or link.inertia is None:
+            return ZERO, ZERO
+        pose, (linear, angular) = self.link_state(name)
+        arm = rotate(pose.orientation, link.inertia.com.position)
+        velocity = add(linear, cross(angular, arm))
+        shares = [
+            share / self.time_step if hypot(*speed) > SLOWEST else 0.0
+            for share, speed in zip(link.decay, (velocity, angular), strict=True)
+        ]
+        x, y, z = (tensor_in(link.inertia, pose.orientation) @ angular).tolist()
+        return scale(velocity, -shares[0] * link.inertia.mass), scale((x, y, z), -shares[1])
 
     def add_damping(self, added: Mapping[str, float]) -> None:
         """Adds damping [N m s/rad, N s/m] to the file's, replacing what was added before."""

@@ -103,6 +103,7 @@ class World:
         self.version = 0  # counts what changes the look of the world: models and lights
         self._entities: dict[str, Entity] = {}
         self._joints: dict[str, Entity] = {}
+        self._passive: list[Model] = []  # that have passive forces
         self._recalled: Sequence[Contact] | None = None  # until the next step
         self.time_step = time_step
         self.gravity = gravity
@@ -256,6 +257,8 @@ class World:
     def step(self) -> None:
         """Integrates all models by one time step."""
         self._recalled = None
+        for model in self._passive:
+            model.apply_passive_forces()
         self.engine.step()
 
     def contacts(self) -> Sequence[Contact]:
@@ -350,6 +353,7 @@ class World:
         It finds new models last, so existing entries stay.
         """
         self.version += 1
+        self._passive = [model for model in self.models.values() if model.has_passive_forces]
         for model in models:
             self._entities.setdefault(model.name, Entity("model", model, model.name))
             for link in model.link_names:

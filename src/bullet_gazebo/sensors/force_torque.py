@@ -73,8 +73,12 @@ class LinkForces:
             return
         applied, inertias = self._sim.applied, self._inertias()
         pushes = [
-            _moved(centre, applied.wrench_on(self._model, link, now))
+            _moved(centre, wrench)
             for link, (_, centre) in inertias.items()
+            for wrench in (
+                applied.wrench_on(self._model, link, now),
+                self._model.decay_wrench(link),
+            )
         ]
         momentum = _sum(self._momentum(link, *each) for link, each in inertias.items())
         effort = applied.effort_on(self._model, self._joint, now)

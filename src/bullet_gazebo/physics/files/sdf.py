@@ -29,6 +29,7 @@ from bullet_gazebo.physics.files.elements import (
     truth,
 )
 from bullet_gazebo.physics.files.mechanisms import add_mechanisms
+from bullet_gazebo.physics.files.motion import read_link_motion
 from bullet_gazebo.physics.files.own_models import own_models
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
 from bullet_gazebo.physics.files.sdf_parts import (
@@ -345,5 +346,6 @@ def _read_link(
     if not static and any(shape.kind == "plane" for shape in link.collisions):
         raise DescriptionError(f"{where}: a plane can only be part of a static model")
     link.gravity = truth(element.findtext("gravity"), default=True)
+    read_link_motion(link, element, parts.warnings)
     parts.sensors += read_sensors(element, name, parts.warnings, frames)
     return link

@@ -343,8 +343,8 @@ class JointReader:
         joint.friction = value(axis, "dynamics/friction", where, 0.0)
         if min(joint.damping, joint.friction) < 0.0:
             raise DescriptionError(f"{where}, dynamics: damping and friction can't be negative")
-        if value(axis, "dynamics/spring_stiffness", where, 0.0) != 0.0:
-            self.warnings.append(f"{where}: the spring is left out")
+        joint.spring_stiffness = value(axis, "dynamics/spring_stiffness", where, 0.0)
+        joint.spring_reference = value(axis, "dynamics/spring_reference", where, 0.0)
 
     def _direction(self, joint: Joint, axis: Element | None, where: str) -> Vector:
         """Returns the axis in the joint's frame, of length 1."""

@@ -34,6 +34,7 @@ from bullet_gazebo.physics.files.elements import (
     shown,
 )
 from bullet_gazebo.physics.files.mechanisms import add_mechanisms
+from bullet_gazebo.physics.files.motion import read_link_motion, read_spring
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
 from bullet_gazebo.physics.files.sdf_parts import read_sensors
 from bullet_gazebo.physics.lumping import find_roots, lump_fixed_joints, unique
@@ -303,6 +304,7 @@ def _apply_to_model(model: ModelDescription, block: Element) -> None:
 
 def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
     model.sensors += read_sensors(block, link.name, model.warnings)
+    read_link_motion(link, block, model.warnings)
     for element in block:
         place = f"<gazebo reference='{shown(link.name)}'>, <{element.tag}>"
         if element.tag in SURFACE:
@@ -312,9 +314,7 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
             changed: dict[str, Any] = {SURFACE[element.tag]: number}
             link.collisions = [replace(shape, **changed) for shape in link.collisions]
         elif element.tag == "turnGravityOff":
-            link.gravity = (
-                _value(element) in NO
-            )  # anything else turns it off, also an empty element
+            link.gravity = _value(element) in NO  # anything else turns it off, also nothing
         elif element.tag == "gravity":
             link.gravity = _value(element) in ("", *YES)
         elif element.tag == "selfCollide":
@@ -325,8 +325,9 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
 
 
 def _apply_to_joint(model: ModelDescription, joint: Joint, block: Element) -> None:
-    """Reads a joint's sensors; keeps a fixed joint as it is, or as a hinge that can't turn."""
+    """Reads a joint's sensors and spring; keeps a fixed joint as it is, or as a hinge that can't turn."""
     model.sensors += read_sensors(block, joint.child, model.warnings, joint=joint.name)
+    read_spring(joint, block)
     if joint.kind != "fixed":
         return
     if _value(block.find("preserveFixedJoint")) in YES:
