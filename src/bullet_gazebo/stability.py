@@ -21,7 +21,7 @@ from bullet_gazebo.control.pid import Loop
 from bullet_gazebo.physics.description import is_control_plugin
 from bullet_gazebo.physics.dynamics import mobility, most_inertias, poses_at_zero
 from bullet_gazebo.physics.engine import Contact
-from bullet_gazebo.physics.model import Model
+from bullet_gazebo.physics.model import SOFTEST, Model
 
 Log = Callable[[int, str], None]
 """Logs a text at a level of `logging`."""
@@ -204,6 +204,12 @@ def too_high(
         for name in left:
             place = order.index(name)
             stiffness[name] += min(2.0 * own[name], 1.0 / matrix[place, place])
+    for name in left:
+        place = order.index(name)
+        spring = model.description.joints[name].spring_stiffness * dt * dt
+        most = SOFTEST / float(matrix[place, place])
+        # Model.apply_damping cuts it there, and damps it.
+        stiffness[name] += spring if spring <= most else 3.0 * most
     found = []
     while left:
         places = [order.index(name) for name in left]

@@ -14,6 +14,7 @@ from file_access.text import one_line
 
 CONTROL_PLUGIN = "libgazebo_ros_control.so"
 MOVABLE = ("revolute", "continuous", "prismatic")
+UNMOVED = 1e9  # [kg, kg m²]; stands for infinity in an engine
 
 
 Color = tuple[float, float, float, float]
@@ -99,8 +100,22 @@ class Link:
     visuals: list[Shape] = field(default_factory=list)
     gravity: bool = True  # whether gravity acts on it
     self_collide: bool = False  # also with links of its own model that it isn't joined to
+    kinematic: bool = False  # moved by services alone; true only of a free root link
     decay: tuple[float, float] | None = None  # of linear and angular velocity, the share of a step
     part_of: str = ""  # of a helper link for the engine: the link that it was split from
+
+    @property
+    def weighs(self) -> bool:
+        """Whether gravity moves it."""
+        return self.gravity and not self.kinematic
+
+    @property
+    def acting_inertia(self) -> Inertia | None:
+        """The inertia that acts: a kinematic link is so heavy that no force moves it."""
+        if not self.kinematic or self.inertia is None:
+            return self.inertia
+        com = Pose(self.inertia.com.position)
+        return Inertia(UNMOVED, com, ixx=UNMOVED, iyy=UNMOVED, izz=UNMOVED)
 
     @property
     def max_vel(self) -> float:

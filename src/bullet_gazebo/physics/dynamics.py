@@ -120,7 +120,7 @@ def mobility(
     `added` are inertias [kg m², kg] of the joints themselves, by name.
     """
     joints = model.movable_joints
-    base = 0 if model.fixed_base else 6
+    base = 0 if model.fixed_base or model.links[model.root].kinematic else 6
     matrix = np.zeros((base + len(joints), base + len(joints)))
     for name, pose in poses.items():
         inertia = model.links[name].inertia

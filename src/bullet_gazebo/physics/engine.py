@@ -140,10 +140,6 @@ class Body(ABC):
     def set_link_gravity(self, name: str, on: bool) -> None:
         """Lets gravity act on link `name`, or not."""
 
-    @abstractmethod
-    def link_gravity(self, name: str) -> bool:
-        """Returns whether gravity acts on link `name`."""
-
 
 LinkOf = tuple[Body, str]
 """A body and the name of a link of it."""

@@ -117,6 +117,10 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
         for joint in model.joints.values()
         if joint.anchor != Pose()
     }
+    root = model.links[model.root]
+    if root.kinematic:
+        heavy = replace(root, inertia=root.acting_inertia)
+        model = replace(model, links={**model.links, root.name: heavy})
     model = one_friction_each(model)
     if not offsets:
         return model, offsets
@@ -154,6 +158,7 @@ def _pieces(link: Link) -> list[Link]:
             f"{link.name}::friction_{count}",
             collisions=shapes,
             self_collide=link.self_collide,
+            kinematic=link.kinematic,
             part_of=link.name,
         )
         for count, shapes in enumerate(list(groups.values())[1:], 1)

@@ -148,6 +148,7 @@ def _lump(model: ModelDescription, name: str) -> None:
     parent, child = model.links[joint.parent], model.links.pop(joint.child)
     parent.gravity = parent.gravity and child.gravity
     parent.self_collide = parent.self_collide or child.self_collide
+    parent.kinematic = parent.kinematic or child.kinematic
     parent.decay = child.decay if parent.decay is None else parent.decay
     parent.inertia = combine(parent.inertia, _moved(child.inertia, joint.pose))
     parent.collisions += [_lumped(shape, joint.pose, child.name) for shape in child.collisions]

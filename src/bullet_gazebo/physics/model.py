@@ -8,7 +8,7 @@ from bullet_gazebo.physics.description import ModelDescription, Shape
 from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero, tensor_in
 from bullet_gazebo.physics.engine import FASTEST, Body, Twist
 from bullet_gazebo.physics.lumping import WORLD
-from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, rotate, scale
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, rotate, scale, subtract
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit
 GENTLEST = 0.5  # of the damping that would stop a joint in one step
@@ -41,7 +41,12 @@ class Model:
         self.time_step = 0.0  # [s], the world's
         self._damped: dict[str, float] = {}  # the engine's damping [N m s/rad, N s/m] by joint
         self._springs: dict[str, float] = {}  # stiffness [N m/rad, N/m] by joint
-        decaying = [name for name, link in description.links.items() if any(link.decay or ())]
+        self.kinematic = description.links[description.root].kinematic
+        decaying = [
+            name
+            for name, link in description.links.items()
+            if any(link.decay or ()) and not link.kinematic
+        ]
         self._decaying = [] if description.static else decaying  # links
         self.damping_added: Mapping[str, float] = {}  # [N m s/rad, N s/m] in addition to the file's
         self._motors: dict[str, tuple[float, float]] = {}  # speed [rad/s, m/s] and effort [N m, N]
@@ -205,9 +210,9 @@ class Model:
             self.body.set_damping(self._joints[name], self._damped[name])
 
     @property
-    def has_passive_forces(self) -> bool:
-        """Whether springs or decay act on it."""
-        return bool(self._springs or self._decaying)
+    def special(self) -> bool:
+        """Whether springs or decay act on it, or its root link is kinematic: steps have more to do then."""
+        return bool(self._springs or self._decaying or self.kinematic)
 
     def apply_passive_forces(self) -> None:
         """Adds the forces of springs, and those by which velocities decay, to the next step's."""
@@ -228,18 +233,42 @@ class Model:
 
         In a step they take a share of the momentum that it has before, as ODE takes it after each step.
         """
-        link = self.description.links[name]
-        if name not in self._decaying or link.decay is None or link.inertia is None:
+        inertia = self.description.links[name].inertia
+        if name not in self._decaying or inertia is None:
             return ZERO, ZERO
+        pose, (linear, angular), shares = self._motion_of_centre(name)
+        x, y, z = (tensor_in(inertia, pose.orientation) @ angular).tolist()
+        force = scale(linear, -shares[0] * inertia.mass / self.time_step)
+        return force, scale((x, y, z), -shares[1] / self.time_step)
+
+    def kinematic_twist(self) -> Twist:
+        """Returns the twist that a kinematic root's centre of mass has after a step, whatever it meets."""
+        _, (linear, angular), shares = self._motion_of_centre(self.description.root)
+        return scale(linear, 1.0 - shares[0]), scale(angular, 1.0 - shares[1])
+
+    def set_kinematic_twist(self, twist: Twist) -> None:
+        """Gives a kinematic root's centre of mass a twist."""
+        linear, angular = twist
+        pose, _ = self.root_state()
+        arm = self._arm(self.description.root, pose)
+        self.body.set_base_twist((subtract(linear, cross(angular, arm)), angular))
+
+    def _motion_of_centre(self, name: str) -> tuple[Pose, Twist, tuple[float, float]]:
+        """Returns a link's pose, its centre's twist, and the shares that it loses of that in a step."""
         pose, (linear, angular) = self.link_state(name)
-        arm = rotate(pose.orientation, link.inertia.com.position)
-        velocity = add(linear, cross(angular, arm))
-        shares = [
-            share / self.time_step if hypot(*speed) > SLOWEST else 0.0
-            for share, speed in zip(link.decay, (velocity, angular), strict=True)
-        ]
-        x, y, z = (tensor_in(link.inertia, pose.orientation) @ angular).tolist()
-        return scale(velocity, -shares[0] * link.inertia.mass), scale((x, y, z), -shares[1])
+        velocity = add(linear, cross(angular, self._arm(name, pose)))
+        shares = self.description.links[name].decay or (0.0, 0.0)
+        slow = [hypot(*speed) <= SLOWEST for speed in (velocity, angular)]
+        return (
+            pose,
+            (velocity, angular),
+            (0.0 if slow[0] else shares[0], 0.0 if slow[1] else shares[1]),
+        )
+
+    def _arm(self, name: str, pose: Pose) -> Vector:
+        """Returns the way [m] from a link's origin to its centre of mass, in world axes."""
+        inertia = self.description.links[name].inertia
+        return ZERO if inertia is None else rotate(pose.orientation, inertia.com.position)
 
     def add_damping(self, added: Mapping[str, float]) -> None:
         """Adds damping [N m s/rad, N s/m] to the file's, replacing what was added before."""

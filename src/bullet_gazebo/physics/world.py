@@ -103,7 +103,7 @@ class World:
         self.version = 0  # counts what changes the look of the world: models and lights
         self._entities: dict[str, Entity] = {}
         self._joints: dict[str, Entity] = {}
-        self._passive: list[Model] = []  # that have passive forces
+        self._special: list[Model] = []  # with springs, decay or a kinematic link
         self._recalled: Sequence[Contact] | None = None  # until the next step
         self.time_step = time_step
         self.gravity = gravity
@@ -237,7 +237,7 @@ class World:
         self._renew()  # from descriptions that are still those of the bodies
         record = model.description.links[link]
         old, record.inertia = record.inertia, inertia
-        if model.description.static:
+        if model.description.static or record.kinematic:
             return
         if not model.body.set_inertia(link, old, inertia):
             try:
@@ -257,9 +257,15 @@ class World:
     def step(self) -> None:
         """Integrates all models by one time step."""
         self._recalled = None
-        for model in self._passive:
+        if not self._special:
+            self.engine.step()
+            return
+        for model in self._special:
             model.apply_passive_forces()
+        held = [(model, model.kinematic_twist()) for model in self._special if model.kinematic]
         self.engine.step()
+        for model, twist in held:
+            model.set_kinematic_twist(twist)
 
     def contacts(self) -> Sequence[Contact]:
         """Returns where bodies touched in the last step; after a restore, in that before the snapshot."""
@@ -353,7 +359,7 @@ class World:
         It finds new models last, so existing entries stay.
         """
         self.version += 1
-        self._passive = [model for model in self.models.values() if model.has_passive_forces]
+        self._special = [model for model in self.models.values() if model.special]
         for model in models:
             self._entities.setdefault(model.name, Entity("model", model, model.name))
             for link in model.link_names:

@@ -114,7 +114,7 @@ class LinkForces:
         return _moved(centre, (scale(velocity, inertia.mass), (x, y, z)))
 
     def _weight(self, link: str, inertia: Inertia, centre: Vector) -> Wrench:
-        mass = inertia.mass if self._model.body.link_gravity(link) else 0.0
+        mass = inertia.mass if self._model.description.links[link].weighs else 0.0
         return _moved(centre, (scale(self._sim.world.gravity, mass), ZERO))
 
     def _contacts(self) -> list[Wrench]:

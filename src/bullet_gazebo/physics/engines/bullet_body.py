@@ -7,14 +7,12 @@ from typing import NamedTuple
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Link, ModelDescription
 from bullet_gazebo.physics.engine import FASTEST, FURTHEST, GEAR, OVERLAP, STRONGEST, Body, Twist
-from bullet_gazebo.physics.engines.bullet_contacts import Separation
+from bullet_gazebo.physics.engines.bullet_contacts import Separation, groups_of
 from bullet_gazebo.physics.engines.bullet_files import is_plane
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
 
 BASE = -1
-# PyBullet's defaults for which links collide: bits of a link's group, and of the groups that it meets.
-DYNAMIC, STATIC, EVERYTHING = 1, 2, -1
 NO_STOP = 1e16  # [rad, m]
 
 
@@ -110,9 +108,9 @@ class BulletBody(Body):
 
         Setting a link's collision filter has that effect.
         """
-        for index in self._links.values():
+        for name, index in self._links.items():
             fixed = self._fixed and index == BASE
-            group, mask = (STATIC, EVERYTHING ^ STATIC) if fixed else (DYNAMIC, EVERYTHING)
+            group, mask = groups_of(self._description, name, fixed)
             pybullet.setCollisionFilterGroupMask(self.id, index, group, mask, self._client)
 
     def _remove_defaults(self) -> None:
@@ -135,10 +133,13 @@ class BulletBody(Body):
         for name in self.link_names:
             self.set_friction(name, 1.0)
         self._choose_self_collisions()
+        root = self._description.links[self._description.root]
+        if root.kinematic or (self._description.static and len(self._links) > 1):
+            self.forget_contacts()  # PyBullet has put them into other groups
         self._separation.add(self.id, self._description, self._links)
         for name in self.link_names:
             link = self._description.links[name]
-            self.set_link_gravity(name, link.gravity)
+            self.set_link_gravity(name, link.weighs)
             if link.inertia is not None and not self._description.static:
                 self._keep_moments(self._links[name], link.inertia)
 
@@ -231,9 +232,6 @@ class BulletBody(Body):
             self._weightless.discard(key)
         else:
             self._weightless.add(key)
-
-    def link_gravity(self, name: str) -> bool:
-        return (self.id, self._links[name]) not in self._weightless
 
     def joint_states(self) -> Sequence[Sequence[float]]:
         return self._states()

@@ -6,7 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription, Shape
+from bullet_gazebo.physics.description import (
+    UNMOVED,
+    DescriptionError,
+    Inertia,
+    ModelDescription,
+    Shape,
+)
 from bullet_gazebo.physics.engine import (
     STRONGEST,
     Body,
@@ -63,13 +69,14 @@ class MujocoBody(Body):
         joints = [] if description.static else description.movable_joints
         self.joint_names = tuple(joint.name for joint in joints)
         self.inertias = {name: link.inertia for name, link in description.links.items()}
-        self._gravity = {name: link.gravity for name, link in description.links.items()}
+        self._gravity = {name: link.weighs for name, link in description.links.items()}
         self._frictions: dict[str, float] = {}  # factors, by link
         self._gears = {name: mimic.effort for name, mimic in description.mimics.items()}  # [N m, N]
         self._joints = []
         for joint in joints:
             lower, upper = (joint.lower, joint.upper) if joint.bounded else (1.0, -1.0)
             self._joints.append(JointSettings(joint.damping, lower, upper, 0.0, joint.friction))
+        self.kinematic = description.links[description.root].kinematic
         self._state = state
         self._compile_anew = compile_anew
 
@@ -94,6 +101,9 @@ class MujocoBody(Body):
         self._qpos, self._qvel, self._qfrc = data.qpos, data.qvel, data.qfrc_applied
         for link, moments in elements.moments.items():
             model.body_inertia[self._ids[link]] = moments
+        if self.kinematic:
+            root = self._ids[self.description.root]
+            model.body_mass[root] = model.body_inertia[root] = UNMOVED
         for name, on in self._gravity.items():
             self._weigh(name, on)
         for link, factor in self._frictions.items():
@@ -234,6 +244,3 @@ class MujocoBody(Body):
         model.body_gravcomp[self._ids[name]] = 0.0 if on else 1.0
         if not on:
             model.flg_gravcomp = True
-
-    def link_gravity(self, name: str) -> bool:
-        return self._gravity[name]

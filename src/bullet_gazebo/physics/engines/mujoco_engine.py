@@ -165,8 +165,11 @@ class MujocoEngine(Engine):
             for body in self._bodies.values()
             for geom, touching in body.touching.items()
         }
-        if any(elements.moments for elements in written.values()):
+        heavy = any(body.kinematic for body in self._bodies.values())
+        if heavy or any(elements.moments for elements in written.values()):
             mujoco.mj_setConst(self._state.model, mujoco.MjData(self._state.model))
+        if heavy:
+            self._state.model.opt.tolerance = 0.0  # else it counts as a share of the heaviest
         self._configure()
 
     def _configure(self) -> None:

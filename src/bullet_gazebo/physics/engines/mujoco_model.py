@@ -25,6 +25,7 @@ GEOMS = {
     "mesh": mujoco.mjtGeom.mjGEOM_MESH,
 }
 MU_STEPS, MOST_PRIORITY = 1e6, 2**30  # friction in whole steps of 1e-6
+OTHERS, KINEMATIC = 1, 2  # groups of geoms, which meet if either's affinity has the other's
 FASTENED = Inertia(mass=1.0, ixx=1.0, iyy=1.0, izz=1.0)  # of links that nothing can move
 
 
@@ -94,7 +95,7 @@ class ModelWriter:
             body.inertia = (max(moments),) * 3
             self._elements.moments[link] = moments
         for shape in self.model.links[link].collisions:
-            self._add_shape(body, shape)
+            self._add_shape(body, shape, link)
         self._elements.bodies[link] = body
         return body
 
@@ -111,12 +112,18 @@ class ModelWriter:
             limited=mujoco.mjtLimited.mjLIMITED_FALSE,  # MujocoBody sets stops, also crossed ones
         )
 
-    def _add_shape(self, body: mujoco.MjsBody, shape: Shape) -> None:
+    def _add_shape(self, body: mujoco.MjsBody, shape: Shape, link: str) -> None:
+        if self.model.links[link].kinematic:
+            meets = KINEMATIC, 0
+        else:
+            fixed = self.model.static or (self.model.fixed_base and link == self.model.root)
+            meets = OTHERS, OTHERS if fixed else OTHERS | KINEMATIC
         for number in range(geoms_of(shape)):
             geom = body.add_geom(
                 type=GEOMS[shape.kind], pos=shape.pose.position, quat=wxyz(shape.pose.orientation),
                 condim=3,
             )  # fmt: skip
+            geom.contype, geom.conaffinity = meets
             geom.friction[0] = shape.mu
             geom.priority = priority(shape.mu)
             if shape.kind == "mesh":

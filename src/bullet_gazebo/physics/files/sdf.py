@@ -29,7 +29,7 @@ from bullet_gazebo.physics.files.elements import (
     truth,
 )
 from bullet_gazebo.physics.files.mechanisms import add_mechanisms
-from bullet_gazebo.physics.files.motion import read_link_motion
+from bullet_gazebo.physics.files.motion import read_link_motion, settle_kinematic
 from bullet_gazebo.physics.files.own_models import own_models
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
 from bullet_gazebo.physics.files.sdf_parts import (
@@ -235,6 +235,7 @@ def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
     model.static, model.sensors, model.stand_ins = static, parts.sensors, parts.stand_ins
     detach_from_world(model)
     mend_moments(model)
+    settle_kinematic(model)
     add_mechanisms(model)
     return model
 

@@ -34,7 +34,7 @@ from bullet_gazebo.physics.files.elements import (
     shown,
 )
 from bullet_gazebo.physics.files.mechanisms import add_mechanisms
-from bullet_gazebo.physics.files.motion import read_link_motion, read_spring
+from bullet_gazebo.physics.files.motion import read_link_motion, read_spring, settle_kinematic
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
 from bullet_gazebo.physics.files.sdf_parts import read_sensors
 from bullet_gazebo.physics.lumping import find_roots, lump_fixed_joints, unique
@@ -392,6 +392,7 @@ def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDe
             rename_lumped(plugin.element, model.lumped)
         except DescriptionError as error:
             warnings.append(f"plugin {shown(plugin.filename)}: {error}")
+    settle_kinematic(lumped)
     add_mechanisms(lumped, robot)
     reading.split_meshes(lumped)
     return lumped
