@@ -66,7 +66,8 @@ int main(int, char **arguments) {
     if (const sdf::JointAxis *axis = joint->Axis()) {
       ignition::math::Vector3d xyz;
       axis->ResolveXyz(xyz, joint->ChildLinkName());
-      std::cout << ' ' << xyz << ' ' << axis->Lower() << ' ' << axis->Upper();
+      std::cout << ' ' << xyz << ' ' << axis->SpringStiffness() << ' ' << axis->SpringReference();
+      std::cout << ' ' << axis->Lower() << ' ' << axis->Upper();
     }
     std::cout << '\n';
   }

@@ -5,10 +5,20 @@ from math import hypot, isfinite
 from typing import Any, NamedTuple
 
 from bullet_gazebo.physics.description import ModelDescription, Shape
-from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero, tensor_in
+from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero
 from bullet_gazebo.physics.engine import FASTEST, Body, Twist
 from bullet_gazebo.physics.lumping import WORLD
-from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, rotate, scale, subtract
+from bullet_gazebo.physics.pose import (
+    ZERO,
+    Pose,
+    Vector,
+    add,
+    conjugate,
+    cross,
+    rotate,
+    scale,
+    subtract,
+)
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit
 GENTLEST = 0.5  # of the damping that would stop a joint in one step
@@ -217,16 +227,15 @@ class Model:
     def apply_passive_forces(self) -> None:
         """Adds the forces of springs, and those by which velocities decay, to the next step's."""
         if self._springs:
-            states = self.body.joint_states()
+            states, joints = self.body.joint_states(), self.description.joints
+            efforts = [0.0] * len(states)
             for name, stiffness in self._springs.items():
-                index, reference = (
-                    self._joints[name],
-                    self.description.joints[name].spring_reference,
-                )
-                self.body.add_effort(index, stiffness * (reference - states[index][0]))
+                index = self._joints[name]
+                efforts[index] = stiffness * (joints[name].spring_reference - states[index][0])
+            self.body.apply_efforts(efforts)
         wrenches = [(link, self.decay_wrench(link)) for link in self._decaying]
-        for link, (force, torque) in wrenches:
-            self.body.add_wrench(link, force, torque)
+        for link, wrench in wrenches:
+            self.body.add_wrench(link, *wrench)
 
     def decay_wrench(self, name: str) -> tuple[Vector, Vector]:
         """Returns the force [N] at the centre of mass and the torque [N m] by which a link's velocity decays.
@@ -236,39 +245,45 @@ class Model:
         inertia = self.description.links[name].inertia
         if name not in self._decaying or inertia is None:
             return ZERO, ZERO
-        pose, (linear, angular), shares = self._motion_of_centre(name)
-        x, y, z = (tensor_in(inertia, pose.orientation) @ angular).tolist()
-        force = scale(linear, -shares[0] * inertia.mass / self.time_step)
-        return force, scale((x, y, z), -shares[1] / self.time_step)
+        centre, twist = self._centre(name)
+        linear, angular = self._lost(name, twist)
+        axes, rate = centre.orientation, -1.0 / self.time_step
+        x, y, z = rotate(conjugate(axes), angular)
+        momentum = (
+            inertia.ixx * x + inertia.ixy * y + inertia.ixz * z,
+            inertia.ixy * x + inertia.iyy * y + inertia.iyz * z,
+            inertia.ixz * x + inertia.iyz * y + inertia.izz * z,
+        )
+        return scale(linear, inertia.mass * rate), scale(rotate(axes, momentum), rate)
 
     def kinematic_twist(self) -> Twist:
         """Returns the twist that a kinematic root's centre of mass has after a step, whatever it meets."""
-        _, (linear, angular), shares = self._motion_of_centre(self.description.root)
-        return scale(linear, 1.0 - shares[0]), scale(angular, 1.0 - shares[1])
+        _, twist = self._centre(self.description.root)
+        lost = self._lost(self.description.root, twist)
+        return subtract(twist[0], lost[0]), subtract(twist[1], lost[1])
 
     def set_kinematic_twist(self, twist: Twist) -> None:
         """Gives a kinematic root's centre of mass a twist."""
         linear, angular = twist
-        pose, _ = self.root_state()
-        arm = self._arm(self.description.root, pose)
+        centre, _ = self._centre(self.description.root)
+        arm = subtract(centre.position, self.root_state()[0].position)
         self.body.set_base_twist((subtract(linear, cross(angular, arm)), angular))
 
-    def _motion_of_centre(self, name: str) -> tuple[Pose, Twist, tuple[float, float]]:
-        """Returns a link's pose, its centre's twist, and the shares that it loses of that in a step."""
-        pose, (linear, angular) = self.link_state(name)
-        velocity = add(linear, cross(angular, self._arm(name, pose)))
-        shares = self.description.links[name].decay or (0.0, 0.0)
-        slow = [hypot(*speed) <= SLOWEST for speed in (velocity, angular)]
-        return (
-            pose,
-            (velocity, angular),
-            (0.0 if slow[0] else shares[0], 0.0 if slow[1] else shares[1]),
-        )
-
-    def _arm(self, name: str, pose: Pose) -> Vector:
-        """Returns the way [m] from a link's origin to its centre of mass, in world axes."""
+    def _centre(self, name: str) -> tuple[Pose, Twist]:
+        """Returns pose and twist of a link's centre of mass, in world axes."""
         inertia = self.description.links[name].inertia
-        return ZERO if inertia is None else rotate(pose.orientation, inertia.com.position)
+        pose, (linear, angular) = self.link_state(name)
+        centre = pose if inertia is None else pose.compose(inertia.com)
+        arm = subtract(centre.position, pose.position)
+        return centre, (add(linear, cross(angular, arm)), angular)
+
+    def _lost(self, name: str, twist: Twist) -> Twist:
+        """Returns what a link's centre loses of its twist in a step."""
+        linear, angular = self.description.links[name].decay or (0.0, 0.0)
+        return (
+            scale(twist[0], linear) if hypot(*twist[0]) > SLOWEST else ZERO,
+            scale(twist[1], angular) if hypot(*twist[1]) > SLOWEST else ZERO,
+        )
 
     def add_damping(self, added: Mapping[str, float]) -> None:
         """Adds damping [N m s/rad, N s/m] to the file's, replacing what was added before."""

@@ -66,6 +66,7 @@ def ours(model: ModelDescription) -> Iterator[list]:
     for joint in model.joints.values():
         yield ["joint", joint.name, joint.parent, joint.child, *place(joint.anchor),
                *(rotate(joint.anchor.orientation, joint.axis) if joint.movable else ()),
+               *((joint.spring_stiffness, joint.spring_reference) if joint.movable else ()),
                *((joint.lower, joint.upper) if joint.bounded else ())]  # fmt: skip
 
 
@@ -143,6 +144,11 @@ def robots(draw) -> str:
                 f'<child link="{link}"/><origin xyz="{words(draw(THREE))}" rpy="{words(draw(THREE))}"/>'
                 f'<axis xyz="{axis}"/><limit lower="-0.5" upper="0.7" effort="3" velocity="2"/></joint>'
             )
+            for tag in draw(st.lists(st.sampled_from(["springStiffness", "springReference"]))):
+                spring = draw(st.sampled_from(["<{0}> {1} </{0}>", '<{0} value="{1}"/>']))
+                parts.append(
+                    f'<gazebo reference="{joints[number - 1]}">{spring.format(tag, draw(NUMBERS))}</gazebo>'
+                )
     order = draw(st.permutations(parts))
     return f'<robot name="drawn">{"".join(order)}</robot>'
 
