@@ -52,11 +52,7 @@ class Model:
         self._damped: dict[str, float] = {}  # the engine's damping [N m s/rad, N s/m] by joint
         self._springs: dict[str, float] = {}  # stiffness [N m/rad, N/m] by joint
         self.kinematic = description.links[description.root].kinematic
-        decaying = [
-            name
-            for name, link in description.links.items()
-            if any(link.decay or ()) and not link.kinematic
-        ]
+        decaying = [name for name, link in description.links.items() if any(link.decay or ())]
         self._decaying = [] if description.static else decaying  # links
         self.damping_added: Mapping[str, float] = {}  # [N m s/rad, N s/m] in addition to the file's
         self._motors: dict[str, tuple[float, float]] = {}  # speed [rad/s, m/s] and effort [N m, N]
@@ -208,16 +204,22 @@ class Model:
         for name in damped | set(self._damped):
             damping = min(dampings[name], GENTLEST * inertias[name] / time_step)
             if name in sprung:
-                stiffness, most = (
-                    joints[name].spring_stiffness,
-                    SOFTEST * inertias[name] / time_step**2,
-                )
+                stiffness = joints[name].spring_stiffness
+                most = SOFTEST * inertias[name] / time_step**2
                 if stiffness > most:
                     stiffness = stiffness if self.body.implicit_damping else most
                     damping += time_step * stiffness
                 self._springs[name] = stiffness
             self._damped[name] = damping
             self.body.set_damping(self._joints[name], self._damped[name])
+
+    @property
+    def softened(self) -> list[str]:
+        """Names of joints whose springs are cut."""
+        joints = self.description.joints
+        return [
+            name for name, each in self._springs.items() if each < joints[name].spring_stiffness
+        ]
 
     @property
     def special(self) -> bool:

@@ -129,6 +129,9 @@ class World:
         except Exception:
             self.engine.remove(body)
             raise
+        if model.softened:
+            joints = ", ".join(sorted(model.softened))
+            description.warnings.append(f"springs too stiff for the step are softened: {joints}")
         if body.overlapping:
             pairs = sorted(" and ".join(sorted(pair)) for pair in body.overlapping)
             description.warnings.append(

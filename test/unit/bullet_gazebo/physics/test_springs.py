@@ -143,6 +143,10 @@ def test_stiff_springs_hold(world, kind, free, stiffness):
     model = spawned(world, kind=kind, stiffness=stiffness, reference=0.3, **options)
     seen = positions(world, model, 3000)
     assert max(map(abs, seen)) < 0.7
+    told = ["springs too stiff for the step are softened: j"]
+    most = 0.25 * (MASS if kind == "prismatic" else MOMENT) / 0.001**2
+    cut = stiffness > most and not model.body.implicit_damping
+    assert model.description.warnings == (told if cut else [])
     if stiffness > 1e6:
         assert seen[-1] == pytest.approx(0.3, abs=1e-4)
 
