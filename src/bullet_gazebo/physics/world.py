@@ -125,6 +125,8 @@ class World:
         try:
             model.apply_damping(self.time_step)
             model.put_followers()
+            if description.start is not None:
+                model.begin(description.start)
         except Exception:
             self.engine.remove(body)
             raise

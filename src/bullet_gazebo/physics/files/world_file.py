@@ -16,6 +16,7 @@ from bullet_gazebo.physics.files import elements
 from bullet_gazebo.physics.files.elements import named, numbers, read_plugin, shown, truth
 from bullet_gazebo.physics.files.own_models import own_models
 from bullet_gazebo.physics.files.reading import Reading, Resources
+from bullet_gazebo.physics.files.saved_state import begin_as_saved
 from bullet_gazebo.physics.files.sdf import (
     FileContext,
     first_entity,
@@ -100,7 +101,21 @@ def _read(root: Element, context: FileContext) -> WorldDescription:
             world.plugins.append(read_plugin(child))
         elif child.tag in NOT_SIMULATED:
             world.left_out.append(f"{child.tag} '{shown(child.get('name', ''))}'")
+    state = element.find("state")
+    if state is not None:
+        _apply(world, state, context)
     return world
+
+
+def _apply(world: WorldDescription, state: Element, context: FileContext) -> None:
+    """Lets a world begin as it was saved."""
+    for child in state.iterfind("insertions/*"):
+        _add(world, child, context)
+    world.warnings += begin_as_saved(state, world.models, world.lights)
+    for each in state.iterfind("deletions/name"):
+        name = (each.text or "").strip()
+        world.models.pop(name, None)
+        world.lights.pop(name, None)
 
 
 def read_light(element: Element) -> Light:
