@@ -5,6 +5,7 @@ import os
 from collections import defaultdict
 from dataclasses import dataclass, field
 from itertools import combinations
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -240,6 +241,14 @@ class Light:
     kind: str = "point"  # or directional, spot
 
 
+class SavedMotion(NamedTuple):
+    """How a model of a saved world begins: `pose` and `twist` of its root link, and its joints."""
+
+    pose: Pose
+    twist: tuple[Vector, Vector]
+    joints: dict[str, tuple[float, float]]
+
+
 @dataclass
 class ModelDescription:
     """A model: links and joints in document order.
@@ -254,6 +263,7 @@ class ModelDescription:
         mimics: what makes joints follow others, by the follower's name, drivers before their followers.
         lumped: links that a fixed joint has made part of another one: that link, and their poses in it.
         initial_pose: where the file puts the model.
+        start: how it begins, if not there.
     """
 
     name: str
@@ -271,6 +281,7 @@ class ModelDescription:
     mimics: dict[str, Mimic] = field(default_factory=dict)
     lumped: dict[str, tuple[str, Pose]] = field(default_factory=dict)
     initial_pose: Pose = Pose()
+    start: SavedMotion | None = None
     static: bool = False
 
     @property

@@ -110,7 +110,7 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
         URDF has that form already.
     """
     if model.static:
-        model = _rigid(model)
+        model = rigid(model)
     check_bounds(model)
     offsets = {
         joint.child: joint.anchor.inverse()
@@ -174,7 +174,7 @@ def parents_first(model: ModelDescription) -> ModelDescription:
     return replace(model, links={name: model.links[name] for name in order})
 
 
-def _rigid(model: ModelDescription) -> ModelDescription:
+def rigid(model: ModelDescription) -> ModelDescription:
     """Returns a static model with all joints fixed, and its islands fixed to the root."""
     joints = {
         name: replace(joint, kind="fixed", anchor=Pose()) for name, joint in model.joints.items()

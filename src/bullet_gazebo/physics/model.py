@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from math import hypot, isfinite
 from typing import Any, NamedTuple
 
-from bullet_gazebo.physics.description import ModelDescription, Shape
+from bullet_gazebo.physics.description import ModelDescription, SavedMotion, Shape
 from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero
 from bullet_gazebo.physics.engine import FASTEST, Body, Twist
 from bullet_gazebo.physics.lumping import WORLD
@@ -111,6 +111,13 @@ class Model:
         """Moves the whole model rigidly to `pose`, its root link moving with `twist`; joints stay."""
         self.placed = pose
         self.body.reset_base(pose.compose(self.description.root_pose), twist)
+
+    def begin(self, start: SavedMotion) -> None:
+        """Moves as in a saved world; the initial pose stays."""
+        self.place(start.pose.compose(self.description.root_pose.inverse()), start.twist)
+        for name, index in self._joints.items():
+            self.body.reset_joint(index, *start.joints[name])
+        self.put_followers()
 
     def joint_state(self, name: str) -> tuple[float, float]:
         """Returns position [rad, m] and velocity [rad/s, m/s] of a joint; zeros for a fixed one."""

@@ -122,10 +122,16 @@ class World:
             raise NameTaken(name)
         self._renew()
         body = self.engine.load(description, pose.compose(description.root_pose))
-        model = Model(name, description, body, pose)
+        return self.admit(Model(name, description, body, pose))
+
+    def admit(self, model: Model) -> Model:
+        """Adds a model whose body the engine has."""
+        description, body = model.description, model.body
         try:
             model.apply_damping(self.time_step)
             model.put_followers()
+            if description.start is not None:
+                model.begin(description.start)
         except Exception:
             self.engine.remove(body)
             raise
@@ -137,7 +143,7 @@ class World:
             description.warnings.append(
                 f"links that overlap in the initial pose don't collide with each other: {', '.join(pairs)}"
             )
-        self.models[name] = model
+        self.models[model.name] = model
         self._index(model)
         model.number = self.version
         return model

@@ -18,6 +18,7 @@ from bullet_gazebo.physics.files.elements import (
     direction,
     files_named_by_a_model,
     finite,
+    mended,
     named,
     numbers,
     positive,
@@ -99,7 +100,8 @@ def read_inertia(link: Element, where: str, static: bool) -> Inertia:
     where = f"{where}, inertial"
     inertial = link.find("inertial")
     mass = value(inertial, "mass", where, 1.0)
-    tensor = {key: value(inertial, f"inertia/{key}", where, d) for key, d in MOMENTS.items()}
+    found = {key: value(inertial, f"inertia/{key}", where, d) for key, d in MOMENTS.items()}
+    tensor = mended(found)
     least = min(mass, tensor["ixx"], tensor["iyy"], tensor["izz"])
     if least < 0.0 or (mass == 0.0 and not static):
         raise DescriptionError(f"{where}: the mass must be above 0, and no moment below it")

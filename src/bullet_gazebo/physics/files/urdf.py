@@ -23,9 +23,11 @@ from bullet_gazebo.physics.description import (
 from bullet_gazebo.physics.engine_form import check_shapes
 from bullet_gazebo.physics.files import elements
 from bullet_gazebo.physics.files.elements import (
+    TINY,
     direction,
     files_named_by_a_model,
     finite,
+    mended,
     named,
     numbers,
     positive,
@@ -50,7 +52,6 @@ MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 Part = TypeVar("Part")
 YES = ("true", "yes", "1")
 NO = ("false", "no", "0")
-TINY = 1e-12  # [kg m²]; what rounding leaves of a moment of 0, with any sign
 SURFACE = {"mu1": "mu", "maxVel": "max_vel", "laserRetro": "retro"}  # of shapes, by element
 
 
@@ -227,8 +228,7 @@ def _inertia(inertial: Element, place: str) -> Inertia:
         raise DescriptionError(f"{place}: <mass> is missing")
     if tensor is None:
         raise DescriptionError(f"{place}: <inertia> is missing")
-    moments = {key: read_number(tensor, key, place) for key in MOMENTS}
-    moments |= {key: 0.0 for key in ("ixx", "iyy", "izz") if -TINY <= moments[key] < 0.0}
+    moments = mended({key: read_number(tensor, key, place) for key in MOMENTS})
     value = read_number(mass, "value", place, required=True)
     return Inertia(mass=value, com=read_origin(inertial, place), **moments)
 
