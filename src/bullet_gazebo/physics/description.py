@@ -44,6 +44,11 @@ class Inertia:
     iyz: float = 0.0
     izz: float = 0.0
 
+    def scaled(self, share: float) -> "Inertia":
+        """Returns the inertia of a body of the same shape with a share of the mass."""
+        moments = (self.ixx, self.ixy, self.ixz, self.iyy, self.iyz, self.izz)
+        return Inertia(share * self.mass, self.com, *(share * each for each in moments))
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
@@ -100,6 +105,7 @@ class Link:
     gravity: bool = True  # whether gravity acts on it
     self_collide: bool = False  # also with links of its own model that it isn't joined to
     part_of: str = ""  # of a helper link for the engine: the link that it was split from
+    welded: bool = False  # whether that helper closes a loop: a constraint fixes it to `part_of`
 
     @property
     def max_vel(self) -> float:
@@ -270,7 +276,10 @@ class ModelDescription:
 
     def pairs_that_collide(self) -> list[tuple[Link, Link]]:
         """Returns links that can meet (SDF's rule): either wants it and no joint connects them."""
-        joined = {frozenset((joint.parent, joint.child)) for joint in self.joints.values()}
+        joined = {
+            frozenset((joint.parent, self.links[joint.child].owner))
+            for joint in self.joints.values()
+        }
         solid = [link for link in self.links.values() if link.collisions]
         return [
             (a, b)
@@ -279,6 +288,24 @@ class ModelDescription:
             and a.owner != b.owner
             and frozenset((a.owner, b.owner)) not in joined
         ]
+
+    @property
+    def loops(self) -> list[Link]:
+        """The helper links that close loops (`Link.welded`)."""
+        return [link for link in self.links.values() if link.welded and not self.static]
+
+    def bodies_of(self, link: str) -> list[str]:
+        """Returns a link and the helpers that share its inertia."""
+        return [link, *(each.name for each in self.loops if each.part_of == link)]
+
+    def inertias(self) -> dict[str, Inertia | None]:
+        """Returns the inertia of each link in an engine: helpers that close loops have shares of it."""
+        found = {name: link.inertia for name, link in self.links.items()}
+        for whole in {link.part_of for link in self.loops}:
+            bodies, inertia = self.bodies_of(whole), self.links[whole].inertia
+            if inertia is not None:
+                found |= dict.fromkeys(bodies, inertia.scaled(1.0 / len(bodies)))
+        return found
 
     def joints_by_parent(self) -> defaultdict[str, list[Joint]]:
         """Returns the joints that each link carries, in document order."""

@@ -1,18 +1,22 @@
 """A model in the world: its description, its body in the engine, and its state."""
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Collection, Mapping, Sequence
 from math import isfinite
 from typing import Any, NamedTuple
 
 from bullet_gazebo.physics.description import ModelDescription, Shape
 from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero
 from bullet_gazebo.physics.engine import FASTEST, Body, Twist
+from bullet_gazebo.physics.loops import closed, in_loops
 from bullet_gazebo.physics.lumping import WORLD
 from bullet_gazebo.physics.pose import ZERO, Pose
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit
 GENTLEST = 0.5  # of the damping that would stop a joint in one step
 SPINNING = 0.1  # [rad] in a step: no base of a robot turns that fast by itself
+
+logger = logging.getLogger(f"rosout.{__name__}")
 AT_REST: Twist = (ZERO, ZERO)
 
 
@@ -108,11 +112,13 @@ class Model:
 
         Unknown names are ignored, and joints are set in order of name (docs/contract/gazebo.md 2.16).
         """
+        before = self.joint_states()
         for name in sorted(set(positions) & set(self._joints)):
             joint = self.description.joints[name]
             self.body.reset_joint(self._joints[name], self.clamped(name, positions[name]))
             self._rest(self._below(joint.child))
         self.put_followers()
+        self.close_loops(positions, before)
 
     def set_joint_velocities(self, velocities: Mapping[str, float]) -> None:
         """Sets the `velocities` [rad/s, m/s] of joints; unknown names are ignored."""
@@ -121,6 +127,7 @@ class Model:
             index = self._joints[name]
             self.body.reset_joint(index, states[index][0], velocities[name])
         self.put_followers()
+        self.close_loops(velocities, states)
 
     def put_followers(self) -> None:
         """Puts joints that follow others where those have them, within their stops."""
@@ -130,6 +137,27 @@ class Model:
             self.body.reset_joint(
                 self._joints[name], self.clamped(name, wanted), mimic.multiplier * velocity
             )
+
+    def close_loops(self, held: Collection[str], before: Sequence[Sequence[float]]) -> None:
+        """Puts the joints of loops so that these close, the `held` ones where they are.
+
+        If that can't be, all joints of loops return to their states `before`, at rest.
+        """
+        if not self.description.loops:
+            return
+        states = dict(zip(self._joints, self.joint_states(), strict=True))
+        found = closed(self.description, states, held, self.clamped)
+        if found is None:
+            loose = in_loops(self.description)
+            old = zip(self._joints, before, strict=True)
+            found = states | {name: (state[0], 0.0) for name, state in old if name in loose}
+            logger.warning(
+                "Model '%s': its loops don't close with %s there; they stay as they were",
+                self.name, ", ".join(sorted(set(held) & loose)),
+            )  # fmt: skip
+        for name, state in found.items():
+            if state != states[name]:
+                self.body.reset_joint(self._joints[name], *state)
 
     def release_follower(self, name: str) -> None:
         """Takes the gear from a joint that follows another one."""
@@ -271,6 +299,7 @@ class Model:
             for index in self._joints.values():
                 self.body.reset_joint(index, 0.0)
             self.put_followers()
+            self.close_loops((), [(0.0, 0.0)] * len(self._joints))
         self.place(self.initial_pose)
         self._rest(list(self._joints))
 

@@ -125,6 +125,7 @@ class World:
         try:
             model.apply_damping(self.time_step)
             model.put_followers()
+            model.close_loops((), model.joint_states())
         except Exception:
             self.engine.remove(body)
             raise

@@ -6,7 +6,8 @@ from itertools import combinations
 from typing import NamedTuple
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Link, ModelDescription
-from bullet_gazebo.physics.engine import FASTEST, FURTHEST, GEAR, OVERLAP, STRONGEST, Body, Twist
+from bullet_gazebo.physics.engine import FASTEST, FURTHEST, OVERLAP, STRONGEST, Body, Twist
+from bullet_gazebo.physics.engines.bullet_constraints import add_gear, add_weld, weld_of
 from bullet_gazebo.physics.engines.bullet_contacts import Separation
 from bullet_gazebo.physics.engines.bullet_files import is_plane
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
@@ -79,8 +80,13 @@ class BulletBody(Body):
             pybullet.setJointMotorControlArray, body, self._indices, pybullet.TORQUE_CONTROL, unused, unused
         )  # fmt: skip
         self._unused = unused
-        self._gears: dict[str, tuple[int, float]] = {}  # constraint and effort [N m, N]
-        self._add_gears()
+        places = {n: (body, i) for n, i in zip(self.joint_names, self._indices, strict=True)}
+        self._gears = {
+            name: (add_gear(client, places[name], places[mimic.driver], mimic), mimic.effort)
+            for name, mimic in description.mimics.items()
+        }  # constraint and effort [N m, N]
+        for helper in description.loops:
+            self._close_loop(helper)
         self._base = pose.compose(self._com)  # where the centre of mass was put last
         if not is_plane(description):
             self.reset_base(pose)
@@ -137,24 +143,20 @@ class BulletBody(Body):
         self._choose_self_collisions()
         self._separation.add(self.id, self._description, self._links)
         for name in self.link_names:
-            link = self._description.links[name]
-            self.set_link_gravity(name, link.gravity)
-            if link.inertia is not None and not self._description.static:
-                self._keep_moments(self._links[name], link.inertia)
+            self.set_link_gravity(name, self._description.links[name].gravity)
+        for name, place in self._links.items():
+            inertia = self._description.links[name].inertia
+            if inertia is not None and not self._description.static:
+                self._keep_moments(place, inertia)
 
-    def _add_gears(self) -> None:
-        """Adds a constraint for each joint that follows another one."""
-        places = dict(zip(self.joint_names, self._indices, strict=True))
-        for name, mimic in self._description.mimics.items():
-            gear = pybullet.createConstraint(
-                self.id, places[name], self.id, places[mimic.driver], pybullet.JOINT_GEAR,
-                [1, 0, 0], [0, 0, 0], [0, 0, 0], physicsClientId=self._client,
-            )  # fmt: skip
-            pybullet.changeConstraint(
-                gear, gearRatio=-mimic.multiplier, relativePositionTarget=mimic.offset, erp=GEAR,
-                physicsClientId=self._client,
-            )  # fmt: skip
-            self._gears[name] = gear, mimic.effort
+    def _close_loop(self, helper: Link) -> None:
+        """Fixes a helper link to the link that it was split from, where it is with all joints at zero."""
+        centres = []
+        for name in (helper.part_of, helper.name):
+            own = pybullet.getDynamicsInfo(self.id, self._links[name], self._client)[3:5]
+            centres.append(self._offsets.get(name, Pose()).inverse().compose(Pose(*own)))
+        whole, part = ((self.id, self._links[name]) for name in (helper.part_of, helper.name))
+        add_weld(self._client, weld_of(whole, part, centres[1].relative_to(centres[0])))
 
     def set_gear(self, joint: str, effort: float) -> None:
         gear, _ = self._gears[joint]
@@ -226,11 +228,8 @@ class BulletBody(Body):
             )
 
     def set_link_gravity(self, name: str, on: bool) -> None:
-        key = (self.id, self._links[name])
-        if on:
-            self._weightless.discard(key)
-        else:
-            self._weightless.add(key)
+        change = self._weightless.difference_update if on else self._weightless.update
+        change((self.id, self._links[body]) for body in self._description.bodies_of(name))
 
     def link_gravity(self, name: str) -> bool:
         return (self.id, self._links[name]) not in self._weightless
@@ -261,8 +260,8 @@ class BulletBody(Body):
 
     def set_inertia(self, link: str, old: Inertia | None, new: Inertia) -> bool:
         index = self._links[link]
-        if self._offsets.get(link, Pose()) != Pose():
-            return False  # the engine's link has other axes
+        if self._offsets.get(link, Pose()) != Pose() or len(self._description.bodies_of(link)) > 1:
+            return False  # the engine's link has other axes, or others have a share of it
         if old is None or old.com != new.com or not (_is_diagonal(old) and _is_diagonal(new)):
             return False  # PyBullet can't move or turn a link's principal axes
         axes = pybullet.getDynamicsInfo(self.id, index, self._client)[2]

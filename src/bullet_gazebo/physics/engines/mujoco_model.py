@@ -26,6 +26,7 @@ GEOMS = {
 }
 MU_STEPS, MOST_PRIORITY = 1e6, 2**30  # friction in whole steps of 1e-6
 FASTENED = Inertia(mass=1.0, ixx=1.0, iyy=1.0, izz=1.0)  # of links that nothing can move
+WEIGHTLESS = Inertia(mass=0.0)  # of a part of another link that is fixed to a third one
 
 
 @dataclass
@@ -67,6 +68,7 @@ class ModelWriter:
         if not model.static:
             self._keep_apart()
             self._add_gears()
+            self._close_loops()
         return self._elements
 
     def _add_gears(self) -> None:
@@ -77,6 +79,12 @@ class ModelWriter:
             tendon.wrap_joint(f"{self.key}:{mimic.driver}", -mimic.multiplier)
             self._elements.tendons[name] = tendon
 
+    def _close_loops(self) -> None:
+        """Adds a weld for each helper link that closes a loop."""
+        for helper in self.model.loops:
+            names = (f"{self.key}:{helper.part_of}", f"{self.key}:{helper.name}")
+            add_weld(self.spec, *names, Pose())
+
     def _add_link(self, parent: mujoco.MjsBody, link: str, pose: Pose) -> mujoco.MjsBody:
         body = parent.add_body(
             name=f"{self.key}:{link}", pos=pose.position, quat=wxyz(pose.orientation),
@@ -84,7 +92,7 @@ class ModelWriter:
         )  # fmt: skip
         inertia = self.inertias[link]
         if inertia is None or self.model.static:
-            inertia = FASTENED
+            inertia = WEIGHTLESS if self.model.links[link].part_of else FASTENED
         axes, moments = principal(inertia)
         body.mass, body.ipos, body.iquat = inertia.mass, inertia.com.position, wxyz(axes)
         body.inertia = moments
@@ -152,6 +160,16 @@ class ModelWriter:
         for a, b in combinations(solid, 2):
             if frozenset((a, b)) not in meet:
                 self.spec.add_exclude(bodyname1=f"{self.key}:{a}", bodyname2=f"{self.key}:{b}")
+
+
+def add_weld(spec: mujoco.MjSpec, first: str, second: str, pose: Pose) -> None:
+    """Fixes a body to another one, at `pose` in the frame of the first one."""
+    data = np.zeros(mujoco.mjNEQDATA)
+    data[3:11] = *pose.position, *wxyz(pose.orientation), 1.0
+    spec.add_equality(
+        type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1=first, name2=second,
+        data=data,
+    )  # fmt: skip
 
 
 def geoms_of(shape: Shape) -> int:

@@ -33,6 +33,7 @@ from bullet_gazebo.physics.files.elements import (
     rename_lumped,
     shown,
 )
+from bullet_gazebo.physics.files.extension_joints import add_extension_joints
 from bullet_gazebo.physics.files.mechanisms import add_mechanisms
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
 from bullet_gazebo.physics.files.sdf_parts import read_sensors
@@ -391,6 +392,7 @@ def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDe
             rename_lumped(plugin.element, model.lumped)
         except DescriptionError as error:
             warnings.append(f"plugin {shown(plugin.filename)}: {error}")
+    add_extension_joints(lumped, robot)
     add_mechanisms(lumped, robot)
     reading.split_meshes(lumped)
     return lumped
