@@ -13,6 +13,7 @@ from bullet_gazebo.physics.pose import Pose, Vector
 from file_access.text import one_line
 
 CONTROL_PLUGIN = "libgazebo_ros_control.so"
+BALL = "ball"
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 
@@ -105,7 +106,7 @@ class Link:
     gravity: bool = True  # whether gravity acts on it
     self_collide: bool = False  # also with links of its own model that it isn't joined to
     part_of: str = ""  # of a helper link for the engine: the link that it was split from
-    welded: bool = False  # whether that helper closes a loop: a constraint fixes it to `part_of`
+    closing: str = ""  # a loop: the constraint, weld or ball, that joins that helper with `part_of`
 
     @property
     def max_vel(self) -> float:
@@ -291,12 +292,13 @@ class ModelDescription:
 
     @property
     def loops(self) -> list[Link]:
-        """The helper links that close loops (`Link.welded`)."""
-        return [link for link in self.links.values() if link.welded and not self.static]
+        """The helper links that close loops (`Link.closing`)."""
+        return [link for link in self.links.values() if link.closing and not self.static]
 
     def bodies_of(self, link: str) -> list[str]:
-        """Returns a link and the helpers that share its inertia."""
-        return [link, *(each.name for each in self.loops if each.part_of == link)]
+        """Returns a link and the helpers that share its inertia: those that are welded to it."""
+        welded = (each for each in self.loops if each.closing == "weld")
+        return [link, *(each.name for each in welded if each.part_of == link)]
 
     def inertias(self) -> dict[str, Inertia | None]:
         """Returns the inertia of each link in an engine: helpers that close loops have shares of it."""

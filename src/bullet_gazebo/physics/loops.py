@@ -5,28 +5,29 @@ closes a loop carries a helper link of its own, which the engines weld to the jo
 of the child's inertia. So it is a joint like any other, with a position, stops, damping and motors.
 """
 
-from collections.abc import Callable, Collection, Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from bullet_gazebo.physics.description import DescriptionError, Joint, Link, ModelDescription
+from bullet_gazebo.physics.description import BALL, DescriptionError, Joint, Link, ModelDescription
 from bullet_gazebo.physics.dynamics import jacobian, link_poses
 from bullet_gazebo.physics.lumping import check_links
 from bullet_gazebo.physics.pose import Pose, rotation, scale, subtract
 
 ITERATIONS = 50
 CLOSE = 1e-9  # [m, rad]
-LONGEST = 0.2  # [rad, m] of a joint in one iteration: a linearised rotation is valid no further
+LONGEST = 0.2  # [rad, m] of a joint in one step: a linearised rotation is valid no further
+MOST_STEPS = 100
+States = dict[str, tuple[float, float]]  # position [rad, m] and velocity [rad/s, m/s] by joint
 
-States = dict[str, tuple[float, float]]
-"""Position [rad, m] and velocity [rad/s, m/s] by joint."""
 
-
-def span(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:
+def span(links: dict[str, Link], joints: dict[str, Joint], warnings: list[str]) -> list[str]:
     """Makes trees of links and joints, in place; returns their roots.
 
     A root is the first link that no joint carries. Of the joints to a link the first one is in the tree.
+    A joint of a kind that isn't simulated may close a loop, with a warning unless it is a ball joint.
     """
     check_links(links, joints)
     first: dict[str, str] = {}
@@ -34,13 +35,20 @@ def span(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:
         first.setdefault(joint.child, joint.name)
     parts = {name: [name] for name in links}  # the links that are joined to each one
     tree: dict[str, list[str]] = {name: [] for name in links}
-    for joint in sorted(
-        joints.values(), key=lambda each: (each.kind != "fixed", first[each.child] != each.name)
-    ):
+    ranks = {
+        joint.name: (joint.kind != "fixed", not joint.movable, first[joint.child] != joint.name)
+        for joint in joints.values()
+    }
+    for joint in sorted(joints.values(), key=lambda each: ranks[each.name]):
         one, other = parts[joint.parent], parts[joint.child]
         if one is other:
-            _close(links, joints, joint)
+            _close(links, joints, joint, warnings)
             continue
+        if not joint.movable and joint.kind != "fixed":
+            raise DescriptionError(
+                f"joint '{joint.name}': type '{joint.kind}' is not simulated; revolute, continuous, "
+                "prismatic and fixed are, and ball where it closes a loop"
+            )
         tree[joint.parent].append(joint.name)
         tree[joint.child].append(joint.name)
         one += other
@@ -64,22 +72,25 @@ def span(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:
 def _reversed(joint: Joint) -> Joint:
     anchor = joint.pose.compose(joint.anchor) if joint.movable else Pose()
     return replace(
-        joint,
-        parent=joint.child,
-        child=joint.parent,
-        pose=joint.pose.inverse(),
-        anchor=anchor,
+        joint, parent=joint.child, child=joint.parent, pose=joint.pose.inverse(), anchor=anchor,
         axis=scale(joint.axis, -1.0),
-    )
+    )  # fmt: skip
 
 
-def _close(links: dict[str, Link], joints: dict[str, Joint], joint: Joint) -> None:
+def _close(
+    links: dict[str, Link], joints: dict[str, Joint], joint: Joint, warnings: list[str]
+) -> None:
     """Hangs a helper link from a joint in place of its child, which something else carries."""
     if joint.parent == joint.child:
         raise DescriptionError(f"joint '{joint.name}' joins link '{joint.child}' to itself")
+    closing = {"fixed": "", BALL: BALL}.get(joint.kind, "weld" if joint.movable else None)
+    if closing is None:
+        warnings.append(f"joint '{joint.name}': type '{joint.kind}' is left out of its loop")
+        del joints[joint.name]
+        return
     name = f"{joint.child}::{joint.name}"
-    links[name] = Link(name, part_of=joint.child, welded=joint.movable)
-    joints[joint.name] = replace(joint, child=name)
+    links[name] = Link(name, part_of=joint.child, closing=closing)
+    joints[joint.name] = replace(joint, child=name, kind=joint.kind if joint.movable else "fixed")
 
 
 def in_loops(model: ModelDescription) -> set[str]:
@@ -93,47 +104,62 @@ def in_loops(model: ModelDescription) -> set[str]:
 
 def closed(
     model: ModelDescription,
-    states: Mapping[str, tuple[float, float]],
-    held: Collection[str],
+    states: States,
+    goals: Mapping[str, float],
     clamp: Callable[[str, float], float],
 ) -> States | None:
     """Returns states of the movable joints with closed loops, near `states`; None if none is found.
 
+    Joints go to their goals in steps, with all loops closed, so that none changes to another branch.
+
     Args:
         model: the model.
         states: position and velocity of each movable joint.
-        held: joints that keep theirs.
+        goals: positions [rad, m] of joints that keep their velocities, too.
         clamp: returns the position [rad, m] within a joint's stops.
     """
     joints = model.movable_joints
     places = {joint.name: place for place, joint in enumerate(joints)}
-    loose = in_loops(model) - set(held) - set(model.mimics)
+    loose = in_loops(model) - set(goals) - set(model.mimics)
     free = [name for name in places if name in loose]
     follow = np.zeros((len(joints), len(free)))  # motion of all joints for that of the free ones
     follow[[places[name] for name in free], range(len(free))] = 1.0
     for name, mimic in model.mimics.items():
         follow[places[name]] = mimic.multiplier * follow[places[mimic.driver]]
     at = {name: position for name, (position, _) in states.items()}
-    for _ in range(ITERATIONS):
-        poses = link_poses(model, Pose(), at)
-        gaps, rows = [], []
-        for helper in model.loops:
-            own, whole = poses[helper.name], poses[helper.part_of]
-            gaps.append(subtract(own.position, whole.position) + rotation(whole, own))
-            point = np.array(whole.position)
-            ways = [
-                np.vstack(jacobian(model, joints, 0, poses, link, point))
-                for link in (helper.part_of, helper.name)
-            ]
-            rows.append(ways[0] - ways[1])
-        gap, matrix = np.concatenate(gaps), np.vstack(rows)
-        if np.abs(gap).max() < CLOSE:
-            speeds = np.array([states[name][1] for name in places])
-            speeds -= follow @ np.linalg.lstsq(matrix @ follow, matrix @ speeds, rcond=1e-9)[0]
-            return {name: (at[name], float(speeds[place])) for name, place in places.items()}
-        step = np.linalg.lstsq(matrix @ follow, gap, rcond=1e-9)[0]
-        moves = follow @ step * min(1.0, LONGEST / max(np.abs(step).max(initial=0.0), 1e-300))
-        for name, place in places.items():
-            if moves[place]:
-                at[name] = clamp(name, at[name] + float(moves[place]))
-    return None
+    ways = {name: goal - at[name] for name, goal in goals.items()}
+    steps = min(MOST_STEPS, math.ceil(max(map(abs, ways.values()), default=0.0) / LONGEST)) or 1
+    for step in range(1, steps + 1):
+        at |= {name: goals[name] - way * (1.0 - step / steps) for name, way in ways.items()}
+        for name, mimic in model.mimics.items():
+            at[name] = clamp(name, mimic.multiplier * at[mimic.driver] + mimic.offset)
+        for _ in range(ITERATIONS):
+            gap, matrix = _open(model, at)
+            if np.abs(gap).max() < CLOSE:
+                break
+            change = np.linalg.lstsq(matrix @ follow, gap, rcond=1e-9)[0]
+            change *= min(1.0, LONGEST / max(np.abs(change).max(initial=0.0), 1e-300))
+            for place, (name, move) in enumerate(zip(places, follow @ change, strict=True)):
+                if follow[place].any():
+                    at[name] = clamp(name, at[name] + float(move))
+        else:
+            return None
+    speeds = np.array([states[name][1] for name in places])
+    speeds -= follow @ np.linalg.lstsq(matrix @ follow, matrix @ speeds, rcond=1e-9)[0]
+    return {name: (at[name], float(speeds[place])) for name, place in places.items()}
+
+
+def _open(model: ModelDescription, at: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Returns how far loops are open [m, rad], and what joints change of it, negative (n, joints)."""
+    joints, poses = model.movable_joints, link_poses(model, Pose(), at)
+    pins = {joint.child: joint.anchor for joint in model.joints.values()}
+    gaps, rows = [], []
+    for helper in model.loops:
+        ends = helper.name, helper.part_of
+        own, whole = (poses[link].compose(pins[helper.name]) for link in ends)
+        size = 3 if helper.closing == BALL else 6
+        gaps.append((subtract(own.position, whole.position) + rotation(whole, own))[:size])
+        point = np.array(whole.position)
+        ways = [np.vstack(jacobian(model, joints, 0, poses, link, point)) for link in ends]
+        rows.append((ways[1] - ways[0])[:size])
+    return np.concatenate(gaps), np.vstack(rows)

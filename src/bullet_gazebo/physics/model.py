@@ -146,14 +146,16 @@ class Model:
         if not self.description.loops:
             return
         states = dict(zip(self._joints, self.joint_states(), strict=True))
-        found = closed(self.description, states, held, self.clamped)
+        old = {name: state[0] for name, state in zip(self._joints, before, strict=True)}
+        starts = {name: (old[name], state[1]) for name, state in states.items()}
+        goals = {name: states[name][0] for name in states if name in held}
+        found = closed(self.description, starts if goals else states, goals, self.clamped)
         if found is None:
             loose = in_loops(self.description)
-            old = zip(self._joints, before, strict=True)
-            found = states | {name: (state[0], 0.0) for name, state in old if name in loose}
+            found = states | {name: (old[name], 0.0) for name in states if name in loose}
             logger.warning(
-                "Model '%s': its loops don't close with %s there; they stay as they were",
-                self.name, ", ".join(sorted(set(held) & loose)),
+                "Model '%s': its loops don't close on the way to %s; they stay as they were",
+                self.name, ", ".join(f"{name} = {goals[name]:g}" for name in sorted(goals) if name in loose),
             )  # fmt: skip
         for name, state in found.items():
             if state != states[name]:
@@ -305,8 +307,7 @@ class Model:
 
     def _rest(self, names: list[str]) -> None:
         states = self.body.joint_states()
-        for name in names:
-            index = self._joints[name]
+        for index in (self._joints[name] for name in names if name in self._joints):
             self.body.reset_joint(index, states[index][0])
 
     def _below(self, link: str) -> list[str]:

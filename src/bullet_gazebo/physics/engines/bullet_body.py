@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Link, ModelDescription
 from bullet_gazebo.physics.engine import FASTEST, FURTHEST, OVERLAP, STRONGEST, Body, Twist
-from bullet_gazebo.physics.engines.bullet_constraints import add_gear, add_weld, weld_of
+from bullet_gazebo.physics.engines.bullet_constraints import add_gear, close_loop
 from bullet_gazebo.physics.engines.bullet_contacts import Separation
 from bullet_gazebo.physics.engines.bullet_files import is_plane
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
@@ -86,7 +86,7 @@ class BulletBody(Body):
             for name, mimic in description.mimics.items()
         }  # constraint and effort [N m, N]
         for helper in description.loops:
-            self._close_loop(helper)
+            close_loop(client, body, helper, self._links, offsets)
         self._base = pose.compose(self._com)  # where the centre of mass was put last
         if not is_plane(description):
             self.reset_base(pose)
@@ -148,15 +148,6 @@ class BulletBody(Body):
             inertia = self._description.links[name].inertia
             if inertia is not None and not self._description.static:
                 self._keep_moments(place, inertia)
-
-    def _close_loop(self, helper: Link) -> None:
-        """Fixes a helper link to the link that it was split from, where it is with all joints at zero."""
-        centres = []
-        for name in (helper.part_of, helper.name):
-            own = pybullet.getDynamicsInfo(self.id, self._links[name], self._client)[3:5]
-            centres.append(self._offsets.get(name, Pose()).inverse().compose(Pose(*own)))
-        whole, part = ((self.id, self._links[name]) for name in (helper.part_of, helper.name))
-        add_weld(self._client, weld_of(whole, part, centres[1].relative_to(centres[0])))
 
     def set_gear(self, joint: str, effort: float) -> None:
         gear, _ = self._gears[joint]

@@ -148,7 +148,7 @@ class MujocoEngine(Engine):
     def _weld(self, spec: mujoco.MjSpec, keys: dict[int, str]) -> None:
         for (one, link), (other, its), pose in self._fastened.values():
             names = f"{keys[id(one)]}:{link}", f"{keys[id(other)]}:{its}"
-            add_weld(spec, *names, pose)
+            add_weld(spec, names, pose)
             if one is not other:
                 spec.add_exclude(bodyname1=names[0], bodyname2=names[1])
 

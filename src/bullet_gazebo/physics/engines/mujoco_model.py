@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from bullet_gazebo.physics.description import (
+    BALL,
     DescriptionError,
     Inertia,
     Joint,
@@ -15,7 +16,7 @@ from bullet_gazebo.physics.description import (
     Shape,
 )
 from bullet_gazebo.physics.dynamics import tensor_in
-from bullet_gazebo.physics.pose import IDENTITY, Pose, Quaternion, Vector, rotate
+from bullet_gazebo.physics.pose import IDENTITY, ZERO, Pose, Quaternion, Vector, rotate
 
 GEOMS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -80,10 +81,14 @@ class ModelWriter:
             self._elements.tendons[name] = tendon
 
     def _close_loops(self) -> None:
-        """Adds a weld for each helper link that closes a loop."""
+        """Adds a constraint for each helper link that closes a loop."""
+        pins = {joint.child: joint.anchor.position for joint in self.model.joints.values()}
         for helper in self.model.loops:
             names = (f"{self.key}:{helper.part_of}", f"{self.key}:{helper.name}")
-            add_weld(self.spec, *names, Pose())
+            if helper.closing == BALL:
+                add_equality(self.spec, mujoco.mjtEq.mjEQ_CONNECT, names, pins[helper.name])
+            else:
+                add_weld(self.spec, names, Pose())
 
     def _add_link(self, parent: mujoco.MjsBody, link: str, pose: Pose) -> mujoco.MjsBody:
         body = parent.add_body(
@@ -162,14 +167,19 @@ class ModelWriter:
                 self.spec.add_exclude(bodyname1=f"{self.key}:{a}", bodyname2=f"{self.key}:{b}")
 
 
-def add_weld(spec: mujoco.MjSpec, first: str, second: str, pose: Pose) -> None:
+def add_weld(spec: mujoco.MjSpec, names: tuple[str, str], pose: Pose) -> None:
     """Fixes a body to another one, at `pose` in the frame of the first one."""
-    data = np.zeros(mujoco.mjNEQDATA)
-    data[3:11] = *pose.position, *wxyz(pose.orientation), 1.0
-    spec.add_equality(
-        type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1=first, name2=second,
-        data=data,
-    )  # fmt: skip
+    numbers = (*ZERO, *pose.position, *wxyz(pose.orientation), 1.0)
+    add_equality(spec, mujoco.mjtEq.mjEQ_WELD, names, numbers)
+
+
+def add_equality(
+    spec: mujoco.MjSpec, kind: mujoco.mjtEq, names: tuple[str, str], numbers: tuple[float, ...]
+) -> None:
+    """Adds a constraint of two bodies."""
+    data = np.pad(numbers, (0, mujoco.mjNEQDATA - len(numbers)))
+    body = mujoco.mjtObj.mjOBJ_BODY
+    spec.add_equality(type=kind, objtype=body, name1=names[0], name2=names[1], data=data)
 
 
 def geoms_of(shape: Shape) -> int:

@@ -37,7 +37,7 @@ def add_extension_joints(model: ModelDescription, robot: Element) -> None:
         joints[joint.name] = joint
         if WORLD not in links and joint.parent == WORLD:
             links = {WORLD: Link(WORLD), **links}
-    roots = span(links, joints)
+    roots = span(links, joints, model.warnings)
     model.links, model.joints = links, joints
     if roots[0] != model.root:
         model.root, model.root_pose = roots[0], poses.get(roots[0], Pose())

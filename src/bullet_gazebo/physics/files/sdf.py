@@ -214,11 +214,15 @@ def read_model(element: Element, context: FileContext) -> ModelDescription:
 def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
     poses = {WORLD: Pose(), **parts.poses}
     if static:
-        parts.joints = [joint for joint in parts.joints if joint.parent != WORLD]
+        parts.joints = [
+            joint if joint.movable else replace(joint, kind="fixed")
+            for joint in parts.joints
+            if joint.parent != WORLD
+        ]
     elif any(joint.parent == WORLD for joint in parts.joints):
         parts.links.insert(0, Link(WORLD))
     links, joints = unique(parts.links, "link"), unique(parts.joints, "joint")
-    roots = span(links, joints)
+    roots = span(links, joints, parts.warnings)
     if len(roots) > 1 and not static:
         raise DescriptionError(
             f"links {roots[:10]} are not joined to each other; make them models of their own, "

@@ -193,6 +193,69 @@ def test_a_four_bar_does_not_drift(linkage):
     assert missed(model) < 1e-4
 
 
+@pytest.mark.parametrize("rooted", [True, False])
+def test_a_ball_joint_closes_a_loop(make_world, rooted):
+    world = make_world()
+    text = four_bar(rooted=rooted).replace('name="tip" type="revolute"', 'name="tip" type="ball"')
+    model = world.spawn("m", parse_sdf(text), Pose())
+    assert model.all_joints[-1] == "tip"
+    assert model.joint_names == ("drive", "pin", "pivot")
+    model.set_motor("drive", 2.0, 1e9)
+    run(world, 2000)
+    assert max(gap(model), missed(model)) < 1e-4
+    model.set_joint_positions({"drive": 1.0})
+    assert max(gap(model), missed(model)) < 1e-5
+
+
+def test_what_is_not_simulated_is_left_out_of_a_loop_and_refused_elsewhere():
+    text = four_bar().replace('name="tip" type="revolute"', 'name="tip" type="universal"')
+    model = parse_sdf(text)
+    assert model.warnings == ["joint 'tip': type 'universal' is left out of its loop"]
+    assert list(model.joints) == ["drive", "pin", "pivot"]
+    with pytest.raises(DescriptionError, match="'drive': type 'ball' is not simulated; revolute"):
+        parse_sdf(text.replace('name="drive" type="revolute"', 'name="drive" type="ball"'))
+    assert len(parse_sdf(text.replace("<static>0", "<static>1")).joints) == 4
+
+
+def test_a_slider_crank_keeps_to_its_closed_form(make_world):
+    """Whichever of its joints closes the loop."""
+    length, start = 0.6, 1.0
+
+    def slide(angle: float) -> float:
+        x, z = 0.2 * math.cos(angle), 0.2 * math.sin(angle)
+        return x + math.sqrt(length**2 - z**2)
+
+    joints = [
+        hinge("wrist", "rod", "block"),
+        '<joint name="slide" type="prismatic"><parent>ground</parent><child>block</child>'
+        "<axis><xyz>1 0 0</xyz></axis></joint>",
+    ]
+    pin = 0.2 * math.cos(start), 0.2 * math.sin(start)
+    for order in (1, -1):
+        world = make_world()
+        text = sdf(
+            rod("ground", 1.0, (0.0, 0.0), 0.0), rod("crank", 0.2, (0.0, 0.0), start),
+            rod("rod", length, pin, math.atan2(-pin[1], slide(start) - pin[0])),
+            rod("block", 0.1, (slide(start), 0.0), 0.0), weld("foot", "world", "ground"),
+            hinge("drive", "ground", "crank"), hinge("pin", "crank", "rod"), *joints[::order],
+        )  # fmt: skip
+        model = world.spawn("m", parse_sdf(text), Pose())
+        model.set_motor("drive", 5.0, 1e9)
+        run(world, 2000)
+        wanted = slide(start + model.joint_state("drive")[0]) - slide(start)
+        assert model.joint_state("slide")[0] == pytest.approx(wanted, abs=1e-4)
+
+
+def test_joints_move_above_welded_links(make_world):
+    """A drawer of two boards that are welded twice."""
+    world = make_world(gravity=(0.0, 0.0, 0.0))
+    joints = [weld(f"w{number}", "b", "c") for number in range(2)]
+    slide = '<joint name="s" type="prismatic"><parent>a</parent><child>b</child></joint>'
+    model = world.spawn("m", parse_sdf(sdf(*CUBES[:3], slide, *joints)), Pose())
+    model.set_joint_positions({"s": 0.5})
+    assert model.link_state("c")[0].position == pytest.approx((CUBE, CUBE, 0.6), abs=1e-6)
+
+
 def energy(model) -> float:
     """Kinetic and potential energy [J] of a planar linkage."""
     total = 0.0
@@ -259,7 +322,7 @@ def test_joints_that_a_service_moves_leave_the_loop_closed(linkage, caplog):
     states = model.joint_states()
     model.set_joint_positions({"pivot": 2.5})  # beyond its dead centre
     assert np.array(model.joint_states()) == pytest.approx(np.array(states))
-    assert "its loops don't close with pivot there" in caplog.text
+    assert "its loops don't close on the way to pivot = 2.5; they stay" in caplog.text
     pose, _ = model.link_state("coupler")
     place_link(
         model,
