@@ -14,6 +14,7 @@ from bullet_gazebo.physics.pose import Pose, Vector
 from file_access.text import one_line
 
 CONTROL_PLUGIN = "libgazebo_ros_control.so"
+BALL = "ball"
 MOVABLE = ("revolute", "continuous", "prismatic")
 UNMOVED = 1e9  # [kg, kg m²]; stands for infinity in an engine
 
@@ -45,6 +46,11 @@ class Inertia:
     iyy: float = 0.0
     iyz: float = 0.0
     izz: float = 0.0
+
+    def scaled(self, share: float) -> "Inertia":
+        """Returns the inertia of a body of the same shape with a share of the mass."""
+        moments = (self.ixx, self.ixy, self.ixz, self.iyy, self.iyz, self.izz)
+        return Inertia(share * self.mass, self.com, *(share * each for each in moments))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +110,7 @@ class Link:
     kinematic: bool = False  # moved by services alone; true only of a free root link
     decay: tuple[float, float] | None = None  # of linear and angular velocity, the share of a step
     part_of: str = ""  # of a helper link for the engine: the link that it was split from
+    closing: str = ""  # a loop: the constraint, weld or ball, that joins that helper with `part_of`
 
     @property
     def weighs(self) -> bool:
@@ -299,7 +306,10 @@ class ModelDescription:
 
     def pairs_that_collide(self) -> list[tuple[Link, Link]]:
         """Returns links that can meet (SDF's rule): either wants it and no joint connects them."""
-        joined = {frozenset((joint.parent, joint.child)) for joint in self.joints.values()}
+        joined = {
+            frozenset((joint.parent, self.links[joint.child].owner))
+            for joint in self.joints.values()
+        }
         solid = [link for link in self.links.values() if link.collisions]
         return [
             (a, b)
@@ -308,6 +318,25 @@ class ModelDescription:
             and a.owner != b.owner
             and frozenset((a.owner, b.owner)) not in joined
         ]
+
+    @property
+    def loops(self) -> list[Link]:
+        """The helper links that close loops (`Link.closing`)."""
+        return [link for link in self.links.values() if link.closing and not self.static]
+
+    def bodies_of(self, link: str) -> list[str]:
+        """Returns a link and the helpers that share its inertia: those that are welded to it."""
+        welded = (each for each in self.loops if each.closing == "weld")
+        return [link, *(each.name for each in welded if each.part_of == link)]
+
+    def inertias(self) -> dict[str, Inertia | None]:
+        """Returns the inertia of each link in an engine: helpers that close loops have shares of it."""
+        found = {name: link.inertia for name, link in self.links.items()}
+        for whole in {link.part_of for link in self.loops}:
+            bodies, inertia = self.bodies_of(whole), self.links[whole].inertia
+            if inertia is not None:
+                found |= dict.fromkeys(bodies, inertia.scaled(1.0 / len(bodies)))
+        return found
 
     def joints_by_parent(self) -> defaultdict[str, list[Joint]]:
         """Returns the joints that each link carries, in document order."""

@@ -117,6 +117,7 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
         for joint in model.joints.values()
         if joint.anchor != Pose()
     }
+    model = _shared(model)
     root = model.links[model.root]
     if root.kinematic:
         heavy = replace(root, inertia=root.acting_inertia)
@@ -127,6 +128,15 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
     links = {name: _moved(link, offsets.get(name)) for name, link in model.links.items()}
     joints = {name: _joined(joint, offsets) for name, joint in model.joints.items()}
     return replace(model, links=links, joints=joints), offsets
+
+
+def _shared(model: ModelDescription) -> ModelDescription:
+    """Returns the model with the inertias of links shared with helpers that close loops."""
+    if not model.loops:
+        return model
+    inertias = model.inertias()
+    links = {name: replace(each, inertia=inertias[name]) for name, each in model.links.items()}
+    return replace(model, links=links)
 
 
 def one_friction_each(model: ModelDescription) -> ModelDescription:

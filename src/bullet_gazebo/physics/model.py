@@ -1,12 +1,14 @@
 """A model in the world: its description, its body in the engine, and its state."""
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Collection, Mapping, Sequence
 from math import hypot, isfinite
 from typing import Any, NamedTuple
 
 from bullet_gazebo.physics.description import ModelDescription, SavedMotion, Shape
 from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero
 from bullet_gazebo.physics.engine import FASTEST, Body, Twist
+from bullet_gazebo.physics.loops import closed, in_loops
 from bullet_gazebo.physics.lumping import WORLD
 from bullet_gazebo.physics.pose import (
     ZERO,
@@ -25,6 +27,8 @@ GENTLEST = 0.5  # of the damping that would stop a joint in one step
 SOFTEST = 0.25  # of inertia / step²; a stiffer spring swings faster than steps can follow
 SLOWEST = 0.01  # [m/s, rad/s]; ODE lets no slower velocity decay
 SPINNING = 0.1  # [rad] in a step: no base of a robot turns that fast by itself
+
+logger = logging.getLogger(f"rosout.{__name__}")
 AT_REST: Twist = (ZERO, ZERO)
 
 
@@ -131,11 +135,13 @@ class Model:
 
         Unknown names are ignored, and joints are set in order of name (docs/contract/gazebo.md 2.16).
         """
+        before = self.joint_states()
         for name in sorted(set(positions) & set(self._joints)):
             joint = self.description.joints[name]
             self.body.reset_joint(self._joints[name], self.clamped(name, positions[name]))
             self._rest(self._below(joint.child))
         self.put_followers()
+        self.close_loops(positions, before)
 
     def set_joint_velocities(self, velocities: Mapping[str, float]) -> None:
         """Sets the `velocities` [rad/s, m/s] of joints; unknown names are ignored."""
@@ -144,6 +150,7 @@ class Model:
             index = self._joints[name]
             self.body.reset_joint(index, states[index][0], velocities[name])
         self.put_followers()
+        self.close_loops(velocities, states)
 
     def put_followers(self) -> None:
         """Puts joints that follow others where those have them, within their stops."""
@@ -153,6 +160,29 @@ class Model:
             self.body.reset_joint(
                 self._joints[name], self.clamped(name, wanted), mimic.multiplier * velocity
             )
+
+    def close_loops(self, held: Collection[str], before: Sequence[Sequence[float]]) -> None:
+        """Puts the joints of loops so that these close, the `held` ones where they are.
+
+        If that can't be, all joints of loops return to their states `before`, at rest.
+        """
+        if not self.description.loops:
+            return
+        states = dict(zip(self._joints, self.joint_states(), strict=True))
+        old = {name: state[0] for name, state in zip(self._joints, before, strict=True)}
+        starts = {name: (old[name], state[1]) for name, state in states.items()}
+        goals = {name: states[name][0] for name in states if name in held}
+        found = closed(self.description, starts if goals else states, goals, self.clamped)
+        if found is None:
+            loose = in_loops(self.description)
+            found = states | {name: (old[name], 0.0) for name in states if name in loose}
+            logger.warning(
+                "Model '%s': its loops don't close on the way to %s; they stay as they were",
+                self.name, ", ".join(f"{name} = {goals[name]:g}" for name in sorted(goals) if name in loose),
+            )  # fmt: skip
+        for name, state in found.items():
+            if state != states[name]:
+                self.body.reset_joint(self._joints[name], *state)
 
     def release_follower(self, name: str) -> None:
         """Takes the gear from a joint that follows another one."""
@@ -378,13 +408,13 @@ class Model:
             for index in self._joints.values():
                 self.body.reset_joint(index, 0.0)
             self.put_followers()
+            self.close_loops((), [(0.0, 0.0)] * len(self._joints))
         self.place(self.initial_pose)
         self._rest(list(self._joints))
 
     def _rest(self, names: list[str]) -> None:
         states = self.body.joint_states()
-        for name in names:
-            index = self._joints[name]
+        for index in (self._joints[name] for name in names if name in self._joints):
             self.body.reset_joint(index, states[index][0])
 
     def _below(self, link: str) -> list[str]:

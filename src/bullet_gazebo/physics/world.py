@@ -130,6 +130,7 @@ class World:
         try:
             model.apply_damping(self.time_step)
             model.put_followers()
+            model.close_loops((), model.joint_states())
             if description.start is not None:
                 model.begin(description.start)
         except Exception:

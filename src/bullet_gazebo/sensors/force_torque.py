@@ -10,6 +10,7 @@ from typing import NamedTuple
 from bullet_gazebo.applied_forces import Wrench
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Joint, ModelDescription
 from bullet_gazebo.physics.dynamics import tensor_in
+from bullet_gazebo.physics.loops import in_loops
 from bullet_gazebo.physics.lumping import WORLD
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import (
@@ -142,6 +143,10 @@ class JointForces:
         self._sim = sim
         self._model = model
         self._joint = joint = _joint(model.description, name)
+        if name in in_loops(model.description):
+            raise DescriptionError(
+                f"joint '{name}' is part of a closed loop: its share of the force isn't known"
+            )
         self.link = joint.child
         self._forces = LinkForces(sim, model, _below(model.description, joint.child), name)
 

@@ -65,10 +65,12 @@ class MujocoBody(Body):
         """`compile_anew` recompiles the world's model from its bodies' present settings."""
         self.description = description
         self.pose = pose  # of the root link; of one that is free, where it was loaded
-        self.link_names = tuple(description.links)
+        self.link_names = tuple(
+            name for name, link in description.links.items() if not link.part_of
+        )
         joints = [] if description.static else description.movable_joints
         self.joint_names = tuple(joint.name for joint in joints)
-        self.inertias = {name: link.inertia for name, link in description.links.items()}
+        self.inertias = description.inertias()
         self._gravity = {name: link.weighs for name, link in description.links.items()}
         self._frictions: dict[str, float] = {}  # factors, by link
         self._gears = {name: mimic.effort for name, mimic in description.mimics.items()}  # [N m, N]
@@ -156,6 +158,8 @@ class MujocoBody(Body):
         self._state.loaded = True
 
     def set_inertia(self, link: str, old: Inertia | None, new: Inertia) -> bool:
+        if len(self.description.bodies_of(link)) > 1:
+            return False  # others have a share of it
         before = self.inertias[link]
         self.inertias[link] = new
         try:
@@ -236,8 +240,9 @@ class MujocoBody(Body):
         return self._state.link(self._ids[name])
 
     def set_link_gravity(self, name: str, on: bool) -> None:
-        self._gravity[name] = on
-        self._weigh(name, on)
+        for body in self.description.bodies_of(name):
+            self._gravity[body] = on
+            self._weigh(body, on)
 
     def _weigh(self, name: str, on: bool) -> None:
         model = self._state.model

@@ -14,8 +14,8 @@ from bullet_gazebo.physics.engines.mujoco_body import MujocoBody
 from bullet_gazebo.physics.engines.mujoco_model import (
     Elements,
     ModelWriter,
+    add_weld,
     compile_spec,
-    wxyz,
 )
 from bullet_gazebo.physics.engines.mujoco_state import MujocoState
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector
@@ -161,13 +161,8 @@ class MujocoEngine(Engine):
 
     def _weld(self, spec: mujoco.MjSpec, keys: dict[int, str]) -> None:
         for (one, link), (other, its), pose in self._fastened.values():
-            names = [f"{keys[id(one)]}:{link}", f"{keys[id(other)]}:{its}"]
-            data = np.zeros(mujoco.mjNEQDATA)
-            data[3:11] = *pose.position, *wxyz(pose.orientation), 1.0
-            spec.add_equality(
-                type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1=names[0],
-                name2=names[1], data=data,
-            )  # fmt: skip
+            names = f"{keys[id(one)]}:{link}", f"{keys[id(other)]}:{its}"
+            add_weld(spec, names, pose)
             if one is not other:
                 spec.add_exclude(bodyname1=names[0], bodyname2=names[1])
 

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from bullet_gazebo.physics.description import (
+    BALL,
     DescriptionError,
     Inertia,
     Joint,
@@ -15,7 +16,7 @@ from bullet_gazebo.physics.description import (
     Shape,
 )
 from bullet_gazebo.physics.dynamics import tensor_in
-from bullet_gazebo.physics.pose import IDENTITY, Pose, Quaternion, Vector, rotate
+from bullet_gazebo.physics.pose import IDENTITY, ZERO, Pose, Quaternion, Vector, rotate
 
 GEOMS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -27,6 +28,7 @@ GEOMS = {
 MU_STEPS, MOST_PRIORITY = 1e6, 2**30  # friction in whole steps of 1e-6
 OTHERS, KINEMATIC = 1, 2  # groups of geoms, which meet if either's affinity has the other's
 FASTENED = Inertia(mass=1.0, ixx=1.0, iyy=1.0, izz=1.0)  # of links that nothing can move
+WEIGHTLESS = Inertia(mass=0.0)  # of a part of another link that is fixed to a third one
 
 
 @dataclass
@@ -68,6 +70,7 @@ class ModelWriter:
         if not model.static:
             self._keep_apart()
             self._add_gears()
+            self._close_loops()
         return self._elements
 
     def _add_gears(self) -> None:
@@ -78,6 +81,16 @@ class ModelWriter:
             tendon.wrap_joint(f"{self.key}:{mimic.driver}", -mimic.multiplier)
             self._elements.tendons[name] = tendon
 
+    def _close_loops(self) -> None:
+        """Adds a constraint for each helper link that closes a loop."""
+        pins = {joint.child: joint.anchor.position for joint in self.model.joints.values()}
+        for helper in self.model.loops:
+            names = (f"{self.key}:{helper.part_of}", f"{self.key}:{helper.name}")
+            if helper.closing == BALL:
+                add_equality(self.spec, mujoco.mjtEq.mjEQ_CONNECT, names, pins[helper.name])
+            else:
+                add_weld(self.spec, names, Pose())
+
     def _add_link(self, parent: mujoco.MjsBody, link: str, pose: Pose) -> mujoco.MjsBody:
         body = parent.add_body(
             name=f"{self.key}:{link}", pos=pose.position, quat=wxyz(pose.orientation),
@@ -85,7 +98,7 @@ class ModelWriter:
         )  # fmt: skip
         inertia = self.inertias[link]
         if inertia is None or self.model.static:
-            inertia = FASTENED
+            inertia = WEIGHTLESS if self.model.links[link].part_of else FASTENED
         axes, moments = principal(inertia)
         body.mass, body.ipos, body.iquat = inertia.mass, inertia.com.position, wxyz(axes)
         body.inertia = moments
@@ -159,6 +172,21 @@ class ModelWriter:
         for a, b in combinations(solid, 2):
             if frozenset((a, b)) not in meet:
                 self.spec.add_exclude(bodyname1=f"{self.key}:{a}", bodyname2=f"{self.key}:{b}")
+
+
+def add_weld(spec: mujoco.MjSpec, names: tuple[str, str], pose: Pose) -> None:
+    """Fixes a body to another one, at `pose` in the frame of the first one."""
+    numbers = (*ZERO, *pose.position, *wxyz(pose.orientation), 1.0)
+    add_equality(spec, mujoco.mjtEq.mjEQ_WELD, names, numbers)
+
+
+def add_equality(
+    spec: mujoco.MjSpec, kind: mujoco.mjtEq, names: tuple[str, str], numbers: tuple[float, ...]
+) -> None:
+    """Adds a constraint of two bodies."""
+    data = np.pad(numbers, (0, mujoco.mjNEQDATA - len(numbers)))
+    body = mujoco.mjtObj.mjOBJ_BODY
+    spec.add_equality(type=kind, objtype=body, name1=names[0], name2=names[1], data=data)
 
 
 def geoms_of(shape: Shape) -> int:

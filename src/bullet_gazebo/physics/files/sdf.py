@@ -42,12 +42,8 @@ from bullet_gazebo.physics.files.sdf_parts import (
     read_pose,
     read_sensors,
 )
-from bullet_gazebo.physics.lumping import (
-    detach_from_world,
-    find_roots,
-    mend_moments,
-    unique,
-)
+from bullet_gazebo.physics.loops import span
+from bullet_gazebo.physics.lumping import detach_from_world, mend_moments, unique
 from bullet_gazebo.physics.pose import Pose
 
 OVERRIDES = ("pose", "static")
@@ -219,11 +215,15 @@ def read_model(element: Element, context: FileContext) -> ModelDescription:
 def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
     poses = {WORLD: Pose(), **parts.poses}
     if static:
-        parts.joints = [joint for joint in parts.joints if joint.parent != WORLD]
+        parts.joints = [
+            joint if joint.movable else replace(joint, kind="fixed")
+            for joint in parts.joints
+            if joint.parent != WORLD
+        ]
     elif any(joint.parent == WORLD for joint in parts.joints):
         parts.links.insert(0, Link(WORLD))
     links, joints = unique(parts.links, "link"), unique(parts.joints, "joint")
-    roots = find_roots(links, joints)
+    roots = span(links, joints, parts.warnings)
     if len(roots) > 1 and not static:
         raise DescriptionError(
             f"links {roots[:10]} are not joined to each other; make them models of their own, "

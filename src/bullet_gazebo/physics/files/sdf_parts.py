@@ -42,7 +42,17 @@ from bullet_gazebo.physics.pose import (
 
 MODEL = "__model__"
 WORLD = "world"
-KINDS = ("revolute", "continuous", "prismatic", "fixed")
+KINDS = (
+    "revolute",
+    "continuous",
+    "prismatic",
+    "fixed",
+    "ball",
+    "universal",
+    "revolute2",
+    "gearbox",
+    "screw",
+)
 NO_LIMIT = 1e16  # [rad, m, N m, N, rad/s, m/s]; SDF's own figure for "none"
 JOINT_FRAME_SINCE = (1, 5)  # before that, axes were given in the model's frame
 NO_NAME = "__default__"  # of a submesh: as if it weren't there
@@ -300,9 +310,7 @@ class JointReader:
         where = f"joint '{name}'"
         kind = element.get("type", "")
         if kind not in KINDS:
-            raise DescriptionError(
-                f"{where}: type '{shown(kind)}' is not simulated; {', '.join(KINDS)} are"
-            )
+            raise DescriptionError(f"{where}: type '{shown(kind)}' is none of {', '.join(KINDS)}")
         joint = Joint(
             name, kind, joint_end(element, "parent"), joint_end(element, "child"), kept=True
         )
@@ -317,7 +325,7 @@ class JointReader:
         parent, child = self._link(joint.parent, where), self._link(joint.child, where)
         joint.pose = child.relative_to(parent)
         pose, relative_to = read_pose(element, where)
-        if joint.movable and (pose != Pose() or relative_to not in ("", joint.child)):
+        if joint.kind != "fixed" and (pose != Pose() or relative_to not in ("", joint.child)):
             joint.anchor = self.frames.resolve(joint.name).relative_to(child)
 
     def _link(self, name: str, where: str) -> Pose:

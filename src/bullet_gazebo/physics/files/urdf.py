@@ -35,6 +35,7 @@ from bullet_gazebo.physics.files.elements import (
     rename_lumped,
     shown,
 )
+from bullet_gazebo.physics.files.extension_joints import add_extension_joints
 from bullet_gazebo.physics.files.mechanisms import add_mechanisms
 from bullet_gazebo.physics.files.motion import read_link_motion, read_spring, settle_kinematic
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
@@ -392,6 +393,7 @@ def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDe
             rename_lumped(plugin.element, model.lumped)
         except DescriptionError as error:
             warnings.append(f"plugin {shown(plugin.filename)}: {error}")
+    add_extension_joints(lumped, robot)
     settle_kinematic(lumped)
     add_mechanisms(lumped, robot)
     reading.split_meshes(lumped)
