@@ -20,7 +20,14 @@ from bullet_gazebo.physics.description import DescriptionError, Mesh
 from bullet_gazebo.physics.files.elements import numbers, place, shown
 from bullet_gazebo.physics.files.hull import convex_pieces, hull_points
 from bullet_gazebo.physics.files.mesh_looks import meters_of, read_glb, read_parts
-from bullet_gazebo.physics.files.meshes import Submesh, read_arrays, written
+from bullet_gazebo.physics.files.meshes import (
+    IMAGES,
+    Selection,
+    Submesh,
+    read_arrays,
+    written,
+)
+from bullet_gazebo.physics.files.shape_meshes import MADE, heightmap
 from file_access.content import FileError, read_file
 from file_access.xml_text import parse
 
@@ -55,7 +62,7 @@ Part = tuple[np.ndarray, np.ndarray]
 def answer(request: bytes) -> bytes:
     """Answers a request of `meshes`: digest, vertices, faces and hulls of a file, its looks, or pieces."""
     head, _, data = request.partition(b"\n")
-    what, name, submesh = json.loads(head)
+    what, name, given = json.loads(head)
     path, stream = Path(name), BytesIO()
     if what == "glb":
         return read_glb(path)
@@ -65,14 +72,20 @@ def answer(request: bytes) -> bytes:
     elif what == "pieces":
         arrays = convex_pieces(*read_arrays(data))
     else:
-        mesh = load(path, Submesh(*submesh) if submesh else None)
+        if what in MADE:
+            mesh = _hashed(*MADE[what](*given))
+        else:
+            mesh = load(path, Submesh(*given) if isinstance(given, list) else given)
         stream.write(mesh.digest.encode())
         arrays = (mesh.vertices, mesh.faces, *mesh.hulls)
     return stream.getvalue() + written(arrays)
 
 
-def load(path: Path, submesh: Submesh | None = None) -> Mesh:
+def load(path: Path, selection: Selection = None) -> Mesh:
     """Returns the mesh of a file, or of one named part of it."""
+    if path.suffix.lower() in IMAGES:
+        return _hashed(*heightmap(path, selection))
+    submesh = selection if isinstance(selection, Submesh) else None
     readers: dict[str, Callable[[bytes, str], list[Part]]]
     readers = {".stl": _read_stl, ".dae": _read_collada, ".obj": _read_obj}
     try:
@@ -103,6 +116,10 @@ def _make_mesh(parts: list[Part]) -> Mesh:
     hulls = tuple(hull_points(points) for points, _ in checked)
     if max(map(len, hulls)) < 3:
         raise DescriptionError("the physics engine finds nothing to touch in it")
+    return _hashed(vertices, faces, hulls)
+
+
+def _hashed(vertices: np.ndarray, faces: np.ndarray, hulls: tuple[np.ndarray, ...]) -> Mesh:
     state = hashlib.blake2b(digest_size=16)
     for array in (vertices, faces, *hulls):
         state.update(repr(array.shape).encode())
