@@ -78,7 +78,7 @@ def extruded(loops: list[list[tuple[float, float]]], height: float) -> Made:
         return vertices, faces, (vertices,)
     top = faces[(vertices[faces][..., 2] == height).all(axis=1)]
     prisms = [np.concatenate([vertices[each], vertices[each] * (1, 1, 0)]) for each in top]
-    return vertices, faces, tuple(filter(is_solid, prisms))
+    return vertices, faces, tuple(filter(is_solid, prisms)) or (vertices,)
 
 
 def ball() -> Made:

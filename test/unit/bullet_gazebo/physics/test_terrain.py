@@ -3,6 +3,7 @@
 import math
 import struct
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,13 +11,16 @@ from PIL import Image
 from support.robots.worlds import run
 
 from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.sdf import parse_sdf
+from bullet_gazebo.physics.files.world_file import load_world
 from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.pictures.visuals import pieces_of
 from bullet_gazebo.sensors.rays import RayScene
 
 RADIUS, GRAVITY = 0.2, 9.8
 ORIGIN = Pose()
+WORLDS = Path(__file__).parents[4] / "worlds"
 SIDE = 33
 DOWN = np.array([[0.0, 0.0, -1.0]])
 
@@ -212,3 +216,22 @@ def test_an_image_is_no_mesh(image):
             f'<sdf version="1.6"><model name="m"><link name="l"><collision name="c">{shape}</collision>'
             "</link></model></sdf>"
         )
+
+
+def test_a_rover_drives_over_hills_and_keeps_to_them(make_world):
+    """`worlds/hills.world`: over a slope, its wheels neither sink nor fly."""
+    hills = load_world(WORLDS / "hills.world", Resources())
+    assert hills.warnings == []
+    world = make_world()
+    for name, each in hills.models.items():
+        world.spawn(name, each, each.initial_pose)
+    pixels, rover = np.asarray(Image.open(WORLDS / "hills.png")), world.models["rover"]
+    for side in ("left", "right"):
+        rover.set_motor(side, 6.0, 5.0)
+    for _ in range(12):
+        run(world, 500)
+        for wheel in ("left_wheel", "right_wheel"):
+            x, y, z = rover.link_state(wheel)[0].position
+            ground = float(heights(np.array([x]), np.array([y]), pixels, 16.0, 1.3)[0])
+            assert 0.098 < z - ground < 0.12
+    assert rover.state()[0].position[0] > 2.0 and ground > 0.2
