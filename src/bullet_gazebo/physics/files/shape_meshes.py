@@ -13,6 +13,7 @@ from bullet_gazebo.physics.files.hull import is_solid
 
 MOST_PIXELS = 1025  # along a side of a height map: two million triangles
 MOST_SAMPLES = 513  # if pixels are divided; PyBullet loads so many in 4 s
+TAKEN = f"a height map has (2^n + 1) x (2^n + 1), from 3 x 3 to {MOST_PIXELS} x {MOST_PIXELS}"
 SAMPLING = 2  # samples for each pixel; the file format's default
 CONVEX = 1.0 - 1e-9  # of the hull's area
 ROUNDS = 4  # of dividing a ball's triangles
@@ -53,13 +54,12 @@ def _heights(path: Path) -> np.ndarray:
         with Image.open(path) as image:
             width, height = image.size
             if width != height or width < 3 or (width - 1) & (width - 2) or width > MOST_PIXELS:
-                raise DescriptionError(
-                    f"a height map of {width} x {height} pixels: it takes (2^n + 1) x (2^n + 1) of "
-                    f"them, from 3 x 3 to {MOST_PIXELS} x {MOST_PIXELS}"
-                )
+                raise DescriptionError(f"it has {width} x {height} pixels; {TAKEN}")
             deep = image.mode.startswith("I")  # 16 bits
             pixels = np.array(image if deep else image.convert("RGB"), dtype=float)
-    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
+    except Image.DecompressionBombError as error:
+        raise DescriptionError(f"it has too many pixels; {TAKEN}") from error
+    except (OSError, SyntaxError) as error:
         raise DescriptionError(f"the image can't be read: {error}") from error
     heights = pixels if deep else pixels[..., 0]
     return np.asarray(heights / max(heights.max(), 1.0))
