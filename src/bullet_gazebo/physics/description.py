@@ -55,13 +55,13 @@ class Inertia:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Checked triangles of a mesh file. Two meshes are equal if their files have the same contents.
+    """Checked triangles, of a file. Two meshes are equal if their files have the same contents.
 
     Attributes:
         vertices: (n, 3), finite [the file's unit; metres for COLLADA].
         faces: (m, 3), indices of vertices.
         hulls: points (k, 3) of the convex bodies that a moving mesh collides by: one for each object of the
-            file.
+            file. A height map has none.
         digest: of the arrays.
         in_pieces: whether `hulls` are solid pieces of a concave mesh.
     """
@@ -71,6 +71,11 @@ class Mesh:
     hulls: tuple[np.ndarray, ...]
     digest: str
     in_pieces: bool = False
+
+    @property
+    def is_heightmap(self) -> bool:
+        """Whether its vertices are a square grid: rows along x, the one at the lowest y first."""
+        return not self.hulls
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Mesh) and self.digest == other.digest
@@ -84,7 +89,8 @@ class Shape:
     """A collision or visual shape.
 
     `size` is (x, y, z) of a box, (radius, length) of a cylinder, (radius,) of a sphere [m], and the scales
-    of a mesh. `mesh` is the path of a mesh file, `solid` the content of a collision's file.
+    of a mesh. `mesh` is the path of a mesh file or of a height map's image, `solid` the content of a
+    collision's file.
     """
 
     kind: str
@@ -234,7 +240,7 @@ class Sensor:
 
 @dataclass
 class Light:
-    """A light. It lights nothing here; clients and windows read it."""
+    """A light. Cameras see by directional ones, windows by all; clients read it."""
 
     name: str
     diffuse: Color = (1.0, 1.0, 1.0, 1.0)

@@ -1,5 +1,6 @@
 """Writes a ModelDescription into MuJoCo's model of the whole world."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -12,6 +13,7 @@ from bullet_gazebo.physics.description import (
     DescriptionError,
     Inertia,
     Joint,
+    Mesh,
     ModelDescription,
     Shape,
 )
@@ -25,6 +27,8 @@ GEOMS = {
     "plane": mujoco.mjtGeom.mjGEOM_PLANE,
     "mesh": mujoco.mjtGeom.mjGEOM_MESH,
 }
+BASE = 1.0  # [m] of rock below the lowest place of a height map
+THINNEST = 1e-6  # [m]; a height map needs some height
 MU_STEPS, MOST_PRIORITY = 1e6, 2**30  # friction in whole steps of 1e-6
 OTHERS, KINEMATIC = 1, 2  # groups of geoms, which meet if either's affinity has the other's
 FASTENED = Inertia(mass=1.0, ixx=1.0, iyy=1.0, izz=1.0)  # of links that nothing can move
@@ -139,7 +143,9 @@ class ModelWriter:
             geom.contype, geom.conaffinity = meets
             geom.friction[0] = shape.mu
             geom.priority = priority(shape.mu)
-            if shape.kind == "mesh":
+            if shape.solid is not None and shape.solid.is_heightmap:
+                self._set_heights(geom, shape, shape.solid)
+            elif shape.kind == "mesh":
                 geom.meshname = self._add_mesh(shape, number)
             elif shape.kind == "box":
                 geom.size = [length / 2.0 for length in shape.size]
@@ -149,6 +155,19 @@ class ModelWriter:
                 geom.size = [shape.size[0], 0.0, 0.0]
             else:
                 geom.size = [0.0, 0.0, 1.0]  # infinite
+
+    def _set_heights(self, geom: mujoco.MjsGeom, shape: Shape, solid: Mesh) -> None:
+        """Makes a geom a height field. MuJoCo measures heights from the lowest place, as shares of all."""
+        heights = solid.vertices[:, 2] * shape.size[2]
+        rows, low, span = math.isqrt(len(heights)), float(heights.min()), float(np.ptp(heights))
+        name = f"{shape.mesh}:{solid.digest}:{shape.size}"
+        if self.spec.hfield(name) is None:
+            self.spec.add_hfield(
+                name=name, nrow=rows, ncol=rows, userdata=((heights - low) / (span or 1.0)).tolist(),
+                size=[shape.size[0] / 2.0, shape.size[1] / 2.0, max(span, THINNEST), BASE],
+            )  # fmt: skip
+        geom.type, geom.hfieldname = mujoco.mjtGeom.mjGEOM_HFIELD, name
+        geom.pos = shape.pose.compose(Pose((0.0, 0.0, low))).position
 
     def _add_mesh(self, shape: Shape, piece: int) -> str:
         """Adds the points of a mesh or of a piece of it, once for each scale; returns their name."""

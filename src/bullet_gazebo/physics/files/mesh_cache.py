@@ -31,14 +31,14 @@ def kept(path: Path, compute: Callable[[], bytes]) -> list[np.ndarray]:
         content = compute()
         arrays = read_arrays(content)
         with suppress(OSError):  # then it is computed anew each time
-            _write(path, path.name.encode() + b"\n" + content)
+            keep(path, path.name.encode() + b"\n" + content)
     else:
         with suppress(OSError):
             os.utime(path)
     return arrays
 
 
-def _write(path: Path, data: bytes) -> None:
+def keep(path: Path, data: bytes) -> None:
     """Writes a file all at once, and makes room for it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with scratch_folder(str(path.parent)) as folder:

@@ -21,8 +21,9 @@ from bullet_gazebo.physics.files.elements import numbers, place, shown
 from bullet_gazebo.physics.files.hull import convex_pieces, hull_points
 from bullet_gazebo.physics.files.mesh_cache import kept, read_arrays, written
 from bullet_gazebo.physics.files.mesh_looks import meters_of, read_glb, read_parts
-from bullet_gazebo.physics.files.meshes import Submesh
+from bullet_gazebo.physics.files.meshes import IMAGES, Selection, Submesh
 from bullet_gazebo.physics.files.plain_obj import READ, plain_obj
+from bullet_gazebo.physics.files.shape_meshes import MADE, heightmap
 from file_access.content import FileError, read_file
 from file_access.xml_text import parse
 
@@ -56,7 +57,7 @@ Part = tuple[np.ndarray, np.ndarray]
 def answer(request: bytes) -> bytes:
     """Answers a request of `meshes`: digest, vertices, faces and hulls of a file, its looks, or pieces."""
     head, _, data = request.partition(b"\n")
-    what, name, submesh, cache = json.loads(head)
+    what, name, given, cache = json.loads(head)
     path = Path(name)
     if what == "glb":
         return read_glb(path)
@@ -66,24 +67,31 @@ def answer(request: bytes) -> bytes:
     elif what == "pieces":
         arrays = convex_pieces(*read_arrays(data))
     else:
-        arrays = _load_once(path, Submesh(*submesh) if submesh else None, Path(cache))
+        if what in MADE:
+            return _as_bytes(_hashed(*MADE[what](*given)))
+        arrays = _load_once(
+            path, Submesh(*given) if isinstance(given, list) else given, Path(cache)
+        )
     return written(arrays)
 
 
-def _load_once(path: Path, submesh: Submesh | None, cache: Path) -> list[np.ndarray]:
+def _load_once(path: Path, selection: Selection, cache: Path) -> list[np.ndarray]:
     """Returns digest, vertices, faces and hulls; those of large files are kept by their content."""
     data = _read(path)
 
     def compute() -> bytes:
-        mesh = load(path, submesh, data)
-        digest = np.frombuffer(mesh.digest.encode(), np.uint8)
-        return written((digest, mesh.vertices, mesh.faces, *mesh.hulls))
+        return _as_bytes(load(path, selection, data))
 
     if len(data) < LARGE:
         return read_arrays(compute())
     content = hashlib.blake2b(data, digest_size=16, key=path.suffix.lower().encode())
-    content.update(repr(submesh).encode())
+    content.update(repr(selection).encode())
     return kept(cache / f"{KEPT}-{content.hexdigest()}", compute)
+
+
+def _as_bytes(mesh: Mesh) -> bytes:
+    digest = np.frombuffer(mesh.digest.encode(), np.uint8)
+    return written((digest, mesh.vertices, mesh.faces, *mesh.hulls))
 
 
 def _read(path: Path) -> bytes:
@@ -93,8 +101,11 @@ def _read(path: Path) -> bytes:
         raise DescriptionError(str(error)) from error
 
 
-def load(path: Path, submesh: Submesh | None = None, data: bytes | None = None) -> Mesh:
+def load(path: Path, selection: Selection = None, data: bytes | None = None) -> Mesh:
     """Returns the mesh of a file, or of one named part of it; `data` is its content if it is read already."""
+    if path.suffix.lower() in IMAGES:
+        return _hashed(*heightmap(path, selection))
+    submesh = selection if isinstance(selection, Submesh) else None
     readers: dict[str, Callable[[bytes, str], list[Part]]]
     readers = {".stl": _read_stl, ".dae": _read_collada, ".obj": _read_obj}
     data = _read(path) if data is None else data
@@ -122,6 +133,10 @@ def _make_mesh(parts: list[Part]) -> Mesh:
     hulls = tuple(hull_points(points) for points, _ in checked)
     if max(map(len, hulls)) < 3:
         raise DescriptionError("the physics engine finds nothing to touch in it")
+    return _hashed(vertices, faces, hulls)
+
+
+def _hashed(vertices: np.ndarray, faces: np.ndarray, hulls: tuple[np.ndarray, ...]) -> Mesh:
     state = hashlib.blake2b(digest_size=16)
     for array in (vertices, faces, *hulls):
         state.update(repr(array.shape).encode())

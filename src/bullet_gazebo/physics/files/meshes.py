@@ -5,6 +5,7 @@ A limited child process reads them (`mesh_program`, `mesh_looks`) and takes them
 
 import json
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -15,13 +16,15 @@ import numpy as np
 from bullet_gazebo.physics.description import Color, DescriptionError, Mesh
 from bullet_gazebo.physics.files.elements import place
 from bullet_gazebo.physics.files.hull import is_solid
-from bullet_gazebo.physics.files.mesh_cache import cache_folder, kept, read_arrays, written
+from bullet_gazebo.physics.files.mesh_cache import cache_folder, keep, kept, read_arrays, written
 from file_access.limited import LimitedProcess, Limits, RequestRefused
 
 SUFFIXES = (".stl", ".dae", ".obj")
-PLAIN = (".stl",)  # of files that have no materials
+IMAGES = (".png", ".jpg", ".jpeg")  # of height maps
+PLAIN = (".stl", *IMAGES)  # of files that have no materials
 LIMITS = Limits(processor_time=60, wall_time=120.0, memory=4 << 30, output=1 << 30)
 MOST_KEPT = 32  # files with their looks
+FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of STL
 PIECES = "v-hacd-1"  # begins the names of kept pieces; another one when others would come out
 
 # It stays for further meshes: starting Python and importing trimesh takes longer than most files.
@@ -36,6 +39,10 @@ class Submesh(NamedTuple):
 
     name: str
     centred: bool
+
+
+Selection = Submesh | int | None
+"""What is read of a file: one part of a mesh, or so many samples per pixel of a height map."""
 
 
 class MeshPart(NamedTuple):
@@ -86,19 +93,32 @@ class MeshLook:
             return b""
 
 
-def read_mesh(path: Path, submesh: Submesh | None = None) -> Mesh:
-    """Returns the mesh of an STL, COLLADA or OBJ file, or of one named part of it.
+def read_mesh(path: Path, selection: Selection = None) -> Mesh:
+    """Returns the mesh of an STL, COLLADA or OBJ file, or of one named part of it, or a height map.
 
     Raises:
         DescriptionError: if it can't be simulated: the file, the place in it and the fault, in one line.
     """
-    check_mesh(path)
+    check_mesh(path, (*SUFFIXES, *IMAGES))
     with place(f"mesh '{path}'"):
-        try:
-            request = ["mesh", str(path), submesh, str(cache_folder())]
-            data = _process.ask(json.dumps(request).encode())
-        except RequestRefused as error:
-            raise DescriptionError(str(error)) from error
+        return _asked("mesh", str(path), selection)
+
+
+def make_mesh(what: str, *given: object) -> tuple[str, Mesh]:
+    """Returns a mesh that `shape_meshes` makes, and the file that it is kept in for whoever draws it."""
+    mesh = _asked(what, "", given)
+    path = cache_folder() / f"{what}-{mesh.digest}.stl"
+    if not path.exists():
+        with suppress(OSError):  # then it isn't drawn
+            keep(path, stl(mesh.vertices[mesh.faces]))
+    return str(path), replace(mesh, in_pieces=len(mesh.hulls) > 1)
+
+
+def _asked(what: str, path: str, given: object) -> Mesh:
+    try:
+        data = _process.ask(json.dumps([what, path, given, str(cache_folder())]).encode())
+    except RequestRefused as error:
+        raise DescriptionError(str(error)) from error
     digest, vertices, faces, *hulls = read_arrays(data)
     return Mesh(vertices, faces, tuple(hulls), digest.tobytes().decode())
 
@@ -130,13 +150,20 @@ def _of_pieces(mesh: Mesh, pieces: Iterable[np.ndarray]) -> Mesh:
     return replace(mesh, hulls=tuple(pieces), digest=f"{mesh.digest}-pieces", in_pieces=True)
 
 
+def stl(corners: np.ndarray) -> bytes:
+    """Returns facets as binary STL, which PyBullet reads fastest, without normals."""
+    facets = np.zeros(corners.size // 9, FACET)
+    facets["corners"] = corners.reshape(-1, 3, 3)
+    return bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
+
+
 def read_look(path: str) -> MeshLook:
     """Reads the mesh file of a visual; the same one, unchanged, is read once.
 
     Raises:
         DescriptionError: it can't be shown; one line with the file and what is wrong.
     """
-    check_mesh(Path(path))
+    check_mesh(Path(path), (*SUFFIXES, *IMAGES))
     found = Path(path).stat()
     return _look(Path(path), found.st_mtime_ns, found.st_size)
 
@@ -146,10 +173,10 @@ def _look(path: Path, _changed: int, _size: int) -> MeshLook:
     return MeshLook(path, read_mesh(path))
 
 
-def check_mesh(path: Path) -> None:
+def check_mesh(path: Path, suffixes: tuple[str, ...] = SUFFIXES) -> None:
     """Refuses what can't be a mesh, without reading it."""
-    if path.suffix.lower() not in SUFFIXES:
-        raise DescriptionError(f"mesh '{path}': only {', '.join(SUFFIXES)} files are read")
+    if path.suffix.lower() not in suffixes:
+        raise DescriptionError(f"mesh '{path}': only {', '.join(suffixes)} files are read")
     if not path.is_file():  # reading a pipe would wait forever
         raise DescriptionError(f"mesh '{path}': it is not a file")
     if path.stat().st_size == 0:

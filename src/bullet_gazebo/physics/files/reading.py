@@ -16,7 +16,13 @@ from bullet_gazebo.physics.description import (
     ModelDescription,
 )
 from bullet_gazebo.physics.files.elements import files_named_by_a_model, place, shown
-from bullet_gazebo.physics.files.meshes import Submesh, check_mesh, in_pieces, read_mesh
+from bullet_gazebo.physics.files.meshes import (
+    SUFFIXES,
+    Selection,
+    check_mesh,
+    in_pieces,
+    read_mesh,
+)
 from file_access.content import MAX_BYTES, FileError, TooLarge, read_file
 from file_access.xml_text import MAX_ELEMENTS, parse
 
@@ -123,7 +129,7 @@ class Reading:
         self._bytes = self._elements = self._models = 0
         self.begin()
         self._files: dict[Path, Element] = {}
-        self._meshes: dict[tuple[Path, Submesh | None], Mesh] = {}
+        self._meshes: dict[tuple[Path, Selection], Mesh] = {}
 
     def begin(self) -> None:
         """Begins another model of a world."""
@@ -161,17 +167,17 @@ class Reading:
             self._files[path] = self.parse(data)
             return self._files[path]
 
-    def mesh(self, path: Path, submesh: Submesh | None = None) -> Mesh:
+    def mesh(self, path: Path, selection: Selection = None) -> Mesh:
         """Returns the mesh of a file or of a named part of it. It is the same object each time."""
-        if (path, submesh) not in self._meshes:
+        if (path, selection) not in self._meshes:
             with files_named_by_a_model(f"mesh '{path}'"):
                 self._mesh_bytes += path.stat().st_size
             if self._mesh_bytes > MAX_MESH_BYTES:
                 raise LimitExceeded(
                     f"mesh '{path}': more than {MAX_MESH_BYTES} bytes of mesh files (MAX_MESH_BYTES)"
                 )
-            self._meshes[path, submesh] = read_mesh(path, submesh)
-        return self._meshes[path, submesh]
+            self._meshes[path, selection] = read_mesh(path, selection)
+        return self._meshes[path, selection]
 
     def split_meshes(self, model: ModelDescription) -> None:
         """Gives concave meshes convex pieces if any link collides with its own model.
@@ -184,7 +190,7 @@ class Reading:
         end = time.monotonic() + MAX_SPLITTING
         for link in model.links.values():
             for number, shape in enumerate(link.collisions):
-                if shape.solid is None:
+                if shape.solid is None or shape.solid.is_heightmap:
                     continue
                 self.check()
                 if shape.solid not in found:
@@ -239,9 +245,14 @@ class MeshFinder:
         return False
 
     def find(
-        self, uri: str, where: str, needed: bool, submesh: Submesh | None = None
+        self,
+        uri: str,
+        where: str,
+        needed: bool,
+        selection: Selection = None,
+        suffixes: tuple[str, ...] = SUFFIXES,
     ) -> MeshFile | None:
-        """Returns the file's path and its mesh, or the `submesh`; None for one that is left out.
+        """Returns the file's path and its mesh, or the `selection`; None for one that is left out.
 
         A visual's isn't `needed`: it is looked for but not read, since nothing is drawn here.
         """
@@ -249,10 +260,8 @@ class MeshFinder:
             if not uri.strip():
                 raise DescriptionError("the mesh has no file name")
             path = self.resources.find(uri, self.folder).absolute()
-            if not needed:
-                check_mesh(path)
-                return str(path), None
-            return str(path), self.reading.mesh(path, submesh)
+            check_mesh(path, suffixes)
+            return str(path), self.reading.mesh(path, selection) if needed else None
         except DescriptionError as error:
             if needed:
                 raise type(error)(f"{where}: {error}") from error

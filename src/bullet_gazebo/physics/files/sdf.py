@@ -36,12 +36,12 @@ from bullet_gazebo.physics.files.sdf_parts import (
     WORLD,
     Frames,
     JointReader,
-    ShapeReader,
     joint_end,
     read_inertia,
     read_pose,
     read_sensors,
 )
+from bullet_gazebo.physics.files.sdf_shapes import ShapeReader
 from bullet_gazebo.physics.loops import span
 from bullet_gazebo.physics.lumping import detach_from_world, mend_moments, unique
 from bullet_gazebo.physics.pose import Pose
@@ -206,6 +206,10 @@ def read_model(element: Element, context: FileContext) -> ModelDescription:
         parts = _read_parts(element, context, static, MAX_NESTING)
         if context.version > NEWEST:
             parts.warnings.append("written for a newer SDF than 1.7: what is new in it is ignored")
+        solids = [shape.solid for link in parts.links for shape in link.collisions]
+        if not static and any(solid and solid.is_heightmap for solid in solids):
+            static = True
+            parts.warnings.append("it has a height map, so it is static, as in Gazebo")
         model = _assemble(name, parts, static)
         model.initial_pose = read_pose(element, "model")[0]
         context.reading.split_meshes(model)

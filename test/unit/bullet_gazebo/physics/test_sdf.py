@@ -306,7 +306,7 @@ def test_sensors_and_plugins_are_read():
         ),
         (
             sdf(link("a", more='<collision name="c"><geometry><heightmap/></geometry></collision>')),
-            "collision 'c', heightmap: this kind of geometry is not simulated",
+            "link 'a', collision 'c': the mesh has no file name",
         ),
     ],
 )  # fmt: skip
