@@ -13,6 +13,7 @@ from bullet_gazebo.physics.description import (
     Plugin,
 )
 from bullet_gazebo.physics.files import elements
+from bullet_gazebo.physics.files.element_table import without_effect
 from bullet_gazebo.physics.files.elements import named, numbers, read_plugin, shown, truth
 from bullet_gazebo.physics.files.own_models import own_models
 from bullet_gazebo.physics.files.reading import Reading, Resources
@@ -40,7 +41,7 @@ SOLVER = {
     "contact_surface_layer": "constraints/contact_surface_layer",
 }
 """Elements of `<physics><ode>`."""
-NOT_SIMULATED = ("actor", "population", "road", "joint")
+NOT_SIMULATED = ("actor",)
 
 
 @dataclass
@@ -92,6 +93,7 @@ def _read(root: Element, context: FileContext) -> WorldDescription:
     if element is None:
         raise DescriptionError("there is no <world>")
     world = WorldDescription(element.get("name", "") or "default")
+    world.warnings += without_effect(root, "sdf")
     _read_physics(world, element)
     for child in element:
         if child.tag in ("model", "include", "light"):
