@@ -97,9 +97,11 @@ class WithoutEffect:
                     continue
                 if row is not None and row.answer in ("", READ) and row.section != MODEL:
                     own = child.get("name", child.get("reference", ""))
-                    inside = [outside, f"{child.tag} '{shown(own)}'" if own else ""]
+                    inner = (
+                        f"{child.tag} '{shown(own)}'" if own else child.tag if row.section else ""
+                    )
                     below = table[row.section].top.below if row.section else row.below
-                    todo.append((child, below, ", ".join(filter(None, inside))))
+                    todo.append((child, below, ", ".join(filter(None, (outside, inner)))))
 
     def _judge(self, what: str, row: Row | None, text: str, outer: Element, place: str) -> bool:
         """Keeps the place of `what` if a warning tells of it; returns whether."""

@@ -33,6 +33,7 @@ NOT_YET = {
     "gazebo": ["dampingFactor", "spring", "kinematic", "velocity_decay", "joint"],
 }
 BY_PLUGINS = [("camera", "@name")]  # the multi-camera's
+OF_SENSORS = ("sensor", "vector", "noise", "ray", "camera")
 # What is looked at but dropped: the frame of any pose, and the kind of a shape that is refused.
 IN_VAIN = ("pose/@relative_to", "pose/@frame", "image")
 SEEN: list[Any] = []  # elements, and pairs of elements and attributes
@@ -103,8 +104,8 @@ def watched(monkeypatch):
     SEEN.clear()
 
 
-def read(document: Element, sim: Simulator) -> None:
-    """Reads a file's world or model, and its sensors."""
+def read(document: Element, sim: Simulator | None) -> None:
+    """Reads a file's world or model, and with a simulator its sensors."""
     text = ElementTree.tostring(document)
     with suppress(DescriptionError):
         if document.tag == "robot":
@@ -115,7 +116,7 @@ def read(document: Element, sim: Simulator) -> None:
             parse_world(text, Resources())
         else:
             description = parse_sdf(text)
-            if description.name not in sim.world.models:
+            if sim is not None:
                 measure(description, sim)
 
 
@@ -139,10 +140,11 @@ def looked_at(path: str) -> bool:
 
 
 def is_seen(section: str, path: str, sim: Simulator) -> bool:
+    """Whether anybody looks at it in any of the files that hold it."""
     seen = False
     for document in documents(section, path, ""):
         SEEN.clear()
-        read(document, sim)
+        read(document, sim if section in OF_SENSORS else None)
         seen = seen or looked_at(path)
     return seen
 

@@ -173,11 +173,13 @@ def test_one_line_names_all_that_has_no_effect_and_what_nobody_knows():
 def test_a_world_has_a_line_of_its_own_and_each_model_too():
     found = parse_world(
         """<sdf version="1.6"><world name="w"><wind><linear_velocity>1 0 0</linear_velocity></wind><models/>
+        <physics type="ode"><ode><solver><type>world</type></solver></ode></physics>
         <model name="m"><link name="l"><enable_wind>true</enable_wind></link></model></world></sdf>""",
         Resources(),
     )
     assert found.warnings == [
-        "no effect here: <linear_velocity> of world 'w'; unknown: <models> of world 'w' (docs/files.md)"
+        "no effect here: <linear_velocity> of world 'w', <type> of world 'w', physics; "
+        "unknown: <models> of world 'w' (docs/files.md)"
     ]
     assert found.models["m"].warnings == [
         "no effect here: <enable_wind> of link 'l' (docs/files.md)"
