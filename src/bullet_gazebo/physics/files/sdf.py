@@ -20,6 +20,7 @@ from bullet_gazebo.physics.description import (
     Sensor,
 )
 from bullet_gazebo.physics.files import elements
+from bullet_gazebo.physics.files.element_table import MODEL, WithoutEffect
 from bullet_gazebo.physics.files.elements import (
     files_named_by_a_model,
     named,
@@ -55,12 +56,16 @@ NEWEST = (1, 7)
 
 @dataclass(frozen=True)
 class FileContext:
-    """The file of an element: how its URIs are resolved, and its version of SDF."""
+    """The file of an element: how its URIs are resolved, and its version of SDF.
+
+    `unread` collects what has no effect in the model that is read.
+    """
 
     resources: Resources
     reading: Reading
     version: tuple[int, int]
     folder: Path | None = None
+    unread: WithoutEffect = field(default_factory=WithoutEffect)
 
 
 def open_include(include: Element, context: FileContext) -> tuple[Element, FileContext]:
@@ -203,7 +208,9 @@ def read_model(element: Element, context: FileContext) -> ModelDescription:
     name = named(element, "model")
     with elements.place(f"model '{shown(name)}'"):
         static = truth(element.findtext("static"))
+        context = replace(context, unread=WithoutEffect())
         parts = _read_parts(element, context, static, MAX_NESTING)
+        parts.warnings[:0] = context.unread.warnings()
         if context.version > NEWEST:
             parts.warnings.append("written for a newer SDF than 1.7: what is new in it is ignored")
         solids = [shape.solid for link in parts.links for shape in link.collisions]
@@ -211,7 +218,9 @@ def read_model(element: Element, context: FileContext) -> ModelDescription:
             static = True
             parts.warnings.append("it has a height map, so it is static, as in Gazebo")
         model = _assemble(name, parts, static)
-        model.initial_pose = read_pose(element, "model")[0]
+        model.initial_pose, frame = read_pose(element, "model")
+        if frame not in ("", WORLD):
+            model.warnings.append(f"<pose>: it is the world's, not relative to '{shown(frame)}'")
         context.reading.split_meshes(model)
         return model
 
@@ -250,7 +259,10 @@ def _read_parts(model: Element, context: FileContext, static: bool, depth: int) 
         raise LimitExceeded(f"models are nested more than {MAX_NESTING} deep (MAX_NESTING)")
     context.reading.model()
     parts, frames = _Parts(), Frames()
-    if model.get("folder") in own_models() and not truth(model.get("exact")):
+    if model.get("folder") not in own_models():
+        place = "" if depth == MAX_NESTING else f"model '{shown(model.get('name', ''))}'"
+        context.unread.look(model, MODEL, place)
+    elif not truth(model.get("exact")):
         parts.stand_ins.append(model.get("folder", ""))
     nested = list(_nested(model, context, static, depth))
     _name_frames(model, frames)

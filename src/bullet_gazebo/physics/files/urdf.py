@@ -22,6 +22,7 @@ from bullet_gazebo.physics.description import (
 )
 from bullet_gazebo.physics.engine_form import check_shapes
 from bullet_gazebo.physics.files import elements
+from bullet_gazebo.physics.files.element_table import without_effect
 from bullet_gazebo.physics.files.elements import (
     TINY,
     direction,
@@ -396,5 +397,6 @@ def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDe
     add_extension_joints(lumped, robot)
     settle_kinematic(lumped)
     add_mechanisms(lumped, robot)
+    lumped.warnings[:0] = without_effect(robot, "robot")
     reading.split_meshes(lumped)
     return lumped

@@ -14,6 +14,7 @@ from bullet_gazebo.physics.description import (
     Plugin,
 )
 from bullet_gazebo.physics.files import elements
+from bullet_gazebo.physics.files.element_table import without_effect
 from bullet_gazebo.physics.files.elements import named, numbers, read_plugin, shown, truth
 from bullet_gazebo.physics.files.own_models import own_models
 from bullet_gazebo.physics.files.reading import LoadProgress, Reading, Resources
@@ -49,7 +50,7 @@ SOLVER = {
     "contact_surface_layer": "constraints/contact_surface_layer",
 }
 """Elements of `<physics><ode>`."""
-NOT_SIMULATED = ("actor", "population", "road", "joint")
+NOT_SIMULATED = ("actor",)
 
 
 @dataclass
@@ -101,6 +102,7 @@ def _read(root: Element, context: FileContext) -> WorldDescription:
     if element is None:
         raise DescriptionError("there is no <world>")
     world = WorldDescription(element.get("name", "") or "default")
+    world.warnings += without_effect(root, "sdf")
     _read_physics(world, element)
     progress = LoadProgress("entities of the world file are read", len(element))
     for child in element:
