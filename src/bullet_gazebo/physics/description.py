@@ -98,6 +98,9 @@ class Link:
     collisions: list[Shape] = field(default_factory=list)
     visuals: list[Shape] = field(default_factory=list)
     gravity: bool = True  # whether gravity acts on it
+    says_gravity: bool = (
+        False  # whether a URDF's <gazebo> says so: then it counts where it is lumped
+    )
     self_collide: bool = False  # also with links of its own model that it isn't joined to
     part_of: str = ""  # of a helper link for the engine: the link that it was split from
 
