@@ -80,7 +80,10 @@ def _of_robot(sim: Simulator, robot: ModelDescription, interfaces: Mapping[str, 
     up = rotate(conjugate(first.orientation), (0.0, 0.0, 1.0))
     level = max(-1.0, min(1.0, rotate(pose.orientation, up)[2]))
     if not fault and not (level > UPRIGHT and sank < most + SLACK):
-        fault = "it falls"
+        solid = any(each.collisions for each in robot.links.values())
+        fault = (
+            "it falls" if solid else "it has no <collision>, so that it falls through the ground"
+        )
     still = []
     for joint in driven:
         sim.restore_state(begin)

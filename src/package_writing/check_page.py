@@ -53,22 +53,24 @@ def examine(file: RobotFile, parameters: str | None) -> Findings:
         CannotUse: if that file can't be read.
     """
     page, content = Findings(str(file.path)), file.content
-    page.notes += [*content.warnings, *(f"without effect: {each}" for each in content.left_out)]
+    page.notes += [f"without effect: {each}" for each in content.left_out]
     page.wrong += _inertia_faults(file.root)
     interfaces: Mapping[str, str] = {}
     if isinstance(content, ModelDescription):
+        page.notes += content.warnings
         page.lines |= _contents(content)
         known = {*content.links, *content.lumped, "world"}
         lost = [each.get("name", "") for each in file.root.findall("link")]
         page.wrong += [f"link '{name}' is dropped: no mass" for name in lost if name not in known]
-        _add_served(page, [content])
+        _add_served(page, [content], [])
         if file.root.tag == "robot":
             interfaces = _control(page, file, content, parameters)
     else:
+        page.wrong += content.warnings  # of models that are left out
         models = list(content.models.values())
         page.notes += [f"model '{m.name}': {w}" for m in models for w in (*m.warnings, *m.left_out)]
         page.lines["world"] = f"{content.name}; models: {', '.join(content.models) or 'none'}"
-        _add_served(page, models)
+        _add_served(page, models, content.plugins)
     faults = defaultdict(list)
     for module, engine in ENGINES.items():
         name = {"bullet": "PyBullet", "mujoco": "MuJoCo"}[engine]
@@ -137,7 +139,9 @@ def _inertia_faults(root: Element) -> Iterator[str]:
             yield f"{moments} kg m²: no body has one above the sum of the others"
 
 
-def _add_served(page: Findings, models: Sequence[ModelDescription]) -> None:
+def _add_served(
+    page: Findings, models: Sequence[ModelDescription], plugins: Sequence[Plugin]
+) -> None:
     known = None
     if importlib.util.find_spec("rospy") is not None:  # which plugins import
         from bullet_gazebo.ros.plugins.plugin_loader import built_in
@@ -150,9 +154,9 @@ def _add_served(page: Findings, models: Sequence[ModelDescription]) -> None:
         return names
 
     sensors = [each for model in models for each in model.sensors]
-    listed = [f"{s.name}: {s.kind}, {' '.join(said(s.plugins)) or 'no plugin'}" for s in sensors]
-    plugins = said([each for model in models for each in model.plugins])
-    page.lines |= {h: ", ".join(f) for h, f in (("plugins", plugins), ("sensors", listed)) if f}
+    listed = [f"{s.name}: {s.kind}, {', '.join(said(s.plugins)) or 'no plugin'}" for s in sensors]
+    libraries = said([*plugins, *(each for model in models for each in model.plugins)])
+    page.lines |= {h: "; ".join(f) for h, f in (("plugins", libraries), ("sensors", listed)) if f}
 
 
 def _control(

@@ -71,6 +71,7 @@ def test_a_sound_robot_is_fine_on_one_page(check):
         (robot(BASE.replace('ixx="0.002"', 'ixx="0"')), "must be above 0"),
         (robot(GROUNDED, '<link name="rod"/>', SWING), "link 'rod' is dropped: no mass"),
         (robot(LINK.format("base", BOX.format("0.3 0 0"))), "it falls (PyBullet and MuJoCo)"),
+        (robot(BASE), "it has no <collision>, so that it falls through the ground"),
         (robot(FIXED, BASE, ROD, SWING, MOTOR.format("ghost", "Effort")), "joint 'ghost': no such joint"),
     ],
 )  # fmt: skip
@@ -187,6 +188,13 @@ def test_sdf_and_worlds(check):
     assert code == 0
     assert "  world       room; models: ground_plane, walls, boxes" in page.splitlines()
     assert page.count("nothing blows up") == 2 and "  model       crate: base free" in page
+
+
+def test_a_model_that_a_world_lacks_is_a_fault(check):
+    code, page, _ = check(ROOT / "test/data/worlds/boxes.world")
+    assert code == 1
+    assert "  WRONG       model 'broken': link 'l': <pose> must hold 6 numbers" in page
+    assert "  note        nothing serves libnobody_has_this.so" in page.splitlines()
 
 
 def test_json_has_the_same(check):
