@@ -112,6 +112,9 @@ class Link:
     collisions: list[Shape] = field(default_factory=list)
     visuals: list[Shape] = field(default_factory=list)
     gravity: bool = True  # whether gravity acts on it
+    says_gravity: bool = (
+        False  # whether a URDF's <gazebo> says so: then it counts where it is lumped
+    )
     self_collide: bool = False  # also with links of its own model that it isn't joined to
     kinematic: bool = False  # moved by services alone; true only of a free root link
     decay: tuple[float, float] | None = None  # of linear and angular velocity, the share of a step

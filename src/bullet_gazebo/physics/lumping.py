@@ -103,6 +103,7 @@ def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
     left = (above[name].name for name in order if name in above)
     model.joints = {name: model.joints[name] for name in left if name in model.joints}
     model.lumped = {name: at for name, at in model.lumped.items() if at[0] in model.links}
+    model.sensors.sort(key=lambda sensor: order.index(sensor.link))
     moved = [_lumped_sensor(model, sensor) for sensor in model.sensors]
     model.sensors = [sensor for sensor in moved if sensor.link in model.links]
     mend_moments(model)
@@ -152,7 +153,8 @@ def detach_from_world(model: ModelDescription) -> None:
 def _lump(model: ModelDescription, name: str) -> None:
     joint = model.joints.pop(name)
     parent, child = model.links[joint.parent], model.links.pop(joint.child)
-    parent.gravity = parent.gravity and child.gravity
+    if child.says_gravity:
+        parent.gravity, parent.says_gravity = child.gravity, True
     parent.self_collide = parent.self_collide or child.self_collide
     parent.kinematic = parent.kinematic or child.kinematic
     parent.decay = child.decay if parent.decay is None else parent.decay

@@ -315,10 +315,10 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
                 raise DescriptionError(f"{place}: {number} is negative")
             changed: dict[str, Any] = {SURFACE[element.tag]: number}
             link.collisions = [replace(shape, **changed) for shape in link.collisions]
-        elif element.tag == "turnGravityOff":
-            link.gravity = _value(element) in NO  # anything else turns it off, also nothing
-        elif element.tag == "gravity":
-            link.gravity = _value(element) in ("", *YES)
+        elif element.tag in ("turnGravityOff", "gravity"):
+            # Anything else than "no" turns it off, also an empty element.
+            on = NO if element.tag == "turnGravityOff" else ("", *YES)
+            link.gravity, link.says_gravity = _value(element) in on, True
         elif element.tag == "selfCollide":
             link.self_collide = _value(element) in YES
         elif element.tag == "plugin":
@@ -335,7 +335,8 @@ def _apply_to_joint(model: ModelDescription, joint: Joint, block: Element) -> No
     if _value(block.find("preserveFixedJoint")) in YES:
         joint.kept = True
     elif _value(block.find("disableFixedJointLumping")) in YES:
-        joint.kind = "revolute"
+        joint.kind, joint.axis = "revolute", (0.0, 0.0, 1.0)
+        joint.effort = joint.velocity = -1.0
 
 
 def _value(element: Element | None) -> str:
