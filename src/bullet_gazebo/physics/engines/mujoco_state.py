@@ -15,6 +15,9 @@ FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
 TENDON = mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON
 ROWS = 3  # constraints of a contact: along its normal, and two across it
+SLIDING = 0.2  # [m/s] times friction; what slides slower hops by micrometres
+SLOWEST = 0.1  # [m/s, rad/s] of a world where something may slide
+PASSES = 2  # solutions of a step before the one that counts; each leaves a part of what friction lifts
 
 
 @dataclass
@@ -47,11 +50,15 @@ class MujocoState:
     def step(self) -> None:
         """Integrates by one time step; efforts and wrenches end with it."""
         np.copyto(self._before, self._positions)
-        if self.speeds or self.gears or (self.placed and not self.whole_steps):
+        moves = not self.whole_steps and hypot(*self._speeds()) > SLOWEST
+        if moves or self.speeds or self.gears or (self.placed and not self.whole_steps):
             mujoco.mj_step1(self.model, self.data)
-            self._drive()
+            if self.speeds or self.gears:
+                self._drive()
             if self.placed:
                 self._ease_contacts()
+            if moves:
+                self._keep_down()
             mujoco.mj_step2(self.model, self.data)
         else:
             mujoco.mj_step(self.model, self.data)
@@ -101,6 +108,32 @@ class MujocoState:
         above = bool((most < aims).any())
         np.minimum(aims, most, out=aims)
         return above
+
+    def _keep_down(self) -> None:
+        """Lets friction lift nothing.
+
+        MuJoCo's friction is convex: what misses its aim across a contact by an acceleration a misses it along
+        the normal by mu a. So the normals aim lower by that, which takes solving the step to know.
+        """
+        model, data = self.model, self.data
+        first = data.ne + data.nf + data.nl
+        speeds = data.efc_vel[first:].tolist()
+        if hypot(*speeds) < SLIDING:
+            return
+        friction = data.contact.friction[data.contact.efc_address >= 0, 0]
+        across = zip(friction.tolist(), speeds[1::ROWS], speeds[2::ROWS], strict=True)
+        if all(mu * hypot(one, other) < SLIDING for mu, one, other in across):
+            return
+        mujoco.mj_fwdActuation(model, data)
+        mujoco.mj_fwdAcceleration(model, data)
+        aims, missed = data.efc_aref[first::ROWS].copy(), np.empty(data.nefc)
+        for _ in range(PASSES):
+            mujoco.mj_fwdConstraint(model, data)
+            mujoco.mj_mulJacVec(model, data, missed, data.qacc)
+            missed -= data.efc_aref
+            along, one, other = missed[first:].reshape(-1, ROWS).T
+            lift = np.where(along > 0.0, friction * np.hypot(one, other), 0.0)
+            data.efc_aref[first::ROWS] = aims - lift
 
     def _slow_down(self) -> None:
         """Limits speeds, and integrates the positions again.
