@@ -66,6 +66,9 @@ std::pair<std::string, std::vector<double>> geometry(const sdf::Geometry &shape)
   if (const auto *mesh = shape.MeshShape()) {
     return {"mesh", {mesh->Scale().X(), mesh->Scale().Y(), mesh->Scale().Z()}};
   }
+  if (const auto *heights = shape.HeightmapShape()) {
+    return {"mesh", {heights->Size().X(), heights->Size().Y(), heights->Size().Z()}};
+  }
   return {shape.Type() == sdf::GeometryType::PLANE ? "plane" : "other", {}};
 }
 

@@ -366,7 +366,7 @@ def test_it_stays_closed_when_the_world_changes(linkage):
         assert max(gap(model), gap(other), missed(model)) < 2e-4
         if name == "other":
             world.delete(name)
-    assert not model.body.link_gravity("rocker")
+    assert not model.description.links["rocker"].gravity
 
 
 def test_a_gripper_of_four_bars_holds_a_box(world):

@@ -30,7 +30,6 @@ def test_an_arm_of_collada_with_y_up_is_the_one_of_stl(tmp_path):
     assert ours == pytest.approx(wanted, abs=2e-5)
 
 
-@pytest.mark.xfail(reason="the springs of joints have no effect yet")
 def test_a_vehicle_on_springs_sinks_by_its_weight(make_world):
     world = make_world(ground=True)
     model = world.spawn("car", parse_urdf(suspension()), Pose((0.0, 0.0, DROP + RADIUS)))
