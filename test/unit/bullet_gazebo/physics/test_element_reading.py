@@ -32,8 +32,8 @@ NOT_YET = {
     "geometry": ["capsule", "ellipsoid", "plane/size", "polyline", "heightmap"],
     "gazebo": ["dampingFactor", "spring", "kinematic", "velocity_decay", "joint"],
 }
-# The multi-camera's plugin reads it; it needs a picture.
-ELSEWHERE = [("camera", "@name"), ("geometry", "heightmap/pos")]
+# The multi-camera's plugin reads it; it needs a picture; it needs another kind of noise.
+ELSEWHERE = [("camera", "@name"), ("geometry", "heightmap/pos"), ("ray", "noise/precision")]
 OF_SENSORS = ("sensor", "vector", "noise", "ray", "camera")
 # What is looked at but dropped: the frame of any pose, and the kind of a shape that is refused.
 IN_VAIN = ("pose/@relative_to", "pose/@frame", "image")
