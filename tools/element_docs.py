@@ -62,7 +62,7 @@ def _listed(rows: list[tuple[str, Row]]) -> Iterator[str]:
 
 def _name(name: str, row: Row) -> str:
     if name == "*":
-        return "all others"
+        return "`*`"
     if row.section in ("", "value"):
         return f"`{name}`"
     heading = element_table()[row.section].title

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Iterator
 from functools import cache
+from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -17,7 +18,7 @@ HERE = "{urn:test}here"  # an attribute of what a document was made for
 XS = "{http://www.w3.org/2001/XMLSchema}"
 ROOTS = ("sdf", "robot")
 NAMED = ("world", "model", "light", "actor", "link", "joint", "collision", "visual", "sensor", "transmission",
-         "frame")  # fmt: skip
+         "frame", "plugin")  # fmt: skip
 
 Found = tuple[str, str, str]
 """Of a schema: a section of the table, a path in it, and the value that the schema has for it."""
@@ -37,7 +38,9 @@ MODEL = """<sdf version="1.7"><model name="m"><link name="l">
 </model></sdf>"""
 WORLD = """<sdf version="1.7"><world name="w"><light name="sun" type="point"/>
 <model name="m"><static>1</static><link name="l"/></model>
-<include><uri>model://table</uri></include></world></sdf>"""
+<include><uri>model://table</uri></include>
+<state world_name="w"><model name="m"><pose/><link name="l"><pose>0 0 0 0 0 0</pose></link></model>
+<light name="sun"/></state></world></sdf>"""
 ROBOT = """<robot name="r"><link name="l"><inertial><mass value="1"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><geometry/></collision><visual><geometry/></visual></link>
@@ -102,9 +105,16 @@ def documents(section: str, path: str, value: str) -> Iterator[Element]:
         bases = ['<sdf version="1.7"/>']
     else:
         bases = [WORLD if way[0] == "world" else MODEL]
-    for base in bases:
+    ways = [way]
+    if section == "geometry":
+        ways.append(["visual" if name == "collision" else name for name in way])
+    for base, inner in product(bases, ways):
         document = ElementTree.fromstring(base)
-        _put(document, way, value)
+        _put(document, inner, value)
+        here = document.find(f".//*[@{HERE}]")
+        refers = element_table()[section].named[path].section
+        if here is not None and here.tag in NAMED and refers and not here.get("name"):
+            here.set("name", f"{here.tag}_x")
         for geometry in document.iter("geometry"):
             if not len(geometry):
                 shape = SubElement(geometry, "box")

@@ -260,7 +260,10 @@ def test_gazebo_blocks_set_friction_and_gravity():
     )
     model = parse_urdf(robot(link("base"), extra))
     assert not model.links["base"].gravity
-    assert model.warnings == ["<gazebo reference='nobody'> refers to no link or joint"]
+    assert model.warnings == [
+        "no effect here: <mu2> of gazebo 'base', <kp> of gazebo 'base' (docs/files.md)",
+        "<gazebo reference='nobody'> refers to no link or joint",
+    ]
 
 
 def test_gravity_of_links_that_a_fixed_joint_joins_is_the_childs():
