@@ -148,9 +148,7 @@ class Scene:
         rest = {joint.name: (0.0, found[at][1]) for at, joint in joints.items()}
         states = closed(robot.links, rest, goals)
         if states is None:
-            raise TaskError(
-                f"an episode puts {sorted(goals)} where the loops of its robot don't close"
-            )
+            raise TaskError(f"an episode puts {sorted(goals)} where its robot's loops don't close")
         found |= {at: states[joint.name] for at, joint in joints.items()}
 
     def placed_models(self, initial: InitialState) -> dict[str, Motion]:

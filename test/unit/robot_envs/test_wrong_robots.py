@@ -236,5 +236,5 @@ def test_an_episode_leaves_closed_loops_closed(root):
     placed = scene.placed_joints(InitialState(joints={"left_drive": (0.5, 1.0)}))
     for name, sign in (("left_drive", 1), ("left_link", 1), ("left_knuckle", -1), ("left_tip", 1)):
         assert placed[name] == pytest.approx((0.5 * sign, 1.0 * sign), abs=1e-6)
-    with pytest.raises(TaskError, match=r"'left_link'\] where the loops of its robot don't close"):
+    with pytest.raises(TaskError, match=r"'left_link'\] where its robot's loops don't close"):
         scene.placed_joints(InitialState(joints={"left_drive": 0.5, "left_link": 0.3}))
