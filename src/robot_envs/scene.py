@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
+from bullet_gazebo.physics.loops import closed
 from file_access.text import nearest_or_all
 from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError, TaskError
@@ -133,7 +134,22 @@ class Scene:
                 self._warned.add(name)
                 text = f"an episode puts the joint '{name}' at {position:g}, beyond its stops"
                 logger.warning("%s: it starts at %g", text, stop)
+        for robot in self.robots:
+            if robot.links.loops:
+                self._close_loops(robot, found, initial)
         return found
+
+    def _close_loops(self, robot: Robot, found: Placed, initial: InitialState) -> None:
+        """Puts the joints of closed loops that an episode doesn't place where these close."""
+        joints = {self.joint(robot, each.name): each for each in robot.links.movable_joints}
+        goals = {
+            j.name: j.clamped(found[at][0]) for at, j in joints.items() if at in initial.joints
+        }
+        rest = {joint.name: (0.0, found[at][1]) for at, joint in joints.items()}
+        states = closed(robot.links, rest, goals)
+        if states is None:
+            raise TaskError(f"an episode puts {sorted(goals)} where its robot's loops don't close")
+        found |= {at: states[joint.name] for at, joint in joints.items()}
 
     def placed_models(self, initial: InitialState) -> dict[str, Motion]:
         """Returns the models to place; raises TaskError for an impossible pose."""

@@ -178,6 +178,12 @@ class Joint:
     def bounded(self) -> bool:
         return self.kind in ("revolute", "prismatic")
 
+    def clamped(self, position: float) -> float:
+        """Returns `position` [rad, m] within its stops. Crossed stops don't act, as in ODE."""
+        if not self.bounded or self.lower > self.upper:
+            return position
+        return max(self.lower, min(self.upper, position))
+
 
 @dataclass(frozen=True)
 class Mimic:
@@ -335,8 +341,8 @@ class ModelDescription:
 
     def bodies_of(self, link: str) -> list[str]:
         """Returns a link and the helpers that share its inertia: those that are welded to it."""
-        welded = (each for each in self.loops if each.closing == "weld")
-        return [link, *(each.name for each in welded if each.part_of == link)]
+        welded = {each.name: each.part_of for each in self.loops if each.closing == "weld"}
+        return [link, *(name for name, whole in welded.items() if whole == link)]
 
     def inertias(self) -> dict[str, Inertia | None]:
         """Returns the inertia of each link in an engine: helpers that close loops have shares of it."""

@@ -6,7 +6,7 @@ of the child's inertia. So it is a joint like any other, with a position, stops,
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -35,11 +35,10 @@ def span(links: dict[str, Link], joints: dict[str, Joint], warnings: list[str]) 
         first.setdefault(joint.child, joint.name)
     parts = {name: [name] for name in links}  # the links that are joined to each one
     tree: dict[str, list[str]] = {name: [] for name in links}
-    ranks = {
-        joint.name: (joint.kind != "fixed", not joint.movable, first[joint.child] != joint.name)
-        for joint in joints.values()
-    }
-    for joint in sorted(joints.values(), key=lambda each: ranks[each.name]):
+    for joint in sorted(
+        joints.values(),
+        key=lambda each: (each.kind != "fixed", not each.movable, first[each.child] != each.name),
+    ):
         one, other = parts[joint.parent], parts[joint.child]
         if one is other:
             _close(links, joints, joint, warnings)
@@ -102,21 +101,11 @@ def in_loops(model: ModelDescription) -> set[str]:
     return found
 
 
-def closed(
-    model: ModelDescription,
-    states: States,
-    goals: Mapping[str, float],
-    clamp: Callable[[str, float], float],
-) -> States | None:
+def closed(model: ModelDescription, states: States, goals: Mapping[str, float]) -> States | None:
     """Returns states of the movable joints with closed loops, near `states`; None if none is found.
 
-    Joints go to their goals in steps, with all loops closed, so that none changes to another branch.
-
-    Args:
-        model: the model.
-        states: position and velocity of each movable joint.
-        goals: positions [rad, m] of joints that keep their velocities, too.
-        clamp: returns the position [rad, m] within a joint's stops.
+    Joints with goals [rad, m] go there in steps, with all loops closed, so that none changes to another
+    branch, and keep their velocities.
     """
     joints = model.movable_joints
     places = {joint.name: place for place, joint in enumerate(joints)}
@@ -129,19 +118,22 @@ def closed(
     at = {name: position for name, (position, _) in states.items()}
     ways = {name: goal - at[name] for name, goal in goals.items()}
     steps = min(MOST_STEPS, math.ceil(max(map(abs, ways.values()), default=0.0) / LONGEST)) or 1
+    if np.abs(_open(model, at | dict(goals))[0]).max() < CLOSE:
+        steps = 1  # in between all joints needn't fit
     for step in range(1, steps + 1):
         at |= {name: goals[name] - way * (1.0 - step / steps) for name, way in ways.items()}
         for name, mimic in model.mimics.items():
-            at[name] = clamp(name, mimic.multiplier * at[mimic.driver] + mimic.offset)
+            wanted = mimic.multiplier * at[mimic.driver] + mimic.offset
+            at[name] = model.joints[name].clamped(wanted)
         for _ in range(ITERATIONS):
             gap, matrix = _open(model, at)
             if np.abs(gap).max() < CLOSE:
                 break
             change = np.linalg.lstsq(matrix @ follow, gap, rcond=1e-9)[0]
             change *= min(1.0, LONGEST / max(np.abs(change).max(initial=0.0), 1e-300))
-            for place, (name, move) in enumerate(zip(places, follow @ change, strict=True)):
-                if follow[place].any():
-                    at[name] = clamp(name, at[name] + float(move))
+            for joint, row in zip(joints, follow, strict=True):
+                if row.any():
+                    at[joint.name] = joint.clamped(at[joint.name] + float(row @ change))
         else:
             return None
     speeds = np.array([states[name][1] for name in places])

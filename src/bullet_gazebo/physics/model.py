@@ -172,7 +172,7 @@ class Model:
         old = {name: state[0] for name, state in zip(self._joints, before, strict=True)}
         starts = {name: (old[name], state[1]) for name, state in states.items()}
         goals = {name: states[name][0] for name in states if name in held}
-        found = closed(self.description, starts if goals else states, goals, self.clamped)
+        found = closed(self.description, starts if goals else states, goals)
         if found is None:
             loose = in_loops(self.description)
             found = states | {name: (old[name], 0.0) for name in states if name in loose}
@@ -191,10 +191,7 @@ class Model:
 
     def clamped(self, name: str, position: float) -> float:
         """Returns `position` [rad, m] within the stops of joint `name`."""
-        joint = self.description.joints[name]
-        if not joint.bounded or joint.lower > joint.upper:
-            return position
-        return max(joint.lower, min(joint.upper, position))
+        return self.description.joints[name].clamped(position)
 
     def set_stops(self, name: str, lower: float | None, upper: float | None) -> None:
         """Sets a joint's stops [rad, m]; None keeps one. Crossed stops don't act, as in ODE."""

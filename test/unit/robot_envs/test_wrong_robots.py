@@ -5,10 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.robots.grippers import transmission
 from support.scenes.solo_arm import SOLO, Hold, episode, is_a_line
 from support.scenes.two_arms import LEFT_CONTROLLERS
 
 from robot_envs import InitialState, Pose, Robot, RobotEnv, RobotEnvError
+from robot_envs.errors import TaskError
 from robot_envs.scene import Scene
 
 XACRO = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">${nothing}</robot>'
@@ -224,3 +226,15 @@ def test_a_start_beyond_a_stop_is_told_once(caplog):
     (record,) = caplog.records
     wanted = f"an episode puts the joint 'elbow' at 45, beyond its stops: it starts at {upper:g}"
     assert record.getMessage() == wanted
+
+
+def test_an_episode_leaves_closed_loops_closed(root):
+    """Joints that it doesn't place follow those that it does."""
+    text = (root / "test/data/robots/four_bar_gripper.urdf").read_text()
+    text = text.replace("</robot>", transmission("left_drive", "Effort") + "</robot>")
+    scene = Scene([Robot(urdf=text)])
+    placed = scene.placed_joints(InitialState(joints={"left_drive": (0.5, 1.0)}))
+    for name, sign in (("left_drive", 1), ("left_link", 1), ("left_knuckle", -1), ("left_tip", 1)):
+        assert placed[name] == pytest.approx((0.5 * sign, 1.0 * sign), abs=1e-6)
+    with pytest.raises(TaskError, match=r"'left_link'\] where its robot's loops don't close"):
+        scene.placed_joints(InitialState(joints={"left_drive": 0.5, "left_link": 0.3}))

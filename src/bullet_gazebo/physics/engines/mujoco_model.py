@@ -90,10 +90,8 @@ class ModelWriter:
         pins = {joint.child: joint.anchor.position for joint in self.model.joints.values()}
         for helper in self.model.loops:
             names = (f"{self.key}:{helper.part_of}", f"{self.key}:{helper.name}")
-            if helper.closing == BALL:
-                add_equality(self.spec, mujoco.mjtEq.mjEQ_CONNECT, names, pins[helper.name])
-            else:
-                add_weld(self.spec, names, Pose())
+            pin = pins[helper.name] if helper.closing == BALL else None
+            add_weld(self.spec, names, Pose(), pin)
 
     def _add_link(self, parent: mujoco.MjsBody, link: str, pose: Pose) -> mujoco.MjsBody:
         body = parent.add_body(
@@ -193,19 +191,16 @@ class ModelWriter:
                 self.spec.add_exclude(bodyname1=f"{self.key}:{a}", bodyname2=f"{self.key}:{b}")
 
 
-def add_weld(spec: mujoco.MjSpec, names: tuple[str, str], pose: Pose) -> None:
-    """Fixes a body to another one, at `pose` in the frame of the first one."""
-    numbers = (*ZERO, *pose.position, *wxyz(pose.orientation), 1.0)
-    add_equality(spec, mujoco.mjtEq.mjEQ_WELD, names, numbers)
-
-
-def add_equality(
-    spec: mujoco.MjSpec, kind: mujoco.mjtEq, names: tuple[str, str], numbers: tuple[float, ...]
+def add_weld(
+    spec: mujoco.MjSpec, names: tuple[str, str], pose: Pose, pin: Vector | None = None
 ) -> None:
-    """Adds a constraint of two bodies."""
-    data = np.pad(numbers, (0, mujoco.mjNEQDATA - len(numbers)))
-    body = mujoco.mjtObj.mjOBJ_BODY
-    spec.add_equality(type=kind, objtype=body, name1=names[0], name2=names[1], data=data)
+    """Fixes a body to another one, at `pose` in the frame of the first one; or only its point `pin` there."""
+    kind = mujoco.mjtEq.mjEQ_WELD if pin is None else mujoco.mjtEq.mjEQ_CONNECT
+    numbers = pin or (*ZERO, *pose.position, *wxyz(pose.orientation), 1.0)
+    spec.add_equality(
+        type=kind, objtype=mujoco.mjtObj.mjOBJ_BODY, name1=names[0], name2=names[1],
+        data=np.pad(numbers, (0, mujoco.mjNEQDATA - len(numbers))),
+    )  # fmt: skip
 
 
 def geoms_of(shape: Shape) -> int:

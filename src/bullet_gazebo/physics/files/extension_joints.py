@@ -29,9 +29,9 @@ def add_extension_joints(model: ModelDescription, robot: Element) -> None:
     joints, links = dict(model.joints), dict(model.links)
     for given in _read(found, poses, model.warnings):
         joint = _on_whole_links(given, model)
-        if joint.name in joints or not {joint.parent, joint.child} <= {WORLD, *links}:
+        if joint.name in joints:
             model.warnings.append(
-                f"joint '{joint.name}' has the name of another one, or its link was dropped; it is left out"
+                f"joint '{joint.name}' is there twice; that in <gazebo> is left out"
             )
             continue
         joints[joint.name] = joint
@@ -62,17 +62,12 @@ def _read(found: Iterable[Element], poses: dict[str, Pose], warnings: list[str])
 def _on_whole_links(joint: Joint, model: ModelDescription) -> Joint:
     """Returns the joint with the links that are simulated in place of its own ones."""
     if joint.parent == WORLD and model.world_joints and WORLD not in model.links:
-        pose = joint.pose.relative_to(model.root_pose)
-        joint = replace(joint, parent=model.root, pose=pose)
+        joint = replace(joint, parent=model.root, pose=joint.pose.relative_to(model.root_pose))
     if joint.parent in model.lumped:
         parent, pose = model.lumped[joint.parent]
         joint = replace(joint, parent=parent, pose=pose.compose(joint.pose))
     if joint.child in model.lumped:
         child, pose = model.lumped[joint.child]
-        joint = replace(
-            joint,
-            child=child,
-            pose=joint.pose.compose(pose.inverse()),
-            anchor=pose.compose(joint.anchor),
-        )
+        place, anchor = joint.pose.compose(pose.inverse()), pose.compose(joint.anchor)
+        joint = replace(joint, child=child, pose=place, anchor=anchor)
     return joint

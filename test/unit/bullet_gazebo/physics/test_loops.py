@@ -335,6 +335,17 @@ def test_joints_that_a_service_moves_leave_the_loop_closed(linkage, caplog):
     assert model.joint_states() == [(0.0, 0.0)] * 4
 
 
+def test_all_joints_of_a_loop_may_be_placed_at_once(linkage):
+    world, model = linkage()
+    model.set_joint_positions({"drive": 1.0})
+    states = model.joint_states()
+    world.reset(joints=True)
+    model.set_joint_positions(
+        dict(zip(model.joint_names, (each[0] for each in states), strict=True))
+    )
+    assert np.array(model.joint_states()) == pytest.approx(np.array(states), abs=1e-6)
+
+
 def test_snapshots_and_new_worlds_repeat_to_the_bit(linkage):
     def future():
         run(world, 300)
@@ -432,7 +443,7 @@ def test_joints_in_a_urdfs_extension():
     assert joint.pose.position == pytest.approx((0.0, 0.0, 0.0))
     for wrong, why in (
         (hinge("tip", "a", "nobody"), "nobody"),
-        (hinge("j", "a", "b"), "the name of another one"),
+        (hinge("j", "a", "b"), "is there twice"),
         ('<joint name="s" type="screw"><parent>a</parent><child>b</child></joint>', "screw"),
         (hinge("tip", "a", "world"), "not its child"),
     ):
