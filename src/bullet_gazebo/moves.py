@@ -4,8 +4,10 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 
 from bullet_gazebo.physics.model import Model
+from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
 
+NEAR = 1e-3  # [m, rad / 2] by which attached links may be off
 Moved = Collection[Model] | None
 """The models that were moved, with what is attached to them; None for all, after a reset."""
 
@@ -25,7 +27,10 @@ class Moves:
         pending = None if moved is None or pending is None else {*pending, *moved}
         self._pending = pending if self._open else ()
         if self._open == 0 and pending != set():
-            found = None if pending is None else self._world.with_attached(pending)
+            found = pending
+            if pending is not None:
+                _carry(self._world, pending)
+                found = self._world.with_attached(pending)
             for listener in self.listeners:
                 listener(found)
 
@@ -52,3 +57,30 @@ class Moves:
 
     def forget(self, listener: Callable[[Moved], None]) -> None:
         self.listeners = [each for each in self.listeners if each is not listener]
+
+
+def _carry(world: World, moved: Collection[Model]) -> None:
+    """Moves what is attached to moved models along; what is fixed, or was moved as well, is detached."""
+    stay = {*moved, *(each for each in world.models.values() if each.description.fixed_base)}
+    waiting = list(moved)
+    while waiting:
+        model = waiting.pop()
+        for each in [attachment for attachment in world.attachments if attachment.joins(model)]:
+            (one, link), (other, its) = each.first, each.second
+            pose, wanted = other.link_state(its)[0], one.link_state(link)[0].compose(each.pose)
+            if one is other or _near(pose, wanted):
+                continue
+            if model is other:
+                wanted, pose = pose.compose(each.pose.inverse()), one.link_state(link)[0]
+                other = one
+            if other in stay:
+                world.detach(each)
+                continue
+            other.place(wanted.compose(other.state()[0].relative_to(pose)))
+            stay.add(other)
+            waiting.append(other)
+
+
+def _near(pose: Pose, other: Pose) -> bool:
+    gap = pose.relative_to(other)
+    return max(map(abs, (*gap.position, *gap.orientation[:3]))) < NEAR

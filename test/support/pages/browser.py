@@ -64,13 +64,6 @@ class Browser:
             self._socket = connect(page["webSocketDebuggerUrl"], max_size=None)
             self._do("Runtime.enable")
             self._do("Page.enable")
-            self._do(
-                "Emulation.setDeviceMetricsOverride",
-                width=self._size[0],
-                height=self._size[1],
-                deviceScaleFactor=1,
-                mobile=False,
-            )  # the window has a frame, and a least width
             if self._offline:
                 self._do("Network.enable")
                 self._do("Network.emulateNetworkConditions", offline=True, latency=0,
@@ -98,6 +91,11 @@ class Browser:
             if answer.get("id") == number:
                 assert "error" not in answer, answer
                 return answer["result"]
+
+    def resize(self, width, height):
+        """Gives the page a size [pixels]: a window has a frame, and a least width."""
+        self._do("Emulation.setDeviceMetricsOverride", width=width, height=height,
+                 deviceScaleFactor=1, mobile=False)  # fmt: skip
 
     def run(self, script):
         """Returns the value of a JavaScript expression."""

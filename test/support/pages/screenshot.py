@@ -21,7 +21,7 @@ def parse_args():
     parser.add_argument("address")
     parser.add_argument("out", type=Path, help="a PNG, of 256 colours")
     parser.add_argument("--click", nargs="*", default=[], metavar="TEXT", help="in this order")
-    parser.add_argument("--size", default="1200x700", help="of the window [pixels]")
+    parser.add_argument("--size", default="1200x700", help="of the picture [pixels]")
     parser.add_argument(
         "--settle", type=float, default=10.0, help="[s] from then on until the picture is taken"
     )
@@ -31,7 +31,8 @@ def parse_args():
 def main():
     args = parse_args()
     size = tuple(int(each) for each in args.size.split("x"))
-    with Browser(args.address, size=size) as page:
+    with Browser(args.address) as page:
+        page.resize(*size)
         for text in args.click:
             page.click(text)
         wait_for(lambda: bool(page.text.strip()), "text on the page")

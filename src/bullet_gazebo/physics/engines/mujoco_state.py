@@ -18,9 +18,7 @@ ROWS = 3  # constraints of a contact: along its normal, and two across it
 OUT = 0.1  # of the fastest separation; what separates more slowly is out
 SLIDING = 0.2  # [m/s] times friction; what slides slower hops by micrometres
 SLOWEST = 0.1  # [m/s, rad/s] of a world where something may slide
-PASSES = (
-    2  # solutions of a step before the one that counts; each leaves a part of what friction lifts
-)
+PASSES = 2  # times that a step is solved before; each leaves a part of what friction lifts
 
 
 @dataclass

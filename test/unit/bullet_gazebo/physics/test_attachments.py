@@ -1,11 +1,15 @@
 """Links of two models that are fixed to each other while the world runs."""
 
+import math
+
 import pytest
 from support.robots.grippers import cube, gripper
 from support.robots.worlds import run
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.model import AT_REST
 from bullet_gazebo.physics.pose import Pose, from_rpy
+from bullet_gazebo.simulator import Simulator
 
 PLACE = Pose((0.12, 0.03, 0.1), from_rpy(0.3, -0.4, 1.0))
 
@@ -74,6 +78,41 @@ def test_detached_it_falls_and_can_be_attached_again(world):
     box.place(box.state()[0])
     run(world, 100)
     assert near(between(robot, box), fallen, 1e-3)
+
+
+def test_what_is_attached_goes_along_when_something_other_than_time_moves_it(world):
+    """Else it was drawn there by the engine, and both flew away at 100 m/s."""
+    robot, box, _ = pair(world)
+    simulator, before = Simulator(world), between(robot, box)
+    other = world.spawn("other", parse_urdf(cube()), Pose((0.5, 0.0, 0.1)))
+    world.attach((other, "cube_link"), (box, "cube_link"))
+    simulator.set_joint_positions(robot, {"lift": 0.3})
+    assert near(between(robot, box), before)
+    run(world, 200)
+    assert near(between(robot, box), before)
+    assert other.state()[0].position[2] == pytest.approx(0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_one_that_is_placed_takes_along_what_is_free_and_leaves_what_is_fixed(world, order):
+    simulator = Simulator(world)
+    boxes = [
+        world.spawn(name, parse_urdf(cube()), Pose((x, 0.0, 1.0), from_rpy(x, 0.2, 0.3)))
+        for name, x in (("a", 0.0), ("b", 0.2))
+    ]
+    made = world.attach(*((box, "cube_link") for box in boxes[::order]))
+    before = boxes[1].state()[0].relative_to(boxes[0].state()[0])
+    simulator.place_model(boxes[0], Pose((1.0, 2.0, 1.5), from_rpy(0.5, 0.0, 2.0)), AT_REST)
+    run(world, 50)
+    assert near(boxes[1].state()[0].relative_to(boxes[0].state()[0]), before)
+    assert math.dist(boxes[1].state()[0].position, (1.0, 2.0, 1.5)) < 0.3
+    world.detach(made)
+    robot, box, _ = pair(world)
+    simulator.place_model(box, Pose((1.0, 1.0, 1.0)), AT_REST)
+    assert not world.attachments
+    run(world, 10)
+    assert near(box.state()[0], Pose((1.0, 1.0, 1.0)), 1e-3)
+    assert near(robot.state()[0], Pose())
 
 
 @pytest.mark.parametrize("joints", [False, True])
