@@ -22,16 +22,7 @@ from bullet_gazebo.sensors.sensing import Mount, Sensing
 from bullet_gazebo.sensors.sensor_readers import BY_KIND, WITHOUT
 from bullet_gazebo.simulator import Simulator
 
-NOT_YET = {
-    "actor": [""],
-    "state": [""],
-    "model_state": [""],
-    "world": ["actor", "state"],
-    "link": ["kinematic", "velocity_decay"],
-    "joint": ["axis/dynamics/spring_reference"],
-    "geometry": ["capsule", "ellipsoid", "plane/size", "polyline", "heightmap"],
-    "gazebo": ["dampingFactor", "spring", "kinematic", "velocity_decay", "joint"],
-}
+NOT_YET = {"actor": [""], "world": ["actor"]}
 # The multi-camera's plugin reads it; it needs a picture; it needs another kind of noise.
 ELSEWHERE = [("camera", "@name"), ("geometry", "heightmap/pos"), ("ray", "noise/precision")]
 OF_SENSORS = ("sensor", "vector", "noise", "ray", "camera")
