@@ -1,8 +1,8 @@
 """Writes a catkin package for the user's own robot; only scripts/new_robot.py uses it.
 
 `cli` reads the command line, `urdf_files` copies the URDF with what it includes, `survey` finds out what
-it is made of, `contents` fills in the files of `template/`, and `package` combines the results. It knows no
-robot by name.
+it is made of, `gains` tunes its controllers, `contents` fills in the templates, and `package` combines the
+results. It knows no robot by name.
 """
 
 __all__ = ["CannotWrite"]
