@@ -5,6 +5,7 @@ it is made of, `gains` tunes its controllers, `contents` fills in the templates,
 results. It knows no robot by name.
 """
 
+__wall_time__ = True  # of its waits, also in a script whose time is simulated
 __all__ = ["CannotWrite"]
 
 

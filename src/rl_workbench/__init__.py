@@ -1,8 +1,8 @@
 """Trains agents in Gymnasium's environments, and shows what they learned.
 
 Public names: `train` and `Callback`, to train from Python, and `WorkbenchError`, the error of both.
-The command line is `python3 -m rl_workbench`. The installed command, `rl-workbench`, is this one with the
-environments of this project registered (`cartpole.workbench`).
+The command line is `python3 -m rl_workbench`; the installed command, `rl-workbench`, has this project's
+environments registered.
 """
 
 from importlib import import_module
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rl_workbench.training.callbacks import Callback
     from rl_workbench.training.train import train
 
+__wall_time__ = True  # of its waits, also in a script whose time is simulated
 __all__ = ["Callback", "WorkbenchError", "train"]
 _MODULES = {"Callback": "training.callbacks", "WorkbenchError": "errors", "train": "training.train"}
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         WorldState,
     )
 
+__wall_time__ = True  # of its waits, also in a script whose time is simulated
 __all__ = [
     "EMPTY",
     "Camera",
