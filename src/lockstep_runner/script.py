@@ -21,6 +21,7 @@ PYTHON_2 = re.compile(
     "call to '(print|exec)'|multiple exception types|leading zeros|inconsistent use of tabs"
 )
 OURS = __name__.partition(".")[0]
+ADDRESS = "LOCKSTEP_CLOCK"  # environment variable: path of the script process's socket
 
 
 class NoScript(Exception):
