@@ -17,4 +17,4 @@ if TYPE_CHECKING:
     from bullet_gazebo.control.errors import ControlError as ControlError
     from bullet_gazebo.physics.model import Model as Model
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(__name__, __path__)

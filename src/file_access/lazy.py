@@ -1,24 +1,27 @@
 """Public names of a package whose modules are imported when a name is first used (PEP 562)."""
 
 import ast
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 
 def attach(
-    package: str, file: str
+    package: str, path: Sequence[str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """Returns `__getattr__`, `__dir__` and `__all__` of a package, from its imports for type checkers.
 
     Args:
         package: The package's name.
-        file: Its `__init__.py`; what `if TYPE_CHECKING:` imports in it are the public names.
+        path: Its `__path__`; what `if TYPE_CHECKING:` imports in `__init__.py` there are the public names. In
+            catkin's devel space that is another file than its `__file__`.
     """
     places = {
         alias.name: node.module
-        for block in ast.parse(Path(file).read_bytes()).body
+        for folder in path
+        for file in Path(folder).glob("__init__.py")
+        for block in ast.parse(file.read_bytes()).body
         if isinstance(block, ast.If)
         for node in block.body
         if isinstance(node, ast.ImportFrom) and node.module

@@ -15,4 +15,4 @@ if TYPE_CHECKING:
     from rl_workbench.training.train import train as train
 
 __wall_time__ = True  # of its waits, also in a script whose time is simulated
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(__name__, __path__)

@@ -34,4 +34,4 @@ if TYPE_CHECKING:
     from robot_envs.world_state import WorldState as WorldState
 
 __wall_time__ = True  # of its waits, also in a script whose time is simulated
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(__name__, __path__)

@@ -33,4 +33,4 @@ if TYPE_CHECKING:
     from ros_utils import step_client as step_client
     from ros_utils import testing as testing
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(__name__, __path__)
