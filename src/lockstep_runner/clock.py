@@ -18,11 +18,10 @@ import rospy.impl.simtime
 from lockstep_runner import originals
 from lockstep_runner.notices import tell_once
 from lockstep_runner.topics import Callbacks
-from lockstep_runner.world import ScriptWorld
+from lockstep_runner.world import NANOSECONDS, ScriptWorld
 
-NANOSECONDS = 1_000_000_000
 LOOK = 0.002  # [s of wall time] between two checks whether a busy thread has ended
-PATIENCE = 10.0  # [s of wall time] for a thread that computes or waits for anything but time
+THREAD_PATIENCE = 10.0  # [s of wall time] for a thread that computes or waits for anything but time
 PAUSED_LOOKS = 0.001, 0.05  # [s of wall time] between two checks of a paused world: first, longest
 Condition = Callable[[], bool]
 
@@ -277,7 +276,7 @@ class Clock:
         """Waits until no other thread computes."""
         if not self._running:
             return
-        deadline = originals.monotonic() + PATIENCE
+        deadline = originals.monotonic() + THREAD_PATIENCE
         me = threading.get_ident()
         with self._guard:
             while self._running.keys() - {me}:
@@ -297,6 +296,6 @@ class Clock:
                         tell_once(
                             f"busy {thread.name}",
                             f"thread '{thread.name}' has computed, or waited for something that isn't"
-                            f" simulated time, for {PATIENCE:g} s; time continues without it, so that what"
-                            " it does from here on isn't repeatable",
+                            f" simulated time, for {THREAD_PATIENCE:g} s; time continues without it, so that"
+                            " what it does from here on isn't repeatable",
                         )

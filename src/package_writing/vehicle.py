@@ -24,7 +24,7 @@ FASTEST = 0.6  # [m/s]
 QUICKEST = 2.0  # [rad/s]
 MARGIN = 0.03  # [m] between the base and what it touches
 ROOM = 0.1  # [m] around the base where it starts
-LARGEST = 0.65  # [m], clearance of a base for which the room that comes along has space
+LARGEST_CLEARANCE = 0.65  # [m], clearance of a base for which the room that comes along has space
 WAYS = 64  # directions in which an outline is measured
 
 
@@ -64,7 +64,7 @@ class Base:
     @property
     def world(self) -> str:
         """The file of a world in which it drives, in the package cartpole; "" for an empty one."""
-        return "worlds/room.world" if self.laser and self.clearance <= LARGEST else ""
+        return "worlds/room.world" if self.laser and self.clearance <= LARGEST_CLEARANCE else ""
 
 
 def find_base(survey: Survey) -> Base | None:

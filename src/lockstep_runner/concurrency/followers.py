@@ -71,7 +71,9 @@ def _name(pid: int) -> str:
     return "ended"
 
 
-PATIENCE = 10.0  # [s of wall time] for a node that computes or waits for something other than time
+NODE_PATIENCE = (
+    10.0  # [s of wall time] for a node that computes or waits for something other than time
+)
 
 
 @dataclass
@@ -160,7 +162,7 @@ class Followers(Others):
         self._until_all_rest()
 
     def _until_all_rest(self) -> None:
-        deadline = originals.monotonic() + PATIENCE
+        deadline = originals.monotonic() + NODE_PATIENCE
         with self._guard:
             while any(node.covered and not node.rests for node in self._nodes.values()):
                 originals.condition_wait(self._guard, LOOK)
@@ -173,8 +175,8 @@ class Followers(Others):
                         node.covered = False
                         tell_once(
                             f"busy {node.name}",
-                            f"node {node.name} has computed for {PATIENCE:g} s; time continues without it,"
-                            " so that what it does meanwhile isn't repeatable",
+                            f"node {node.name} has computed for {NODE_PATIENCE:g} s; time continues without"
+                            " it, so that what it does meanwhile isn't repeatable",
                         )
 
     def _accept(self) -> None:
