@@ -21,7 +21,7 @@ from bullet_gazebo.control.pid import Loop
 from bullet_gazebo.physics.description import is_control_plugin
 from bullet_gazebo.physics.dynamics import mobility, most_inertias, poses_at_zero
 from bullet_gazebo.physics.engine import Contact
-from bullet_gazebo.physics.model import Model
+from bullet_gazebo.physics.model import SOFTEST, Model
 
 Log = Callable[[int, str], None]
 """Logs a text at a level of `logging`."""
@@ -30,7 +30,7 @@ MOST = 4.0  # of the eigenvalue
 P_ONLY_DAMPING = 0.05  # of critical damping
 P_ONLY_TAG = "pOnlyDamping"
 STILL = 1e-3  # [rad, m] by which a stalled joint may move
-OFF = 0.05  # [rad, m] of a stalled joint to its goal, if its motor isn't at the limit
+OFF = 0.05  # [rad, m] of a stalled joint to its goal, and that it may move, if its motor isn't at the limit
 STALLED = 1_000_000_000  # [ns]
 
 
@@ -112,7 +112,8 @@ class StabilityWatch:
         for name, how in held.items():
             position = joints[name].position
             since, place = self._pushing.get(name, (now, position))
-            if now < since or abs(position - place) > STILL:
+            # What its own links hold may creep or tremble.
+            if now < since or abs(position - place) > (STILL if name in full else OFF):
                 since, place = now, position
             pushing[name] = since, place
             if now - since < STALLED or ("stalled", name) in self._logged:
@@ -204,6 +205,12 @@ def too_high(
         for name in left:
             place = order.index(name)
             stiffness[name] += min(2.0 * own[name], 1.0 / matrix[place, place])
+    for name in left:
+        place = order.index(name)
+        spring = model.description.joints[name].spring_stiffness * dt * dt
+        most = SOFTEST / float(matrix[place, place])
+        # Model.apply_damping cuts it there, and damps it.
+        stiffness[name] += spring if spring <= most else 3.0 * most
     found = []
     while left:
         places = [order.index(name) for name in left]

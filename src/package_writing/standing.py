@@ -160,10 +160,10 @@ def feet(model: ModelDescription) -> list[str]:
 
 
 def lows_of(model: ModelDescription, positions: Mapping[str, float]) -> dict[str, float]:
-    """Returns how low each link with a collision reaches, seen from the root [m]."""
+    """Returns how low each link with a collision reaches, seen from the model [m]."""
     return {
         name: -_reach(model, name, pose, DOWN)
-        for name, pose in link_poses(model, Pose(), positions).items()
+        for name, pose in link_poses(model, model.root_pose, positions).items()
         if model.links[name].collisions
     }
 

@@ -64,7 +64,11 @@ def read_description(text: str) -> RobotDescription:
         robot = parse(text)
     except FileError as error:
         raise ControlError(f"robot_description: {error}") from error
-    joints = {e.get("name", ""): _joint(e) for e in robot.findall("joint")}
+    found_joints = [
+        *robot.findall("gazebo/joint"),
+        *robot.findall("joint"),
+    ]  # those of SDF close loops
+    joints = {e.get("name", ""): _joint(e) for e in found_joints}
     warnings: list[str] = []
     transmissions: dict[str, Transmission] = {}
     for element in robot.findall("transmission"):

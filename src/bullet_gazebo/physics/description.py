@@ -5,6 +5,7 @@ import os
 from collections import defaultdict
 from dataclasses import dataclass, field
 from itertools import combinations
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -13,7 +14,9 @@ from bullet_gazebo.physics.pose import Pose, Vector
 from file_access.text import one_line
 
 CONTROL_PLUGIN = "libgazebo_ros_control.so"
+BALL = "ball"
 MOVABLE = ("revolute", "continuous", "prismatic")
+UNMOVED = 1e9  # [kg, kg m²]; stands for infinity in an engine
 
 
 Color = tuple[float, float, float, float]
@@ -44,16 +47,21 @@ class Inertia:
     iyz: float = 0.0
     izz: float = 0.0
 
+    def scaled(self, share: float) -> "Inertia":
+        """Returns the inertia of a body of the same shape with a share of the mass."""
+        moments = (self.ixx, self.ixy, self.ixz, self.iyy, self.iyz, self.izz)
+        return Inertia(share * self.mass, self.com, *(share * each for each in moments))
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Checked triangles of a mesh file. Two meshes are equal if their files have the same contents.
+    """Checked triangles, of a file. Two meshes are equal if their files have the same contents.
 
     Attributes:
         vertices: (n, 3), finite [the file's unit; metres for COLLADA].
         faces: (m, 3), indices of vertices.
         hulls: points (k, 3) of the convex bodies that a moving mesh collides by: one for each object of the
-            file.
+            file. A height map has none.
         digest: of the arrays.
         in_pieces: whether `hulls` are solid pieces of a concave mesh.
     """
@@ -63,6 +71,11 @@ class Mesh:
     hulls: tuple[np.ndarray, ...]
     digest: str
     in_pieces: bool = False
+
+    @property
+    def is_heightmap(self) -> bool:
+        """Whether its vertices are a square grid: rows along x, the one at the lowest y first."""
+        return not self.hulls
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Mesh) and self.digest == other.digest
@@ -76,7 +89,8 @@ class Shape:
     """A collision or visual shape.
 
     `size` is (x, y, z) of a box, (radius, length) of a cylinder, (radius,) of a sphere [m], and the scales
-    of a mesh. `mesh` is the path of a mesh file, `solid` the content of a collision's file.
+    of a mesh. `mesh` is the path of a mesh file or of a height map's image, `solid` the content of a
+    collision's file.
     """
 
     kind: str
@@ -98,8 +112,27 @@ class Link:
     collisions: list[Shape] = field(default_factory=list)
     visuals: list[Shape] = field(default_factory=list)
     gravity: bool = True  # whether gravity acts on it
+    says_gravity: bool = (
+        False  # whether a URDF's <gazebo> says so: then it counts where it is lumped
+    )
     self_collide: bool = False  # also with links of its own model that it isn't joined to
+    kinematic: bool = False  # moved by services alone; true only of a free root link
+    decay: tuple[float, float] | None = None  # of linear and angular velocity, the share of a step
     part_of: str = ""  # of a helper link for the engine: the link that it was split from
+    closing: str = ""  # a loop: the constraint, weld or ball, that joins that helper with `part_of`
+
+    @property
+    def weighs(self) -> bool:
+        """Whether gravity moves it."""
+        return self.gravity and not self.kinematic
+
+    @property
+    def acting_inertia(self) -> Inertia | None:
+        """The inertia that acts: a kinematic link is so heavy that no force moves it."""
+        if not self.kinematic or self.inertia is None:
+            return self.inertia
+        com = Pose(self.inertia.com.position)
+        return Inertia(UNMOVED, com, ixx=UNMOVED, iyy=UNMOVED, izz=UNMOVED)
 
     @property
     def max_vel(self) -> float:
@@ -133,6 +166,8 @@ class Joint:
     velocity: float = -1.0
     damping: float = 0.0
     friction: float = 0.0
+    spring_stiffness: float = 0.0  # [N m/rad, N/m]
+    spring_reference: float = 0.0  # [rad, m]; where the spring is at rest
     kept: bool = False  # whether a fixed joint is not lumped
 
     @property
@@ -208,7 +243,7 @@ class Sensor:
 
 @dataclass
 class Light:
-    """A light. It lights nothing here; clients and windows read it."""
+    """A light. Cameras see by directional ones, windows by all; clients read it."""
 
     name: str
     diffuse: Color = (1.0, 1.0, 1.0, 1.0)
@@ -220,6 +255,14 @@ class Light:
     pose: Pose = Pose()
     cast_shadows: bool = False
     kind: str = "point"  # or directional, spot
+
+
+class SavedMotion(NamedTuple):
+    """How a model of a saved world begins: `pose` and `twist` of its root link, and its joints."""
+
+    pose: Pose
+    twist: tuple[Vector, Vector]
+    joints: dict[str, tuple[float, float]]
 
 
 @dataclass
@@ -236,6 +279,7 @@ class ModelDescription:
         mimics: what makes joints follow others, by the follower's name, drivers before their followers.
         lumped: links that a fixed joint has made part of another one: that link, and their poses in it.
         initial_pose: where the file puts the model.
+        start: how it begins, if not there.
     """
 
     name: str
@@ -253,6 +297,7 @@ class ModelDescription:
     mimics: dict[str, Mimic] = field(default_factory=dict)
     lumped: dict[str, tuple[str, Pose]] = field(default_factory=dict)
     initial_pose: Pose = Pose()
+    start: SavedMotion | None = None
     static: bool = False
 
     @property
@@ -270,7 +315,10 @@ class ModelDescription:
 
     def pairs_that_collide(self) -> list[tuple[Link, Link]]:
         """Returns links that can meet (SDF's rule): either wants it and no joint connects them."""
-        joined = {frozenset((joint.parent, joint.child)) for joint in self.joints.values()}
+        joined = {
+            frozenset((joint.parent, self.links[joint.child].owner))
+            for joint in self.joints.values()
+        }
         solid = [link for link in self.links.values() if link.collisions]
         return [
             (a, b)
@@ -279,6 +327,25 @@ class ModelDescription:
             and a.owner != b.owner
             and frozenset((a.owner, b.owner)) not in joined
         ]
+
+    @property
+    def loops(self) -> list[Link]:
+        """The helper links that close loops (`Link.closing`)."""
+        return [link for link in self.links.values() if link.closing and not self.static]
+
+    def bodies_of(self, link: str) -> list[str]:
+        """Returns a link and the helpers that share its inertia: those that are welded to it."""
+        welded = (each for each in self.loops if each.closing == "weld")
+        return [link, *(each.name for each in welded if each.part_of == link)]
+
+    def inertias(self) -> dict[str, Inertia | None]:
+        """Returns the inertia of each link in an engine: helpers that close loops have shares of it."""
+        found = {name: link.inertia for name, link in self.links.items()}
+        for whole in {link.part_of for link in self.loops}:
+            bodies, inertia = self.bodies_of(whole), self.links[whole].inertia
+            if inertia is not None:
+                found |= dict.fromkeys(bodies, inertia.scaled(1.0 / len(bodies)))
+        return found
 
     def joints_by_parent(self) -> defaultdict[str, list[Joint]]:
         """Returns the joints that each link carries, in document order."""

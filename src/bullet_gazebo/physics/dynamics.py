@@ -120,14 +120,15 @@ def mobility(
     `added` are inertias [kg m², kg] of the joints themselves, by name.
     """
     joints = model.movable_joints
-    base = 0 if model.fixed_base else 6
+    base = 0 if model.fixed_base or model.links[model.root].kinematic else 6
     matrix = np.zeros((base + len(joints), base + len(joints)))
+    inertias = model.inertias()
     for name, pose in poses.items():
-        inertia = model.links[name].inertia
+        inertia = inertias[name]
         if inertia is None:
             continue
         com = np.array(pose.compose(inertia.com).position)
-        linear, angular = _jacobian(model, joints, base, poses, name, com)
+        linear, angular = jacobian(model, joints, base, poses, name, com)
         tensor = tensor_in(inertia, pose.orientation)
         matrix += inertia.mass * linear.T @ linear + angular.T @ tensor @ angular
     for place, joint in enumerate(joints, start=base):
@@ -153,14 +154,16 @@ def most_inertias(model: ModelDescription) -> dict[str, float]:
 
     It is that of all that the joint carries, stretched out.
     """
-    below = model.joints_by_parent()
-    return {joint.name: _stretched(model, below, joint) for joint in model.movable_joints}
+    below, inertias = model.joints_by_parent(), model.inertias()
+    return {joint.name: _stretched(inertias, below, joint) for joint in model.movable_joints}
 
 
-def _stretched(model: ModelDescription, below: Mapping[str, list[Joint]], top: Joint) -> float:
+def _stretched(
+    inertias: Mapping[str, Inertia | None], below: Mapping[str, list[Joint]], top: Joint
+) -> float:
     total, todo = 0.0, [(top.child, float(np.linalg.norm(top.anchor.position)))]
     for name, reach in todo:
-        inertia = model.links[name].inertia
+        inertia = inertias[name]
         if inertia is not None:
             arm = reach + float(np.linalg.norm(inertia.com.position))
             turning = inertia.mass * arm**2 + max(inertia.ixx, inertia.iyy, inertia.izz)
@@ -169,7 +172,7 @@ def _stretched(model: ModelDescription, below: Mapping[str, list[Joint]], top: J
     return total
 
 
-def _jacobian(
+def jacobian(
     model: ModelDescription,
     joints: list[Joint],
     base: int,

@@ -2,10 +2,10 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
-from bullet_gazebo.physics.description import Inertia, ModelDescription
+from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription
 from bullet_gazebo.physics.pose import Pose, Vector
 
 Twist = tuple[Vector, Vector]
@@ -140,10 +140,6 @@ class Body(ABC):
     def set_link_gravity(self, name: str, on: bool) -> None:
         """Lets gravity act on link `name`, or not."""
 
-    @abstractmethod
-    def link_gravity(self, name: str) -> bool:
-        """Returns whether gravity acts on link `name`."""
-
 
 LinkOf = tuple[Body, str]
 """A body and the name of a link of it."""
@@ -162,6 +158,16 @@ class Engine(ABC):
         Raises:
             DescriptionError: if the engine can't take it.
         """
+
+    def load_all(
+        self, models: Sequence[tuple[ModelDescription, Pose]]
+    ) -> Iterator[Body | DescriptionError]:
+        """Adds models in order; yields each one's body, or why the engine can't take it."""
+        for description, pose in models:
+            try:
+                yield self.load(description, pose)
+            except DescriptionError as error:
+                yield error
 
     @abstractmethod
     def remove(self, body: Body) -> None:

@@ -19,7 +19,7 @@ MOST_SHAPES = 5000  # beyond that, PyBullet takes seconds to load a model
 FURTHEST = 1e7  # [m]; no length in a model may be larger
 MASSES = (1e-9, 1e9)  # [kg]
 LARGEST_MOMENT = 1e15  # [kg m²]
-STRONGEST = 1e12  # damping [N m s/rad, N s/m] and friction [N m, N]
+STRONGEST = 1e12  # damping [N m s/rad, N s/m], friction [N m, N], stiffness [N m/rad, N/m]
 
 
 def check_bounds(model: ModelDescription) -> None:
@@ -90,7 +90,12 @@ def _check_joint(joint: Joint) -> None:
     for length in (*joint.pose.position, *joint.anchor.position):
         if not abs(length) <= FURTHEST:
             raise DescriptionError(f"joint '{joint.name}': {length} m is beyond {FURTHEST:g} m")
-    for what, value in (("damping", joint.damping), ("friction", joint.friction)):
+    if not abs(joint.spring_reference) <= FURTHEST:
+        raise DescriptionError(
+            f"joint '{joint.name}': a spring_reference of {joint.spring_reference} is beyond {FURTHEST:g}"
+        )
+    for what in ("damping", "friction", "spring_stiffness"):
+        value = getattr(joint, what)
         if not 0.0 <= value <= STRONGEST:
             raise DescriptionError(
                 f"joint '{joint.name}': a {what} of {value} is not between 0 and {STRONGEST:g}"
@@ -105,19 +110,33 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
         URDF has that form already.
     """
     if model.static:
-        model = _rigid(model)
+        model = rigid(model)
     check_bounds(model)
     offsets = {
         joint.child: joint.anchor.inverse()
         for joint in model.joints.values()
         if joint.anchor != Pose()
     }
+    model = _shared(model)
+    root = model.links[model.root]
+    if root.kinematic:
+        heavy = replace(root, inertia=root.acting_inertia)
+        model = replace(model, links={**model.links, root.name: heavy})
     model = one_friction_each(model)
     if not offsets:
         return model, offsets
     links = {name: _moved(link, offsets.get(name)) for name, link in model.links.items()}
     joints = {name: _joined(joint, offsets) for name, joint in model.joints.items()}
     return replace(model, links=links, joints=joints), offsets
+
+
+def _shared(model: ModelDescription) -> ModelDescription:
+    """Returns the model with the inertias of links shared with helpers that close loops."""
+    if not model.loops:
+        return model
+    inertias = model.inertias()
+    links = {name: replace(each, inertia=inertias[name]) for name, each in model.links.items()}
+    return replace(model, links=links)
 
 
 def one_friction_each(model: ModelDescription) -> ModelDescription:
@@ -149,6 +168,7 @@ def _pieces(link: Link) -> list[Link]:
             f"{link.name}::friction_{count}",
             collisions=shapes,
             self_collide=link.self_collide,
+            kinematic=link.kinematic,
             part_of=link.name,
         )
         for count, shapes in enumerate(list(groups.values())[1:], 1)
@@ -164,7 +184,7 @@ def parents_first(model: ModelDescription) -> ModelDescription:
     return replace(model, links={name: model.links[name] for name in order})
 
 
-def _rigid(model: ModelDescription) -> ModelDescription:
+def rigid(model: ModelDescription) -> ModelDescription:
     """Returns a static model with all joints fixed, and its islands fixed to the root."""
     joints = {
         name: replace(joint, kind="fixed", anchor=Pose()) for name, joint in model.joints.items()

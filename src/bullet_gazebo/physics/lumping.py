@@ -43,13 +43,8 @@ def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
 
 def find_roots(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:
     """Returns the links without a parent joint, in document order; all others hang from one of them."""
-    if not links:
-        raise DescriptionError("there is no <link>")
-    if len(links) > MAX_LINKS:
-        raise DescriptionError(
-            f"there are {len(links)} links; up to {MAX_LINKS} are read (MAX_LINKS)"
-        )
-    below = _children(links, joints)
+    check_links(links, joints)
+    below = _children(joints)
     children = {name for names in below.values() for name in names}
     roots = [name for name in links if name not in children]
     if not roots:
@@ -65,13 +60,24 @@ def find_roots(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:
     return roots
 
 
-def _children(links: dict[str, Link], joints: dict[str, Joint]) -> dict[str, list[str]]:
-    below: dict[str, list[str]] = defaultdict(list)
-    seen: set[str] = set()
+def check_links(links: dict[str, Link], joints: dict[str, Joint]) -> None:
+    """Refuses a model without links, with too many, or with joints to links that it doesn't have."""
+    if not links:
+        raise DescriptionError("there is no <link>")
+    if len(links) > MAX_LINKS:
+        raise DescriptionError(
+            f"there are {len(links)} links; up to {MAX_LINKS} are read (MAX_LINKS)"
+        )
     for joint in joints.values():
         for role, name in (("parent", joint.parent), ("child", joint.child)):
             if name not in links:
                 raise DescriptionError(f"joint '{joint.name}': {role} link '{name}' does not exist")
+
+
+def _children(joints: dict[str, Joint]) -> dict[str, list[str]]:
+    below: dict[str, list[str]] = defaultdict(list)
+    seen: set[str] = set()
+    for joint in joints.values():
         if joint.child in seen:
             raise DescriptionError(f"link '{joint.child}' has more than one parent joint")
         seen.add(joint.child)
@@ -97,6 +103,7 @@ def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
     left = (above[name].name for name in order if name in above)
     model.joints = {name: model.joints[name] for name in left if name in model.joints}
     model.lumped = {name: at for name, at in model.lumped.items() if at[0] in model.links}
+    model.sensors.sort(key=lambda sensor: order.index(sensor.link))
     moved = [_lumped_sensor(model, sensor) for sensor in model.sensors]
     model.sensors = [sensor for sensor in moved if sensor.link in model.links]
     mend_moments(model)
@@ -146,8 +153,11 @@ def detach_from_world(model: ModelDescription) -> None:
 def _lump(model: ModelDescription, name: str) -> None:
     joint = model.joints.pop(name)
     parent, child = model.links[joint.parent], model.links.pop(joint.child)
-    parent.gravity = parent.gravity and child.gravity
+    if child.says_gravity:
+        parent.gravity, parent.says_gravity = child.gravity, True
     parent.self_collide = parent.self_collide or child.self_collide
+    parent.kinematic = parent.kinematic or child.kinematic
+    parent.decay = child.decay if parent.decay is None else parent.decay
     parent.inertia = combine(parent.inertia, _moved(child.inertia, joint.pose))
     parent.collisions += [_lumped(shape, joint.pose, child.name) for shape in child.collisions]
     parent.visuals += [_lumped(shape, joint.pose, child.name) for shape in child.visuals]

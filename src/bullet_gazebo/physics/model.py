@@ -1,18 +1,34 @@
 """A model in the world: its description, its body in the engine, and its state."""
 
-from collections.abc import Mapping
-from math import isfinite
+import logging
+from collections.abc import Collection, Mapping, Sequence
+from math import hypot, isfinite
 from typing import Any, NamedTuple
 
-from bullet_gazebo.physics.description import ModelDescription, Shape
+from bullet_gazebo.physics.description import ModelDescription, SavedMotion, Shape
 from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero
 from bullet_gazebo.physics.engine import FASTEST, Body, Twist
+from bullet_gazebo.physics.loops import closed, in_loops
 from bullet_gazebo.physics.lumping import WORLD
-from bullet_gazebo.physics.pose import ZERO, Pose
+from bullet_gazebo.physics.pose import (
+    ZERO,
+    Pose,
+    Vector,
+    add,
+    conjugate,
+    cross,
+    rotate,
+    scale,
+    subtract,
+)
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit
 GENTLEST = 0.5  # of the damping that would stop a joint in one step
+SOFTEST = 0.25  # of inertia / step²; a stiffer spring swings faster than steps can follow
+SLOWEST = 0.01  # [m/s, rad/s]; ODE lets no slower velocity decay
 SPINNING = 0.1  # [rad] in a step: no base of a robot turns that fast by itself
+
+logger = logging.getLogger(f"rosout.{__name__}")
 AT_REST: Twist = (ZERO, ZERO)
 
 
@@ -38,6 +54,10 @@ class Model:
         self.placed = pose  # where it was put last: a static model stays there
         self.time_step = 0.0  # [s], the world's
         self._damped: dict[str, float] = {}  # the engine's damping [N m s/rad, N s/m] by joint
+        self._springs: dict[str, float] = {}  # stiffness [N m/rad, N/m] by joint
+        self.kinematic = description.links[description.root].kinematic
+        decaying = [name for name, link in description.links.items() if any(link.decay or ())]
+        self._decaying = [] if description.static else decaying  # links
         self.damping_added: Mapping[str, float] = {}  # [N m s/rad, N s/m] in addition to the file's
         self._motors: dict[str, tuple[float, float]] = {}  # speed [rad/s, m/s] and effort [N m, N]
         self._grip: dict[str, float] = {}  # factors of the friction of links
@@ -96,6 +116,13 @@ class Model:
         self.placed = pose
         self.body.reset_base(pose.compose(self.description.root_pose), twist)
 
+    def begin(self, start: SavedMotion) -> None:
+        """Moves as in a saved world; the initial pose stays."""
+        self.place(start.pose.compose(self.description.root_pose.inverse()), start.twist)
+        for name, index in self._joints.items():
+            self.body.reset_joint(index, *start.joints[name])
+        self.put_followers()
+
     def joint_state(self, name: str) -> tuple[float, float]:
         """Returns position [rad, m] and velocity [rad/s, m/s] of a joint; zeros for a fixed one."""
         if name not in self._joints and name in self.all_joints:
@@ -108,11 +135,13 @@ class Model:
 
         Unknown names are ignored, and joints are set in order of name (docs/contract/gazebo.md 2.16).
         """
+        before = self.joint_states()
         for name in sorted(set(positions) & set(self._joints)):
             joint = self.description.joints[name]
             self.body.reset_joint(self._joints[name], self.clamped(name, positions[name]))
             self._rest(self._below(joint.child))
         self.put_followers()
+        self.close_loops(positions, before)
 
     def set_joint_velocities(self, velocities: Mapping[str, float]) -> None:
         """Sets the `velocities` [rad/s, m/s] of joints; unknown names are ignored."""
@@ -121,6 +150,7 @@ class Model:
             index = self._joints[name]
             self.body.reset_joint(index, states[index][0], velocities[name])
         self.put_followers()
+        self.close_loops(velocities, states)
 
     def put_followers(self) -> None:
         """Puts joints that follow others where those have them, within their stops."""
@@ -130,6 +160,29 @@ class Model:
             self.body.reset_joint(
                 self._joints[name], self.clamped(name, wanted), mimic.multiplier * velocity
             )
+
+    def close_loops(self, held: Collection[str], before: Sequence[Sequence[float]]) -> None:
+        """Puts the joints of loops so that these close, the `held` ones where they are.
+
+        If that can't be, all joints of loops return to their states `before`, at rest.
+        """
+        if not self.description.loops:
+            return
+        states = dict(zip(self._joints, self.joint_states(), strict=True))
+        old = {name: state[0] for name, state in zip(self._joints, before, strict=True)}
+        starts = {name: (old[name], state[1]) for name, state in states.items()}
+        goals = {name: states[name][0] for name in states if name in held}
+        found = closed(self.description, starts if goals else states, goals, self.clamped)
+        if found is None:
+            loose = in_loops(self.description)
+            found = states | {name: (old[name], 0.0) for name in states if name in loose}
+            logger.warning(
+                "Model '%s': its loops don't close on the way to %s; they stay as they were",
+                self.name, ", ".join(f"{name} = {goals[name]:g}" for name in sorted(goals) if name in loose),
+            )  # fmt: skip
+        for name, state in found.items():
+            if state != states[name]:
+                self.body.reset_joint(self._joints[name], *state)
 
     def release_follower(self, name: str) -> None:
         """Takes the gear from a joint that follows another one."""
@@ -171,21 +224,105 @@ class Model:
     def apply_damping(self, time_step: float) -> None:
         """Sets the joints' damping in the engine, cut where a step of `time_step` [s] couldn't follow it.
 
-        The bound is that with all joints at zero, so that it doesn't depend on the history.
+        A spring that is too stiff acts implicitly: on the position after the step, by a damping of
+        stiffness · step. Where damping is explicit, its stiffness is cut. The bounds are those with all
+        joints at zero, so that they don't depend on the history.
         """
         self.time_step = time_step
         joints = self.description.joints
         dampings = {
             name: joints[name].damping + self.damping_added.get(name, 0.0) for name in self._joints
         }
-        damped = {name for name, damping in dampings.items() if damping > 0.0}
+        sprung = {name for name in self._joints if joints[name].spring_stiffness > 0.0}
+        damped = {name for name, damping in dampings.items() if damping > 0.0} | sprung
         if not damped | set(self._damped):
             return
         inertias = effective_inertias(self.description, poses_at_zero(self.description))
         for name in damped | set(self._damped):
-            most = GENTLEST * inertias[name] / time_step
-            self._damped[name] = min(dampings[name], most)
+            damping = min(dampings[name], GENTLEST * inertias[name] / time_step)
+            if name in sprung:
+                stiffness = joints[name].spring_stiffness
+                most = SOFTEST * inertias[name] / time_step**2
+                if stiffness > most:
+                    stiffness = stiffness if self.body.implicit_damping else most
+                    damping += time_step * stiffness
+                self._springs[name] = stiffness
+            self._damped[name] = damping
             self.body.set_damping(self._joints[name], self._damped[name])
+
+    @property
+    def softened(self) -> list[str]:
+        """Names of joints whose springs are cut."""
+        joints = self.description.joints
+        return [
+            name for name, each in self._springs.items() if each < joints[name].spring_stiffness
+        ]
+
+    @property
+    def special(self) -> bool:
+        """Whether springs or decay act on it, or its root link is kinematic: steps have more to do then."""
+        return bool(self._springs or self._decaying or self.kinematic)
+
+    def apply_passive_forces(self) -> None:
+        """Adds the forces of springs, and those by which velocities decay, to the next step's."""
+        if self._springs:
+            states, joints = self.body.joint_states(), self.description.joints
+            efforts = [0.0] * len(states)
+            for name, stiffness in self._springs.items():
+                index = self._joints[name]
+                efforts[index] = stiffness * (joints[name].spring_reference - states[index][0])
+            self.body.apply_efforts(efforts)
+        wrenches = [(link, self.decay_wrench(link)) for link in self._decaying]
+        for link, wrench in wrenches:
+            self.body.add_wrench(link, *wrench)
+
+    def decay_wrench(self, name: str) -> tuple[Vector, Vector]:
+        """Returns the force [N] at the centre of mass and the torque [N m] by which a link's velocity decays.
+
+        In a step they take a share of the momentum that it has before, as ODE takes it after each step.
+        """
+        inertia = self.description.links[name].inertia
+        if name not in self._decaying or inertia is None:
+            return ZERO, ZERO
+        centre, twist = self._centre(name)
+        linear, angular = self._lost(name, twist)
+        axes, rate = centre.orientation, -1.0 / self.time_step
+        x, y, z = rotate(conjugate(axes), angular)
+        momentum = (
+            inertia.ixx * x + inertia.ixy * y + inertia.ixz * z,
+            inertia.ixy * x + inertia.iyy * y + inertia.iyz * z,
+            inertia.ixz * x + inertia.iyz * y + inertia.izz * z,
+        )
+        return scale(linear, inertia.mass * rate), scale(rotate(axes, momentum), rate)
+
+    def kinematic_twist(self) -> Twist:
+        """Returns the twist that a kinematic root's centre of mass has after a step, whatever it meets."""
+        _, twist = self._centre(self.description.root)
+        lost = self._lost(self.description.root, twist)
+        return subtract(twist[0], lost[0]), subtract(twist[1], lost[1])
+
+    def set_kinematic_twist(self, twist: Twist) -> None:
+        """Gives a kinematic root's centre of mass a twist."""
+        linear, angular = twist
+        centre, _ = self._centre(self.description.root)
+        arm = subtract(centre.position, self.root_state()[0].position)
+        self.body.set_base_twist((subtract(linear, cross(angular, arm)), angular))
+
+    def _centre(self, name: str) -> tuple[Pose, Twist]:
+        """Returns pose and twist of a link's centre of mass, in world axes."""
+        inertia = self.description.links[name].inertia
+        pose, (linear, angular) = self.link_state(name)
+        centre = pose if inertia is None else pose.compose(inertia.com)
+        arm = subtract(centre.position, pose.position)
+        return centre, (add(linear, cross(angular, arm)), angular)
+
+    def _lost(self, name: str, twist: Twist) -> Twist:
+        """Returns what a link's centre loses of its twist in a step."""
+        linear, angular = self.description.links[name].decay or (0.0, 0.0)
+        return (
+            scale(twist[0], linear) if hypot(*twist[0]) > SLOWEST else ZERO,
+            scale(twist[1], angular) if hypot(*twist[1]) > SLOWEST else ZERO,
+        )
 
     def add_damping(self, added: Mapping[str, float]) -> None:
         """Adds damping [N m s/rad, N s/m] to the file's, replacing what was added before."""
@@ -271,13 +408,13 @@ class Model:
             for index in self._joints.values():
                 self.body.reset_joint(index, 0.0)
             self.put_followers()
+            self.close_loops((), [(0.0, 0.0)] * len(self._joints))
         self.place(self.initial_pose)
         self._rest(list(self._joints))
 
     def _rest(self, names: list[str]) -> None:
         states = self.body.joint_states()
-        for name in names:
-            index = self._joints[name]
+        for index in (self._joints[name] for name in names if name in self._joints):
             self.body.reset_joint(index, states[index][0])
 
     def _below(self, link: str) -> list[str]:

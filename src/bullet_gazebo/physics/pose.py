@@ -108,3 +108,13 @@ def to_rpy(q: Quaternion) -> Vector:
 
 def is_finite(pose: Pose) -> bool:
     return all(math.isfinite(c) for c in pose.position + pose.orientation)
+
+
+def rotation(now: Pose, wanted: Pose) -> Vector:
+    """Returns the shortest rotation [rad], a vector in outer axes, from `now` to `wanted`."""
+    x, y, z, w = multiply(wanted.orientation, conjugate(now.orientation))
+    length = math.sqrt(x * x + y * y + z * z)
+    if length < 1e-15:
+        return ZERO
+    angle = 2.0 * math.atan2(length, abs(w)) * math.copysign(1.0, w)
+    return (x / length * angle, y / length * angle, z / length * angle)

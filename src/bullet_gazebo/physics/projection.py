@@ -4,13 +4,11 @@ Gazebo's links are free bodies, which joints pull back together; PyBullet's can'
 projected onto the joints that carry the link, and the velocity onto their speeds.
 """
 
-import math
-
 import numpy as np
 
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import Model
-from bullet_gazebo.physics.pose import Pose, conjugate, multiply, subtract
+from bullet_gazebo.physics.pose import Pose, rotation, subtract
 
 ITERATIONS = 30
 CLOSE = 1e-10  # [m, rad]; no smaller corrections are made
@@ -26,18 +24,19 @@ def place_link(model: Model, link: str, pose: Pose, twist: Twist) -> None:
         if not model.description.fixed_base:
             model.body.reset_base(pose, twist)
         return
-    carriers = model.carriers(link)
+    carriers, before = model.carriers(link), model.joint_states()
     for _ in range(ITERATIONS):
         if _approach(model, carriers, link, pose) < CLOSE:
             break
     _match(model, carriers, link, twist)
     model.put_followers()
+    model.close_loops((), before)
 
 
 def _approach(model: Model, carriers: list[str], link: str, pose: Pose) -> float:
     """One Gauss-Newton step of the carriers' positions; returns its length."""
     now, _ = model.link_state(link)
-    gap = np.array(subtract(pose.position, now.position) + _rotation(now, pose))
+    gap = np.array(subtract(pose.position, now.position) + rotation(now, pose))
     correction = np.linalg.lstsq(_jacobian(model, carriers, link), gap, rcond=1e-9)[0]
     correction *= min(1.0, LONGEST / max(np.abs(correction).max(), 1e-300))
     moved = 0.0
@@ -78,13 +77,3 @@ def _speed_up(model: Model, carriers: list[str], speeds: np.ndarray) -> None:
     for name, speed in zip(carriers, speeds, strict=True):
         position, _ = model.joint_state(name)
         model.body.reset_joint(model.joint_index(name), position, float(speed))
-
-
-def _rotation(now: Pose, wanted: Pose) -> tuple[float, float, float]:
-    """Returns the shortest rotation [rad], a vector in world axes, from `now` to `wanted`."""
-    x, y, z, w = multiply(wanted.orientation, conjugate(now.orientation))
-    length = math.sqrt(x * x + y * y + z * z)
-    if length < 1e-15:
-        return (0.0, 0.0, 0.0)
-    angle = 2.0 * math.atan2(length, abs(w)) * math.copysign(1.0, w)
-    return (x / length * angle, y / length * angle, z / length * angle)

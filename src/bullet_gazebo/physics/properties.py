@@ -45,8 +45,9 @@ def set_link_properties(
         )
     if inertia != model.description.links[link].inertia:
         world.set_inertia(model, link, inertia)
-    model.description.links[link].gravity = gravity
-    model.body.set_link_gravity(link, gravity)
+    record = model.description.links[link]
+    record.gravity = gravity
+    model.body.set_link_gravity(link, record.weighs)
 
 
 def set_joint_properties(

@@ -103,6 +103,7 @@ class World:
         self.version = 0  # counts what changes the look of the world: models and lights
         self._entities: dict[str, Entity] = {}
         self._joints: dict[str, Entity] = {}
+        self._special: list[Model] = []  # with springs, decay or a kinematic link
         self._recalled: Sequence[Contact] | None = None  # until the next step
         self.time_step = time_step
         self.gravity = gravity
@@ -121,19 +122,29 @@ class World:
             raise NameTaken(name)
         self._renew()
         body = self.engine.load(description, pose.compose(description.root_pose))
-        model = Model(name, description, body, pose)
+        return self.admit(Model(name, description, body, pose))
+
+    def admit(self, model: Model) -> Model:
+        """Adds a model whose body the engine has."""
+        description, body = model.description, model.body
         try:
             model.apply_damping(self.time_step)
             model.put_followers()
+            model.close_loops((), model.joint_states())
+            if description.start is not None:
+                model.begin(description.start)
         except Exception:
             self.engine.remove(body)
             raise
+        if model.softened:
+            joints = ", ".join(sorted(model.softened))
+            description.warnings.append(f"springs too stiff for the step are softened: {joints}")
         if body.overlapping:
             pairs = sorted(" and ".join(sorted(pair)) for pair in body.overlapping)
             description.warnings.append(
                 f"links that overlap in the initial pose don't collide with each other: {', '.join(pairs)}"
             )
-        self.models[name] = model
+        self.models[model.name] = model
         self._index(model)
         model.number = self.version
         return model
@@ -236,7 +247,7 @@ class World:
         self._renew()  # from descriptions that are still those of the bodies
         record = model.description.links[link]
         old, record.inertia = record.inertia, inertia
-        if model.description.static:
+        if model.description.static or record.kinematic:
             return
         if not model.body.set_inertia(link, old, inertia):
             try:
@@ -256,7 +267,15 @@ class World:
     def step(self) -> None:
         """Integrates all models by one time step."""
         self._recalled = None
+        if not self._special:
+            self.engine.step()
+            return
+        for model in self._special:
+            model.apply_passive_forces()
+        held = [(model, model.kinematic_twist()) for model in self._special if model.kinematic]
         self.engine.step()
+        for model, twist in held:
+            model.set_kinematic_twist(twist)
 
     def contacts(self) -> Sequence[Contact]:
         """Returns where bodies touched in the last step; after a restore, in that before the snapshot."""
@@ -350,6 +369,7 @@ class World:
         It finds new models last, so existing entries stay.
         """
         self.version += 1
+        self._special = [model for model in self.models.values() if model.special]
         for model in models:
             self._entities.setdefault(model.name, Entity("model", model, model.name))
             for link in model.link_names:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from bullet_gazebo.applied_forces import Wrench
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Joint, ModelDescription
 from bullet_gazebo.physics.dynamics import tensor_in
+from bullet_gazebo.physics.loops import in_loops
 from bullet_gazebo.physics.lumping import WORLD
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import (
@@ -73,8 +74,12 @@ class LinkForces:
             return
         applied, inertias = self._sim.applied, self._inertias()
         pushes = [
-            _moved(centre, applied.wrench_on(self._model, link, now))
+            _moved(centre, wrench)
             for link, (_, centre) in inertias.items()
+            for wrench in (
+                applied.wrench_on(self._model, link, now),
+                self._model.decay_wrench(link),
+            )
         ]
         momentum = _sum(self._momentum(link, *each) for link, each in inertias.items())
         effort = applied.effort_on(self._model, self._joint, now)
@@ -110,7 +115,7 @@ class LinkForces:
         return _moved(centre, (scale(velocity, inertia.mass), (x, y, z)))
 
     def _weight(self, link: str, inertia: Inertia, centre: Vector) -> Wrench:
-        mass = inertia.mass if self._model.body.link_gravity(link) else 0.0
+        mass = inertia.mass if self._model.description.links[link].weighs else 0.0
         return _moved(centre, (scale(self._sim.world.gravity, mass), ZERO))
 
     def _contacts(self) -> list[Wrench]:
@@ -138,6 +143,10 @@ class JointForces:
         self._sim = sim
         self._model = model
         self._joint = joint = _joint(model.description, name)
+        if name in in_loops(model.description):
+            raise DescriptionError(
+                f"joint '{name}' is part of a closed loop: its share of the force isn't known"
+            )
         self.link = joint.child
         self._forces = LinkForces(sim, model, _below(model.description, joint.child), name)
 

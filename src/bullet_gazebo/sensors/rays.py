@@ -78,7 +78,7 @@ class RayScene:
     """
 
     def __init__(self, world: World, visuals: bool = False) -> None:
-        self._world = world
+        self.world = world
         self._visuals = visuals
         self.targets: list[Target] = []
         self.retro = np.zeros(1)  # reflectivity of each target
@@ -92,8 +92,8 @@ class RayScene:
         self._is_fresh = False
 
     def _refresh(self) -> None:
-        models = self._world.models.values()
-        key = self._world.version, [model.placed for model in models if model.description.static]
+        models = self.world.models.values()
+        key = self.world.version, [model.placed for model in models if model.description.static]
         if key != self._key:
             self._build()
             self._key = key
@@ -216,7 +216,7 @@ class RayScene:
         self._targets_of = {
             model: known.get(model)
             or [target for link in model.description.links.values() for target in read(model, link)]
-            for model in self._world.models.values()
+            for model in self.world.models.values()
         }
         self.targets = targets = [each for found in self._targets_of.values() for each in found]
         count = len(targets)

@@ -1,14 +1,19 @@
-"""Colours of what rays meet: flat shading by a light from above, with the textures of meshes."""
+"""Colours of what rays meet: flat shading by the world's directional lights, with the textures of meshes."""
+
+from collections.abc import Iterable
 
 import numpy as np
 
+from bullet_gazebo.physics.description import Light
+from bullet_gazebo.physics.pose import rotate
 from bullet_gazebo.pictures.visuals import GREY
 from bullet_gazebo.sensors.rays import NONE, Hits, RayScene
 
 BACKGROUND = 178.0  # of each channel, as Gazebo's
 GROUND = (0.8, 0.8, 0.8, 1.0)  # of a plane without a colour
-AMBIENT, DIFFUSE = 0.4, 0.6
-TO_LIGHT = np.array([0.5, -0.1, 0.9]) / np.sqrt(1.07)
+AMBIENT, DIFFUSE = 0.4, 0.6  # the latter of a light as bright as Gazebo's sun
+BRIGHT = 0.8
+SUN = Light("sun", (BRIGHT, BRIGHT, BRIGHT, 1.0), direction=(-0.5, 0.1, -0.9), kind="directional")
 
 
 def colours(scene: RayScene, hits: Hits, origin: np.ndarray, directions: np.ndarray) -> np.ndarray:
@@ -24,9 +29,18 @@ def colours(scene: RayScene, hits: Hits, origin: np.ndarray, directions: np.ndar
     # Meshes' triangles may face either way: light falls on the side that is seen.
     away = np.einsum("ij,ij->i", normals, directions) > 0.0
     normals[away] *= -1.0
-    light = AMBIENT + DIFFUSE * np.maximum(normals[met] @ TO_LIGHT, 0.0)
-    seen[met] *= light[:, None]
+    seen[met] *= _light(scene.world.lights.values(), normals[met])
     return seen
+
+
+def _light(lights: Iterable[Light], normals: np.ndarray) -> np.ndarray:
+    """Returns the light (k, 3) on surfaces with these normals; without any directional light the sun's."""
+    found = np.full_like(normals, AMBIENT)
+    for light in [each for each in lights if each.kind == "directional"] or [SUN]:
+        direction = np.array(rotate(light.pose.orientation, light.direction))
+        facing = np.maximum(normals @ -direction / (np.linalg.norm(direction) or 1.0), 0.0)
+        found += DIFFUSE * facing[:, None] * (np.array(light.diffuse[:3]) / BRIGHT)
+    return found
 
 
 def _own_colours(

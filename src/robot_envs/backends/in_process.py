@@ -268,7 +268,7 @@ class InProcessChanges:
 
     def set_link(self, link: RobotPart, inertia: Inertia) -> None:
         model = self._model(link)
-        gravity = model.body.link_gravity(link.name)
+        gravity = model.description.links[link.name].gravity
         try:
             set_link_properties(self._sim.world, model, link.name, inertia, gravity)
         except (PropertyError, DescriptionError) as error:

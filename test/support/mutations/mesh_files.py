@@ -10,10 +10,10 @@ FACES = [(0, 2, 1), (1, 2, 3), (4, 5, 6), (5, 7, 6), (0, 1, 4), (1, 5, 4),
          (2, 6, 3), (3, 6, 7), (0, 4, 2), (2, 4, 6), (1, 3, 5), (3, 7, 5)]  # fmt: skip
 
 
-def binary_stl(size=1.0):
-    """A cube with edges of twice `size` [m]."""
+def binary_stl(size=1.0, corners=CORNERS):
+    """A cube with edges of twice `size` [m], or what else has such corners."""
     facets = (
-        struct.pack("<12fH", 0, 0, 0, *(size * x for i in face for x in CORNERS[i]), 0)
+        struct.pack("<12fH", 0, 0, 0, *(size * x for i in face for x in corners[i]), 0)
         for face in FACES
     )
     return bytes(80) + struct.pack("<I", len(FACES)) + b"".join(facets)
@@ -35,8 +35,8 @@ def obj():
     return "\n".join([*lines, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in FACES), ""]).encode()
 
 
-def dae(unit="1", up="Z_UP"):
-    positions = " ".join(str(c) for corner in CORNERS for c in corner)
+def dae(unit="1", up="Z_UP", corners=CORNERS):
+    positions = " ".join(str(c) for corner in corners for c in corner)
     indices = " ".join(str(i) for face in FACES for i in face)
     return f"""<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">

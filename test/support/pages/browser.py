@@ -64,6 +64,13 @@ class Browser:
             self._socket = connect(page["webSocketDebuggerUrl"], max_size=None)
             self._do("Runtime.enable")
             self._do("Page.enable")
+            self._do(
+                "Emulation.setDeviceMetricsOverride",
+                width=self._size[0],
+                height=self._size[1],
+                deviceScaleFactor=1,
+                mobile=False,
+            )  # the window has a frame, and a least width
             if self._offline:
                 self._do("Network.enable")
                 self._do("Network.emulateNetworkConditions", offline=True, latency=0,

@@ -96,6 +96,21 @@ def test_a_loop_beyond_the_bound_is_softened_and_told_and_one_below_is_neither(
     assert [text for text in told if "would shake" in text and "'axle'" in text]
 
 
+@pytest.mark.parametrize("stiffness", [2e4, 1e12])
+def test_the_joints_own_spring_counts(rig, stiffness):
+    spring = f"<springStiffness>{stiffness}</springStiffness>"
+    block = f'<gazebo reference="axle">{spring}</gazebo></robot>'
+    text = EXACT.replace("</robot>", block)
+    p, _ = bound(POSITION, 0.0, 0.001)
+    own = stiffness if stiffness < 1e5 else 0.75 * INERTIA / 0.001**2
+    first, most, _, told = swing(rig, {"p": 0.97 * (p - own)}, 0.001, text, POSITION)
+    assert most < 10.0 * first
+    assert told == []
+    first, most, _, told = swing(rig, {"p": 0.98 * p}, 0.001, text, POSITION)
+    assert most < 10.0 * first
+    assert told
+
+
 @pytest.mark.parametrize("step", [0.001, 0.005])
 def test_the_joints_own_damping_counts_as_the_engine_takes_it(rig, step):
     text = wheel('<dynamics damping="20"/>')

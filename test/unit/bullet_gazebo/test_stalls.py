@@ -108,15 +108,16 @@ NEAR_UP = (0.0, 0.4, 0.5)
 
 
 def folding(gains, goals, collide="true"):
-    """Three links in a plane that are led to `goals` within a second, by PIDs."""
-    text = chain("Effort", 3).replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"')
+    """Links in a plane that are led to `goals` within a second, by PIDs."""
+    text = chain("Effort", len(goals)).replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"')
     own = "".join(
-        f'<gazebo reference="l{i}"><selfCollide>{collide}</selfCollide></gazebo>' for i in range(3)
+        f'<gazebo reference="l{i}"><selfCollide>{collide}</selfCollide></gazebo>'
+        for i in range(len(goals))
     )
 
     def lead(world):
         robot = Rig(world, text.replace("</robot>", f"{own}</robot>"))
-        loops = [robot.load(POSITION, f"j{i}", gains) for i in range(3)]
+        loops = [robot.load(POSITION, f"j{i}", gains) for i in range(len(goals))]
 
         def go(now):
             for each, goal in zip(loops, goals, strict=True):
@@ -143,6 +144,12 @@ def test_what_its_own_links_hold_off_its_goal_is_told_below_the_limit_too(make_w
         )
         assert "rad or m off its goal: link 'l2' touches link 'l0' of its own model" in text
     assert max(abs(each.effort) for each in robot.hardware.joints.values()) < 0.99 * EFFORT
+
+
+def test_seven_soft_joints_that_creep_where_their_links_meet_are_told(make_world):
+    gains = {"p": 60, "i": 30, "d": 3, "i_clamp": 20}
+    robot = folding(gains, (0.0, 0.6, 0.9, 1.2, 1.2, 1.2, 1.0))(make_world())
+    assert [text for text in robot.warnings() if "stalled" in text and "of its own model" in text]
 
 
 @pytest.mark.parametrize(("goals", "collide"), [(NEAR_UP, "true"), (FOLDED, "false")])

@@ -31,6 +31,7 @@ from bullet_gazebo.ros.journal import journal_output
 from bullet_gazebo.ros.node import replay_command
 from cartpole import dqn_train, pg_train, policy_node, workbench
 from lockstep_runner import launcher as lockstep_launcher
+from package_writing import check_cli as check_robot
 from package_writing import cli as new_robot
 from rl_workbench.training import train as training_cli
 from rl_workbench.training.algorithms import ALGORITHMS
@@ -120,6 +121,7 @@ GROUPS = {
     "launches": of("roslaunch"),
     "requests": of("rosservice call"),
     "packages": of("rosrun cartpole new_robot.py"),
+    "checks of robots": of("rosrun cartpole check_robot.py"),
     "tests": of("test", "rostest", "check", "shell", "tensorboard"),
     "window": of("rosrun gazebo_ros gzclient"),
     "lockstep": of("rosrun cartpole lockstep.py"),
@@ -160,13 +162,14 @@ def test_a_training_runs(command: Command, tmp_path: Path, monkeypatch, capsys) 
     assert TRAININGS[program](flags) == 0, capsys.readouterr()
 
 
-@pytest.mark.parametrize("command", GROUPS["packages"], ids=str)
-def test_new_robot_takes_it(command: Command, only_parsing: None, monkeypatch) -> None:
+@pytest.mark.parametrize("command", GROUPS["packages"] + GROUPS["checks of robots"], ids=str)
+def test_commands_on_robots_are_taken(command: Command, only_parsing: None, monkeypatch) -> None:
     monkeypatch.setattr(
         argparse.ArgumentParser, "parse_intermixed_args", argparse.ArgumentParser.parse_args
     )
+    main = new_robot.main if command.words[2] == "new_robot.py" else check_robot.main
     with pytest.raises(Parsed):
-        new_robot.main(command.words[3:])
+        main(command.words[3:])
 
 
 @pytest.mark.parametrize("command", GROUPS["window"], ids=str)

@@ -6,15 +6,14 @@ from itertools import combinations
 from typing import NamedTuple
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Link, ModelDescription
-from bullet_gazebo.physics.engine import FASTEST, FURTHEST, GEAR, OVERLAP, STRONGEST, Body, Twist
-from bullet_gazebo.physics.engines.bullet_contacts import Separation
+from bullet_gazebo.physics.engine import FASTEST, FURTHEST, OVERLAP, STRONGEST, Body, Twist
+from bullet_gazebo.physics.engines.bullet_constraints import add_gear, close_loop
+from bullet_gazebo.physics.engines.bullet_contacts import Separation, groups_of
 from bullet_gazebo.physics.engines.bullet_files import is_plane
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
 
 BASE = -1
-# PyBullet's defaults for which links collide: bits of a link's group, and of the groups that it meets.
-DYNAMIC, STATIC, EVERYTHING = 1, 2, -1
 NO_STOP = 1e16  # [rad, m]
 
 
@@ -79,8 +78,13 @@ class BulletBody(Body):
             pybullet.setJointMotorControlArray, body, self._indices, pybullet.TORQUE_CONTROL, unused, unused
         )  # fmt: skip
         self._unused = unused
-        self._gears: dict[str, tuple[int, float]] = {}  # constraint and effort [N m, N]
-        self._add_gears()
+        places = {n: (body, i) for n, i in zip(self.joint_names, self._indices, strict=True)}
+        self._gears = {
+            name: (add_gear(client, places[name], places[mimic.driver], mimic), mimic.effort)
+            for name, mimic in description.mimics.items()
+        }  # constraint and effort [N m, N]
+        for helper in description.loops:
+            close_loop(client, body, helper, self._links, offsets)
         self._base = pose.compose(self._com)  # where the centre of mass was put last
         if not is_plane(description):
             self.reset_base(pose)
@@ -110,9 +114,9 @@ class BulletBody(Body):
 
         Setting a link's collision filter has that effect.
         """
-        for index in self._links.values():
+        for name, index in self._links.items():
             fixed = self._fixed and index == BASE
-            group, mask = (STATIC, EVERYTHING ^ STATIC) if fixed else (DYNAMIC, EVERYTHING)
+            group, mask = groups_of(self._description, name, fixed)
             pybullet.setCollisionFilterGroupMask(self.id, index, group, mask, self._client)
 
     def _remove_defaults(self) -> None:
@@ -135,26 +139,16 @@ class BulletBody(Body):
         for name in self.link_names:
             self.set_friction(name, 1.0)
         self._choose_self_collisions()
+        root = self._description.links[self._description.root]
+        if root.kinematic or (self._description.static and len(self._links) > 1):
+            self.forget_contacts()  # PyBullet has put them into other groups
         self._separation.add(self.id, self._description, self._links)
         for name in self.link_names:
-            link = self._description.links[name]
-            self.set_link_gravity(name, link.gravity)
-            if link.inertia is not None and not self._description.static:
-                self._keep_moments(self._links[name], link.inertia)
-
-    def _add_gears(self) -> None:
-        """Adds a constraint for each joint that follows another one."""
-        places = dict(zip(self.joint_names, self._indices, strict=True))
-        for name, mimic in self._description.mimics.items():
-            gear = pybullet.createConstraint(
-                self.id, places[name], self.id, places[mimic.driver], pybullet.JOINT_GEAR,
-                [1, 0, 0], [0, 0, 0], [0, 0, 0], physicsClientId=self._client,
-            )  # fmt: skip
-            pybullet.changeConstraint(
-                gear, gearRatio=-mimic.multiplier, relativePositionTarget=mimic.offset, erp=GEAR,
-                physicsClientId=self._client,
-            )  # fmt: skip
-            self._gears[name] = gear, mimic.effort
+            self.set_link_gravity(name, self._description.links[name].weighs)
+        for name, place in self._links.items():
+            inertia = self._description.links[name].inertia
+            if inertia is not None and not self._description.static:
+                self._keep_moments(place, inertia)
 
     def set_gear(self, joint: str, effort: float) -> None:
         gear, _ = self._gears[joint]
@@ -226,14 +220,8 @@ class BulletBody(Body):
             )
 
     def set_link_gravity(self, name: str, on: bool) -> None:
-        key = (self.id, self._links[name])
-        if on:
-            self._weightless.discard(key)
-        else:
-            self._weightless.add(key)
-
-    def link_gravity(self, name: str) -> bool:
-        return (self.id, self._links[name]) not in self._weightless
+        change = self._weightless.difference_update if on else self._weightless.update
+        change((self.id, self._links[body]) for body in self._description.bodies_of(name))
 
     def joint_states(self) -> Sequence[Sequence[float]]:
         return self._states()
@@ -261,8 +249,8 @@ class BulletBody(Body):
 
     def set_inertia(self, link: str, old: Inertia | None, new: Inertia) -> bool:
         index = self._links[link]
-        if self._offsets.get(link, Pose()) != Pose():
-            return False  # the engine's link has other axes
+        if self._offsets.get(link, Pose()) != Pose() or len(self._description.bodies_of(link)) > 1:
+            return False  # the engine's link has other axes, or others have a share of it
         if old is None or old.com != new.com or not (_is_diagonal(old) and _is_diagonal(new)):
             return False  # PyBullet can't move or turn a link's principal axes
         axes = pybullet.getDynamicsInfo(self.id, index, self._client)[2]

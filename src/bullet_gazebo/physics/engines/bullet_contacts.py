@@ -20,10 +20,23 @@ RELAXATION = 0.02  # [s]
 STIFFNESS = 1e6  # [N/m] of the contact points of a light model
 STIFFNESS_OF_A_KILOGRAM = 6e4  # [N/m]; a weight on a single point sinks 0.16 mm
 HARD = 1e9  # [N s/m] of contacts at a given speed: much more than mass / time step
+# Which links collide: bits of a link's group, and of the groups that it meets; one that meets the other
+# is enough. The third is for links of static models, which kinematic ones don't meet; the others are
+# PyBullet's defaults.
+DYNAMIC, STATIC, FIXED, EVERYTHING = 1, 2, 4, -1
 SHALLOW = 0.0002  # [m]; at the file format's usual 0.01 m/s, what ends within RELAXATION anyway
 
 LinkIndex = tuple[int, int]
 """PyBullet's numbers of a body and a link of it."""
+
+
+def groups_of(model: ModelDescription, link: str, fixed: bool) -> tuple[int, int]:
+    """Returns the groups that a link is in, and meets; `fixed` is the base of a model that can't move."""
+    if fixed:
+        return STATIC, EVERYTHING ^ STATIC
+    if model.links[link].kinematic:
+        return STATIC, EVERYTHING ^ STATIC ^ FIXED
+    return (FIXED, EVERYTHING ^ STATIC) if model.static else (DYNAMIC, EVERYTHING)
 
 
 class Separation:
@@ -41,7 +54,7 @@ class Separation:
         self._eased: set[LinkIndex] = set()
 
     def add(self, body: int, model: ModelDescription, links: Mapping[str, int]) -> None:
-        """Makes the contacts of a body compliant, unless it is static.
+        """Makes the contacts of a body compliant, but those of static and kinematic links.
 
         Args:
             body: PyBullet's number.
@@ -49,12 +62,15 @@ class Separation:
             links: PyBullet's indices of its links.
         """
         # Python 3.12 sums floats up in another way than 3.11; their exact sum has the same bits in both.
-        mass = math.fsum(link.inertia.mass for link in model.links.values() if link.inertia)
+        inertias = [link.inertia for link in model.links.values() if not link.kinematic]
+        mass = math.fsum(inertia.mass for inertia in inertias if inertia)
         stiffness = 0.0 if model.static else max(STIFFNESS, STIFFNESS_OF_A_KILOGRAM * mass)
         for name, index in links.items():
-            self._links[body, index] = stiffness, model.links[name].max_vel
-            if stiffness:
-                self._set((body, index), stiffness, stiffness * RELAXATION)
+            link = model.links[name]
+            own = 0.0 if link.kinematic else stiffness
+            self._links[body, index] = own, link.max_vel
+            if own:
+                self._set((body, index), own, own * RELAXATION)
         self.placed = True
 
     def remove(self, body: int) -> None:

@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 
 from bullet_gazebo.heap import give_back
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
-from bullet_gazebo.physics.engine import STRONGEST, Body, Contact, Engine, LinkOf, Side
+from bullet_gazebo.physics.engine import Body, Contact, Engine, LinkOf, Side
 from bullet_gazebo.physics.engine_form import at_joints, parents_first
 from bullet_gazebo.physics.engines.bullet_body import BASE, BulletBody
+from bullet_gazebo.physics.engines.bullet_constraints import add_weld, weld_of
 from bullet_gazebo.physics.engines.bullet_contacts import Separation
 from bullet_gazebo.physics.engines.bullet_files import is_plane, write_urdf
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
@@ -207,10 +208,7 @@ class BulletClient:
         wanted = one.link_state(link)[0].compose(pose).compose(centre)
         place = wanted.relative_to(one.centre_of_mass(link))
         pairs = [(a, b) for a in one.pieces(link) for b in other.pieces(its)]
-        made_of = (
-            one.id, pairs[0][0], other.id, pairs[0][1], pybullet.JOINT_FIXED, [0, 0, 0],
-            place.position, [0, 0, 0], place.orientation, [0, 0, 0, 1],
-        )  # fmt: skip
+        made_of = weld_of((one.id, pairs[0][0]), (other.id, pairs[0][1]), place)
         number = next(self._count)
         self._fix(number, made_of, [(one.id, other.id, a, b) for a, b in pairs])
         return number
@@ -218,8 +216,7 @@ class BulletClient:
     def _fix(
         self, number: int, made_of: Sequence[Any], apart: Sequence[tuple[int, int, int, int]]
     ) -> None:
-        constraint = pybullet.createConstraint(*made_of, self._client)
-        pybullet.changeConstraint(constraint, maxForce=STRONGEST, physicsClientId=self._client)
+        constraint = add_weld(self._client, made_of)
         self.fastened[number] = Fastening(constraint, made_of, apart)
         self._let_meet(number, False)
 

@@ -7,11 +7,11 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from bullet_gazebo.physics.description import Inertia, Joint, Link, Mesh, ModelDescription, Shape
+from bullet_gazebo.physics.files.meshes import stl
 from bullet_gazebo.physics.pose import Pose, to_rpy
 
 TURNING = ("revolute", "continuous")
 TREAD = 1e-6  # [m]; much less than contacts yield, so the whole line carries
-FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of STL
 
 
 def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
@@ -29,20 +29,13 @@ def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
     if path.exists():
         return str(path)
     if concave:
-        path.write_bytes(_stl(mesh.vertices[mesh.faces]))
+        path.write_bytes(stl(mesh.vertices[mesh.faces]))
     elif objects:
         path.write_text(_obj(mesh), encoding="ascii")
     else:
         points = np.concatenate(mesh.hulls)
-        path.write_bytes(_stl(points[np.arange(-(-len(points) // 3) * 3) % len(points)]))
+        path.write_bytes(stl(points[np.arange(-(-len(points) // 3) * 3) % len(points)]))
     return str(path)
-
-
-def _stl(corners: np.ndarray) -> bytes:
-    """Returns facets as binary STL, which PyBullet reads fastest, without normals."""
-    facets = np.zeros(corners.size // 9, FACET)
-    facets["corners"] = corners.reshape(-1, 3, 3)
-    return bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
 
 
 def _obj(mesh: Mesh) -> str:

@@ -6,7 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription, Shape
+from bullet_gazebo.physics.description import (
+    UNMOVED,
+    DescriptionError,
+    Inertia,
+    ModelDescription,
+    Shape,
+)
 from bullet_gazebo.physics.engine import (
     STRONGEST,
     Body,
@@ -59,17 +65,20 @@ class MujocoBody(Body):
         """`compile_anew` recompiles the world's model from its bodies' present settings."""
         self.description = description
         self.pose = pose  # of the root link; of one that is free, where it was loaded
-        self.link_names = tuple(description.links)
+        self.link_names = tuple(
+            name for name, link in description.links.items() if not link.part_of
+        )
         joints = [] if description.static else description.movable_joints
         self.joint_names = tuple(joint.name for joint in joints)
-        self.inertias = {name: link.inertia for name, link in description.links.items()}
-        self._gravity = {name: link.gravity for name, link in description.links.items()}
+        self.inertias = description.inertias()
+        self._gravity = {name: link.weighs for name, link in description.links.items()}
         self._frictions: dict[str, float] = {}  # factors, by link
         self._gears = {name: mimic.effort for name, mimic in description.mimics.items()}  # [N m, N]
         self._joints = []
         for joint in joints:
             lower, upper = (joint.lower, joint.upper) if joint.bounded else (1.0, -1.0)
             self._joints.append(JointSettings(joint.damping, lower, upper, 0.0, joint.friction))
+        self.kinematic = description.links[description.root].kinematic
         self._state = state
         self._compile_anew = compile_anew
 
@@ -94,6 +103,9 @@ class MujocoBody(Body):
         self._qpos, self._qvel, self._qfrc = data.qpos, data.qvel, data.qfrc_applied
         for link, moments in elements.moments.items():
             model.body_inertia[self._ids[link]] = moments
+        if self.kinematic:
+            root = self._ids[self.description.root]
+            model.body_mass[root] = model.body_inertia[root] = UNMOVED
         for name, on in self._gravity.items():
             self._weigh(name, on)
         for link, factor in self._frictions.items():
@@ -146,6 +158,8 @@ class MujocoBody(Body):
         self._state.loaded = True
 
     def set_inertia(self, link: str, old: Inertia | None, new: Inertia) -> bool:
+        if len(self.description.bodies_of(link)) > 1:
+            return False  # others have a share of it
         before = self.inertias[link]
         self.inertias[link] = new
         try:
@@ -226,14 +240,12 @@ class MujocoBody(Body):
         return self._state.link(self._ids[name])
 
     def set_link_gravity(self, name: str, on: bool) -> None:
-        self._gravity[name] = on
-        self._weigh(name, on)
+        for body in self.description.bodies_of(name):
+            self._gravity[body] = on
+            self._weigh(body, on)
 
     def _weigh(self, name: str, on: bool) -> None:
         model = self._state.model
         model.body_gravcomp[self._ids[name]] = 0.0 if on else 1.0
         if not on:
             model.flg_gravcomp = True
-
-    def link_gravity(self, name: str) -> bool:
-        return self._gravity[name]

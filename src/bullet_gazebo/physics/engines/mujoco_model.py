@@ -1,5 +1,6 @@
 """Writes a ModelDescription into MuJoCo's model of the whole world."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -8,14 +9,16 @@ import mujoco
 import numpy as np
 
 from bullet_gazebo.physics.description import (
+    BALL,
     DescriptionError,
     Inertia,
     Joint,
+    Mesh,
     ModelDescription,
     Shape,
 )
 from bullet_gazebo.physics.dynamics import tensor_in
-from bullet_gazebo.physics.pose import IDENTITY, Pose, Quaternion, Vector, rotate
+from bullet_gazebo.physics.pose import IDENTITY, ZERO, Pose, Quaternion, Vector, rotate
 
 GEOMS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -24,8 +27,12 @@ GEOMS = {
     "plane": mujoco.mjtGeom.mjGEOM_PLANE,
     "mesh": mujoco.mjtGeom.mjGEOM_MESH,
 }
+BASE = 1.0  # [m] of rock below the lowest place of a height map
+THINNEST = 1e-6  # [m]; a height map needs some height
 MU_STEPS, MOST_PRIORITY = 1e6, 2**30  # friction in whole steps of 1e-6
+OTHERS, KINEMATIC = 1, 2  # groups of geoms, which meet if either's affinity has the other's
 FASTENED = Inertia(mass=1.0, ixx=1.0, iyy=1.0, izz=1.0)  # of links that nothing can move
+WEIGHTLESS = Inertia(mass=0.0)  # of a part of another link that is fixed to a third one
 
 
 @dataclass
@@ -67,6 +74,7 @@ class ModelWriter:
         if not model.static:
             self._keep_apart()
             self._add_gears()
+            self._close_loops()
         return self._elements
 
     def _add_gears(self) -> None:
@@ -77,6 +85,16 @@ class ModelWriter:
             tendon.wrap_joint(f"{self.key}:{mimic.driver}", -mimic.multiplier)
             self._elements.tendons[name] = tendon
 
+    def _close_loops(self) -> None:
+        """Adds a constraint for each helper link that closes a loop."""
+        pins = {joint.child: joint.anchor.position for joint in self.model.joints.values()}
+        for helper in self.model.loops:
+            names = (f"{self.key}:{helper.part_of}", f"{self.key}:{helper.name}")
+            if helper.closing == BALL:
+                add_equality(self.spec, mujoco.mjtEq.mjEQ_CONNECT, names, pins[helper.name])
+            else:
+                add_weld(self.spec, names, Pose())
+
     def _add_link(self, parent: mujoco.MjsBody, link: str, pose: Pose) -> mujoco.MjsBody:
         body = parent.add_body(
             name=f"{self.key}:{link}", pos=pose.position, quat=wxyz(pose.orientation),
@@ -84,7 +102,7 @@ class ModelWriter:
         )  # fmt: skip
         inertia = self.inertias[link]
         if inertia is None or self.model.static:
-            inertia = FASTENED
+            inertia = WEIGHTLESS if self.model.links[link].part_of else FASTENED
         axes, moments = principal(inertia)
         body.mass, body.ipos, body.iquat = inertia.mass, inertia.com.position, wxyz(axes)
         body.inertia = moments
@@ -94,7 +112,7 @@ class ModelWriter:
             body.inertia = (max(moments),) * 3
             self._elements.moments[link] = moments
         for shape in self.model.links[link].collisions:
-            self._add_shape(body, shape)
+            self._add_shape(body, shape, link)
         self._elements.bodies[link] = body
         return body
 
@@ -111,15 +129,23 @@ class ModelWriter:
             limited=mujoco.mjtLimited.mjLIMITED_FALSE,  # MujocoBody sets stops, also crossed ones
         )
 
-    def _add_shape(self, body: mujoco.MjsBody, shape: Shape) -> None:
+    def _add_shape(self, body: mujoco.MjsBody, shape: Shape, link: str) -> None:
+        if self.model.links[link].kinematic:
+            meets = KINEMATIC, 0
+        else:
+            fixed = self.model.static or (self.model.fixed_base and link == self.model.root)
+            meets = OTHERS, OTHERS if fixed else OTHERS | KINEMATIC
         for number in range(geoms_of(shape)):
             geom = body.add_geom(
                 type=GEOMS[shape.kind], pos=shape.pose.position, quat=wxyz(shape.pose.orientation),
                 condim=3,
             )  # fmt: skip
+            geom.contype, geom.conaffinity = meets
             geom.friction[0] = shape.mu
             geom.priority = priority(shape.mu)
-            if shape.kind == "mesh":
+            if shape.solid is not None and shape.solid.is_heightmap:
+                self._set_heights(geom, shape, shape.solid)
+            elif shape.kind == "mesh":
                 geom.meshname = self._add_mesh(shape, number)
             elif shape.kind == "box":
                 geom.size = [length / 2.0 for length in shape.size]
@@ -129,6 +155,19 @@ class ModelWriter:
                 geom.size = [shape.size[0], 0.0, 0.0]
             else:
                 geom.size = [0.0, 0.0, 1.0]  # infinite
+
+    def _set_heights(self, geom: mujoco.MjsGeom, shape: Shape, solid: Mesh) -> None:
+        """Makes a geom a height field. MuJoCo measures heights from the lowest place, as shares of all."""
+        heights = solid.vertices[:, 2] * shape.size[2]
+        rows, low, span = math.isqrt(len(heights)), float(heights.min()), float(np.ptp(heights))
+        name = f"{shape.mesh}:{solid.digest}:{shape.size}"
+        if self.spec.hfield(name) is None:
+            self.spec.add_hfield(
+                name=name, nrow=rows, ncol=rows, userdata=((heights - low) / (span or 1.0)).tolist(),
+                size=[shape.size[0] / 2.0, shape.size[1] / 2.0, max(span, THINNEST), BASE],
+            )  # fmt: skip
+        geom.type, geom.hfieldname = mujoco.mjtGeom.mjGEOM_HFIELD, name
+        geom.pos = shape.pose.compose(Pose((0.0, 0.0, low))).position
 
     def _add_mesh(self, shape: Shape, piece: int) -> str:
         """Adds the points of a mesh or of a piece of it, once for each scale; returns their name."""
@@ -152,6 +191,21 @@ class ModelWriter:
         for a, b in combinations(solid, 2):
             if frozenset((a, b)) not in meet:
                 self.spec.add_exclude(bodyname1=f"{self.key}:{a}", bodyname2=f"{self.key}:{b}")
+
+
+def add_weld(spec: mujoco.MjSpec, names: tuple[str, str], pose: Pose) -> None:
+    """Fixes a body to another one, at `pose` in the frame of the first one."""
+    numbers = (*ZERO, *pose.position, *wxyz(pose.orientation), 1.0)
+    add_equality(spec, mujoco.mjtEq.mjEQ_WELD, names, numbers)
+
+
+def add_equality(
+    spec: mujoco.MjSpec, kind: mujoco.mjtEq, names: tuple[str, str], numbers: tuple[float, ...]
+) -> None:
+    """Adds a constraint of two bodies."""
+    data = np.pad(numbers, (0, mujoco.mjNEQDATA - len(numbers)))
+    body = mujoco.mjtObj.mjOBJ_BODY
+    spec.add_equality(type=kind, objtype=body, name1=names[0], name2=names[1], data=data)
 
 
 def geoms_of(shape: Shape) -> int:

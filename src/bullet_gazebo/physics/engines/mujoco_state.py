@@ -15,6 +15,12 @@ FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
 TENDON = mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON
 ROWS = 3  # constraints of a contact: along its normal, and two across it
+OUT = 0.1  # of the fastest separation; what separates more slowly is out
+SLIDING = 0.2  # [m/s] times friction; what slides slower hops by micrometres
+SLOWEST = 0.1  # [m/s, rad/s] of a world where something may slide
+PASSES = (
+    2  # solutions of a step before the one that counts; each leaves a part of what friction lifts
+)
 
 
 @dataclass
@@ -47,11 +53,15 @@ class MujocoState:
     def step(self) -> None:
         """Integrates by one time step; efforts and wrenches end with it."""
         np.copyto(self._before, self._positions)
-        if self.speeds or self.gears or (self.placed and not self.whole_steps):
+        may_lift = not self.whole_steps and (self.placed or hypot(*self._speeds()) > SLOWEST)
+        if may_lift or self.speeds or self.gears:
             mujoco.mj_step1(self.model, self.data)
-            self._drive()
+            if self.speeds or self.gears:
+                self._drive()
             if self.placed:
                 self._ease_contacts()
+            if may_lift:
+                self._keep_down()
             mujoco.mj_step2(self.model, self.data)
         else:
             mujoco.mj_step(self.model, self.data)
@@ -92,15 +102,46 @@ class MujocoState:
         self.placed = bool(aims.size) and self._bound_separation(first, aims[::ROWS])
 
     def _bound_separation(self, first: int, aims: np.ndarray) -> bool:
-        """Bounds the accelerations [m/s²] that normals aim at; returns whether one was above."""
+        """Bounds the accelerations [m/s²] that normals aim at; returns whether something still comes out."""
         data, fastest = self.data, self._separation
         if fastest.size > 1:
             geoms = data.contact.geom[data.contact.efc_address >= 0]
             fastest = fastest[geoms].min(axis=1)
-        most = data.efc_KBIP[first, 1] * (fastest - data.efc_vel[first::ROWS])
-        above = bool((most < aims).any())
+        speeds = data.efc_vel[first::ROWS]
+        most = data.efc_KBIP[first, 1] * (fastest - speeds)
+        comes_out = bool(((most < aims) | (speeds > OUT * fastest)).any())
         np.minimum(aims, most, out=aims)
-        return above
+        return comes_out
+
+    def _keep_down(self) -> None:
+        """Lets friction lift nothing.
+
+        MuJoCo's friction is convex: what misses its aim across a contact by an acceleration a misses it along
+        the normal by mu a. So the normals aim lower by that, which takes solving the step to know.
+        """
+        model, data = self.model, self.data
+        first = data.ne + data.nf + data.nl
+        friction = data.contact.friction[data.contact.efc_address >= 0, 0]
+        if not self.placed and not self._slides(friction, data.efc_vel[first:].tolist()):
+            return
+        mujoco.mj_fwdActuation(model, data)
+        mujoco.mj_fwdAcceleration(model, data)
+        aims, missed = data.efc_aref[first::ROWS].copy(), np.empty(data.nefc)
+        for _ in range(PASSES):
+            mujoco.mj_fwdConstraint(model, data)
+            mujoco.mj_mulJacVec(model, data, missed, data.qacc)
+            missed -= data.efc_aref
+            along, one, other = missed[first:].reshape(-1, ROWS).T
+            lift = np.where(along > 0.0, friction * np.hypot(one, other), 0.0)
+            data.efc_aref[first::ROWS] = aims - lift
+
+    @staticmethod
+    def _slides(friction: np.ndarray, speeds: Sequence[float]) -> bool:
+        """Returns whether something slides, from the speeds [m/s] along and across contacts."""
+        if hypot(*speeds) < SLIDING:
+            return False
+        across = zip(friction.tolist(), speeds[1::ROWS], speeds[2::ROWS], strict=True)
+        return any(mu * hypot(one, other) > SLIDING for mu, one, other in across)
 
     def _slow_down(self) -> None:
         """Limits speeds, and integrates the positions again.

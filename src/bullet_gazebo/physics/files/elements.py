@@ -10,6 +10,7 @@ from bullet_gazebo.physics.pose import Pose, Vector, from_rpy, to_rpy
 
 FRAME_TAGS = ("bodyName", "frameName")  # of plugins, where they name a link
 OFFSETS = ("xyzOffset", "rpyOffset")
+TINY = 1e-12  # [kg m²]; what rounding leaves of a moment of 0, with any sign
 SHOWN = 80  # characters of a faulty value that an error quotes
 
 
@@ -59,6 +60,11 @@ def direction(xyz: tuple[float, ...], what: str) -> Vector:
     if not 0.0 < length < math.inf:
         raise DescriptionError(f"{what} has length {length:g}")
     return (x / length, y / length, z / length)
+
+
+def mended(moments: dict[str, float]) -> dict[str, float]:
+    """Returns moments of inertia [kg m²] with 0 in place of what rounding has left just below it."""
+    return moments | {key: 0.0 for key in ("ixx", "iyy", "izz") if -TINY <= moments[key] < 0.0}
 
 
 def truth(text: str | None, default: bool = False) -> bool:

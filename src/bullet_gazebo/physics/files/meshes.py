@@ -4,29 +4,27 @@ A limited child process reads them (`mesh_program`, `mesh_looks`) and takes them
 """
 
 import json
-import os
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
-from zipfile import BadZipFile
 
 import numpy as np
 
 from bullet_gazebo.physics.description import Color, DescriptionError, Mesh
 from bullet_gazebo.physics.files.elements import place
 from bullet_gazebo.physics.files.hull import is_solid
+from bullet_gazebo.physics.files.mesh_cache import cache_folder, keep, kept, read_arrays, written
 from file_access.limited import LimitedProcess, Limits, RequestRefused
-from file_access.locks import scratch_folder
 
 SUFFIXES = (".stl", ".dae", ".obj")
-PLAIN = (".stl",)  # of files that have no materials
+IMAGES = (".png", ".jpg", ".jpeg")  # of height maps
+PLAIN = (".stl", *IMAGES)  # of files that have no materials
 LIMITS = Limits(processor_time=60, wall_time=120.0, memory=4 << 30, output=1 << 30)
-DIGEST = 32  # characters
 MOST_KEPT = 32  # files with their looks
+FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of STL
 PIECES = "v-hacd-1"  # begins the names of kept pieces; another one when others would come out
 
 # It stays for further meshes: starting Python and importing trimesh takes longer than most files.
@@ -41,6 +39,10 @@ class Submesh(NamedTuple):
 
     name: str
     centred: bool
+
+
+Selection = Submesh | int | None
+"""What is read of a file: one part of a mesh, or so many samples per pixel of a height map."""
 
 
 class MeshPart(NamedTuple):
@@ -86,27 +88,39 @@ class MeshLook:
         if self.path.suffix.lower() in PLAIN:
             return b""
         try:
-            return _process.ask(json.dumps([what, str(self.path), None]).encode())
+            return _process.ask(json.dumps([what, str(self.path), None, ""]).encode())
         except RequestRefused:
             return b""
 
 
-def read_mesh(path: Path, submesh: Submesh | None = None) -> Mesh:
-    """Returns the mesh of an STL, COLLADA or OBJ file, or of one named part of it.
+def read_mesh(path: Path, selection: Selection = None) -> Mesh:
+    """Returns the mesh of an STL, COLLADA or OBJ file, or of one named part of it, or a height map.
 
     Raises:
         DescriptionError: if it can't be simulated: the file, the place in it and the fault, in one line.
     """
-    check_mesh(path)
+    check_mesh(path, (*SUFFIXES, *IMAGES))
     with place(f"mesh '{path}'"):
-        try:
-            data = _process.ask(json.dumps(["mesh", str(path), submesh]).encode())
-        except RequestRefused as error:
-            raise DescriptionError(str(error)) from error
-    stream = BytesIO(data)
-    digest = stream.read(DIGEST).decode()
-    vertices, faces, *hulls = read_arrays(stream.read())
-    return Mesh(vertices, faces, tuple(hulls), digest)
+        return _asked("mesh", str(path), selection)
+
+
+def make_mesh(what: str, *given: object) -> tuple[str, Mesh]:
+    """Returns a mesh that `shape_meshes` makes, and the file that it is kept in for whoever draws it."""
+    mesh = _asked(what, "", given)
+    path = cache_folder() / f"{what}-{mesh.digest}.stl"
+    if not path.exists():
+        with suppress(OSError):  # then it isn't drawn
+            keep(path, stl(mesh.vertices[mesh.faces]))
+    return str(path), replace(mesh, in_pieces=len(mesh.hulls) > 1)
+
+
+def _asked(what: str, path: str, given: object) -> Mesh:
+    try:
+        data = _process.ask(json.dumps([what, path, given, str(cache_folder())]).encode())
+    except RequestRefused as error:
+        raise DescriptionError(str(error)) from error
+    digest, vertices, faces, *hulls = read_arrays(data)
+    return Mesh(vertices, faces, tuple(hulls), digest.tobytes().decode())
 
 
 def in_pieces(mesh: Mesh) -> Mesh:
@@ -120,21 +134,15 @@ def in_pieces(mesh: Mesh) -> Mesh:
     """
     if len(mesh.hulls) > 1:
         return _of_pieces(mesh, mesh.hulls) if all(map(is_solid, mesh.hulls)) else mesh
-    cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    kept = Path(cache, "bullet_gazebo", "meshes", f"{PIECES}-{mesh.digest}")
+    data = json.dumps(["pieces", "", None, ""]).encode() + b"\n"
+
+    def compute() -> bytes:
+        return _process.ask(data + written((mesh.vertices, mesh.faces)))
+
     try:
-        mark, content = kept.read_bytes().split(b"\n", 1)
-        if mark != PIECES.encode():  # a file that was cut off
-            raise ValueError(mark)
-        pieces = read_arrays(content)
-    except (OSError, ValueError, EOFError, BadZipFile):
-        data = json.dumps(["pieces", "", None]).encode() + b"\n"
-        try:
-            answer = _process.ask(data + written((mesh.vertices, mesh.faces)))
-        except RequestRefused as error:
-            raise DescriptionError(str(error)) from error
-        _keep(kept, PIECES.encode() + b"\n" + answer)
-        pieces = read_arrays(answer)
+        pieces = kept(cache_folder() / f"{PIECES}-{mesh.digest}", compute)
+    except RequestRefused as error:
+        raise DescriptionError(str(error)) from error
     return _of_pieces(mesh, pieces) if pieces else mesh
 
 
@@ -142,13 +150,11 @@ def _of_pieces(mesh: Mesh, pieces: Iterable[np.ndarray]) -> Mesh:
     return replace(mesh, hulls=tuple(pieces), digest=f"{mesh.digest}-pieces", in_pieces=True)
 
 
-def _keep(path: Path, data: bytes) -> None:
-    """Writes a file all at once; where that is not possible, none."""
-    with suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with scratch_folder(str(path.parent)) as folder:
-            (folder / path.name).write_bytes(data)
-            os.replace(folder / path.name, path)
+def stl(corners: np.ndarray) -> bytes:
+    """Returns facets as binary STL, which PyBullet reads fastest, without normals."""
+    facets = np.zeros(corners.size // 9, FACET)
+    facets["corners"] = corners.reshape(-1, 3, 3)
+    return bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
 
 
 def read_look(path: str) -> MeshLook:
@@ -157,7 +163,7 @@ def read_look(path: str) -> MeshLook:
     Raises:
         DescriptionError: it can't be shown; one line with the file and what is wrong.
     """
-    check_mesh(Path(path))
+    check_mesh(Path(path), (*SUFFIXES, *IMAGES))
     found = Path(path).stat()
     return _look(Path(path), found.st_mtime_ns, found.st_size)
 
@@ -167,27 +173,10 @@ def _look(path: Path, _changed: int, _size: int) -> MeshLook:
     return MeshLook(path, read_mesh(path))
 
 
-def written(arrays: Iterable[np.ndarray]) -> bytes:
-    """Returns arrays as bytes, one after the other."""
-    stream = BytesIO()
-    for array in arrays:
-        np.save(stream, array, allow_pickle=False)
-    return stream.getvalue()
-
-
-def read_arrays(data: bytes) -> list[np.ndarray]:
-    """Returns the arrays that `written` has written."""
-    stream, arrays = BytesIO(data), []
-    while stream.tell() < len(data):
-        arrays.append(np.load(stream, allow_pickle=False))
-        arrays[-1].setflags(write=False)
-    return arrays
-
-
-def check_mesh(path: Path) -> None:
+def check_mesh(path: Path, suffixes: tuple[str, ...] = SUFFIXES) -> None:
     """Refuses what can't be a mesh, without reading it."""
-    if path.suffix.lower() not in SUFFIXES:
-        raise DescriptionError(f"mesh '{path}': only {', '.join(SUFFIXES)} files are read")
+    if path.suffix.lower() not in suffixes:
+        raise DescriptionError(f"mesh '{path}': only {', '.join(suffixes)} files are read")
     if not path.is_file():  # reading a pipe would wait forever
         raise DescriptionError(f"mesh '{path}': it is not a file")
     if path.stat().st_size == 0:

@@ -1,5 +1,6 @@
 """What reading one model or world needs: the files that it names, and limits on their number and size."""
 
+import logging
 import os
 import time
 from collections.abc import Callable, Iterable
@@ -15,7 +16,13 @@ from bullet_gazebo.physics.description import (
     ModelDescription,
 )
 from bullet_gazebo.physics.files.elements import files_named_by_a_model, place, shown
-from bullet_gazebo.physics.files.meshes import Submesh, check_mesh, in_pieces, read_mesh
+from bullet_gazebo.physics.files.meshes import (
+    SUFFIXES,
+    Selection,
+    check_mesh,
+    in_pieces,
+    read_mesh,
+)
 from file_access.content import MAX_BYTES, FileError, TooLarge, read_file
 from file_access.xml_text import MAX_ELEMENTS, parse
 
@@ -24,12 +31,17 @@ MeshFile = tuple[str, Mesh | None]
 
 # Limits on the text and all that it includes, counted each time it is included.
 MAX_FILES = 1000  # different ones
-MAX_MESH_BYTES = 400_000_000  # of different mesh files, which take about twice that of memory
+MAX_MESH_BYTES = (
+    400_000_000  # of a model's different mesh files, which take about twice that of memory
+)
 MAX_MODELS = 5000  # in a world, or nested in a model
 MAX_SPLITTING = (
     120.0  # [s] of wall time for a model's convex pieces; the other meshes keep their hulls
 )
-MAX_SECONDS = 60.0  # [s] of computing, however busy the machine is otherwise
+MAX_SECONDS = 60.0  # [s] of computing for a model, however busy the machine is otherwise
+TELLING = 5.0  # [s] between two lines on the progress
+
+logger = logging.getLogger(f"rosout.{__name__}")
 
 
 def _no_packages(name: str) -> str:
@@ -85,12 +97,26 @@ class Resources:
             return []
 
 
+class LoadProgress:
+    """Says in the log how far something has come that takes long."""
+
+    def __init__(self, what: str, total: int) -> None:
+        self._what, self._done, self._total = what, 0, total
+        self._next = time.monotonic() + TELLING
+
+    def one_more(self) -> None:
+        self._done += 1
+        if time.monotonic() > self._next:
+            logger.info("%d of %d %s", self._done, self._total, self._what)
+            self._next = time.monotonic() + TELLING
+
+
 class Reading:
     """Counts what reading one model or world takes, and ends it with LimitExceeded beyond a limit.
 
-    The limits are MAX_BYTES, MAX_ELEMENTS, MAX_FILES, MAX_MESH_BYTES, MAX_MODELS and MAX_SECONDS. Each file
-    is parsed once, but its elements count each time it is included. Each mesh file, or named part of one, is
-    read once.
+    The limits are MAX_BYTES, MAX_ELEMENTS, MAX_FILES, MAX_MODELS, and for each model of a world
+    MAX_MESH_BYTES and MAX_SECONDS. Each file is parsed once, but its elements count each time it is
+    included. Each mesh file, or named part of one, is read once.
     """
 
     def __init__(self, cancelled: Callable[[], bool] = lambda: False) -> None:
@@ -100,10 +126,15 @@ class Reading:
                 its processor time counts.
         """
         self._cancelled = cancelled
-        self._end = time.thread_time() + MAX_SECONDS
-        self._bytes = self._elements = self._models = self._mesh_bytes = 0
+        self._bytes = self._elements = self._models = 0
+        self.begin()
         self._files: dict[Path, Element] = {}
-        self._meshes: dict[tuple[Path, Submesh | None], Mesh] = {}
+        self._meshes: dict[tuple[Path, Selection], Mesh] = {}
+
+    def begin(self) -> None:
+        """Begins another model of a world."""
+        self._end = time.thread_time() + MAX_SECONDS
+        self._mesh_bytes = 0
 
     def parse(self, text: str | bytes) -> Element:
         """Returns the root element of an XML text or a file's content."""
@@ -136,17 +167,17 @@ class Reading:
             self._files[path] = self.parse(data)
             return self._files[path]
 
-    def mesh(self, path: Path, submesh: Submesh | None = None) -> Mesh:
+    def mesh(self, path: Path, selection: Selection = None) -> Mesh:
         """Returns the mesh of a file or of a named part of it. It is the same object each time."""
-        if (path, submesh) not in self._meshes:
+        if (path, selection) not in self._meshes:
             with files_named_by_a_model(f"mesh '{path}'"):
                 self._mesh_bytes += path.stat().st_size
             if self._mesh_bytes > MAX_MESH_BYTES:
                 raise LimitExceeded(
                     f"mesh '{path}': more than {MAX_MESH_BYTES} bytes of mesh files (MAX_MESH_BYTES)"
                 )
-            self._meshes[path, submesh] = read_mesh(path, submesh)
-        return self._meshes[path, submesh]
+            self._meshes[path, selection] = read_mesh(path, selection)
+        return self._meshes[path, selection]
 
     def split_meshes(self, model: ModelDescription) -> None:
         """Gives concave meshes convex pieces if any link collides with its own model.
@@ -159,7 +190,7 @@ class Reading:
         end = time.monotonic() + MAX_SPLITTING
         for link in model.links.values():
             for number, shape in enumerate(link.collisions):
-                if shape.solid is None:
+                if shape.solid is None or shape.solid.is_heightmap:
                     continue
                 self.check()
                 if shape.solid not in found:
@@ -214,9 +245,14 @@ class MeshFinder:
         return False
 
     def find(
-        self, uri: str, where: str, needed: bool, submesh: Submesh | None = None
+        self,
+        uri: str,
+        where: str,
+        needed: bool,
+        selection: Selection = None,
+        suffixes: tuple[str, ...] = SUFFIXES,
     ) -> MeshFile | None:
-        """Returns the file's path and its mesh, or the `submesh`; None for one that is left out.
+        """Returns the file's path and its mesh, or the `selection`; None for one that is left out.
 
         A visual's isn't `needed`: it is looked for but not read, since nothing is drawn here.
         """
@@ -224,10 +260,8 @@ class MeshFinder:
             if not uri.strip():
                 raise DescriptionError("the mesh has no file name")
             path = self.resources.find(uri, self.folder).absolute()
-            if not needed:
-                check_mesh(path)
-                return str(path), None
-            return str(path), self.reading.mesh(path, submesh)
+            check_mesh(path, suffixes)
+            return str(path), self.reading.mesh(path, selection) if needed else None
         except DescriptionError as error:
             if needed:
                 raise type(error)(f"{where}: {error}") from error

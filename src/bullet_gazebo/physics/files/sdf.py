@@ -20,6 +20,7 @@ from bullet_gazebo.physics.description import (
     Sensor,
 )
 from bullet_gazebo.physics.files import elements
+from bullet_gazebo.physics.files.element_table import MODEL, WithoutEffect
 from bullet_gazebo.physics.files.elements import (
     files_named_by_a_model,
     named,
@@ -29,24 +30,21 @@ from bullet_gazebo.physics.files.elements import (
     truth,
 )
 from bullet_gazebo.physics.files.mechanisms import add_mechanisms
+from bullet_gazebo.physics.files.motion import read_link_motion, settle_kinematic
 from bullet_gazebo.physics.files.own_models import own_models
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
 from bullet_gazebo.physics.files.sdf_parts import (
     WORLD,
     Frames,
     JointReader,
-    ShapeReader,
     joint_end,
     read_inertia,
     read_pose,
     read_sensors,
 )
-from bullet_gazebo.physics.lumping import (
-    detach_from_world,
-    find_roots,
-    mend_moments,
-    unique,
-)
+from bullet_gazebo.physics.files.sdf_shapes import ShapeReader
+from bullet_gazebo.physics.loops import span
+from bullet_gazebo.physics.lumping import detach_from_world, mend_moments, unique
 from bullet_gazebo.physics.pose import Pose
 
 OVERRIDES = ("pose", "static")
@@ -58,12 +56,16 @@ NEWEST = (1, 7)
 
 @dataclass(frozen=True)
 class FileContext:
-    """The file of an element: how its URIs are resolved, and its version of SDF."""
+    """The file of an element: how its URIs are resolved, and its version of SDF.
+
+    `unread` collects what has no effect in the model that is read.
+    """
 
     resources: Resources
     reading: Reading
     version: tuple[int, int]
     folder: Path | None = None
+    unread: WithoutEffect = field(default_factory=WithoutEffect)
 
 
 def open_include(include: Element, context: FileContext) -> tuple[Element, FileContext]:
@@ -206,11 +208,19 @@ def read_model(element: Element, context: FileContext) -> ModelDescription:
     name = named(element, "model")
     with elements.place(f"model '{shown(name)}'"):
         static = truth(element.findtext("static"))
+        context = replace(context, unread=WithoutEffect())
         parts = _read_parts(element, context, static, MAX_NESTING)
+        parts.warnings[:0] = context.unread.warnings()
         if context.version > NEWEST:
             parts.warnings.append("written for a newer SDF than 1.7: what is new in it is ignored")
+        solids = [shape.solid for link in parts.links for shape in link.collisions]
+        if not static and any(solid and solid.is_heightmap for solid in solids):
+            static = True
+            parts.warnings.append("it has a height map, so it is static, as in Gazebo")
         model = _assemble(name, parts, static)
-        model.initial_pose = read_pose(element, "model")[0]
+        model.initial_pose, frame = read_pose(element, "model")
+        if frame not in ("", WORLD):
+            model.warnings.append(f"<pose>: it is the world's, not relative to '{shown(frame)}'")
         context.reading.split_meshes(model)
         return model
 
@@ -218,11 +228,15 @@ def read_model(element: Element, context: FileContext) -> ModelDescription:
 def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
     poses = {WORLD: Pose(), **parts.poses}
     if static:
-        parts.joints = [joint for joint in parts.joints if joint.parent != WORLD]
+        parts.joints = [
+            joint if joint.movable else replace(joint, kind="fixed")
+            for joint in parts.joints
+            if joint.parent != WORLD
+        ]
     elif any(joint.parent == WORLD for joint in parts.joints):
         parts.links.insert(0, Link(WORLD))
     links, joints = unique(parts.links, "link"), unique(parts.joints, "joint")
-    roots = find_roots(links, joints)
+    roots = span(links, joints, parts.warnings)
     if len(roots) > 1 and not static:
         raise DescriptionError(
             f"links {roots[:10]} are not joined to each other; make them models of their own, "
@@ -234,6 +248,7 @@ def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
     model.static, model.sensors, model.stand_ins = static, parts.sensors, parts.stand_ins
     detach_from_world(model)
     mend_moments(model)
+    settle_kinematic(model)
     add_mechanisms(model)
     return model
 
@@ -244,7 +259,10 @@ def _read_parts(model: Element, context: FileContext, static: bool, depth: int) 
         raise LimitExceeded(f"models are nested more than {MAX_NESTING} deep (MAX_NESTING)")
     context.reading.model()
     parts, frames = _Parts(), Frames()
-    if model.get("folder") in own_models() and not truth(model.get("exact")):
+    if model.get("folder") not in own_models():
+        place = "" if depth == MAX_NESTING else f"model '{shown(model.get('name', ''))}'"
+        context.unread.look(model, MODEL, place)
+    elif not truth(model.get("exact")):
         parts.stand_ins.append(model.get("folder", ""))
     nested = list(_nested(model, context, static, depth))
     _name_frames(model, frames)
@@ -345,5 +363,6 @@ def _read_link(
     if not static and any(shape.kind == "plane" for shape in link.collisions):
         raise DescriptionError(f"{where}: a plane can only be part of a static model")
     link.gravity = truth(element.findtext("gravity"), default=True)
+    read_link_motion(link, element, parts.warnings)
     parts.sensors += read_sensors(element, name, parts.warnings, frames)
     return link

@@ -1,8 +1,7 @@
-"""Poses, inertia, shapes and joints of SDF models (sdformat.org, specification 1.4 to 1.7)."""
+"""Poses, inertia, sensors and joints of SDF models (sdformat.org, specification 1.4 to 1.7)."""
 
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import (
@@ -10,41 +9,41 @@ from bullet_gazebo.physics.description import (
     DescriptionError,
     Inertia,
     Joint,
-    LimitExceeded,
     Sensor,
-    Shape,
 )
 from bullet_gazebo.physics.files.elements import (
     direction,
-    files_named_by_a_model,
     finite,
+    mended,
     named,
     numbers,
-    positive,
     read_plugin,
     shown,
     truth,
 )
-from bullet_gazebo.physics.files.meshes import Submesh
-from bullet_gazebo.physics.files.own_models import model_of_mesh
-from bullet_gazebo.physics.files.reading import MeshFile, MeshFinder
 from bullet_gazebo.physics.pose import (
     Pose,
-    Quaternion,
     Vector,
     conjugate,
-    cross,
     from_rpy,
-    normalized,
     rotate,
 )
 
 MODEL = "__model__"
 WORLD = "world"
-KINDS = ("revolute", "continuous", "prismatic", "fixed")
+KINDS = (
+    "revolute",
+    "continuous",
+    "prismatic",
+    "fixed",
+    "ball",
+    "universal",
+    "revolute2",
+    "gearbox",
+    "screw",
+)
 NO_LIMIT = 1e16  # [rad, m, N m, N, rad/s, m/s]; SDF's own figure for "none"
 JOINT_FRAME_SINCE = (1, 5)  # before that, axes were given in the model's frame
-NO_NAME = "__default__"  # of a submesh: as if it weren't there
 MOMENTS = {"ixx": 1.0, "ixy": 0.0, "ixz": 0.0, "iyy": 1.0, "iyz": 0.0, "izz": 1.0}  # defaults
 
 
@@ -99,7 +98,8 @@ def read_inertia(link: Element, where: str, static: bool) -> Inertia:
     where = f"{where}, inertial"
     inertial = link.find("inertial")
     mass = value(inertial, "mass", where, 1.0)
-    tensor = {key: value(inertial, f"inertia/{key}", where, d) for key, d in MOMENTS.items()}
+    found = {key: value(inertial, f"inertia/{key}", where, d) for key, d in MOMENTS.items()}
+    tensor = mended(found)
     least = min(mass, tensor["ixx"], tensor["iyy"], tensor["izz"])
     if least < 0.0 or (mass == 0.0 and not static):
         raise DescriptionError(f"{where}: the mass must be above 0, and no moment below it")
@@ -139,144 +139,6 @@ def read_sensors(
             warnings.append(f"{error}; it is left out")
 
 
-@dataclass
-class ShapeReader:
-    """Reads the collisions and visuals of the links of one model."""
-
-    meshes: MeshFinder
-    frames: Frames
-
-    def read(self, link: Element, tag: str, where: str) -> Iterator[Shape]:
-        """Yields the shapes; a visual that can't be shown is a warning."""
-        for element in link.findall(tag):
-            here = f"{where}, {tag} '{shown(element.get('name', ''))}'"
-            self.meshes.reading.check()
-            try:
-                shape = self._shape(element, link.get("name", ""), here)
-            except DescriptionError as error:
-                if tag == "collision" or isinstance(error, LimitExceeded):
-                    raise
-                self.meshes.warnings.append(f"{error}; it is left out")
-                continue
-            if shape is not None:
-                yield from self._simplified(shape)
-
-    def _simplified(self, shape: Shape) -> Iterator[Shape]:
-        """Yields the simple shapes of our own model in place of a mesh of it that isn't there.
-
-        They have its size: Gazebo's models scale their meshes, each by another factor.
-        """
-        model = model_of_mesh(shape.mesh) if shape.kind == "mesh" else None
-        if model is None:
-            yield shape
-            return
-        self.meshes.stand_ins.append(model.get("folder", ""))
-        red, green, blue, alpha = numbers(model.get("rgba", ""), "rgba", 4)
-        rgba = shape.rgba or (red, green, blue, alpha)
-        origin = Pose((0.0, 0.0, -float(model.get("origin", 0.0))))
-        for number, element in enumerate(model.iterfind("link/collision")):
-            part = self._shape(element, "", "")
-            assert part is not None
-            yield replace(
-                shape,
-                kind=part.kind,
-                size=part.size,
-                pose=shape.pose.compose(origin).compose(part.pose),
-                mesh="",
-                rgba=rgba,
-                name=f"{shape.name}_{part.name}" if number else shape.name,
-            )
-
-    def _shape(self, element: Element, link: str, where: str) -> Shape | None:
-        geometry = element.find("geometry")
-        if geometry is None or len(geometry) == 0:
-            raise DescriptionError(f"{where}: <geometry> with a shape is missing")
-        solid, collides = geometry[0], element.tag == "collision"
-        if solid.tag == "empty" or (solid.tag == "plane" and not collides):
-            return None
-        pose, relative_to = read_pose(element, where)
-        if relative_to and relative_to != link:
-            frame = self.frames.resolve(relative_to)
-            pose = frame.compose(pose).relative_to(self.frames.resolve(link))
-        mesh: MeshFile = ("", None)
-        size = _size(solid, where)
-        if solid.tag == "mesh":
-            with files_named_by_a_model(where):
-                uri = solid.findtext("uri") or ""
-                if model_of_mesh(uri) is not None and self.meshes.is_missing(uri):
-                    found: MeshFile | None = uri, None
-                else:
-                    found = self.meshes.find(uri, where, collides, _submesh(solid))
-            if found is None:
-                return None
-            mesh = found
-        elif solid.tag == "plane":
-            pose = pose.compose(Pose(orientation=_onto_normal(solid, where)))
-        else:
-            positive(size, f"{where}, {solid.tag}")
-        color, name = _color(element, where), element.get("name", "")
-        shape = Shape(solid.tag, size, pose, mesh[0], color, name, solid=mesh[1])
-        if not collides:
-            return shape
-        retro = value(element, "laser_retro", where, 0.0)
-        return replace(
-            shape,
-            mu=_not_negative(element, "surface/friction/ode/mu", where, "friction", shape.mu),
-            max_vel=_not_negative(
-                element, "surface/contact/ode/max_vel", where, "max_vel", shape.max_vel
-            ),
-            retro=retro,
-        )
-
-
-def _submesh(mesh: Element) -> Submesh | None:
-    name = (mesh.findtext("submesh/name") or "").strip()
-    if name in ("", NO_NAME):
-        return None
-    return Submesh(name, truth(mesh.findtext("submesh/center")))
-
-
-def _not_negative(collision: Element, path: str, where: str, name: str, default: float) -> float:
-    number = value(collision, path, where, default)
-    if number < 0.0:
-        raise DescriptionError(f"{where}: a {name} of {number} is negative")
-    return number
-
-
-def _size(solid: Element, where: str) -> tuple[float, ...]:
-    where = f"{where}, {shown(solid.tag)}"
-    if solid.tag == "box":
-        return numbers(solid.findtext("size", "1 1 1"), f"{where}: <size>", 3)
-    if solid.tag == "cylinder":
-        return (value(solid, "radius", where, 1.0), value(solid, "length", where, 1.0))
-    if solid.tag == "sphere":
-        return (value(solid, "radius", where, 1.0),)
-    if solid.tag == "mesh":
-        return numbers(solid.findtext("scale", "1 1 1"), f"{where}: <scale>", 3)
-    if solid.tag == "plane":
-        return ()
-    raise DescriptionError(f"{where}: this kind of geometry is not simulated")
-
-
-def _onto_normal(plane: Element, where: str) -> Quaternion:
-    """Returns the shortest rotation of z onto the plane's normal."""
-    x, y, z = numbers(plane.findtext("normal", "0 0 1"), f"{where}: <normal>", 3)
-    length = (x * x + y * y + z * z) ** 0.5
-    if not 0.0 < length < math.inf:
-        raise DescriptionError(f"{where}: the plane's normal has length {length:g}")
-    if z < -0.999999 * length:
-        return (1.0, 0.0, 0.0, 0.0)
-    axis = cross((0.0, 0.0, 1.0), (x, y, z))
-    return normalized((*axis, length + z))
-
-
-def _color(element: Element, where: str) -> Color | None:
-    text = element.findtext("material/diffuse")
-    if not (text or "").strip():
-        return None
-    return read_color(text or "", f"{where}: <diffuse>")
-
-
 def read_color(text: str, where: str) -> Color:
     """Returns red, green, blue and alpha; alpha may be missing."""
     words = [*text.split(None, 4), "1"][:4]
@@ -298,9 +160,7 @@ class JointReader:
         where = f"joint '{name}'"
         kind = element.get("type", "")
         if kind not in KINDS:
-            raise DescriptionError(
-                f"{where}: type '{shown(kind)}' is not simulated; {', '.join(KINDS)} are"
-            )
+            raise DescriptionError(f"{where}: type '{shown(kind)}' is none of {', '.join(KINDS)}")
         joint = Joint(
             name, kind, joint_end(element, "parent"), joint_end(element, "child"), kept=True
         )
@@ -315,7 +175,7 @@ class JointReader:
         parent, child = self._link(joint.parent, where), self._link(joint.child, where)
         joint.pose = child.relative_to(parent)
         pose, relative_to = read_pose(element, where)
-        if joint.movable and (pose != Pose() or relative_to not in ("", joint.child)):
+        if joint.kind != "fixed" and (pose != Pose() or relative_to not in ("", joint.child)):
             joint.anchor = self.frames.resolve(joint.name).relative_to(child)
 
     def _link(self, name: str, where: str) -> Pose:
@@ -343,8 +203,8 @@ class JointReader:
         joint.friction = value(axis, "dynamics/friction", where, 0.0)
         if min(joint.damping, joint.friction) < 0.0:
             raise DescriptionError(f"{where}, dynamics: damping and friction can't be negative")
-        if value(axis, "dynamics/spring_stiffness", where, 0.0) != 0.0:
-            self.warnings.append(f"{where}: the spring is left out")
+        joint.spring_stiffness = value(axis, "dynamics/spring_stiffness", where, 0.0)
+        joint.spring_reference = value(axis, "dynamics/spring_reference", where, 0.0)
 
     def _direction(self, joint: Joint, axis: Element | None, where: str) -> Vector:
         """Returns the axis in the joint's frame, of length 1."""

@@ -22,10 +22,13 @@ from bullet_gazebo.physics.description import (
 )
 from bullet_gazebo.physics.engine_form import check_shapes
 from bullet_gazebo.physics.files import elements
+from bullet_gazebo.physics.files.element_table import without_effect
 from bullet_gazebo.physics.files.elements import (
+    TINY,
     direction,
     files_named_by_a_model,
     finite,
+    mended,
     named,
     numbers,
     positive,
@@ -33,7 +36,9 @@ from bullet_gazebo.physics.files.elements import (
     rename_lumped,
     shown,
 )
+from bullet_gazebo.physics.files.extension_joints import add_extension_joints
 from bullet_gazebo.physics.files.mechanisms import add_mechanisms
+from bullet_gazebo.physics.files.motion import read_link_motion, read_spring, settle_kinematic
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
 from bullet_gazebo.physics.files.sdf_parts import read_sensors
 from bullet_gazebo.physics.lumping import find_roots, lump_fixed_joints, unique
@@ -49,7 +54,6 @@ MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 Part = TypeVar("Part")
 YES = ("true", "yes", "1")
 NO = ("false", "no", "0")
-TINY = 1e-12  # [kg m²]; what rounding leaves of a moment of 0, with any sign
 SURFACE = {"mu1": "mu", "maxVel": "max_vel", "laserRetro": "retro"}  # of shapes, by element
 
 
@@ -226,8 +230,7 @@ def _inertia(inertial: Element, place: str) -> Inertia:
         raise DescriptionError(f"{place}: <mass> is missing")
     if tensor is None:
         raise DescriptionError(f"{place}: <inertia> is missing")
-    moments = {key: read_number(tensor, key, place) for key in MOMENTS}
-    moments |= {key: 0.0 for key in ("ixx", "iyy", "izz") if -TINY <= moments[key] < 0.0}
+    moments = mended({key: read_number(tensor, key, place) for key in MOMENTS})
     value = read_number(mass, "value", place, required=True)
     return Inertia(mass=value, com=read_origin(inertial, place), **moments)
 
@@ -303,6 +306,7 @@ def _apply_to_model(model: ModelDescription, block: Element) -> None:
 
 def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
     model.sensors += read_sensors(block, link.name, model.warnings)
+    read_link_motion(link, block, model.warnings)
     for element in block:
         place = f"<gazebo reference='{shown(link.name)}'>, <{element.tag}>"
         if element.tag in SURFACE:
@@ -311,12 +315,10 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
                 raise DescriptionError(f"{place}: {number} is negative")
             changed: dict[str, Any] = {SURFACE[element.tag]: number}
             link.collisions = [replace(shape, **changed) for shape in link.collisions]
-        elif element.tag == "turnGravityOff":
-            link.gravity = (
-                _value(element) in NO
-            )  # anything else turns it off, also an empty element
-        elif element.tag == "gravity":
-            link.gravity = _value(element) in ("", *YES)
+        elif element.tag in ("turnGravityOff", "gravity"):
+            # Anything else than "no" turns it off, also an empty element.
+            on = NO if element.tag == "turnGravityOff" else ("", *YES)
+            link.gravity, link.says_gravity = _value(element) in on, True
         elif element.tag == "selfCollide":
             link.self_collide = _value(element) in YES
         elif element.tag == "plugin":
@@ -325,14 +327,16 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
 
 
 def _apply_to_joint(model: ModelDescription, joint: Joint, block: Element) -> None:
-    """Reads a joint's sensors; keeps a fixed joint as it is, or as a hinge that can't turn."""
+    """Reads a joint's sensors and spring; keeps a fixed joint as it is, or as a hinge that can't turn."""
     model.sensors += read_sensors(block, joint.child, model.warnings, joint=joint.name)
+    read_spring(joint, block)
     if joint.kind != "fixed":
         return
     if _value(block.find("preserveFixedJoint")) in YES:
         joint.kept = True
     elif _value(block.find("disableFixedJointLumping")) in YES:
-        joint.kind = "revolute"
+        joint.kind, joint.axis = "revolute", (0.0, 0.0, 1.0)
+        joint.effort = joint.velocity = -1.0
 
 
 def _value(element: Element | None) -> str:
@@ -391,6 +395,9 @@ def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDe
             rename_lumped(plugin.element, model.lumped)
         except DescriptionError as error:
             warnings.append(f"plugin {shown(plugin.filename)}: {error}")
+    add_extension_joints(lumped, robot)
+    settle_kinematic(lumped)
     add_mechanisms(lumped, robot)
+    lumped.warnings[:0] = without_effect(robot, "robot")
     reading.split_meshes(lumped)
     return lumped

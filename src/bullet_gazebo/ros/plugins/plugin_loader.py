@@ -207,8 +207,8 @@ class PluginRegistry:
         self._thinner = thinner
         self.sensing = Sensing(sim, seed)
         # Imported now, so that no spawn waits for it.
-        self._built_in = _built_in("LIBRARIES")
-        self._of_worlds = _built_in("WORLD_LIBRARIES")
+        self._built_in = built_in("LIBRARIES")
+        self._of_worlds = built_in("WORLD_LIBRARIES")
         self._loaded_of_world: list[object] = []
         self._loaded: dict[Model, list[tuple[PluginContext, LoadedPlugin | None]]] = {}
 
@@ -293,7 +293,7 @@ class PluginRegistry:
             return None
 
 
-def _built_in(table: str) -> dict[str, Callable[[Any], Any]]:
+def built_in(table: str) -> dict[str, Callable[[Any], Any]]:
     """Returns the plugins of this folder: each module's `table`, file names of libraries and a factory."""
     modules = [
         importlib.import_module(f"{__package__}.{found.name}")

@@ -139,7 +139,7 @@ class LinkServices:
     ) -> srv.GetLinkPropertiesResponse:
         with self._sim.lock:
             found = existing(self._sim.world.link(request.link_name), NO_LINK)
-            inertia, gravity = link_inertia(*found), found[0].body.link_gravity(found[1])
+            inertia, gravity = link_inertia(*found), found[0].description.links[found[1]].gravity
         return srv.GetLinkPropertiesResponse(
             com=to_pose_msg(Pose(inertia.com.position)),  # never its orientation
             gravity_mode=gravity,

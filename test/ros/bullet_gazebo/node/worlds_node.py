@@ -4,6 +4,7 @@
 See docs/contract/gazebo.md 2.3 to 2.5.
 """
 
+import math
 import subprocess
 import tempfile
 import threading
@@ -24,6 +25,7 @@ from gazebo_msgs.srv import (
     SpawnModelRequest,
 )
 from geometry_msgs.msg import Point, Pose, Quaternion
+from std_srvs.srv import Empty
 from support.ros.calls import BOUND, call, executable
 
 from ros_utils import ros_gazebo
@@ -107,6 +109,15 @@ class WorldFile(unittest.TestCase):
     def test_links_of_a_static_model_stand_where_the_file_puts_them(self):
         state = call("/gazebo/get_link_state", GetLinkState, "table::leg", "").link_state
         self.assertAlmostEqual(state.pose.position.z, 0.225, delta=1e-6)
+
+    def test_it_begins_as_it_was_saved_and_a_reset_returns_to_the_models_poses(self):
+        found = call("/gazebo/get_model_state", GetModelState, "shelf", "")
+        self.assertAlmostEqual(found.pose.position.y, -4.0, delta=1e-6)
+        self.assertAlmostEqual(found.pose.orientation.z, math.sin(0.35), delta=1e-6)
+        call("/gazebo/reset_world", Empty)
+        found = call("/gazebo/get_model_state", GetModelState, "shelf", "")
+        self.assertAlmostEqual(found.pose.position.y, -8.0, delta=1e-6)
+        self.assertAlmostEqual(found.pose.orientation.z, 0.0, delta=1e-6)
 
     def test_physics_is_the_files(self):
         physics = call("/gazebo/get_physics_properties", GetPhysicsProperties)

@@ -2,6 +2,7 @@
 """The window in a real browser: the page shows the world, and its buttons work."""
 
 import io
+import os
 import tempfile
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from bullet_gazebo.pictures.renderer import Renderer
 from bullet_gazebo.pictures.visuals import visible_shapes
 from bullet_gazebo.ros.common.messages import from_pose_msg
 from bullet_gazebo.ros.window.window import CAMERA
+from ros_calls import master
 
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>
@@ -176,6 +178,12 @@ class WindowTest(WindowCase):
         self.page.click("/scan")
         self.wait_until_gone(RED)
         self.assertEqual(self.watchers("/scan"), [])
+        files = self.open_files()
+        for _ in range(5):
+            for watched in (True, False):
+                self.page.click("/scan")
+                wait_for(lambda: bool(self.watchers("/scan")) == watched, "subscriber")  # noqa: B023
+        wait_for(lambda: self.open_files() <= files + 2, "end of the connections")
         self.wait_until_gone(BLUE)
         self.page.click("/eye/image_raw")
         wait_for(lambda: self.page.run(PICTURES) == 1, "picture")
@@ -183,6 +191,11 @@ class WindowTest(WindowCase):
         self.delete("seeing")
         wait_for(lambda: "/eye" not in self.page.text, "end of its sensors")
         self.wait_until_gone(BLUE)
+
+    def open_files(self):
+        """How many files the window's process has open."""
+        pid = master.call_node(master.call("lookupNode", "/gazebo_gui"), "getPid")
+        return len(os.listdir(f"/proc/{pid}/fd"))
 
     def watchers(self, topic):
         """The nodes that subscribe to a topic."""

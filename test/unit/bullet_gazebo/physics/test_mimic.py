@@ -166,5 +166,5 @@ def test_a_link_that_is_switched_off_touches_nothing_and_weighs_nothing(world):
     off_plugin = plugin("libroboticsgroup_gazebo_disable_link_plugin.so", link="left_link")
     model = world.spawn("gripper", parse_urdf(gripper(MIMIC, more=off_plugin)), Pose())
     assert not model.collisions("left_link")
-    assert not model.body.link_gravity("left_link")
+    assert not model.description.links["left_link"].gravity
     assert model.collisions("right_link")

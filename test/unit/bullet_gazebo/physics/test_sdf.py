@@ -45,6 +45,15 @@ def spawn(make_world):
     return spawn
 
 
+def test_moments_just_below_zero_are_what_rounding_leaves():
+    tiny = link("a").replace("<ixx>0.1", "<ixx>-5e-20")
+    assert parse_sdf(sdf(tiny)).warnings == [
+        "link 'a': no body has its moments of inertia; they are 1 kg m² instead, as in ODE"
+    ]
+    with pytest.raises(DescriptionError, match="no moment below it"):
+        parse_sdf(sdf(tiny.replace("-5e-20", "-1e-3")))
+
+
 COLLIDE = "<self_collide>{}</self_collide>"
 
 
@@ -297,7 +306,7 @@ def test_sensors_and_plugins_are_read():
         ),
         (
             sdf(link("a", more='<collision name="c"><geometry><heightmap/></geometry></collision>')),
-            "collision 'c', heightmap: this kind of geometry is not simulated",
+            "link 'a', collision 'c': the mesh has no file name",
         ),
     ],
 )  # fmt: skip

@@ -243,6 +243,7 @@ def test_fixed_joints_are_kept_where_the_file_says(make_world):
     )  # fmt: skip
     assert [(j.name, j.kind) for j in model.joints.values()] == [("a", "fixed"), ("b", "revolute")]
     assert (model.joints["b"].lower, model.joints["b"].upper) == (0.0, 0.0)
+    assert model.joints["b"].axis == (0.0, 0.0, 1.0)
     world = make_world()
     spawned = world.spawn("r", model, Pose())
     assert spawned.link_names == ["base", "x", "y"]
@@ -260,6 +261,14 @@ def test_gazebo_blocks_set_friction_and_gravity():
     model = parse_urdf(robot(link("base"), extra))
     assert not model.links["base"].gravity
     assert model.warnings == ["<gazebo reference='nobody'> refers to no link or joint"]
+
+
+def test_gravity_of_links_that_a_fixed_joint_joins_is_the_childs():
+    off, on = (f"<turnGravityOff>{word}</turnGravityOff>" for word in ("true", "false"))
+    for of_parent, of_child, acts in ((off, on, True), (on, off, False), (off, "", False)):
+        extra = f'<gazebo reference="base">{of_parent}</gazebo><gazebo reference="x">{of_child}</gazebo>'
+        text = robot(link("base"), link("x"), joint("a", "fixed", "base", "x"), extra)
+        assert parse_urdf(text).links["base"].gravity is acts
 
 
 def test_a_lumped_caster_keeps_its_own_friction(make_world):

@@ -2,17 +2,21 @@
 
 import sys
 import threading
+from importlib.metadata import version
 from types import SimpleNamespace
 
+import msgspec
 import numpy as np
 import pytest
 import viser
 from support.pages.browser import Browser, find_browser, wait_for
+from websockets.sync.client import connect
 
 from bullet_gazebo.physics.description import Joint, Link
 from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.visuals import VisibleModel
+from bullet_gazebo.ros.window import window
 from bullet_gazebo.ros.window.model_panel import NONE, ModelPanel
 from bullet_gazebo.ros.window.panels import ONLY_STEPS, TimePanel
 from bullet_gazebo.ros.window.window import Window
@@ -266,3 +270,28 @@ def test_a_camera_that_cant_be_moved_ends_nothing(server):
     window = SimpleNamespace(_picture=picture, _aimed=set(), _server=server)
     Window._aim(window)
     assert window._aimed == {3}
+
+
+CAMERA = {
+    "type": "ViewerCameraMessage", "wxyz": [1, 0, 0, 0], "position": [3.0, 0, 1], "fov": 1.0, "near": 0.01,
+    "far": 1000.0, "image_height": 600, "image_width": 800, "look_at": [0, 0, 0], "up_direction": [0, 0, 1],
+}  # fmt: skip
+
+
+def test_a_screenshot_of_a_page_that_goes_away_is_one_line(server, monkeypatch):
+    told = []
+    monkeypatch.setattr(window.rospy, "logwarn", lambda text, *values: told.append(text % values))
+    address = f"ws://127.0.0.1:{server.get_port()}"
+    with connect(address, subprotocols=[f"viser-v{version('viser')}"], max_size=None) as page:
+        page.send(msgspec.msgpack.encode(CAMERA))
+        wait_for(server.get_clients, "page")
+        (client,) = server.get_clients().values()
+        click, asked = SimpleNamespace(client=client), threading.Event()
+        monkeypatch.setattr(client, "flush", asked.set)  # once the picture has been asked for
+        clicked = threading.Thread(target=Window._screenshot, args=(None, click), daemon=True)
+        clicked.start()
+        assert asked.wait(60.0)
+    clicked.join(60.0)
+    assert not clicked.is_alive()
+    (line,) = told
+    assert line.startswith("The window: no screenshot: ")

@@ -85,6 +85,26 @@ def test_a_falling_arm_weighs_less(make):
     assert found[2] == pytest.approx(-3 * (G - 0.5 * acceleration), rel=0.01)
 
 
+def test_what_velocity_decay_takes_is_no_load_of_the_joint(make_world):
+    """Nothing but the centripetal force of the arm and its tip acts, though the arm slows down."""
+    sim = Simulator(make_world(gravity=(0.0, 0.0, 0.0)), lockstep=True)
+    block = "".join(
+        f'<gazebo reference="{link}"><dampingFactor>0.01</dampingFactor></gazebo>'
+        for link in ("arm", "tip")
+    )
+    text = ROBOT.format(kind="revolute", rpy="0 0 0", low=-3, z=1.0)
+    model = sim.world.spawn("r", parse_urdf(text.replace("</robot>", f"{block}</robot>")), Pose())
+    model.set_stops("wrist", None, 3.0)
+    model.set_joint_velocities({"wrist": 1.0})
+    found = borne(sim, JointForces(sim, model, "wrist"), 10)
+    speed = model.joint_state("wrist")[1]
+    assert speed == pytest.approx(0.99**10, rel=1e-3)
+    speed /= 0.99  # before the last step, which is what it measures
+    # The child pulls outwards, along its own x and, for the tip that hangs down, z.
+    np.testing.assert_allclose(found[:3], [3 * 0.5 * speed**2, 0, -0.2 * speed**2], atol=0.005)
+    assert found[4] == pytest.approx(0.0, abs=0.02)
+
+
 def test_what_the_ground_or_a_client_bears_does_not_hang_on_the_joint(make):
     """The arm's ball touches the ground below a vertical slide."""
     sim, model = make("prismatic", low=-1, ground=True, z=0.1, rpy="1.5707963 0 0")

@@ -1,0 +1,131 @@
+"""Trials of a robot in an engine: whether it stands with its joints held, and which of them commands move."""
+
+import math
+from collections.abc import Iterable, Mapping
+from copy import deepcopy
+from typing import NamedTuple
+
+from bullet_gazebo.control.hardware import EFFORT
+from bullet_gazebo.physics.description import Joint, ModelDescription
+from bullet_gazebo.physics.engines import make_engine
+from bullet_gazebo.physics.files.world_file import WorldDescription
+from bullet_gazebo.physics.model import Model
+from bullet_gazebo.physics.pose import Pose, conjugate, rotate
+from bullet_gazebo.physics.world import World, ground_plane
+from bullet_gazebo.simulator import Simulator
+from package_writing.standing import stance, standing_height
+from robot_envs.testing.episodes import LOWER, UPRIGHT
+
+SECONDS = 2.0  # for which it has to stand
+PUSH = 0.2  # [s] for which a joint is commanded
+LOOK = 0.05  # [s] between two looks at it
+SPEED = 1.0  # [rad/s, m/s], of a command, at most
+STRONG = 1e5  # [N m, N], of a joint whose file knows no limit
+SHARE = 0.1  # of the way commanded: less is no motion
+SLACK = 0.01  # [m], by which a base on the ground may sink
+FASTEST, QUICKEST = 100.0, 1000.0  # [m/s] of a base, [rad/s, m/s] of a joint
+
+
+class Trial(NamedTuple):
+    """What an engine makes of a robot or a world."""
+
+    fault: str = ""  # why it doesn't stand
+    sank: float = 0.0  # [m]
+    tilt: float = 0.0  # [degrees]
+    moved: int = 0  # joints
+    still: tuple[str, ...] = ()  # a line for each joint that commands don't move
+
+
+def observe(
+    content: ModelDescription | WorldDescription, interfaces: Mapping[str, str], engine: str
+) -> Trial:
+    """Lets a world run, or a robot stand, whose joints are commanded then, each alone.
+
+    Args:
+        content: of a file.
+        interfaces: hardware interfaces by joint; joints without one take efforts.
+        engine: "bullet" or "mujoco".
+
+    Raises:
+        DescriptionError: if the engine can't take it.
+    """
+    sim = Simulator(World(make_engine(engine)), lockstep=True)
+    try:
+        if isinstance(content, ModelDescription):
+            return _of_robot(sim, content, interfaces)
+        sim.set_time_step(content.time_step)
+        sim.world.set_gravity(content.gravity)
+        for name, each in content.models.items():
+            sim.world.spawn(name, deepcopy(each), each.initial_pose)
+        return Trial(_run(sim, sim.world.models.values()))
+    finally:
+        sim.world.close()
+
+
+def _of_robot(sim: Simulator, robot: ModelDescription, interfaces: Mapping[str, str]) -> Trial:
+    starts, height = stance(robot), 0.0
+    if not robot.fixed_base:
+        sim.world.spawn("ground_plane", ground_plane(), Pose())
+        height = standing_height(robot, starts) or 0.0
+    model = sim.world.spawn(robot.name, deepcopy(robot), Pose((0.0, 0.0, height)))
+    sim.set_joint_states(model, starts, {})
+    joints = [] if robot.static else robot.movable_joints
+    driven = [each for each in joints if each.name not in robot.mimics]
+    for joint in driven:
+        model.set_motor(joint.name, 0.0, _strength(joint, ""))
+    begin, (first, _) = sim.save_state(), model.root_state()
+    fault = _run(sim, [model])
+    pose, _ = model.root_state()
+    sank, most = first.position[2] - pose.position[2], (1.0 - LOWER) * abs(first.position[2])
+    up = rotate(conjugate(first.orientation), (0.0, 0.0, 1.0))
+    level = max(-1.0, min(1.0, rotate(pose.orientation, up)[2]))
+    if not fault and not (level > UPRIGHT and sank < most + SLACK):
+        solid = any(each.collisions for each in robot.links.values())
+        fault = (
+            "it falls" if solid else "it has no <collision>, so that it falls through the ground"
+        )
+    still = []
+    for joint in driven:
+        sim.restore_state(begin)
+        why = _why_still(sim, model, joint, interfaces.get(joint.name, EFFORT))
+        still += [f"commands don't move '{joint.name}': {why}"] if why else []
+    return Trial(
+        fault, sank, math.degrees(math.acos(level)), len(driven) - len(still), tuple(still)
+    )
+
+
+def _why_still(sim: Simulator, model: Model, joint: Joint, interface: str) -> str:
+    """Commands a joint both ways; returns why that moves it nowhere, "" if it does."""
+    speed = min(joint.velocity, SPEED) if joint.velocity >= 0.0 else SPEED
+    room = joint.upper - joint.lower if joint.bounded else math.inf
+    strength, begin, ends = _strength(joint, interface), sim.save_state(), []
+    limits = {"range": room, "velocity": speed, "effort": strength}
+    for what in (what for what, limit in limits.items() if limit == 0.0):
+        return f"the {what} of its <limit> is 0"
+    for way in (speed, -speed):
+        sim.restore_state(begin)
+        model.set_motor(joint.name, way, strength)
+        sim.advance(round(PUSH / sim.world.time_step))
+        ends.append(model.joint_state(joint.name)[0])
+    if abs(ends[0] - ends[1]) > SHARE * min(PUSH * speed, room):
+        return ""
+    unit = "N" if joint.kind == "prismatic" else "N m"
+    return f"{strength:g} {unit} are too little for its load, or links are in the way"
+
+
+def _run(sim: Simulator, models: Iterable[Model]) -> str:
+    """Lets time pass; returns which model blew up, "" for none."""
+    for _ in range(round(SECONDS / LOOK)):
+        sim.advance(max(1, round(LOOK / sim.world.time_step)))
+        for model in models:
+            _, (linear, _) = model.root_state()
+            speeds = [abs(speed) for _, speed in model.joint_states()]
+            if not (math.hypot(*linear) < FASTEST and all(speed < QUICKEST for speed in speeds)):
+                return f"'{model.name}' blows up after {sim.sim_time:.2g} s"
+    return ""
+
+
+def _strength(joint: Joint, interface: str) -> float:
+    """Returns a joint's limit of effort; files say 0 where they know none, which holds effort commands."""
+    known = joint.effort > 0.0 or (joint.effort == 0.0 and interface == EFFORT)
+    return min(joint.effort, STRONG) if known else STRONG
