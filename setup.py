@@ -32,7 +32,7 @@ setup(
     package_data={
         "bullet_gazebo.physics.files": ["elements.toml", "models.sdf"],
         "package_writing": [
-            "parts/*",
+            "*.in",
             "drive/**/*",
             "reach/**/*",
             "template/**/*",

@@ -3,10 +3,11 @@
 #
 # A check NAME has a function check_NAME and a title; all of them run, also after one that failed.
 
-CHECKS=(lint format types shell catkin dead_code links site)
+CHECKS=(lint format imports types shell catkin dead_code links site)
 declare -A CHECK_TITLE=(
     [lint]="ruff check"
     [format]="ruff format --check"
+    [imports]="lint-imports"
     [types]="mypy"
     [shell]="shellcheck"
     [catkin]="catkin_lint"
@@ -17,6 +18,7 @@ declare -A CHECK_TITLE=(
 
 check_lint() { "$VENV/bin/ruff" check .; }
 check_format() { "$VENV/bin/ruff" format --check .; }
+check_imports() { PYTHONPATH=src "$VENV/bin/lint-imports" --no-cache; }  # devel space hides packages
 check_types() { "$VENV/bin/mypy"; }
 check_shell() { /usr/bin/shellcheck --external-sources ws .ci/run tools/*.sh; }
 check_catkin() { /usr/bin/catkin_lint --quiet --offline --ignore env_var --strict -W2 "$WS/src" "$COMPANIONS/src"; }

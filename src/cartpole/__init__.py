@@ -7,6 +7,7 @@ one.
 
 import gymnasium
 
+__wall_time__ = True  # of its waits, also in a script whose time is simulated
 __all__ = ["NAMESPACE"]
 
 NAMESPACE = "cartpole"

@@ -2,7 +2,7 @@
 
 import sys
 
-from cartpole.workbench import PROGRAM, ros_options
+from cartpole.workbench import PROGRAM, recommend_ws, ros_options
 from rl_workbench.starting import ended_by_ctrl_c
 from rl_workbench.training import train as cli
 from robot_envs.errors import RobotEnvError
@@ -12,6 +12,7 @@ NODE = "dqn_train"
 
 def main(argv: list[str] | None = None) -> int:
     """Runs the command line; returns the process's exit code."""
+    recommend_ws()
     try:
         with ended_by_ctrl_c():
             flags, parameters, _ = ros_options(sys.argv[1:] if argv is None else argv, NODE)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cartpole import NAMESPACE
-from cartpole.workbench import PROGRAM, ros_options
+from cartpole.workbench import PROGRAM, recommend_ws, ros_options
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import Options, check_options, option
 from rl_workbench.starting import Interrupt, run_command
@@ -67,6 +67,7 @@ _ANYWHERE = (False, 0.0, "bullet")  # values that suit every environment
 
 def main(argv: list[str] | None = None) -> int:
     """Runs the command line; returns the process's exit code."""
+    recommend_ws()
     words = sys.argv[1:] if argv is None else argv
 
     def command(interrupt: Interrupt) -> None:

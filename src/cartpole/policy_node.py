@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import gymnasium
 from gymnasium import spaces
 
-from cartpole.workbench import ros_options
+from cartpole.workbench import recommend_ws, ros_options
 from rl_workbench.errors import WorkbenchError, error_line
 from rl_workbench.starting import Interrupt, run_command
 from rl_workbench.tools.flags import WHICH, env_options, number
@@ -48,6 +48,7 @@ class Deployed(NamedTuple):
 
 def main(argv: list[str] | None = None) -> int:
     """Runs the command line; returns the process's exit code."""
+    recommend_ws()
     words = sys.argv[1:] if argv is None else argv
 
     def command(interrupt: Interrupt) -> None:

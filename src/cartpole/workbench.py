@@ -46,12 +46,15 @@ class WorkspaceHints(errors.Hints):
         return shlex.join([*command, "view", str(folder)])
 
 
-if "CARTPOLE_WS" in os.environ:  # ws sets it to its own path
-    errors.hints = WorkspaceHints(os.environ["CARTPOLE_WS"])
+def recommend_ws() -> None:
+    """Has texts recommend commands by way of ws, if it has started this one."""
+    if "CARTPOLE_WS" in os.environ:  # its path
+        errors.hints = WorkspaceHints(os.environ["CARTPOLE_WS"])
 
 
 def main(argv: list[str] | None = None) -> int:
     """Runs the command line; returns the process's exit code."""
+    recommend_ws()
     if os.environ.get(JOB):  # environments over ROS may start a master
         os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{_free_port()}"
     argv = sys.argv[1:] if argv is None else argv

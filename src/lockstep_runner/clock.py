@@ -9,7 +9,6 @@ import math
 import threading
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from weakref import WeakKeyDictionary
 
 import genpy
@@ -17,15 +16,12 @@ import rospy
 import rospy.impl.simtime
 
 from lockstep_runner import originals
-from lockstep_runner.looks import Seen
 from lockstep_runner.notices import tell_once
 from lockstep_runner.topics import Callbacks
-from lockstep_runner.world import ScriptWorld
+from lockstep_runner.world import NANOSECONDS, ScriptWorld
 
-NANOSECONDS = 1_000_000_000
 LOOK = 0.002  # [s of wall time] between two checks whether a busy thread has ended
-PATIENCE = 10.0  # [s of wall time] for a thread that computes or waits for anything but time
-OWN_QUIET = 30  # idle checks in a row after which a thread of the script counts as waiting; 1 s
+THREAD_PATIENCE = 10.0  # [s of wall time] for a thread that computes or waits for anything but time
 PAUSED_LOOKS = 0.001, 0.05  # [s of wall time] between two checks of a paused world: first, longest
 Condition = Callable[[], bool]
 
@@ -78,8 +74,8 @@ class Clock:
         self._guard = originals.Condition()
         self._sleepers: list[Sleeper] = []
         self._running: dict[int, threading.Thread] = {}
-        # Threads that the script itself has started, and their observed activity
-        self._own: WeakKeyDictionary[threading.Thread, Seen] = WeakKeyDictionary()
+        # Threads that the script itself has started, and whether they are observed to wait
+        self._own: WeakKeyDictionary[threading.Thread, Callable[[], bool]] = WeakKeyDictionary()
         self._order = 0
         self._now = 0  # [ns] simulator time in its last answer
         self.behind = False  # a call was interrupted, so the simulator may be ahead
@@ -137,10 +133,9 @@ class Clock:
             if ident is not None and all(each.thread != ident for each in self._sleepers):
                 self._running[ident] = thread
 
-    def began_own(self, thread: threading.Thread) -> None:
+    def began_own(self, thread: threading.Thread, is_quiet: Callable[[], bool]) -> None:
         """As `began`, for a thread that the script started: it may also wait for anything but time."""
-        place = Path("/proc/self/task", str(thread.native_id))
-        self._own[thread] = Seen(place, OWN_QUIET)
+        self._own[thread] = is_quiet
         self.began(thread)
 
     def is_own(self, thread: threading.Thread) -> bool:
@@ -281,7 +276,7 @@ class Clock:
         """Waits until no other thread computes."""
         if not self._running:
             return
-        deadline = originals.monotonic() + PATIENCE
+        deadline = originals.monotonic() + THREAD_PATIENCE
         me = threading.get_ident()
         with self._guard:
             while self._running.keys() - {me}:
@@ -289,7 +284,7 @@ class Clock:
                 for ident, thread in list(self._running.items()):
                     if not thread.is_alive():
                         del self._running[ident]
-                    elif ident != me and thread in self._own and self._own[thread].is_quiet():
+                    elif ident != me and thread in self._own and self._own[thread]():
                         del self._running[ident]
                         tell_once(
                             f"waits {thread.name}",
@@ -301,6 +296,6 @@ class Clock:
                         tell_once(
                             f"busy {thread.name}",
                             f"thread '{thread.name}' has computed, or waited for something that isn't"
-                            f" simulated time, for {PATIENCE:g} s; time continues without it, so that what"
-                            " it does from here on isn't repeatable",
+                            f" simulated time, for {THREAD_PATIENCE:g} s; time continues without it, so that"
+                            " what it does from here on isn't repeatable",
                         )

@@ -56,18 +56,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(args: argparse.Namespace, code: types.CodeType) -> int:
+    from lockstep_runner import on_demand
     from lockstep_runner.replaced import install
-    from lockstep_runner.replaced.python_threads import end_executors
     from lockstep_runner.runner import watch
 
     runner = install(args)
+    on_demand.follow_processes(runner)
+    on_demand.replace_threads(runner)
     if args.seed is not None:
         script.seed_everything(args.seed)
     watch(runner)
     show, sys.excepthook = sys.excepthook, _hide_ourselves(sys.excepthook, args.script)
     try:
         script.run(args.script, args.arguments, code)
-        end_executors()
+        on_demand.end_threads()
         others = [
             each
             for each in threading.enumerate()

@@ -21,6 +21,7 @@ PYTHON_2 = re.compile(
     "call to '(print|exec)'|multiple exception types|leading zeros|inconsistent use of tabs"
 )
 OURS = __name__.partition(".")[0]
+ADDRESS = "LOCKSTEP_CLOCK"  # environment variable: path of the script process's socket
 
 
 class NoScript(Exception):
@@ -117,15 +118,15 @@ class AfterImport(importlib.abc.MetaPathFinder):
 
 
 STANDARD = sysconfig.get_path("stdlib") + "/"
-# They wait for their own processes, sockets, files and threads: such waits stay wall time.
+# They wait for their own processes, sockets, files and threads: such waits stay wall time, as do those of
+# a package that says so itself, by WALL_TIME.
 LIBRARIES = frozenset(
-    ["bullet_gazebo", "cartpole", "catkin_pkg", "file_access", "genpy", "joblib",
-     "lockstep_runner", "matplotlib", "multiprocess", "numpy", "optuna", "package_writing",
-     "psutil", "pybullet", "ray", "rl_workbench", "robot_envs", "ros_calls", "ros_utils",
-     "rosgraph", "roslaunch", "roslib", "rosmaster", "rosnode", "rosparam", "rospkg", "rospy",
-     "rosservice", "rostopic", "scipy", "tensorboard", "tensorboardX", "tensorflow", "torch",
-     "tqdm", "wandb", "web_viewer", "xacro", "xmlrpc"]
+    ["bullet_gazebo", "catkin_pkg", "file_access", "genpy", "joblib", "lockstep_runner", "matplotlib",
+     "multiprocess", "numpy", "optuna", "psutil", "pybullet", "ray", "ros_calls", "ros_utils", "rosgraph",
+     "roslaunch", "roslib", "rosmaster", "rosnode", "rosparam", "rospkg", "rospy", "rosservice", "rostopic",
+     "scipy", "tensorboard", "tensorboardX", "tensorflow", "torch", "tqdm", "wandb", "xacro", "xmlrpc"]
 )  # fmt: skip
+WALL_TIME = "__wall_time__"
 
 
 # A wait in these counts as their caller's.
@@ -167,7 +168,8 @@ def _is_a_script(frame: types.FrameType) -> bool:
         return False
     if path.startswith(STANDARD) and "-packages/" not in path:
         return False
-    return _package(frame) not in LIBRARIES
+    package = _package(frame)
+    return package not in LIBRARIES and WALL_TIME not in vars(sys.modules.get(package, builtins))
 
 
 def caller(depth: int) -> str:

@@ -50,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = _parser().parse_intermixed_args(argv)  # arguments may follow options
     try:
         parent = package.PARENT if args.to is None else args.to.expanduser()
-        lines = _write(args, parent)
+        report = _write(args, parent)
     except CannotWrite as error:
         print(f"new_robot: {error}", file=sys.stderr)
         return EXIT_REFUSED
@@ -60,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("new_robot: interrupted", file=sys.stderr)
         return INTERRUPTED
-    print("\n".join(lines))
+    print(report)
     return 0
 
 
@@ -116,8 +116,8 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def _write(args: argparse.Namespace, parent: Path) -> list[str]:
-    """Writes the package next to its destination, then moves it there; returns lines to print."""
+def _write(args: argparse.Namespace, parent: Path) -> str:
+    """Writes the package next to its destination, then moves it there; returns the report to print."""
     check_name(args.name)
     folder = Path(os.path.abspath(parent)) / args.name
     if os.path.lexists(folder):
@@ -140,9 +140,9 @@ def _write(args: argparse.Namespace, parent: Path) -> list[str]:
             f"{parent}: {error.strerror}; --to FOLDER names a place where you may write"
         ) from error
     try:
-        lines = package.write(request, made)
+        report = package.write(request, made)
         made.rename(folder)
     except BaseException:
         shutil.rmtree(made, ignore_errors=True)
         raise
-    return lines
+    return report

@@ -1,6 +1,5 @@
 """Writes one package, and reports its contents."""
 
-import json
 import math
 import os
 import re
@@ -8,17 +7,18 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from xml.sax.saxutils import escape
+from typing import Any
 
 import yaml
 
 from bullet_gazebo.physics.files.reading import Resources
 from package_writing import CannotWrite, contents
+from package_writing.gains import VELOCITY, effort_gains, wheel_gains
 from package_writing.standing import feet, stance, standing_height
-from package_writing.survey import Survey, height_note, look_at, root_link
+from package_writing.survey import EFFORT, Survey, height_note, look_at, root_link
 from package_writing.trial import stands_note, try_out
 from package_writing.urdf_files import Copied, copy_urdf, expanded
-from package_writing.vehicle import DRIVE, Base, find_base
+from package_writing.vehicle import DRIVE, find_base, scan_topic
 from robot_envs import Robot, RobotEnvError, controllers, files
 
 TREE = Path(__file__).resolve().parents[2]  # the source tree
@@ -28,7 +28,7 @@ PARENT = TREE.parent if IS_CHECKOUT else Path()
 
 INTERFACES = ("effort", "position", "velocity")
 ARM = contents.TEMPLATE / "urdf/two_link_arm.urdf.xacro"
-NOTES = 3  # largest number of a URDF's warnings to show
+UNITS = ("rad", "m", "rad/s")
 OURS = ("cartpole", "controller_manager", "gazebo_ros", "xacro")  # the template depends on them
 
 
@@ -70,11 +70,11 @@ def read_arguments(texts: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def write(request: PackageRequest, made: Path) -> list[str]:
+def write(request: PackageRequest, made: Path) -> str:
     """Writes the package into an empty folder.
 
     Returns:
-        Lines to print.
+        The report to print.
 
     Raises:
         CannotWrite: if the robot can't be read, simulated or moved.
@@ -97,38 +97,42 @@ def write(request: PackageRequest, made: Path) -> list[str]:
                 "new_robot.py ..., where FOLDER has that package"
             )
     loose = _loose_link(request, root_link(copied.xml), request.urdf or ARM)
-    urdf, xml, survey, lacks = _completed(request, copied, made, loose)
-    base = find_base(survey)
-    held = contents.held_motors(survey, base)
-    contents.check_controllers(held, base)
-    starts = stance(survey.model)
-    stands = None if survey.model.fixed_base else standing_height(survey.model, starts)
-    if request.height is None:
-        request = replace(request, height=stands or 0.0)
-    values = _values(request, survey, base, urdf, copied, starts)
-    contents.fill(made, request.name, values, base)
+    urdf, xml, survey = _completed(request, copied, made, loose)
+    values = _values(request, copied, survey, urdf)
+    contents.check_controllers(values["held"], values["base"])
+    contents.fill(made, request.name, values)
     parameters = yaml.safe_load((made / "config/controllers.yaml").read_text(encoding="utf-8"))
-    run = tuple(values["run"].split())
+    run = tuple(values["run"])
     robot = Robot(urdf=xml, controllers=parameters, run=run)
     movable = [each.name for each in survey.model.movable_joints]
     wrong = list(controllers.faults(run, None, parameters, robot.hardware(), movable))
     if wrong:
         raise CannotWrite("; ".join(wrong))
-    on = feet(survey.model)
-    env_id = f"{request.name}.environment:{request.name}/{values['task']}-v0"
-    faults = try_out(request.name, env_id, made, stands=bool(on))
-    note = stands_note(on, faults) if on else ""
-    more = f"urdf/{urdf}, which includes it, adds {' and '.join(lacks)}" if lacks else ""
-    return list(_report(request, copied, survey, base, more, stands, note))
+    on, notes = values["feet"], []
+    faults = try_out(request.name, values["env_id"], made, stands=bool(on))
+    if not survey.model.fixed_base:
+        notes.append(height_note(values["height"], standing_height(survey.model, values["starts"])))
+    if on:
+        notes.append(stands_note(on, faults))
+    near = request.folder.parent == PARENT
+    return contents.render(
+        "report.in",
+        **values,
+        lacks=list(_lacks(survey, loose)),
+        stand_notes=notes,
+        checkout=f"in {TREE}, " if IS_CHECKOUT else "",
+        here=os.path.relpath(request.folder, TREE) if near else shlex.quote(str(request.folder)),
+        folders=list(_others(copied)),
+    ).rstrip("\n")
 
 
 def _completed(
     request: PackageRequest, copied: Copied, made: Path, loose: str
-) -> tuple[str, str, Survey, list[str]]:
+) -> tuple[str, str, Survey]:
     """Surveys the robot, and writes a file that adds what its own lacks.
 
     Returns:
-        The file to use, in the folder urdf; its XML; the survey; and what was lacking.
+        The file to use, in the folder urdf; its XML; and the survey.
     """
     others = files.resources()
     resources = Resources(
@@ -143,7 +147,13 @@ def _completed(
         )
 
     def with_more(survey: Survey | None) -> str:
-        text = contents.control_text(request.name, copied.place, survey, loose)
+        text = contents.render(
+            "control.urdf.xacro.in",
+            name=request.name,
+            urdf=copied.place,
+            survey=survey,
+            loose=loose,
+        )
         (made / "urdf" / control).write_text(text, encoding="utf-8")
         return expanded(made / "urdf" / control, request.arguments)
 
@@ -151,11 +161,11 @@ def _completed(
     if loose:  # a base without mass can't be simulated until it is fixed
         urdf, xml = control, with_more(None)
     survey = look_at(xml, interface, resources, free=free, passive=request.passive)
-    lacks, added = list(_lacks(survey, loose)), survey.added
-    if added or not survey.has_plugin:
+    added, has_plugin = survey.added, survey.has_plugin
+    if added or not has_plugin:
         urdf, xml = control, with_more(survey)
-        survey = replace(look_at(xml, interface, resources, free=free), added=added)
-    return urdf, xml, survey, lacks
+        survey = look_at(xml, interface, resources, free=free)
+    return urdf, xml, replace(survey, added=added, has_plugin=has_plugin)
 
 
 def _loose_link(request: PackageRequest, root: str, source: Path) -> str:
@@ -177,50 +187,30 @@ def _package(name: str) -> Path | None:
         return None
 
 
-def _values(
-    request: PackageRequest,
-    survey: Survey,
-    base: Base | None,
-    urdf: str,
-    copied: Copied,
-    starts: Mapping[str, float],
-) -> dict[str, str]:
-    needed = [each for each in copied.packages if each not in OURS]
-    held = contents.held_motors(survey, base)
-    pairs = [f"{name}:={value}" for name, value in request.arguments.items()]
-    units = {"rad/s" if each.wheel else "m" if each.linear else "rad" for each in survey.motors}
-    given = json.dumps(request.arguments, ensure_ascii=False)
-    others = ", ".join(f"`{each}`" for each in needed)
-    if others:
-        others = f"`FOLDER` has what the robot needs of other packages: {others}.\n\n"
+def _values(request: PackageRequest, copied: Copied, survey: Survey, urdf: str) -> dict[str, Any]:
+    """Returns what the templates say of a robot, by the names that they have for it."""
+    model, name, base = survey.model, request.name, find_base(survey)
+    held = [each for each in survey.motors if not (base and each.wheel)]  # by their own controllers
+    starts, height = stance(model), request.height
+    if height is None:
+        height = 0.0 if model.fixed_base else standing_height(model, starts) or 0.0
+    task, algo = ("Drive", "sac") if base else ("Reach", "ppo")
+    gains = {True: wheel_gains(model), False: effort_gains(model)}
     return {
-        "name": request.name,
-        "urdf": urdf,
-        "dependencies": "".join(f"  <exec_depend>{each}</exec_depend>\n" for each in needed),
-        "controllers": "".join(
-            f'    {contents.literal(each.joint)}: "{contents.controller(each)}",\n' for each in held
-        ),
-        "controllers_yaml": contents.controllers_text(survey, base),
-        **contents.base_text(request.name, survey, base),
-        "ranges": contents.ranges_text(survey, starts),
-        "goals": contents.goals_text(survey, starts),
-        **contents.stance_text(request.name, survey, starts),
-        "units": ", ".join(each for each in ("rad", "m", "rad/s") if each in units),
-        **contents.wheels_text(survey),
-        "run": " ".join([DRIVE] * bool(base) + list(map(contents.controller, held))),
-        "arguments": f"\n    arguments={given}," if pairs else "",
-        "launch_arguments": "".join(
-            f" {escape(shlex.quote(each), contents.QUOTE)}" for each in pairs
-        ),
-        "namespace": f'\n    namespace="{ns}",' if (ns := survey.namespace) else "",
-        "ns": ns,
-        "height": str(request.height),
-        "period": str(contents.DRIVE_PERIOD if base else contents.PERIOD),
-        "commands": "\n".join(
-            _commands(request.name, base, f"../{request.name}", ["FOLDER"] * bool(needed))
-        ),
-        "folder": others,
-    }
+        "name": name, "urdf": urdf, "arguments": request.arguments, "folder": request.folder,
+        "needed": [each for each in copied.packages if each not in OURS], "outside": copied.outside,
+        "survey": survey, "base": base, "held": held, "feet": feet(model), "starts": starts, "height": height,
+        "drive": DRIVE, "run": [DRIVE] * bool(base) + [each.controller for each in held],
+        "task": task, "algo": algo, "env_id": f"{name}.environment:{name}/{task}-v0",
+        "gains": {e.joint: gains[e.wheel][e.joint] for e in held if e.interface == EFFORT},
+        "velocity_gain": VELOCITY, "goals": contents.goals(survey, starts),
+        "ranges": {  # the stance included; wheels start at 0
+            each.joint: (min(each.low, start), max(each.high, start))
+            for each in survey.motors for start in [starts.get(each.joint, 0.0)]
+        },
+        "units": ", ".join(each for each in UNITS if each in {motor.unit for motor in survey.motors}),
+        "scan": scan_topic(base.laser, survey.namespace, name) if base and base.laser else "",
+    }  # fmt: skip
 
 
 def _lacks(survey: Survey, loose: str) -> Iterator[str]:
@@ -232,89 +222,6 @@ def _lacks(survey: Survey, loose: str) -> Iterator[str]:
         yield f"transmissions ({', '.join(interfaces)})"
     if not survey.has_plugin:
         yield "ros_control's plugin"
-
-
-def _report(
-    request: PackageRequest,
-    copied: Copied,
-    survey: Survey,
-    base: Base | None,
-    more: str,
-    stands: float | None,
-    note: str,
-) -> Iterator[str]:
-    yield f"written: {request.folder}"
-    joints = ", ".join(each.joint for each in survey.motors)
-    if more:
-        yield f"what the file lacks: {more}"
-    hint = " (--passive JOINT leaves one without)" if survey.added else ""
-    yield f"joints with a motor and a controller: {joints}{hint}"
-    wheels = [each.joint for each in survey.motors if each.wheel]
-    if base:
-        yield (
-            f"{', '.join(base.left)} on the left and {', '.join(base.right)} on the right get a {DRIVE}: "
-            f"wheels of {base.radius:g} m, {base.separation:g} m apart"
-        )
-        if base.note:
-            yield f"note: the task uses no laser: {base.note}"
-        elif base.laser:
-            yield (
-                f"the task uses its laser '{base.laser.name}': what is nearer than {base.touch:g} m is "
-                "touched"
-            )
-    elif wheels:
-        yield f"continuous joints of a free base get a velocity controller, as wheels: {', '.join(wheels)}"
-        yield (
-            "note: a diff_drive_controller takes velocity motors, as many on the left as on the right, "
-            "alike, and with axes to the left"
-        )
-    if not survey.model.fixed_base:
-        yield height_note(request.height or 0.0, stands)
-        if note:
-            yield note
-    if survey.passive:
-        yield f"joints that move without a motor, and that tasks don't see: {', '.join(survey.passive)}"
-    if survey.followers:
-        yield f"joints that follow another one by <mimic>: {', '.join(survey.followers)}"
-    held = [each.joint for each in survey.motors if not each.limited]
-    if held:
-        yield (
-            f"limits of effort and velocity that are 0 would hold {', '.join(held)}: config/controllers.yaml "
-            "lifts them; the true ones belong into the URDF"
-        )
-    others = ", ".join(each for each in copied.packages if each not in OURS)
-    if others:
-        yield f"it takes files from other packages (--standalone copies them): {others}"
-    for path in copied.outside:
-        yield f"not copied, and read from where it is: {path}"
-    warnings = survey.model.warnings
-    for warning in warnings[:NOTES]:
-        yield f"note: {warning}"
-    if len(warnings) > NOTES:
-        yield f"note: {len(warnings) - NOTES} more of such"
-    yield f"in {TREE}, next:" if IS_CHECKOUT else "next:"
-    near = request.folder.parent == PARENT
-    here = os.path.relpath(request.folder, TREE) if near else str(request.folder)
-    commands = _commands(request.name, base, shlex.quote(here), list(_others(copied)))
-    yield from (f"  {each}" for each in commands)
-
-
-def _commands(name: str, base: Base | None, here: str, others: Sequence[str]) -> list[str]:
-    """Returns commands for the next steps, to run in the checkout; `here` and `others` are for ws."""
-    ws = f"./ws {''.join(f'--with {each} ' for each in others)}--with {here}"
-    run = f"{ws} rosrun cartpole workbench.py"
-    runs, (algo, task) = f"runs/{name}", ("sac", "Drive") if base else ("ppo", "Reach")
-    return [
-        f"{ws} roslaunch {name} simulation.launch    # look at it; Ctrl-C ends it",
-        f"{ws} test {here}",
-        f"{ws} rostest {name} simulation.test",
-        "./ws extras true    # once: Stable-Baselines3",
-        f"{run} train --algo {algo} --env-id {name}.environment:{name}/{task}-v0 "
-        f"--config {here}/config/{algo}.yaml --run-dir {runs}",
-        f"{run} eval {runs} --episodes 20",
-        f"{run} record {runs} --out {name}.gif",
-        f"{run} eval {runs} --episodes 5 --env-kwargs backend=ros    # the same over ROS",
-    ]
 
 
 def _others(copied: Copied) -> Iterator[str]:

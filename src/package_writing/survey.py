@@ -44,6 +44,22 @@ class Motor:
     wheel: bool  # a continuous joint of a robot whose base is free, which gets velocity commands
     fastest: float  # the URDF's limit of its velocity [rad/s, m/s]; inf: none
 
+    @property
+    def kind(self) -> str:
+        """The interface's kind, by which the controllers are called."""
+        return self.interface.removesuffix("JointInterface").lower()
+
+    @property
+    def controller(self) -> str:
+        """The name of the joint's controller: the joint's, as far as it makes a ROS name."""
+        name = re.sub(r"[^A-Za-z0-9_]", "_", self.joint)
+        return f"{name if name[:1].isalpha() else f'joint_{name}'}_controller"
+
+    @property
+    def unit(self) -> str:
+        """The unit of what it is commanded."""
+        return "rad/s" if self.wheel else "m" if self.linear else "rad"
+
 
 @dataclass(frozen=True)
 class Survey:
@@ -56,6 +72,15 @@ class Survey:
     added: bool  # whether the URDF lacks transmissions, so that they must be added
     has_plugin: bool
     namespace: str  # of the plugin
+
+    @property
+    def wheels(self) -> list[Motor]:
+        return [motor for motor in self.motors if motor.wheel]
+
+    @property
+    def unlimited(self) -> list[str]:
+        """Joints that the URDF's limits of 0 would hold."""
+        return [motor.joint for motor in self.motors if not motor.limited]
 
 
 def look_at(

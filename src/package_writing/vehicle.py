@@ -2,7 +2,6 @@
 
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,7 +24,7 @@ FASTEST = 0.6  # [m/s]
 QUICKEST = 2.0  # [rad/s]
 MARGIN = 0.03  # [m] between the base and what it touches
 ROOM = 0.1  # [m] around the base where it starts
-LARGEST = 0.65  # [m], clearance of a base for which the room that comes along has space
+LARGEST_CLEARANCE = 0.65  # [m], clearance of a base for which the room that comes along has space
 WAYS = 64  # directions in which an outline is measured
 
 
@@ -65,7 +64,7 @@ class Base:
     @property
     def world(self) -> str:
         """The file of a world in which it drives, in the package cartpole; "" for an empty one."""
-        return "worlds/room.world" if self.laser and self.clearance <= LARGEST else ""
+        return "worlds/room.world" if self.laser and self.clearance <= LARGEST_CLEARANCE else ""
 
 
 def find_base(survey: Survey) -> Base | None:
@@ -74,7 +73,7 @@ def find_base(survey: Survey) -> Base | None:
     Returns:
         The base; None if its wheels are others, or their motors take no velocity.
     """
-    wheels = [motor for motor in survey.motors if motor.wheel]
+    wheels = survey.wheels
     found = [_wheel(survey, motor) for motor in wheels]
     rims = [each for each in found if each is not None]
     if not rims or len(rims) < len(found):
@@ -162,33 +161,6 @@ def _outline(survey: Survey, laser: Sensor | None) -> tuple[float, float]:
     touch = max(widest(eye, Laser(laser).horizontal.angles(WAYS)), Laser(laser).low) + MARGIN
     away = math.hypot(*eye.position[:2])
     return rounded(touch), rounded(max(middle, touch + away) + ROOM)
-
-
-def controller(base: Base) -> dict[str, object]:
-    """Returns the parameters of the drive controller."""
-    diagonal = [0.001, 0.001, 1e6, 1e6, 1e6, 0.01]
-
-    def limits(most: float) -> Mapping[str, object]:
-        """With the acceleration that is there within half a second."""
-        return {
-            "has_velocity_limits": True, "max_velocity": most,
-            "has_acceleration_limits": True, "max_acceleration": 2.0 * most,
-        }  # fmt: skip
-
-    return {
-        "type": "diff_drive_controller/DiffDriveController",
-        "left_wheel": list(base.left),
-        "right_wheel": list(base.right),
-        "wheel_separation": base.separation,
-        "wheel_radius": base.radius,
-        "publish_rate": 50,
-        "cmd_vel_timeout": 0.5,
-        "base_frame_id": base.frame,
-        "pose_covariance_diagonal": diagonal,
-        "twist_covariance_diagonal": list(diagonal),
-        "linear": {"x": limits(base.speed)},
-        "angular": {"z": limits(base.turn)},
-    }
 
 
 def scan_topic(laser: Sensor, namespace: str, name: str) -> str:

@@ -57,7 +57,7 @@ def need(module: str, package: str, what: str) -> None:
 
 
 class Hints:
-    """The commands that texts recommend, each ready to be pasted. A launcher sets `hints` to its own."""
+    """The commands that texts recommend, each ready to be pasted. A command sets `hints` to its own."""
 
     extras = ""
     """Installs all optional packages; empty if each has to be named."""

@@ -8,67 +8,30 @@ A `Robot` (robot.py) describes what it is made of, a `Task` (task.py) what is to
 Importing this is cheap; a name's module is imported when the name is first used.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from file_access.lazy import attach
 
 if TYPE_CHECKING:
-    from bullet_gazebo.pictures.camera import Camera
-    from robot_envs.environment import RobotEnv
-    from robot_envs.errors import RobotEnvError, SimulatorError
-    from robot_envs.registration import register
-    from robot_envs.robot import EMPTY, Robot
-    from robot_envs.task import GoalTask, Object, Task
-    from robot_envs.world_state import (
-        Commands,
-        InitialState,
-        JointState,
-        LinkQuery,
-        Motion,
-        Pose,
-        StateQuery,
-        WorldState,
-    )
+    from bullet_gazebo.pictures.camera import Camera as Camera
+    from robot_envs.environment import RobotEnv as RobotEnv
+    from robot_envs.errors import RobotEnvError as RobotEnvError
+    from robot_envs.errors import SimulatorError as SimulatorError
+    from robot_envs.registration import register as register
+    from robot_envs.robot import EMPTY as EMPTY
+    from robot_envs.robot import Robot as Robot
+    from robot_envs.task import GoalTask as GoalTask
+    from robot_envs.task import Object as Object
+    from robot_envs.task import Task as Task
+    from robot_envs.world_state import Commands as Commands
+    from robot_envs.world_state import InitialState as InitialState
+    from robot_envs.world_state import JointState as JointState
+    from robot_envs.world_state import LinkQuery as LinkQuery
+    from robot_envs.world_state import Motion as Motion
+    from robot_envs.world_state import Pose as Pose
+    from robot_envs.world_state import Reading as Reading
+    from robot_envs.world_state import StateQuery as StateQuery
+    from robot_envs.world_state import WorldState as WorldState
 
-__all__ = [
-    "EMPTY",
-    "Camera",
-    "Commands",
-    "GoalTask",
-    "InitialState",
-    "JointState",
-    "LinkQuery",
-    "Motion",
-    "Object",
-    "Pose",
-    "Reading",
-    "Robot",
-    "RobotEnv",
-    "RobotEnvError",
-    "SimulatorError",
-    "StateQuery",
-    "Task",
-    "WorldState",
-    "register",
-]
-
-_MODULES = {
-    "bullet_gazebo.pictures.camera": ("Camera",),
-    "robot_envs.environment": ("RobotEnv",),
-    "robot_envs.errors": ("RobotEnvError", "SimulatorError"),
-    "robot_envs.registration": ("register",),
-    "robot_envs.robot": ("EMPTY", "Robot"),
-    "robot_envs.task": ("GoalTask", "Object", "Task"),
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module 'robot_envs' has no attribute '{name}'")
-    modules = (module for module, names in _MODULES.items() if name in names)
-    found = getattr(import_module(next(modules, "robot_envs.world_state")), name)
-    globals()[name] = found
-    return found
-
-
-def __dir__() -> list[str]:
-    return [*globals(), *__all__]
+__wall_time__ = True  # of its waits, also in a script whose time is simulated
+__getattr__, __dir__, __all__ = attach(__name__, __path__)

@@ -21,7 +21,7 @@ SIMULATOR = (
     *PHYSICS, "collada", "manifold3d", "numpy", "psutil", "trimesh", "vhacdx", "xacro", "yaml",
 )  # fmt: skip
 WINDOW = (*SIMULATOR, "PIL", "viser", "websockets")
-ALL = (*WINDOW, "gymnasium", "matplotlib", "pygame", "tensorboard", "torch", "tqdm")
+ALL = (*WINDOW, "gymnasium", "jinja2", "matplotlib", "pygame", "tensorboard", "torch", "tqdm")
 
 
 def require(modules: tuple[str, ...]) -> None:

@@ -15,26 +15,22 @@ Use the modules: ``from ros_utils import ros_gazebo, ros_node``. Each is importe
 Python process that started them exits. No program is ever ended by its name.
 """
 
-from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "readiness",
-    "ros_controllers",
-    "ros_gazebo",
-    "ros_launch",
-    "ros_node",
-    "ros_params",
-    "ros_spawn",
-    "ros_urdf",
-    "service_client",
-    "simulation",
-    "step_client",
-    "testing",
-]
+from file_access.lazy import attach
 
+if TYPE_CHECKING:
+    from ros_utils import readiness as readiness
+    from ros_utils import ros_controllers as ros_controllers
+    from ros_utils import ros_gazebo as ros_gazebo
+    from ros_utils import ros_launch as ros_launch
+    from ros_utils import ros_node as ros_node
+    from ros_utils import ros_params as ros_params
+    from ros_utils import ros_spawn as ros_spawn
+    from ros_utils import ros_urdf as ros_urdf
+    from ros_utils import service_client as service_client
+    from ros_utils import simulation as simulation
+    from ros_utils import step_client as step_client
+    from ros_utils import testing as testing
 
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return import_module(f"{__name__}.{name}")
+__getattr__, __dir__, __all__ = attach(__name__, __path__)

@@ -11,4 +11,5 @@ Modules:
     video: `Mp4Writer`.
 """
 
+__wall_time__ = True  # of its waits, also in a script whose time is simulated
 __all__ = ["address", "curves", "server", "table", "video"]

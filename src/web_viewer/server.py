@@ -32,7 +32,7 @@ Answer = Callable[[Any, Request], Response | None]
 LONGEST_PATH = 1000  # of a request [characters]
 HTML, EMPTY = "text/html", b'<div id="root">'
 LOADING = b"<p style='font-family: sans-serif; padding: 1em'>The page is loading ...</p>"
-LARGEST = 2.0**53  # integers that JavaScript has exactly
+LARGEST_INTEGER = 2.0**53  # integers that JavaScript has exactly
 LARGEST_SIDE = 2**14  # of a page [pixels]
 Point = tuple[float, float, float]  # [m]
 
@@ -112,7 +112,7 @@ def _is_camera(message: messages.ViewerCameraMessage) -> bool:
     sides = message.image_height, message.image_width
     numbers = [*(n for each in vectors for n in each), message.fov, message.near, message.far]
     return [len(each) for each in vectors] == [4, 3, 3, 3] and (
-        all(type(n) in (int, float) and abs(n) <= LARGEST for n in numbers)
+        all(type(n) in (int, float) and abs(n) <= LARGEST_INTEGER for n in numbers)
         and list(message.look_at) != list(message.position)
         and any(message.up_direction)
         and all(type(side) is int and 0 <= side <= LARGEST_SIDE for side in sides)

@@ -5,8 +5,7 @@ import os
 
 import rospy
 
-from lockstep_runner.followers import Followers
-from lockstep_runner.replaced import python_locks, python_threads, ros
+from lockstep_runner.replaced import python_time, ros
 from lockstep_runner.runner import ScriptRunner
 from lockstep_runner.world import ScriptWorld
 
@@ -25,19 +24,10 @@ def install(args: argparse.Namespace, world: ScriptWorld | None = None) -> Scrip
     if args.step_on is not None:
         triggers = [f"/{name.removeprefix('/')}" for name in args.step_on if name != "none"]
     runner = ScriptRunner(args.dt, triggers, world or ScriptWorld(args.seed))
-    if world is None:
-        followers = Followers()
-        followers.passed = lambda: runner.clock.passed
-        followers.forget_mail = runner.world.forget_mail
-        runner.clock.others = followers
-        runner.topics.follows = followers.has
     ros.replace_topics(runner)
     ros.replace_services(runner)
     ros.replace_time(runner)
-    python_threads.replace_threads(runner)
-    python_locks.install(runner)
-    python_threads.replace_futures(runner)
-    python_threads.replace_time(runner, args.virtual_wall_clock)
+    python_time.replace_time(runner, args.virtual_wall_clock)
     os.register_at_fork(after_in_child=runner.world.leave)
     rospy.core.add_shutdown_hook(lambda reason: runner.clock.release_all())
     return runner

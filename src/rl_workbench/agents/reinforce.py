@@ -14,7 +14,9 @@ import numpy as np
 import torch
 from torch import nn
 
-from rl_workbench.agents.document import (
+from rl_workbench.agents.greedy import ClippedAction, Scaling, SingleChoice, Spread
+from rl_workbench.agents.normalisation import Normaliser
+from rl_workbench.agents.policy_gradient import (
     Episode,
     Losses,
     TwoNetworks,
@@ -23,8 +25,6 @@ from rl_workbench.agents.document import (
     descend,
     start_at_zero,
 )
-from rl_workbench.agents.greedy import ClippedAction, Scaling, SingleChoice, Spread
-from rl_workbench.agents.normalisation import Normaliser
 from rl_workbench.agents.policy_networks import (
     Actor,
     Bounds,

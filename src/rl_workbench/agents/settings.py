@@ -6,6 +6,11 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import check_options, option
 
 
+def discount() -> float:
+    """Returns the option gamma, which all algorithms have."""
+    return option(0.99, "discount factor", 0, 1)
+
+
 @dataclass(frozen=True)
 class DQNSettings:
     """The options of DQN. Steps are environment steps, unless called gradient steps."""
@@ -26,7 +31,7 @@ class DQNSettings:
     )
     train_frequency: int = option(1, "steps between rounds of learning", 1, 2**31)
     gradient_steps: int = option(1, "gradient steps in each round of learning", 1, 2**24)
-    gamma: float = option(0.99, "discount factor", 0, 1)
+    gamma: float = discount()
     n_step: int = option(
         1, "rewards summed before bootstrapping from the value estimate", 1, 10_000
     )
@@ -75,7 +80,7 @@ class DQNSettings:
 class ReinforceSettings:
     """The options of REINFORCE."""
 
-    gamma: float = option(0.99, "discount factor", 0, 1)
+    gamma: float = discount()
     gae_lambda: float = option(
         0.95, "lambda of generalised advantage estimation; 1: full returns, 0: one step", 0, 1
     )
@@ -118,7 +123,7 @@ class ReinforceSettings:
 class DocumentSettings:
     """The options of the policy-gradient document's algorithm, which are constants in its script."""
 
-    gamma: float = option(0.99, "discount factor", 0, 1)
+    gamma: float = discount()
     policy_learning_rate: float = option(0.01, "learning rate of the policy", 0, 10)
     value_learning_rate: float = option(0.1, "learning rate of the value network", 0, 10)
     random_weights: bool = option(

@@ -45,7 +45,7 @@ CAMERA, LOOK_AT = (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)  # in front of a picture on 
 HEIGHT, WIDTH = 1.2, 1.8  # of a picture on a page, at most
 FACING = (np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0)  # turns a picture's down to the page's, wxyz
 QUALITY = 85  # of JPEG on a page
-PATIENCE = 10.0  # [s] to wait for the recording thread to end
+RECORDER_PATIENCE = 10.0  # [s] to wait for the recording thread to end
 MAX_STEPS = 20_000  # of an episode on a page; some never end
 MAX_BYTES = 2**28  # of an episode's pictures
 
@@ -257,7 +257,7 @@ class EpisodeRecorder:
         with self._changed:
             self._is_closed = True
             self._changed.notify()
-        self._thread.join(PATIENCE)
+        self._thread.join(RECORDER_PATIENCE)
 
     def newest(self, which: str) -> tuple[int, ...]:
         """Returns an identity of the checkpoint that `play` would load; empty if there is none."""

@@ -14,7 +14,9 @@ from gymnasium import spaces
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, own_frames
 from rl_workbench.training.progress import warn
 
-LARGEST = float(np.finfo(np.float32).max)  # networks and replay buffers hold no larger number
+LARGEST_FLOAT32 = float(
+    np.finfo(np.float32).max
+)  # networks and replay buffers hold no larger number
 COMPUTE_REWARD = "compute_reward"  # method of an environment with a goal
 BEGIN_STEP = "begin_step"  # method of an environment whose step takes time in another process
 LONGEST = 10_000  # [steps], of an episode where nothing says how long one lasts
@@ -84,7 +86,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
             size = abs(float(reward))
         except (TypeError, ValueError) as error:
             raise self._error(f"the reward of {self._id} isn't a number: {reward!r}") from error
-        if not size <= LARGEST:  # true for NaN, too
+        if not size <= LARGEST_FLOAT32:  # true for NaN, too
             raise self._not_finite("reward", reward)
         return observation, reward, terminated, truncated, info
 
@@ -187,7 +189,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def _check_array(self, name: str, array: Any, space: gymnasium.Space[Any]) -> None:
         try:
-            is_finite = np.abs(array).max(initial=0) <= LARGEST
+            is_finite = np.abs(array).max(initial=0) <= LARGEST_FLOAT32
         except (TypeError, ValueError) as error:
             what = f"the {name} of {self._id} isn't a vector of numbers"
             raise self._error(f"{what}: {' '.join(repr(array).split())}") from error

@@ -7,7 +7,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from rl_workbench.agents.document import Episode, PolicyGradientAgent
+from rl_workbench.agents.document import PolicyGradientAgent
+from rl_workbench.agents.policy_gradient import Episode
 from rl_workbench.agents.reinforce import ReinforceAgent
 from rl_workbench.states import (
     generator_state,

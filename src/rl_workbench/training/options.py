@@ -16,7 +16,7 @@ from rl_workbench.training.algorithms import AlgorithmKind, algorithm
 
 # A resumed training may change these.
 EXTENDING = ("total_timesteps", "episodes", "stop_at_length", "stop_at_return", "device")
-LARGEST = 2**53
+LARGEST_COUNT = 2**53
 TREE = Path(__file__).resolve().parents[3]
 SHARE = Path(__file__).resolve().parents[1] / "share"  # where it is installed (setup.py)
 
@@ -34,8 +34,12 @@ class RunOptions:
     )
     seed: int = option(0, "seed of weights, exploration, environment and evaluation", 0, 2**31 - 1)
     num_envs: int = option(1, "number of environments to learn in at the same time", 1, 1024)
-    total_timesteps: int = option(0, "length of the training [steps]; 0: no limit", 0, LARGEST)
-    episodes: int = option(0, "length in episodes, if that comes first; 0: no limit", 0, LARGEST)
+    total_timesteps: int = option(
+        0, "length of the training [steps]; 0: no limit", 0, LARGEST_COUNT
+    )
+    episodes: int = option(
+        0, "length in episodes, if that comes first; 0: no limit", 0, LARGEST_COUNT
+    )
     stop_at_return: float | None = option(
         None, "end the training when a confirmed mean return reaches X", -1e18, 1e18, metavar="X"
     )
@@ -47,7 +51,7 @@ class RunOptions:
     exp_name: str = option("", "part of the run folder's name; the algorithm's name by default")
     run_dir: str = option("", "a new or empty folder for all results (runs/ENV__EXP__SEED__TIME)")
     eval_frequency: int = option(
-        10_000, "steps between evaluations; 0: only at the end", 0, LARGEST
+        10_000, "steps between evaluations; 0: only at the end", 0, LARGEST_COUNT
     )
     eval_episodes: int = option(10, "greedy episodes per evaluation", 1, 10**6)
     confirm_episodes: int = option(
@@ -57,12 +61,12 @@ class RunOptions:
         10**6,
     )
     checkpoint_frequency: int = option(
-        10_000, "steps between checkpoints; 0: only at start and end", 0, LARGEST
+        10_000, "steps between checkpoints; 0: only at start and end", 0, LARGEST_COUNT
     )
     keep_checkpoints: int = option(
         3, "how many of the newest checkpoints to keep; 0: all", 0, 10**6
     )
-    log_frequency: int = option(500, "steps between logged points of losses/", 1, LARGEST)
+    log_frequency: int = option(500, "steps between logged points of losses/", 1, LARGEST_COUNT)
 
     def __post_init__(self) -> None:
         check_options(self)

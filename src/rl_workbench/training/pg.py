@@ -6,7 +6,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from rl_workbench.agents.document import Episode, Losses, PolicyGradientAgent
+from rl_workbench.agents.document import PolicyGradientAgent
+from rl_workbench.agents.policy_gradient import Episode, Losses
 from rl_workbench.agents.policy_networks import Bounds
 from rl_workbench.agents.reinforce import ReinforceAgent
 from rl_workbench.agents.settings import DocumentSettings

@@ -92,12 +92,12 @@ def _bounds(limits: JointLimits, quantity: str) -> tuple[float, float]:
 MARGIN = 0.1  # of a joint's range, that it may be beyond its stops
 LEAST_MARGIN = 0.05  # [rad, m]
 FASTEST = 10.0  # times its velocity limit, which a joint that is pushed may exceed
-LARGEST = 1e6  # [rad, m, rad/s, m/s] that any joint may have
+LARGEST_STATE = 1e6  # [rad, m, rad/s, m/s] that any joint may have
 
 
 def impossible(limits: JointLimits, position: float, velocity: float) -> str:
     """Returns why no joint with these limits has this state [rad or m, and 1/s]; empty if one may have it."""
-    if not (abs(position) <= LARGEST and abs(velocity) <= LARGEST):  # NaN, too
+    if not (abs(position) <= LARGEST_STATE and abs(velocity) <= LARGEST_STATE):  # NaN, too
         return f"position {position:g} and velocity {velocity:g}, which no joint has"
     lower, upper = limits.lower, limits.upper
     if lower is not None and upper is not None:

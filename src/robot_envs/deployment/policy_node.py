@@ -26,7 +26,7 @@ from robot_envs.world_state import ODOMETRY, Command, JointState
 LATE_PERIODS, LATE_AT_LEAST = 5, 0.1  # control periods, and [s]
 LATE_AT_MOST = 0.3  # [s] of a vehicle, which drives on meanwhile
 POLL = 0.05  # [s] of wall time between two looks at what else might end a wait
-PATIENCE = 2.0  # [s] of wall time, until what is missing is logged
+MISSING_PATIENCE = 2.0  # [s] of wall time, until what is missing is logged
 REPORTING = 1.0  # [s] of wall time between two lines about why the robot stands still
 SENDING = 1.0  # [s] of wall time, for each of the last commands to be sent
 
@@ -145,7 +145,7 @@ class PolicyNode:
         """Waits until all joints are known and all controllers listen; returns the time [s]."""
         beginning = time.monotonic()
         while (missing := self._missing()) and not self._is_over():
-            if time.monotonic() - beginning > PATIENCE:
+            if time.monotonic() - beginning > MISSING_PATIENCE:
                 self._report(f"waiting for {missing}", lockstep_hint)
             self._let_go()
             rospy.rostime.wallsleep(POLL)
@@ -187,7 +187,7 @@ class PolicyNode:
                 continue
             if now > seen:
                 seen, since = now, time.monotonic()
-            elif time.monotonic() - since > PATIENCE:
+            elif time.monotonic() - since > MISSING_PATIENCE:
                 self._report("the time on /clock stands still", lockstep_hint)
             with clock:
                 clock.wait(POLL)

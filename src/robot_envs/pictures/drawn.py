@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["HEIGHT", "WIDTH", "Camera", "CameraLike", "DrawnEnv", "RobotPicture"]
 
 WIDTH, HEIGHT = 640, 320  # [pixels], by default
-LARGEST = 4096  # [pixels]
+LARGEST_PICTURE = 4096  # [pixels]
 RENDER_MODES = ("human", "rgb_array")
 
 
@@ -55,8 +55,10 @@ class RobotPicture:
         beside: Surroundings | None = None,
     ) -> None:
         for side in (width, height):
-            if not 1 <= side <= LARGEST or side != int(side):
-                raise ValueError(f"a picture's width and height lie in [1, {LARGEST}], not {side}")
+            if not 1 <= side <= LARGEST_PICTURE or side != int(side):
+                raise ValueError(
+                    f"a picture's width and height lie in [1, {LARGEST_PICTURE}], not {side}"
+                )
         self._size = (int(width), int(height))
         if isinstance(camera, Mapping):
             Camera().changed(camera)

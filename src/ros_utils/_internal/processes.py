@@ -21,7 +21,7 @@ from ros_utils._internal import log as _log
 
 MARK = "ROS_UTILS_LAUNCH"  # environment variable: the starts a process belongs to, outer ones first
 # roslaunch gives each of its nodes 15 s after SIGINT and 2 s after SIGTERM before it ends itself.
-PATIENCE = {"node": 8.0, "launch": 20.0, "master": 20.0}  # [s] after SIGINT
+END_PATIENCE = {"node": 8.0, "launch": 20.0, "master": 20.0}  # [s] after SIGINT
 LEFTOVERS = 3.0  # [s] instead, for processes that outlive the program itself
 AFTER_TERM = 3.0  # [s]
 AFTER_KILL = 2.0  # [s]
@@ -140,7 +140,7 @@ def end(starts: Sequence[Start], reap: Callable[[set[str]], bool]) -> bool:
         wave = [start for start in starts if start.kind == kind]
         if not wave:
             continue
-        left = _end_wave(wave, PATIENCE[kind], reap)
+        left = _end_wave(wave, END_PATIENCE[kind], reap)
         gone = reap({start.token for start in wave} - left) and gone and not left
     return gone
 
@@ -155,7 +155,7 @@ def end_orphans(reap: Callable[[set[str]], bool]) -> bool:
         Whether none is left.
     """
     orphans = [each for each in started(()) if each.kind != "node" and each.is_orphan]
-    deadline = time.monotonic() + max((PATIENCE[each.kind] for each in orphans), default=0.0)
+    deadline = time.monotonic() + max((END_PATIENCE[each.kind] for each in orphans), default=0.0)
     while any(each.is_orphan for each in orphans) and time.monotonic() < deadline:
         time.sleep(POLL)
     return end(orphans, reap)

@@ -15,7 +15,7 @@ from ros_utils import ros_node
 from ros_utils._internal import nodes
 from ros_utils._internal.programs import Started
 from ros_utils.testing.lockstep_subscriber import (
-    PATIENCE,
+    ANSWER_PATIENCE,
     SIMULATOR,
     LockstepSubscriber,
     WorldError,
@@ -95,10 +95,10 @@ class FollowedNode:
         last: list[float] = []
         while self._waiting:
             try:
-                last = _numbers(self._answers.get(timeout=PATIENCE))
+                last = _numbers(self._answers.get(timeout=ANSWER_PATIENCE))
             except queue.Empty:
                 raise WorldError(
-                    f"{self.name} hasn't answered a message on {self._hears} for {PATIENCE:g} s"
+                    f"{self.name} hasn't answered a message on {self._hears} for {ANSWER_PATIENCE:g} s"
                 ) from None
             self._waiting -= 1
         return last

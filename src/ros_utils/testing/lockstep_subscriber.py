@@ -11,7 +11,7 @@ from ros_calls.service import ServiceClient, ServiceFailed
 from ros_utils._internal import nodes
 
 SIMULATOR = "/gazebo"
-PATIENCE = 30.0  # [s of wall time] for an answer
+ANSWER_PATIENCE = 30.0  # [s of wall time] for an answer
 LONGEST = 500  # ticks in one call
 
 
@@ -39,10 +39,10 @@ class LockstepSubscriber:
         except (NoAnswer, Refused, ValueError) as fault:
             raise WorldError(f"the simulator doesn't publish {topic}") from fault
         self._call = ServiceClient(
-            f"{SIMULATOR}/advance_world", AdvanceWorld, persistent=True, timeout=PATIENCE
+            f"{SIMULATOR}/advance_world", AdvanceWorld, persistent=True, timeout=ANSWER_PATIENCE
         )
         self._call(AdvanceWorldRequest(node=name))  # what comes from now on is kept for it
-        self._connection = socket.create_connection((host, port), PATIENCE)
+        self._connection = socket.create_connection((host, port), ANSWER_PATIENCE)
         header = {"callerid": name, "topic": topic, "md5sum": "*", "type": "*"}
         write_ros_handshake_header(self._connection, header)
         request = AdvanceWorldRequest(node=name, connect=True, subscriptions=[topic])

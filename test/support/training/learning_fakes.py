@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from rl_workbench.agents.document import Episode, PolicyGradientAgent
+from rl_workbench.agents.document import PolicyGradientAgent
+from rl_workbench.agents.policy_gradient import Episode
 from rl_workbench.agents.reinforce import ReinforceAgent
 from rl_workbench.training.episodes import play, play_all
 

@@ -10,7 +10,8 @@ import pytest
 from support.training import workbench_runs
 
 from cartpole import workbench
-from cartpole.workbench import PROGRAM, WorkspaceHints, main
+from cartpole.workbench import PROGRAM, main
+from rl_workbench import errors
 from rl_workbench.starting import JOB
 
 
@@ -71,7 +72,11 @@ def test_recommended_commands_go_by_way_of_ws(
         (tmp_path / name).mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "other arm")
     monkeypatch.setenv("CARTPOLE_WITH", f"{tmp_path}/mine:{tmp_path}/link")
-    hints = WorkspaceHints(f"{root}/ws")
+    monkeypatch.setenv("CARTPOLE_WS", f"{root}/ws")
+    monkeypatch.setattr(errors, "hints", errors.hints)
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    hints = errors.hints
     folders = f"--with {tmp_path}/mine --with '{tmp_path}/other arm'"
     command = f"{root}/ws {folders} rosrun cartpole workbench.py view {tmp_path}/run"
     assert hints.replaying(tmp_path / "run") == command

@@ -139,7 +139,7 @@ def test_no_time_passes_while_a_thread_computes(clock):
 
 
 def test_a_thread_that_hangs_is_told_of_once_and_time_goes_on(clock, monkeypatch, capsys):
-    monkeypatch.setattr(module, "PATIENCE", 0.1)
+    monkeypatch.setattr(module, "THREAD_PATIENCE", 0.1)
     go = threading.Event()
     beside(clock, lambda: go.wait(BOUND))
     clock.wait(0.1)

@@ -1,6 +1,8 @@
 """lockstep.py's command line."""
 
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -101,3 +103,28 @@ def test_what_is_imported_later_is_seen_to_once(tmp_path, monkeypatch):
 
     assert again is not imported_later and len(seen) == 1
     sys.modules.pop("imported_later")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "loaded"),
+    [
+        ("import os, sys, time, rospy; rospy.sleep(0.01)", set()),
+        ("from concurrent import futures", {"looks", "python_locks", "python_threads"}),
+        ("import subprocess; subprocess.run(['true'])", {"followers", "line", "looks"}),
+    ],
+)
+def test_what_simulates_threads_and_processes_is_loaded_for_scripts_that_use_them(
+    root, tmp_path, line, loaded
+):
+    script = tmp_path / "script.py"
+    script.write_text(
+        f"{line}\nimport sys\n"
+        "print(*[name for name in sys.modules if name.startswith('lockstep_runner.concurrency.')])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, root / "scripts/lockstep.py", script],
+        env=os.environ | {"ROS_MASTER_URI": "http://127.0.0.1:1"},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert {name.rpartition(".")[2] for name in done.stdout.split()} == loaded

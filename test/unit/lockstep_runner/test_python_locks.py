@@ -6,7 +6,7 @@ import pytest
 from support.ros.lockstep_world import MS
 
 from lockstep_runner import originals
-from lockstep_runner.replaced import python_locks, python_threads
+from lockstep_runner.concurrency import python_locks, python_threads
 
 KINDS = ["Lock", "RLock"]
 

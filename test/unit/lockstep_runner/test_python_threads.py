@@ -13,7 +13,8 @@ import rospy
 from support.ros.lockstep_world import MS
 
 from lockstep_runner import originals
-from lockstep_runner.replaced import python_threads
+from lockstep_runner.concurrency import python_threads
+from lockstep_runner.replaced import python_time
 
 BOUND = 30.0  # [s of wall time]
 
@@ -140,7 +141,7 @@ def test_tasks_of_an_executor_take_the_time_that_they_sleep(replaced, workers):
 @pytest.mark.parametrize("polls", [False, True])
 def test_a_paused_world_ends_a_task_s_sleep_at_once(replaced, monkeypatch, polls):
     monkeypatch.setattr(time, "sleep", time.sleep)
-    python_threads.replace_time(replaced, virtual_wall_clock=False)
+    python_time.replace_time(replaced, virtual_wall_clock=False)
     replaced.world.paused = True
     begin = originals.monotonic()
     with ThreadPoolExecutor(1) as executor:

@@ -1,68 +1,28 @@
-"""The architecture (docs/architecture.md): who may import whom, no circles, one name for one thing."""
+"""The architecture (docs/architecture.md), beside the contracts of pyproject.toml: one name for one thing."""
 
 import ast
+import re
 import subprocess
 import sys
+import tomllib
 from collections import defaultdict
-from functools import cache
-from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-from lockstep_runner.script import LIBRARIES
-from rl_workbench.training.algorithms import ALGORITHMS
+from lockstep_runner.script import LIBRARIES, WALL_TIME
 
 SRC = Path(__file__).resolve().parents[3] / "src"
 ROOT = SRC.parent
 MODULES = sorted(SRC.rglob("*.py"))
-FOLDERS = sorted({path.parent for path in MODULES} | {SRC})
-OURS = {"bullet_gazebo", "cartpole", "rl_workbench", "robot_envs", "ros_calls", "ros_utils",
-        "file_access", "lockstep_runner", "package_writing", "web_viewer"}  # fmt: skip
 LEARNING = {"gymnasium", "torch", "stable_baselines3", "matplotlib"}
 MOST_ENTRIES = 25
 MOST_DOUBLE_CLASSES = 3
 ROS = ("rospy", "rosgraph", "rosnode", "roslib", "rosparam", "roslaunch", "rosservice")
-ROS_ROOMS = (
-    "bullet_gazebo/ros",
-    "lockstep_runner",
-    "ros_calls",
-    "ros_utils",
-    "robot_envs/backends",
-    "robot_envs/deployment",
-)
-
-# A library, and which of ours it may import.
-ALLOWED = {
-    "bullet_gazebo": {"ros_calls", "file_access", "web_viewer"},
-    "ros_calls": {"file_access"},
-    "file_access": set(),
-    "ros_utils": {"ros_calls", "file_access"},
-    "robot_envs": {"bullet_gazebo", "file_access", "ros_calls", "ros_utils", "web_viewer"},
-    "lockstep_runner": {"file_access", "ros_calls"},
-    "package_writing": {"bullet_gazebo", "file_access", "robot_envs", "ros_calls"},
-    "rl_workbench": {"file_access", "web_viewer"},
-    "web_viewer": {"file_access"},
-    "cartpole": {"rl_workbench", "robot_envs"},
-}
-# The modules or folders of the algorithms, below rl_workbench.training.
-ADAPTERS = {".".join(kind.implementation.split(".")[:3]) for kind in ALGORITHMS.values()}
-# A folder, and what nothing in it may import beside that.
-FORBIDDEN = [
-    ("bullet_gazebo/physics", ("bullet_gazebo.control", "bullet_gazebo.ros", "bullet_gazebo.simulator",
-                               "bullet_gazebo.timing")),
-    ("bullet_gazebo/control", ("bullet_gazebo.physics", "bullet_gazebo.ros", "bullet_gazebo.simulator",
-                               "bullet_gazebo.timing", "pybullet")),
-    ("bullet_gazebo", ("gymnasium", "torch")),
-    ("ros_utils", ("pybullet", "torch")),
-    ("robot_envs", ("bullet_gazebo.ros", "torch")),
-    ("cartpole", ("pybullet", "torch")),
-    ("rl_workbench/agents", ("gymnasium", "rl_workbench.tools", "rl_workbench.training")),
-    ("rl_workbench/training", ("rl_workbench.tools",)),
-    ("rl_workbench/training/training.py", tuple(ADAPTERS)),
-    *((f"{own.replace('.', '/')}{suffix}", tuple(ADAPTERS - {own}))
-      for own in ADAPTERS for suffix in ("", ".py")),
-]  # fmt: skip
+LINTER = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+LAYERS = [set(layer.split(" | ")) for layer in LINTER["contracts"][0]["layers"]]
+# What still names higher libraries.
+NAMING = {"bullet_gazebo/held_state.py", "bullet_gazebo/physics/engines/__init__.py"}
 WITHOUT_ROS = (
     "bullet_gazebo.physics.world",
     "bullet_gazebo.control.manager",
@@ -76,58 +36,31 @@ WITHOUT_ROS = (
 )
 
 
-@cache
-def imports(path: Path) -> list[str]:
-    names = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: imports are absolute"
-            names += [f"{node.module}.{alias.name}" for alias in node.names]
-    return names
-
-
-def below(name: str, package: str) -> bool:
-    return name == package or name.startswith(f"{package}.")
-
-
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SRC)))
-def test_nothing_imports_against_the_arrows(path: Path) -> None:
-    library = path.relative_to(SRC).parts[0]
-    forbidden = OURS - {library} - ALLOWED[library]
-    for room, packages in FORBIDDEN:
-        if path.is_relative_to(SRC / room):
-            forbidden |= set(packages)
-    if not any(path.is_relative_to(SRC / room) for room in ROS_ROOMS):
-        forbidden |= set(ROS)
-    against = {name for name in imports(path) for package in forbidden if below(name, package)}
-    assert not against
-
-
-@pytest.mark.parametrize("folder", FOLDERS, ids=lambda path: str(path.relative_to(SRC)))
-def test_what_lies_in_a_folder_imports_in_no_circle(folder: Path) -> None:
-    """Modules and folders in it, each folder as one."""
-    own = folder.relative_to(SRC).parts
-    children: dict[str, set[str]] = defaultdict(set)
-    for path in (path for path in MODULES if path.is_relative_to(folder)):
-        child = path.relative_to(folder).parts[0].removesuffix(".py")
-        for name in imports(path):
-            parts = tuple(name.split("."))
-            if parts[: len(own)] == own and len(parts) > len(own):
-                other = parts[len(own)]
-                exists = (folder / other).is_dir() or (folder / f"{other}.py").is_file()
-                if exists and other != child:
-                    children[child].add(other)
-    try:
-        TopologicalSorter(children).prepare()
-    except CycleError as error:
-        pytest.fail(f"{folder.relative_to(SRC)}: {' -> '.join(error.args[1])}")
+def test_the_contracts_speak_of_all_libraries() -> None:
+    libraries = {path.parent.name for path in SRC.glob("*/__init__.py")}
+    assert libraries == set(LINTER["root_packages"]) == set().union(*LAYERS)
 
 
 def test_a_wait_in_our_libraries_stays_wall_time_under_the_lockstep_runner() -> None:
-    assert {path.name for path in SRC.iterdir() if (path / "__init__.py").exists()} == OURS
-    assert OURS <= LIBRARIES
+    marked = {
+        path.parent.name for path in SRC.glob("*/__init__.py") if WALL_TIME in path.read_text()
+    }
+    assert set(LINTER["root_packages"]) <= marked | LIBRARIES
+
+
+@pytest.mark.parametrize("place", range(1, len(LAYERS)))
+def test_no_string_names_a_higher_library(place: int) -> None:
+    """A module of it: the package for ROS is called cartpole, too."""
+    higher = set().union(*LAYERS[:place])
+    named = re.compile(rf"\b(cartpole[./]\w|({'|'.join(higher - {'cartpole'})})\b)")
+    found = {
+        str(path.relative_to(SRC))
+        for path in MODULES
+        if path.relative_to(SRC).parts[0] in LAYERS[place]
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and named.search(str(node.value))
+    }
+    assert found <= NAMING
 
 
 @pytest.mark.slow

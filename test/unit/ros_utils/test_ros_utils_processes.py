@@ -142,7 +142,7 @@ def test_names_of_this_machine_mean_the_same_master(monkeypatch):
     ("trap", "number"), [("INT", signal.SIGTERM), ("INT TERM", signal.SIGKILL)]
 )
 def test_a_stubborn_program_is_ended(place, monkeypatch, trap, number):
-    monkeypatch.setitem(_processes.PATIENCE, "node", 0.3)
+    monkeypatch.setitem(_processes.END_PATIENCE, "node", 0.3)
     monkeypatch.setattr(_processes, "AFTER_TERM", 0.3)
     code = "import signal; [signal.signal(getattr(signal, 'SIG' + n), signal.SIG_IGN)"
     code += f" for n in '{trap}'.split()]; open({str(place / 'pid')!r}, 'w').write('1\\n'); "
@@ -184,7 +184,7 @@ while True:
 def test_a_launch_whose_caller_was_killed_is_waited_for(place, monkeypatch, stubborn):
     """Its master is about to end: what is started now must not take it for its own."""
     program = SLOW_TO_END.replace("0.5", "1000") if stubborn else SLOW_TO_END
-    monkeypatch.setitem(_processes.PATIENCE, "launch", 0.3 if stubborn else BOUND)
+    monkeypatch.setitem(_processes.END_PATIENCE, "launch", 0.3 if stubborn else BOUND)
     command = [sys.executable, "-c", program, str(place / "listens")]
     code = "from ros_utils._internal import programs as p; import signal;"
     starter = python(f"{code} p.start({command!r}, 'launch', 'slow'); signal.pause()")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from math import inf
 from typing import Any, ClassVar
 
+from rl_workbench.agents.settings import discount
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import check_options, is_plain, option
 
@@ -24,7 +25,7 @@ class SB3Options:
     lr_schedule: str = option(
         "constant", "linear: falls to 0 over total_timesteps", choices=("constant", "linear")
     )
-    gamma: float = option(0.99, "discount factor", 0, 1)
+    gamma: float = discount()
     policy: str = option(
         "", "MlpPolicy, CnnPolicy or MultiInputPolicy, or one of your own as module:Class; by default what "
         "the observations need",

@@ -133,22 +133,12 @@ def _failed(text: str) -> SpawnResult:
 
 def gazebo_spawn_urdf_path(
     model_path: str,
-    model_name: str = "robot1",
-    robot_namespace: str = "/",
-    reference_frame: str = "world",
-    pos_x: float = 0.0,
-    pos_y: float = 0.0,
-    pos_z: float = 0.0,
-    ori_x: float = 0.0,
-    ori_y: float = 0.0,
-    ori_z: float = 0.0,
-    ori_w: float = 1.0,
-    *,
-    args_xacro: Sequence[str] | None = None,
-    timeout: float = TIMEOUT,
-    gazebo_ns: str = GAZEBO,
-    verify: bool = False,
-) -> SpawnResult:
+    model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
+    pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
+    ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
+    *, args_xacro: Sequence[str] | None = None,
+    timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+) -> SpawnResult:  # fmt: skip
     """Spawns a URDF or xacro file, given by its path. See `gazebo_spawn_urdf_string`."""
     xml = urdf_parse_from_path(model_path, args_xacro)
     if xml is None:
@@ -159,25 +149,13 @@ def gazebo_spawn_urdf_path(
 
 
 def gazebo_spawn_urdf_pkg(
-    pkg_name: str,
-    file_name: str,
-    file_folder: str = "/urdf",
-    model_name: str = "robot1",
-    robot_namespace: str = "/",
-    reference_frame: str = "world",
-    pos_x: float = 0.0,
-    pos_y: float = 0.0,
-    pos_z: float = 0.0,
-    ori_x: float = 0.0,
-    ori_y: float = 0.0,
-    ori_z: float = 0.0,
-    ori_w: float = 1.0,
-    *,
-    args_xacro: Sequence[str] | None = None,
-    timeout: float = TIMEOUT,
-    gazebo_ns: str = GAZEBO,
-    verify: bool = False,
-) -> SpawnResult:
+    pkg_name: str, file_name: str, file_folder: str = "/urdf",
+    model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
+    pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
+    ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
+    *, args_xacro: Sequence[str] | None = None,
+    timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+) -> SpawnResult:  # fmt: skip
     """Spawns URDF or xacro ``<pkg_name><file_folder>/<file_name>``. See `gazebo_spawn_urdf_string`."""
     xml = urdf_parse_from_pkg(pkg_name, file_name, file_folder, args_xacro)
     if xml is None:
@@ -191,21 +169,11 @@ def gazebo_spawn_urdf_pkg(
 
 def gazebo_spawn_urdf_string(
     model_string: str,
-    model_name: str = "robot1",
-    robot_namespace: str = "/",
-    reference_frame: str = "world",
-    pos_x: float = 0.0,
-    pos_y: float = 0.0,
-    pos_z: float = 0.0,
-    ori_x: float = 0.0,
-    ori_y: float = 0.0,
-    ori_z: float = 0.0,
-    ori_w: float = 1.0,
-    *,
-    timeout: float = TIMEOUT,
-    gazebo_ns: str = GAZEBO,
-    verify: bool = False,
-) -> SpawnResult:
+    model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
+    pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
+    ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
+    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+) -> SpawnResult:  # fmt: skip
     """Spawns a model from URDF text.
 
     Args:
@@ -229,21 +197,11 @@ def gazebo_spawn_urdf_string(
 
 def gazebo_spawn_urdf_param(
     param_name: str,
-    model_name: str = "robot1",
-    robot_namespace: str = "/",
-    reference_frame: str = "world",
-    pos_x: float = 0.0,
-    pos_y: float = 0.0,
-    pos_z: float = 0.0,
-    ori_x: float = 0.0,
-    ori_y: float = 0.0,
-    ori_z: float = 0.0,
-    ori_w: float = 1.0,
-    *,
-    timeout: float = TIMEOUT,
-    gazebo_ns: str = GAZEBO,
-    verify: bool = False,
-) -> SpawnResult:
+    model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
+    pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
+    ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
+    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+) -> SpawnResult:  # fmt: skip
     """Spawns the URDF in parameter ``<robot_namespace>/<param_name>``. See `gazebo_spawn_urdf_string`."""
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     place = (robot_namespace, reference_frame, pose)
@@ -252,21 +210,11 @@ def gazebo_spawn_urdf_param(
 
 def gazebo_spawn_sdf_path(
     model_path: str,
-    model_name: str = "robot1",
-    robot_namespace: str = "/",
-    reference_frame: str = "world",
-    pos_x: float = 0.0,
-    pos_y: float = 0.0,
-    pos_z: float = 0.0,
-    ori_x: float = 0.0,
-    ori_y: float = 0.0,
-    ori_z: float = 0.0,
-    ori_w: float = 1.0,
-    *,
-    timeout: float = TIMEOUT,
-    gazebo_ns: str = GAZEBO,
-    verify: bool = False,
-) -> bool:
+    model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
+    pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
+    ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
+    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+) -> bool:  # fmt: skip
     """Spawns an SDF file, given by its path. See `gazebo_spawn_sdf_string`."""
     try:
         xml = decode(read_file(Path(_packages.existing(model_path))))
@@ -279,24 +227,12 @@ def gazebo_spawn_sdf_path(
 
 
 def gazebo_spawn_sdf_pkg(
-    pkg_name: str,
-    file_name: str,
-    file_folder: str = "/sdf",
-    model_name: str = "robot1",
-    robot_namespace: str = "/",
-    reference_frame: str = "world",
-    pos_x: float = 0.0,
-    pos_y: float = 0.0,
-    pos_z: float = 0.0,
-    ori_x: float = 0.0,
-    ori_y: float = 0.0,
-    ori_z: float = 0.0,
-    ori_w: float = 1.0,
-    *,
-    timeout: float = TIMEOUT,
-    gazebo_ns: str = GAZEBO,
-    verify: bool = False,
-) -> bool:
+    pkg_name: str, file_name: str, file_folder: str = "/sdf",
+    model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
+    pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
+    ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
+    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+) -> bool:  # fmt: skip
     """Spawns the SDF file ``<pkg_name><file_folder>/<file_name>``. See `gazebo_spawn_sdf_string`."""
     try:
         path = _packages.file(pkg_name, file_folder, file_name)
@@ -310,21 +246,11 @@ def gazebo_spawn_sdf_pkg(
 
 def gazebo_spawn_sdf_string(
     model_string: str,
-    model_name: str = "robot1",
-    robot_namespace: str = "/",
-    reference_frame: str = "world",
-    pos_x: float = 0.0,
-    pos_y: float = 0.0,
-    pos_z: float = 0.0,
-    ori_x: float = 0.0,
-    ori_y: float = 0.0,
-    ori_z: float = 0.0,
-    ori_w: float = 1.0,
-    *,
-    timeout: float = TIMEOUT,
-    gazebo_ns: str = GAZEBO,
-    verify: bool = False,
-) -> bool:
+    model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
+    pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
+    ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
+    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+) -> bool:  # fmt: skip
     """Spawns a model from SDF text; the arguments are those of `gazebo_spawn_urdf_string`.
 
     Returns:
@@ -337,21 +263,11 @@ def gazebo_spawn_sdf_string(
 
 def gazebo_spawn_sdf_param(
     param_name: str,
-    model_name: str = "robot1",
-    robot_namespace: str = "/",
-    reference_frame: str = "world",
-    pos_x: float = 0.0,
-    pos_y: float = 0.0,
-    pos_z: float = 0.0,
-    ori_x: float = 0.0,
-    ori_y: float = 0.0,
-    ori_z: float = 0.0,
-    ori_w: float = 1.0,
-    *,
-    timeout: float = TIMEOUT,
-    gazebo_ns: str = GAZEBO,
-    verify: bool = False,
-) -> bool:
+    model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
+    pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
+    ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
+    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+) -> bool:  # fmt: skip
     """Spawns the SDF in parameter ``<robot_namespace>/<param_name>``. See `gazebo_spawn_sdf_string`."""
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     place = (robot_namespace, reference_frame, pose)

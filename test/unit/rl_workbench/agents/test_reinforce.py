@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.training.learning_fakes import learned_lengths
 
-from rl_workbench.agents.document import Episode
+from rl_workbench.agents.policy_gradient import Episode
 from rl_workbench.agents.policy_networks import SoftmaxActor
 from rl_workbench.agents.reinforce import ReinforceAgent, generalised_advantages
 from rl_workbench.agents.settings import ReinforceSettings

@@ -5,8 +5,6 @@ import json
 import socket
 from typing import Any
 
-ADDRESS = "LOCKSTEP_CLOCK"  # environment variable: path of the script process's socket
-
 
 class LineEnded(Exception):
     """The other side has closed the connection."""

@@ -7,48 +7,30 @@ passes until the processes that the script has started are at rest.
 import atexit
 import contextlib
 import math
-import os
 import socket
-import subprocess
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import psutil
 
-from file_access.locks import scratch_folder
 from lockstep_runner import originals
 from lockstep_runner.clock import Others
-from lockstep_runner.line import ADDRESS, Line, LineEnded
-from lockstep_runner.looks import LOOK, QUIET, WORKING, Seen, look_at
+from lockstep_runner.concurrency.line import Line, LineEnded
+from lockstep_runner.concurrency.looks import LOOK, QUIET, WORKING, Seen, look_at
 from lockstep_runner.notices import tell, tell_once
+from lockstep_runner.runner import ScriptRunner
 
-SITE = Path(__file__).with_name("site")
 STARTING_PATIENCE = 30.0  # [s of wall time]
 
 
 class StartedProcesses:
-    """Detects when the script starts processes, and when they stop working."""
+    """Detects when the processes that the script has started stop working."""
 
     def __init__(self) -> None:
-        self.is_going_on = False
+        self.is_going_on = False  # set when one is started
         self._known: set[int] = set()  # already reported: these compute on their own
-        paths = [str(SITE), *filter(None, [os.environ.get("PYTHONPATH")])]
-        os.environ["PYTHONPATH"] = os.pathsep.join(paths)
-        begin, system = subprocess.Popen.__init__, os.system
-
-        def popen(process: Any, *args: Any, **kwds: Any) -> None:
-            begin(process, *args, **kwds)
-            self.is_going_on = True
-
-        def run(command: Any) -> int:
-            self.is_going_on = True
-            return system(command)
-
-        subprocess.Popen.__init__ = popen  # type: ignore[method-assign, assignment]
-        os.system = run
 
     def settle(self, resting: Callable[[], set[int]]) -> None:
         """Waits until no descendant of this process works; `resting` ones may, as the clock holds them."""
@@ -89,7 +71,9 @@ def _name(pid: int) -> str:
     return "ended"
 
 
-PATIENCE = 10.0  # [s of wall time] for a node that computes or waits for something other than time
+NODE_PATIENCE = (
+    10.0  # [s of wall time] for a node that computes or waits for something other than time
+)
 
 
 @dataclass
@@ -110,20 +94,22 @@ class _Node:
 class Followers(Others):
     """All nodes that follow the clock."""
 
-    def __init__(self) -> None:
-        self.passed = lambda: 0  # [ns] Clock.passed
-        self.forget_mail = lambda node: None
+    def __init__(self, address: str, runner: ScriptRunner) -> None:
+        """Listens for nodes.
+
+        Args:
+            address: path of the socket.
+            runner: the script's.
+        """
+        self._clock, self._world = runner.clock, runner.world
         self.starting = StartedProcesses()
         self._guard = originals.Condition()
         self._nodes: dict[str, _Node] = {}
-        folder = contextlib.ExitStack()
-        address = str(folder.enter_context(scratch_folder()) / "clock")
-        atexit.register(folder.close)
         atexit.register(self._tell_of_end)
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._listener.bind(address)
         self._listener.listen(64)
-        os.environ[ADDRESS] = address
+        self._clock.others = self
         thread = threading.Thread(target=self._accept, name="nodes under the clock", daemon=True)
         originals.start(thread)
 
@@ -162,7 +148,7 @@ class Followers(Others):
         with self._guard:
             found = self._nodes.get(node)
         if found is None:
-            self.forget_mail(node)  # the node has ended
+            self._world.forget_mail(node)  # the node has ended
         elif found.rests:
             self._go_on(found)
 
@@ -170,13 +156,13 @@ class Followers(Others):
         with self._guard:
             node.rests, node.wake = False, math.inf
         try:
-            node.line.send(passed=self.passed() - node.began)
+            node.line.send(passed=self._clock.passed - node.began)
         except LineEnded:
             self._gone(node)
         self._until_all_rest()
 
     def _until_all_rest(self) -> None:
-        deadline = originals.monotonic() + PATIENCE
+        deadline = originals.monotonic() + NODE_PATIENCE
         with self._guard:
             while any(node.covered and not node.rests for node in self._nodes.values()):
                 originals.condition_wait(self._guard, LOOK)
@@ -189,8 +175,8 @@ class Followers(Others):
                         node.covered = False
                         tell_once(
                             f"busy {node.name}",
-                            f"node {node.name} has computed for {PATIENCE:g} s; time continues without it,"
-                            " so that what it does meanwhile isn't repeatable",
+                            f"node {node.name} has computed for {NODE_PATIENCE:g} s; time continues without"
+                            " it, so that what it does meanwhile isn't repeatable",
                         )
 
     def _accept(self) -> None:
@@ -208,7 +194,7 @@ class Followers(Others):
             while True:
                 rest = line.receive()["rest"]
                 with self._guard:
-                    node.began = self.passed()
+                    node.began = self._clock.passed
                     node.wake = math.inf if rest is None else node.began + rest
                     node.rests = node.covered = True
                     node.seen = Seen(node.seen.place)

@@ -6,8 +6,8 @@ import socket
 import sys
 from typing import Any
 
-from lockstep_runner.line import ADDRESS, Line, LineEnded
-from lockstep_runner.script import AfterImport
+from lockstep_runner.concurrency.line import Line, LineEnded
+from lockstep_runner.script import ADDRESS, AfterImport
 
 # These make up the simulation and the ROS graph.
 NOT_FOLLOWING = frozenset(
@@ -39,8 +39,9 @@ def _wrap_init_node(rospy: Any) -> None:
 def _follow(name: str) -> None:
     import rospy
 
+    from lockstep_runner.concurrency import python_threads
+    from lockstep_runner.concurrency.followed_world import FollowedWorld
     from lockstep_runner.replaced import install
-    from lockstep_runner.world import FollowedWorld
 
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
@@ -52,4 +53,4 @@ def _follow(name: str) -> None:
         return
     rospy.core.add_shutdown_hook(lambda reason: line.close())  # ends a rest at Ctrl-C
     options = argparse.Namespace(seed=None, dt=0.0, step_on=["none"], virtual_wall_clock=False)
-    install(options, FollowedWorld(line))
+    python_threads.replace(install(options, FollowedWorld(line)))

@@ -1,7 +1,6 @@
-"""Makes Python's waits take simulated time where the script itself calls them.
+"""Makes the waits of Python's threads take simulated time where the script itself calls them.
 
-Event.wait, Condition.wait, Thread.start and join; through them queue, threading.Timer and concurrent.futures;
-time.sleep; with --virtual-wall-clock also time.time, monotonic and perf_counter.
+Event.wait, Condition.wait, Thread.start and join; through them queue, threading.Timer and concurrent.futures.
 """
 
 import concurrent.futures._base as futures
@@ -9,30 +8,34 @@ import contextlib
 import math
 import queue
 import threading
-import time
 import types
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import thread as pools
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
 
-import rospy
-
 from lockstep_runner import originals
 from lockstep_runner.clock import Clock
-from lockstep_runner.looks import LOOK
-from lockstep_runner.notices import tell_once
+from lockstep_runner.concurrency import python_locks
+from lockstep_runner.concurrency.looks import LOOK, Seen
 from lockstep_runner.runner import ScriptRunner
-from lockstep_runner.script import SubmittedCall, caller, is_the_script
+from lockstep_runner.script import SubmittedCall, is_the_script
 
 # [s] a time limit with less than this left is over: the rest is floating-point error.
 ROUNDING = 1e-6
-LONGEST_SLEEP = 9e9  # [s]; Python counts nanoseconds in 64 bits
-
+OWN_QUIET = 30  # idle checks in a row after which a thread of the script counts as waiting; 1 s
 
 _rounded = threading.local()  # `passed`: when a thread's time limit was all but over
+
+
+def replace(runner: ScriptRunner) -> None:
+    """Replaces the waits of threads, locks and executors."""
+    replace_threads(runner)
+    python_locks.install(runner)
+    replace_futures(runner)
 
 
 def replace_threads(runner: ScriptRunner) -> None:
@@ -108,7 +111,8 @@ def _replace_start(runner: ScriptRunner) -> None:
         self.run = run  # type: ignore[method-assign]
         try:
             originals.start(self)
-            runner.clock.began_own(self)
+            place = Path("/proc/self/task", str(self.native_id))
+            runner.clock.began_own(self, Seen(place, OWN_QUIET).is_quiet)
         finally:
             gate.release()
 
@@ -231,52 +235,3 @@ def end_executors() -> None:
         pools._shutdown = True
     for work in list(pools._threads_queues.values()):
         work.put(None)
-
-
-def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
-    """Replaces time.sleep, and with `virtual_wall_clock` Python's clocks."""
-
-    def sleep(seconds: float) -> None:
-        """As time.sleep, in simulated time [s]."""
-        if (
-            rospy.core.is_shutdown()
-            or not is_the_script(1)
-            or caller(1) == "actionlib"
-            and runner.waits_for_others(seconds)
-        ):
-            originals.sleep(seconds)
-        elif _is_wall_time(runner):
-            _sleep_in_wall_time(runner, seconds)
-        elif runner.is_connected():
-            if not 0.0 <= seconds <= LONGEST_SLEEP:
-                originals.sleep(seconds)  # raises
-            runner.wait(seconds, in_pause=0.0)
-        else:
-            originals.sleep(seconds)
-
-    time.sleep = sleep  # type: ignore[assignment]
-    if virtual_wall_clock:
-        start, passed = time.time(), runner.clock
-
-        def simulated() -> float:
-            return passed.passed / 1e9
-
-        time.time = lambda: start + simulated()
-        time.monotonic = time.perf_counter = simulated
-
-
-def _sleep_in_wall_time(runner: ScriptRunner, seconds: float) -> None:
-    thread = threading.current_thread()
-    tell_once(
-        f"sleep {thread.name}",
-        f"thread '{thread.name}' sleeps by time.sleep, outside the main thread: its sleeps are wall time,"
-        " so that what it does isn't repeatable; rospy.sleep, rospy.Rate and rospy.Timer are covered",
-    )
-    runner.clock.ended(thread)  # time doesn't wait for this thread
-    originals.sleep(seconds)
-
-
-def _is_wall_time(runner: ScriptRunner) -> bool:
-    """Returns whether this thread sleeps in wall time, as threads do that the script itself started."""
-    clock = runner.clock
-    return not clock.covers_this_thread() or clock.is_own(threading.current_thread())

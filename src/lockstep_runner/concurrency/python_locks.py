@@ -8,9 +8,9 @@ import sys
 import threading
 from typing import Any
 
-from lockstep_runner.clock import NANOSECONDS
 from lockstep_runner.runner import ScriptRunner
 from lockstep_runner.script import GO_BETWEENS, is_the_script
+from lockstep_runner.world import NANOSECONDS
 
 
 def install(runner: ScriptRunner) -> None:

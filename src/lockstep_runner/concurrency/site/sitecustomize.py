@@ -1,4 +1,4 @@
-"""Read by every Python process below a script in lock-step, and by no other (see ../followers.py)."""
+"""Read by every Python process below a script in lock-step, and by no other (see ../following.py)."""
 
 import importlib.machinery
 import importlib.util
@@ -19,7 +19,7 @@ def _go_on() -> None:
 
 _go_on()
 try:
-    from lockstep_runner.following import watch_for_rospy
+    from lockstep_runner.concurrency.following import watch_for_rospy
 except (ImportError, TypeError):  # another Python: without ROS, or older
     pass
 else:
