@@ -6,7 +6,6 @@ called, SystemExit and KeyboardInterrupt included: a Ctrl-C raises nothing in th
 """
 
 import importlib
-import os
 import pkgutil
 import re
 import threading
@@ -207,8 +206,8 @@ class PluginRegistry:
         self._thinner = thinner
         self.sensing = Sensing(sim, seed)
         # Imported now, so that no spawn waits for it.
-        self._built_in = _built_in("LIBRARIES")
-        self._of_worlds = _built_in("WORLD_LIBRARIES")
+        self._built_in = built_in("LIBRARIES")
+        self._of_worlds = built_in("WORLD_LIBRARIES")
         self._loaded_of_world: list[object] = []
         self._loaded: dict[Model, list[tuple[PluginContext, LoadedPlugin | None]]] = {}
 
@@ -293,11 +292,11 @@ class PluginRegistry:
             return None
 
 
-def _built_in(table: str) -> dict[str, Callable[[Any], Any]]:
+def built_in(table: str) -> dict[str, Callable[[Any], Any]]:
     """Returns the plugins of this folder: each module's `table`, file names of libraries and a factory."""
     modules = [
         importlib.import_module(f"{__package__}.{found.name}")
-        for found in pkgutil.iter_modules([os.path.dirname(__file__)])
+        for found in pkgutil.iter_modules(importlib.import_module(__package__ or "").__path__)
     ]
     return {
         library: factory
