@@ -56,8 +56,10 @@ FORBIDDEN = [
     ("bullet_gazebo", ("gymnasium", "torch")),
     ("ros_utils", ("pybullet", "torch")),
     ("robot_envs", ("torch",)),
-    *((f"robot_envs/{each}", ("bullet_gazebo.ros",)) for each in ("backends/in_process.py", "backends/backend.py",
-      "deployment", "pictures", "robots", "testing", "variation", "environment.py", "task.py", "robot.py")),
+    *((f"robot_envs/{each}", ("bullet_gazebo.ros",)) for each in (
+        "backends/in_process.py", "backends/backend.py", "deployment", "pictures", "robots", "testing",
+        "variation", "environment.py", "task.py", "robot.py",
+    )),
     ("cartpole", ("pybullet", "torch")),
     ("rl_workbench/agents", ("gymnasium", "rl_workbench.tools", "rl_workbench.training")),
     ("rl_workbench/training", ("rl_workbench.tools",)),
