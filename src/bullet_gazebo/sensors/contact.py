@@ -1,28 +1,25 @@
 """Contact sensors: what the collisions of a link touch (docs/contract/sensors.md 5)."""
 
 import logging
+from typing import ClassVar
 
 from bullet_gazebo.physics.lumping import LUMPED
-from bullet_gazebo.sensors.sensing import Mount, sensor_of
+from bullet_gazebo.sensors.sensing import Field, Measurement, Mount, sensor_of
 from bullet_gazebo.simulator import NANOSECONDS
 from bullet_gazebo.state import ContactPair, contact_pairs
 
 logger = logging.getLogger(f"rosout.{__name__}")
 
 
-class ContactSensor:
-    """A sensor of the contacts of `<contact>`'s collisions.
+class ContactSensor(Measurement):
+    """A sensor of the contacts of `<contact>`'s collisions."""
 
-    Args:
-        mount: its place.
-
-    Raises:
-        DescriptionError: if the sensor is of another kind.
-    """
+    kinds = ("contact",)
+    fields: ClassVar = {"contacts": Field("what its collisions touched in the last step")}
 
     def __init__(self, mount: Mount) -> None:
-        self._mount = mount
-        sensor = sensor_of(mount, ("contact",))
+        super().__init__(mount)
+        sensor = sensor_of(mount, self.kinds)
         self.rate = sensor.rate
         names = [(each.text or "").strip() for each in sensor.element.findall("contact/collision")]
         model, link = mount.model, sensor.link
@@ -38,17 +35,16 @@ class ContactSensor:
 
     def is_stale(self, now: int) -> bool:
         """Returns whether a service has moved the model since the last step, so that nothing is known."""
-        step = round(self._mount.sim.world.time_step * NANOSECONDS)
-        return now - self._mount.sensing.schedule.last_move(self._mount.model).at <= step
+        step = round(self.mount.sim.world.time_step * NANOSECONDS)
+        return now - self.mount.sensing.schedule.last_move(self.mount.model).at <= step
 
     def measure(self, now: int) -> list[ContactPair]:
         """Returns what they touched in the last step."""
         if self.is_stale(now) or not self._collisions:
             return []
-        return contact_pairs(self._mount.sim.world, self._collisions)
+        return contact_pairs(self.mount.sim.world, self._collisions)
 
     def values(self, now: int) -> dict[str, list[ContactPair]]:
-        """Returns `contacts`."""
         return {"contacts": self.measure(now)}
 
 
@@ -65,3 +61,6 @@ def collision_named(name: str, link: str, collisions: list[str]) -> str | None:
         if each.startswith(f"{spelling}_") and each.removeprefix(f"{spelling}_").isdigit()
     ]
     return next(iter([*exact, *numbered]), None)
+
+
+SENSORS = (ContactSensor,)

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from bullet_gazebo.applied_forces import Wrench
+from bullet_gazebo.control.hardware import FORCE_TORQUE
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Joint, ModelDescription
 from bullet_gazebo.physics.dynamics import tensor_in
 from bullet_gazebo.physics.loops import in_loops
@@ -23,7 +24,7 @@ from bullet_gazebo.physics.pose import (
     scale,
     subtract,
 )
-from bullet_gazebo.sensors.sensing import Mount, sensor_of
+from bullet_gazebo.sensors.sensing import Measurement, Mount, sensor_of
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 
 NOTHING: Wrench = (ZERO, ZERO)
@@ -180,25 +181,19 @@ class JointForces:
         return self._forces.effort + sum(robot.effort_on(self._joint.name) for robot in robots)
 
 
-class ForceTorqueSensor:
-    """A sensor of type force_torque: see `JointForces`. It measures in each step.
+class ForceTorqueSensor(Measurement):
+    """A sensor of type force_torque: see `JointForces`. It measures in each step."""
 
-    Args:
-        mount: its place.
-
-    Raises:
-        DescriptionError: if the model lacks its joint.
-    """
-
-    rate = 0.0
+    kinds = ("force_torque",)
+    interface = FORCE_TORQUE
 
     def __init__(self, mount: Mount) -> None:
-        self._mount = mount
-        self._joint = JointForces(mount.sim, mount.model, sensor_of(mount, ("force_torque",)).joint)
+        super().__init__(mount)
+        self._joint = JointForces(mount.sim, mount.model, sensor_of(mount, self.kinds).joint)
 
     def measure(self, now: int) -> Wrench | None:
         """Returns force [N] and torque [N m] in the last step; none after a move, None if not known."""
-        moves, moved_at = self._mount.sensing.schedule.last_move(self._mount.model)
+        moves, moved_at = self.mount.sensing.schedule.last_move(self.mount.model)
         self._joint.look(now, moves)
         return NOTHING if now == moved_at else self._joint.wrench()
 
@@ -235,3 +230,6 @@ def _sum(wrenches: Iterable[Wrench]) -> Wrench:
     for each in wrenches:
         force, torque = add(force, each[0]), add(torque, each[1])
     return force, torque
+
+
+SENSORS = (ForceTorqueSensor,)

@@ -1,9 +1,11 @@
 """Inertial measurement units (docs/contract/sensors.md 3)."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from bullet_gazebo.control.hardware import IMU
 from bullet_gazebo.physics.files.elements import numbers, truth
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import (
@@ -20,7 +22,7 @@ from bullet_gazebo.physics.pose import (
     subtract,
 )
 from bullet_gazebo.sensors.noise import read_noise
-from bullet_gazebo.sensors.sensing import Mount, sensor_of, slower
+from bullet_gazebo.sensors.sensing import Field, Measurement, Mount, sensor_of, slower
 from bullet_gazebo.simulator import NANOSECONDS
 
 HERE = Pose()
@@ -94,23 +96,23 @@ class Imu:
         )
 
 
-class ModelImu:
+class ModelImu(Measurement):
     """The IMU of a model, which feels no gravity (docs/contract/sensors.md 3b).
 
     Of its plugin, `bodyName`, which is required, `updateRate` (0 Hz), `gaussianNoise` (0) and `rpyOffset` are
     read.
-
-    Args:
-        mount: its place.
-
-    Raises:
-        DescriptionError: if an element is missing or wrong.
     """
 
+    libraries: ClassVar[Sequence[str]] = ("libgazebo_ros_imu.so",)
+    fields: ClassVar = {
+        "orientation": Field("(4,): the quaternion (x, y, z, w) of the sensor in the world"),
+        "angular_velocity": Field("(3,) in the sensor's axes [rad/s]", True),
+        "linear_acceleration": Field("(3,) in the sensor's axes [m/s²]", True),
+    }
     feels_gravity = False
 
     def __init__(self, mount: Mount) -> None:
-        self._mount = mount
+        super().__init__(mount)
         self.deviation = mount.deviation()
         self._turn = from_rpy(*numbers(mount.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
         self._model, self._link, self._offset = self._place(mount)
@@ -129,7 +131,7 @@ class ModelImu:
 
     def measure(self, now: int) -> InertialSample | None:
         """Returns a measurement at a time [ns]; None for the first one."""
-        mount = self._mount
+        mount = self.mount
         motion = motion_of(self._model, self._link, self._offset)
         moves, _ = mount.sensing.schedule.last_move(self._model)
         sample = self._imu.measure(now, moves, motion, mount.sim.world.gravity)
@@ -143,7 +145,6 @@ class ModelImu:
         return sample
 
     def values(self, now: int) -> dict[str, np.ndarray] | None:
-        """Returns what an `InertialSample` has, as arrays."""
         sample = self.measure(now)
         return sample and {name: np.array(each) for name, each in sample._asdict().items()}
 
@@ -155,6 +156,9 @@ class ImuSensor(ModelImu):
     (false) are read.
     """
 
+    kinds = ("imu",)
+    libraries = ()
+    interface = IMU
     feels_gravity = True
 
     def _place(self, mount: Mount) -> tuple[Model, str, Pose]:
@@ -179,7 +183,7 @@ class ImuSensor(ModelImu):
         )
 
     def _distorted(self, sample: InertialSample, random: np.random.Generator) -> InertialSample:
-        biases = self._mount.biases() if self._noise else random
+        biases = self.mount.biases() if self._noise else random
         for part, axis, noise in self._noise:
             values = list(getattr(sample, part))
             values[axis] = float(noise.applied(values[axis], noise.draw_bias(biases), random))
@@ -204,3 +208,6 @@ def with_noise(
     x, y, z, w = (value / length for value in noisy[0])
     (p, q, r), (u, v, s) = noisy[1:]
     return InertialSample((x, y, z, w), (p, q, r), (u, v, s))
+
+
+SENSORS = (ModelImu, ImuSensor)

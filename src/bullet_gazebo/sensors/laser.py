@@ -1,8 +1,9 @@
 """Lasers: ranges along a fan or grid of rays (docs/contract/sensors.md 2)."""
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -12,7 +13,15 @@ from bullet_gazebo.physics.files.sdf_parts import value
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.sensors.noise import Noise, read_noise
 from bullet_gazebo.sensors.rays import RayScene, frames
-from bullet_gazebo.sensors.sensing import FURTHEST, Mount, sensor_of, sensor_pose, slower
+from bullet_gazebo.sensors.sensing import (
+    FURTHEST,
+    Field,
+    Measurement,
+    Mount,
+    sensor_of,
+    sensor_pose,
+    slower,
+)
 
 KINDS = ("ray", "gpu_ray", "lidar", "gpu_lidar")
 RENDERED = ("gpu_ray", "gpu_lidar")  # they see visuals, the others collisions
@@ -121,15 +130,23 @@ class Laser:
         return Scan(ranges, intensities)
 
 
-class LaserSensor:
-    """A laser on a model; raises as `Laser`.
+RANGES = Field(
+    "(n,) of float32 [m], the lowest row first; inf for nothing, -inf for too near", True
+)
 
-    Args:
-        mount: its place.
-    """
+
+class LaserSensor(Measurement):
+    """A laser on a model."""
+
+    kinds: ClassVar[Sequence[str]] = KINDS
+    fields: ClassVar = {
+        "ranges": RANGES,
+        "intensities": Field("(n,) of float32: the `laser_retro` of what each ray has met"),
+    }
 
     def __init__(self, mount: Mount) -> None:
-        self._mount, self.sensor = mount, sensor_of(mount, KINDS)
+        super().__init__(mount)
+        self.sensor = sensor_of(mount, KINDS)
         self.laser = Laser(self.sensor)
         self.rate = self.sensor.rate
         sensing = mount.sensing
@@ -137,17 +154,16 @@ class LaserSensor:
 
     def measure(self, now: int) -> tuple[Scan, np.random.Generator]:
         """Returns a scan at a time [ns], and what draws further noise of it."""
-        random = self._mount.random(now)
+        random = self.mount.random(now)
         return self.scan(random), random
 
     def scan(self, random: np.random.Generator) -> Scan:
         """Returns a scan, whose noise is drawn from `random`."""
-        mount, noise = self._mount, self.laser.noise
+        mount, noise = self.mount, self.laser.noise
         bias = 0.0 if noise is None else noise.draw_bias(mount.biases())
         return self.laser.measure(self._scene, sensor_pose(mount.model, self.sensor), bias, random)
 
     def values(self, now: int) -> dict[str, np.ndarray]:
-        """Returns `ranges` and `intensities`, each (n,) of float32, the lowest row first."""
         scan, _ = self.measure(now)
         return {name: each.astype(np.float32).ravel() for name, each in scan._asdict().items()}
 
@@ -155,17 +171,22 @@ class LaserSensor:
 class RangeSensor(LaserSensor):
     """The nearest ray of a laser. Of its plugin, `gaussianNoise` (0 m) and `updateRate` (0 Hz) are read."""
 
+    kinds = ()
+    libraries = ("libgazebo_ros_range.so",)
+    fields: ClassVar = {"ranges": RANGES}
+
     def __init__(self, mount: Mount) -> None:
         super().__init__(mount)
         self.rate = slower(mount.rate(), self.rate)
         self._deviation = mount.deviation()
 
-    def values(self, now: int) -> dict[str, np.ndarray]:
-        """Returns `ranges` (1,) of float32."""
+    def nearest(self, now: int) -> float:
+        """Returns the smallest range at a time [ns], at most the largest that it measures [m]."""
         scan, random = self.measure(now)
-        return {
-            "ranges": np.array([nearest(scan, self.laser, self._deviation, random)], np.float32)
-        }
+        return nearest(scan, self.laser, self._deviation, random)
+
+    def values(self, now: int) -> dict[str, np.ndarray]:
+        return {"ranges": np.array([self.nearest(now)], np.float32)}
 
 
 def nearest(scan: Scan, laser: Laser, deviation: float, random: np.random.Generator) -> float:
@@ -211,3 +232,6 @@ def _resampled(values: np.ndarray, fan: Fan, axis: int) -> np.ndarray:
     with np.errstate(invalid="ignore"):  # between two rays that meet nothing: inf - inf
         between = before + share * (after - before)
     return np.where(share == 0.0, before, np.where(np.isnan(between), np.inf, between))
+
+
+SENSORS = (LaserSensor, RangeSensor)

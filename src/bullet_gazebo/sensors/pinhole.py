@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -12,7 +12,14 @@ from bullet_gazebo.physics.files.sdf_parts import read_pose, value
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.sensors.noise import Noise, read_noise
 from bullet_gazebo.sensors.rays import RayScene, frames
-from bullet_gazebo.sensors.sensing import FURTHEST, Mount, sensor_of, slower
+from bullet_gazebo.sensors.sensing import (
+    FURTHEST,
+    Field,
+    Measurement,
+    Mount,
+    sensor_of,
+    slower,
+)
 from bullet_gazebo.sensors.shading import colours
 
 KINECT = "libgazebo_ros_openni_kinect.so"
@@ -147,28 +154,25 @@ def rate_of(mount: Mount, sensor: Sensor) -> float:
     return slower(mount.rate(), sensor.rate)
 
 
-class CameraSensor:
-    """A camera on a model; raises as `PinholeCamera`.
+class CameraSensor(Measurement):
+    """A camera on a model."""
 
-    Args:
-        mount: its place.
-    """
-
-    kinds: Sequence[str] = ("camera",)
+    kinds: ClassVar[Sequence[str]] = ("camera",)
+    fields: ClassVar = {"image": Field("(height, width, 3) of uint8: red, green and blue", True)}
 
     def __init__(self, mount: Mount) -> None:
-        self._mount, self._sensor = mount, sensor_of(mount, self.kinds)
+        super().__init__(mount)
+        self._sensor = sensor_of(mount, self.kinds)
         self.camera = camera_of(self._sensor)
         self.rate = rate_of(mount, self._sensor)
 
     def view(self, in_colour: bool = True) -> CameraView:
         """Returns what it sees now, without noise."""
-        link = self._mount.model.link_state(self._sensor.link)[0]
-        return self.camera.picture(self._mount.sensing.visuals, link, in_colour)
+        link = self.mount.model.link_state(self._sensor.link)[0]
+        return self.camera.picture(self.mount.sensing.visuals, link, in_colour)
 
     def values(self, now: int) -> dict[str, np.ndarray]:
-        """Returns `image` (height, width, 3) of uint8."""
-        return {"image": with_noise(self._mount, self.camera, self.view().colours, now)}
+        return {"image": with_noise(self.mount, self.camera, self.view().colours, now)}
 
 
 class DepthSensor(CameraSensor):
@@ -176,6 +180,11 @@ class DepthSensor(CameraSensor):
     (5 m)."""
 
     kinds = DEPTH_KINDS
+    fields: ClassVar = {
+        "depth": Field(
+            "(height, width) of float32 along the optical axis [m]; NaN beyond the cutoffs", True
+        )
+    }
 
     def __init__(self, mount: Mount) -> None:
         super().__init__(mount)
@@ -190,7 +199,6 @@ class DepthSensor(CameraSensor):
         return depths
 
     def values(self, now: int) -> dict[str, np.ndarray]:
-        """Returns `depth` (height, width) of float32."""
         return {"depth": self.depths(self.view(in_colour=False)).astype(np.float32)}
 
 
@@ -199,3 +207,6 @@ def _pixels(element: Element, path: str, where: str, default: int) -> int:
     if count != int(count) or not 1 <= count <= LONGEST_SIDE:
         raise DescriptionError(f"{where}: <{path}> is {count:g}; 1 to {LONGEST_SIDE} are possible")
     return int(count)
+
+
+SENSORS = (CameraSensor, DepthSensor)

@@ -1,7 +1,8 @@
 """What all sensors of a world share: their schedule, what rays meet, and the seed of their noise."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -155,6 +156,51 @@ class Mount:
     def biases(self, part: str = "") -> np.random.Generator:
         """Returns what draws its biases, the same each time."""
         return self.sensing.bias(self.model, self.key + part)
+
+
+class Field(NamedTuple):
+    """One thing that a sensor measures."""
+
+    about: str  # its shape and unit
+    is_noisy: bool = False  # whether an environment's `sensor_noise` can add to it
+
+
+class Measurement:
+    """A sensor on a model. Each module of this folder lists its own in `SENSORS`.
+
+    Attributes:
+        kinds: of `<sensor>` that it measures.
+        libraries: of plugins, a sensor's or a model's, that it measures for, whatever the kind.
+        interface: of ros_control by which controllers have it.
+        fields: what `values` returns, by attribute of a `Reading`; without any, tasks can't see it.
+        rate: of measurements [Hz of simulated time]; 0 is every step.
+
+    Args:
+        mount: Its place.
+
+    Raises:
+        DescriptionError: If it can't be simulated.
+    """
+
+    kinds: ClassVar[Sequence[str]] = ()
+    libraries: ClassVar[Sequence[str]] = ()
+    interface: ClassVar[str] = ""
+    fields: ClassVar[Mapping[str, Field]] = {}
+    rate: float = 0.0
+
+    def __init__(self, mount: Mount) -> None:
+        self.mount = mount
+
+    def start(self) -> None:
+        """Lets the next measurement be one, if sensors of its kind compare each with the last."""
+
+    def measure(self, now: int) -> Any:
+        """Returns a measurement at a time [ns], as its kind has it; None for nothing yet."""
+        raise NotImplementedError
+
+    def values(self, now: int) -> Mapping[str, Any] | None:
+        """Returns a measurement at a time [ns], by the names of `fields`; None for nothing yet."""
+        raise NotImplementedError
 
 
 def sensor_of(mount: Mount, kinds: Sequence[str]) -> Sensor:

@@ -1,55 +1,41 @@
 """Measures sensors for those who ask by name, over ROS with a step and in-process, and for controllers."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
-from typing import Any, NamedTuple, Protocol
+from functools import cache, partial
+from importlib import import_module
+from itertools import chain
+from pkgutil import iter_modules
+from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.hardware import FORCE_TORQUE, IMU, RobotHardware, SensorHandle
+from bullet_gazebo.control.hardware import RobotHardware, SensorHandle
 from bullet_gazebo.physics.description import DescriptionError, Plugin, library_of
 from bullet_gazebo.physics.model import Model
-from bullet_gazebo.physics.world import World
-from bullet_gazebo.sensors.contact import ContactSensor
-from bullet_gazebo.sensors.force_torque import ForceTorqueSensor
-from bullet_gazebo.sensors.imu import ImuSensor, ModelImu
-from bullet_gazebo.sensors.laser import KINDS, LaserSensor, RangeSensor
-from bullet_gazebo.sensors.pinhole import DEPTH_KINDS, CameraSensor, DepthSensor
 from bullet_gazebo.sensors.schedule import SensorClock
-from bullet_gazebo.sensors.sensing import Mount, Sensing
+from bullet_gazebo.sensors.sensing import Measurement, Mount, Sensing
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import SCOPE, UnknownName
 from file_access.text import did_you_mean
 
-
-class Measuring(Protocol):
-    """A sensor on a model."""
-
-    rate: float  # [Hz] of simulated time; 0 is every step
-
-    def values(self, now: int) -> Mapping[str, Any] | None:
-        """Returns a measurement at a time [ns], by the attributes of a `Reading`; None for nothing yet."""
-
-
-Maker = Callable[[Mount], Measuring]
-BY_KIND: dict[str, Maker] = {
-    **dict.fromkeys(KINDS, LaserSensor),
-    **dict.fromkeys(DEPTH_KINDS, DepthSensor),
-    "camera": CameraSensor,
-    "contact": ContactSensor,
-    "imu": ImuSensor,
-}
-BY_LIBRARY: dict[str, Maker] = {  # of a sensor's plugin, or a model's
-    "libgazebo_ros_range.so": RangeSensor,
-    "libgazebo_ros_imu.so": ModelImu,
-}
-BY_INTERFACE: dict[str, tuple[str, type[ImuSensor | ForceTorqueSensor]]] = {  # of a kind of sensor
-    "imu": (IMU, ImuSensor),
-    "force_torque": (FORCE_TORQUE, ForceTorqueSensor),
-}
 WITHOUT = Plugin("", "", Element("plugin"))
+
+
+@cache
+def measurements() -> tuple[type[Measurement], ...]:
+    """Returns the sensors that the modules of this folder list in `SENSORS`."""
+    folder = import_module(__package__ or "")
+    names = [f"{folder.__name__}.{found.name}" for found in iter_modules(folder.__path__)]
+    listed = [getattr(module, "SENSORS", ()) for module in map(import_module, names)]
+    return tuple(chain.from_iterable(listed))
+
+
+def noisy_fields() -> list[str]:
+    """Returns the attributes of readings that `sensor_noise` can add to."""
+    fields = [item for each in measurements() for item in each.fields.items()]
+    return list(dict.fromkeys(name for name, field in fields if field.is_noisy))
 
 
 class Taken(NamedTuple):
@@ -94,9 +80,8 @@ class SensorReaders:
         """Returns whether these are the sensors, all on models that are there: then their clocks go on."""
         return self.names == tuple(names) and not any(map(_is_gone, self._mounts))
 
-    def _taker(self, name: str, mount: Mount, sensor: Measuring) -> Callable[[int], None]:
-        if isinstance(sensor, ModelImu):
-            sensor.start()
+    def _taker(self, name: str, mount: Mount, sensor: Measurement) -> Callable[[int], None]:
+        sensor.start()
 
         def take(now: int) -> None:
             if _is_gone(mount):
@@ -129,9 +114,9 @@ def _is_gone(mount: Mount) -> bool:
     return mount.sim.world.models.get(mount.model.name) is not mount.model
 
 
-def find_sensor(sim: Simulator, sensing: Sensing, name: str) -> tuple[Mount, Maker]:
+def find_sensor(sim: Simulator, sensing: Sensing, name: str) -> tuple[Mount, type[Measurement]]:
     """Returns the sensor of a name, and what makes it; raises UnknownName."""
-    known: dict[str, list[tuple[Mount, Maker]]] = {}
+    known: dict[str, list[tuple[Mount, type[Measurement]]]] = {}
     for plain, mount, maker in _sensors(sim, sensing):
         for each in (plain, f"{mount.model.name}{SCOPE}{plain}"):
             known.setdefault(each, []).append((mount, maker))
@@ -145,19 +130,21 @@ def find_sensor(sim: Simulator, sensing: Sensing, name: str) -> tuple[Mount, Mak
     return found[0]
 
 
-def _sensors(sim: Simulator, sensing: Sensing) -> Iterator[tuple[str, Mount, Maker]]:
+def _sensors(sim: Simulator, sensing: Sensing) -> Iterator[tuple[str, Mount, type[Measurement]]]:
     """Yields all sensors that can be read, with their plain names."""
-    world: World = sim.world
-    for model in world.models.values():
+    seen = [each for each in measurements() if each.fields]
+    by_library = {library: each for each in seen for library in each.libraries}
+    by_kind = {kind: each for each in seen for kind in each.kinds}
+    for model in sim.world.models.values():
         for sensor in model.description.sensors:
             plugin = next(iter(sensor.plugins), WITHOUT)
-            maker = BY_LIBRARY.get(library_of(plugin.filename), BY_KIND.get(sensor.kind))
-            if maker is not None:
-                yield sensor.name, Mount(sim, model, plugin, sensing, sensor), maker
+            found = by_library.get(library_of(plugin.filename), by_kind.get(sensor.kind))
+            if found is not None:
+                yield sensor.name, Mount(sim, model, plugin, sensing, sensor), found
         for plugin in model.description.plugins:
-            maker = BY_LIBRARY.get(library_of(plugin.filename))
-            if maker is not None:
-                yield plugin.name, Mount(sim, model, plugin, sensing, None), maker
+            found = by_library.get(library_of(plugin.filename))
+            if found is not None:
+                yield plugin.name, Mount(sim, model, plugin, sensing, None), found
 
 
 class MeasuringHandle(SensorHandle):
@@ -172,15 +159,14 @@ class MeasuringHandle(SensorHandle):
         ControlError: if it can't be simulated.
     """
 
-    def __init__(self, mount: Mount, kind: type[ImuSensor | ForceTorqueSensor], frame: str) -> None:
+    def __init__(self, mount: Mount, kind: type[Measurement], frame: str) -> None:
         assert mount.sensor is not None
         super().__init__(mount.sensor.name, frame)
         try:
             self._sensor = kind(mount)
         except DescriptionError as error:
             raise ControlError(f"the sensor '{self.name}' can't be simulated: {error}") from error
-        if isinstance(self._sensor, ImuSensor):
-            self._sensor.start()
+        self._sensor.start()
         self._model, self._schedule = mount.model, mount.sensing.schedule
         self._clock: SensorClock | None = None
 
@@ -209,16 +195,19 @@ def offer_sensors(
 
     Without `sensing` they measure nothing.
     """
+    if not model.description.sensors:
+        return
+    kinds = {kind: each for each in measurements() if each.interface for kind in each.kinds}
     for sensor in model.description.sensors:
-        if sensor.kind in BY_INTERFACE:
-            interface, kind = BY_INTERFACE[sensor.kind]
+        if sensor.kind in kinds:
+            measurement = kinds[sensor.kind]
             plugin = next(iter(sensor.plugins), WITHOUT)
             link = sensor.link.rpartition(SCOPE)[2]
             frame = (plugin.element.findtext("frameName") or link).strip().lstrip("/")
-            hardware.sensors[interface].append(
+            hardware.sensors[measurement.interface].append(
                 partial(SensorHandle, sensor.name, frame)
                 if sensing is None
                 else partial(
-                    MeasuringHandle, Mount(sim, model, plugin, sensing, sensor), kind, frame
+                    MeasuringHandle, Mount(sim, model, plugin, sensing, sensor), measurement, frame
                 )
             )

@@ -7,6 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from bullet_gazebo.sensors.sensor_readers import noisy_fields
 from file_access.text import nearest_or_all
 from robot_envs.world_state import Joints, JointState, Reading, Sensors, WorldState
 
@@ -63,7 +64,6 @@ def steps(option: str, given: Any, most: int) -> int:
 
 Noise = float | tuple[float, float] | Mapping[str, Any]
 MOST_DELAY: Final = 1000  # [control steps]
-NOISY: Final = ("ranges", "depth", "image", "angular_velocity", "linear_acceleration")
 LEAST_STEP: Final = 1e-9  # [rad, m]; of an encoder
 
 
@@ -202,7 +202,7 @@ class Sensor:
 
 def _by_part(given: Any) -> dict[str, float]:
     """Returns the standard deviations of what a sensor measures, by attribute of its `Reading`."""
-    sizes = by_name("sensor_noise", given, NOISY, "attribute of a reading")
+    sizes = by_name("sensor_noise", given, noisy_fields(), "attribute of a reading")
     return {name: at_least_zero("sensor_noise", size) for name, size in sizes.items()}
 
 

@@ -164,6 +164,22 @@ def to_contact_state(pair: ContactPair) -> ContactState:
     )
 
 
+def from_contact_state(state: ContactState) -> ContactPair:
+    """Returns what a message says of a contact."""
+
+    def vector(message: Vector3) -> poses.Vector:
+        return (message.x, message.y, message.z)
+
+    return ContactPair(
+        state.collision1_name,
+        state.collision2_name,
+        [vector(each) for each in state.contact_positions],
+        [vector(each) for each in state.contact_normals],
+        [(vector(each.force), vector(each.torque)) for each in state.wrenches],
+        list(state.depths),
+    )
+
+
 def to_reading(now: int, values: Mapping[str, Any]) -> SensorReading:
     """Converts what a sensor measured at a time [ns]; see `bullet_gazebo.sensors.sensor_reading.Reading`."""
     arrays = [

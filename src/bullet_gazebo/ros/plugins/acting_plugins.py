@@ -23,7 +23,7 @@ from bullet_gazebo.ros.common.messages import bad_number, from_transform, to_tra
 from bullet_gazebo.ros.plugins.drive_topics import REPEAT
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
-    SensorPlugin,
+    ContextPlugin,
     advertised,
     namespace_of,
     subscribe,
@@ -38,7 +38,7 @@ SLIPS = [
 ]
 
 
-class PushPlugin(SensorPlugin):
+class PushPlugin(ContextPlugin):
     """Pushes a link by the newest wrench, in world axes, until the next one."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -61,7 +61,7 @@ class PushPlugin(SensorPlugin):
         self._context.model.body.add_wrench(self._link, *self._wrench)
 
 
-class HandOfGodPlugin(SensorPlugin):
+class HandOfGodPlugin(ContextPlugin):
     """Pulls a link towards a frame of tf by springs that are damped critically."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -129,7 +129,7 @@ def _spring(stiffness: float, inertia: float, way: Vector, speed: Vector) -> Vec
     return subtract(scale(way, stiffness), scale(speed, damping))
 
 
-class JointPoseTrajectoryPlugin(SensorPlugin):
+class JointPoseTrajectoryPlugin(ContextPlugin):
     """Puts joints at each point of a trajectory and holds them there, without physics."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -195,7 +195,7 @@ def _put_back(model: Model, link: str, pose: Pose) -> None:
     model.place(pose.compose(model.state()[0].relative_to(found)))
 
 
-class WheelSlipPlugin(SensorPlugin):
+class WheelSlipPlugin(ContextPlugin):
     """Offers what clients set, without effect: wheels slip as their friction lets them."""
 
     def __init__(self, context: PluginContext) -> None:

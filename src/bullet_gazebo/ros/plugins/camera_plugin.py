@@ -7,19 +7,29 @@ those with "left" or "right" in their names have topics, below left/ or right/; 
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
+from typing import ClassVar
 
 import rospy
+from sensor_msgs.msg import Image
 from std_msgs.msg import Empty
 
 from bullet_gazebo.physics.description import DescriptionError, Sensor
-from bullet_gazebo.ros.plugins.camera_topics import CameraTopics, offer_rate, scope_of
+from bullet_gazebo.ros.plugins.camera_topics import (
+    CameraTopics,
+    offer_rate,
+    read_image,
+    scope_of,
+)
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
-    SensorPlugin,
+    MODEL,
+    ContextPlugin,
     SensorTopics,
+    TopicSource,
     topic_in,
 )
-from bullet_gazebo.sensors.pinhole import PinholeCamera, camera_of, rate_of
+from bullet_gazebo.sensors.pinhole import CameraSensor, PinholeCamera, camera_of, rate_of
 from bullet_gazebo.sensors.sensing import sensor_of
 
 MULTICAMERA = "multicamera"
@@ -27,9 +37,13 @@ SIDES = ("left/", "right/")
 MOST_WAITING = 20  # triggers
 
 
-class CameraPlugin(SensorPlugin):
+class CameraPlugin(ContextPlugin):
     """Publishes the pictures of its cameras, of one time, while somebody looks at one of them."""
 
+    source: ClassVar = TopicSource(
+        Image, "image_raw", MODEL, tag="imageTopicName", rate=("updateRate", 0.0), read=read_image
+    )
+    measurement: ClassVar = CameraSensor
     kind = "camera"  # of sensor
     latch = False  # a new subscriber has a picture taken
 
@@ -42,7 +56,7 @@ class CameraPlugin(SensorPlugin):
         offer_rate(context, topics, scope)
         baseline = context.number("hackBaseline", 0.0)
         names = (
-            context.text("imageTopicName", "image_raw"),
+            context.text(self.source.tag, self.source.topic),
             context.text("cameraInfoTopicName", "camera_info"),
         )
         self._eyes = [
@@ -66,12 +80,14 @@ class CameraPlugin(SensorPlugin):
 class MulticameraPlugin(CameraPlugin):
     """As the camera, for several."""
 
+    source = replace(CameraPlugin.source, read=None)
     kind = MULTICAMERA
 
 
 class TriggeredCameraPlugin(CameraPlugin):
     """Publishes pictures once for each trigger, at the next step."""
 
+    source = replace(CameraPlugin.source, read=None)
     latch = True  # the last picture is all there is
 
     def __init__(self, context: PluginContext) -> None:

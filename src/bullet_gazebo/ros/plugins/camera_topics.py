@@ -2,6 +2,7 @@
 
 import io
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 import rospy
@@ -35,6 +36,10 @@ COLOUR = {
 BAYER = {  # the channel of each pixel of a two-by-two tile
     "BAYER_RGGB8": (0, 1, 1, 2), "BAYER_BGGR8": (2, 1, 1, 0), "BAYER_GBRG8": (1, 2, 0, 1),
     "BAYER_GRBG8": (1, 0, 2, 1),
+}  # fmt: skip
+READABLE = {  # by encoding: how many channels, and where red, green and blue are
+    "rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2)), "bgra8": (4, (2, 1, 0)),
+    "mono8": (1, (0, 0, 0)),
 }  # fmt: skip
 LUMINANCE = (0.299, 0.587, 0.114)
 OPTICAL = Pose(orientation=(-0.5, 0.5, -0.5, 0.5))  # x right, y down, z ahead
@@ -156,6 +161,31 @@ def to_image(seen: np.ndarray, pixel_format: str, header: Header) -> Image:
         data = np.take_along_axis(seen, channels[..., None], axis=2)[..., 0]
     content = np.ascontiguousarray(data)
     return Image(header, height, width, encoding, 0, content.nbytes // height, content.tobytes())
+
+
+def read_image(message: Image) -> dict[str, np.ndarray]:
+    """Returns a message's picture; an encoding that isn't `READABLE` is a ValueError."""
+    if message.encoding not in READABLE:
+        raise ValueError(f"pictures are {message.encoding}; {', '.join(READABLE)} can be read")
+    count, order = READABLE[message.encoding]
+    pixels = _rows(message, np.dtype(np.uint8), count)
+    return {"image": np.ascontiguousarray(pixels[..., order])}
+
+
+def read_depth(message: Image) -> dict[str, np.ndarray]:
+    """Returns a message's depths [m]; another encoding than 32FC1 and 16UC1 is a ValueError."""
+    if message.encoding == "32FC1":
+        return {"depth": _rows(message, np.dtype("<f4"), 1)[..., 0]}
+    if message.encoding != "16UC1":
+        raise ValueError(f"depths are {message.encoding}; 32FC1 and 16UC1 can be read")
+    depth = _rows(message, np.dtype("<u2"), 1)[..., 0] / np.float32(1000.0)
+    return {"depth": np.where(depth > 0.0, depth, np.float32(np.nan))}
+
+
+def _rows(message: Image, kind: np.dtype[Any], channels: int) -> np.ndarray:
+    rows = np.frombuffer(message.data, np.uint8).reshape(message.height, message.step)
+    used = np.ascontiguousarray(rows[:, : message.width * channels * kind.itemsize])
+    return used.view(kind).reshape(message.height, message.width, channels)
 
 
 def _to_jpeg(seen: np.ndarray, header: Header) -> CompressedImage:

@@ -5,6 +5,8 @@ As the camera's plugin, with pictures at ir/image_raw, and `depthImageTopicName`
 (0.4 m), `useDepth16UC1Format` (false), and `pointCloudCutoffMax` (5 m), which only the second one reads.
 """
 
+from typing import ClassVar
+
 import numpy as np
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header
@@ -14,11 +16,18 @@ from bullet_gazebo.ros.plugins.camera_topics import (
     QUEUE,
     CameraTopics,
     offer_rate,
+    read_depth,
     scope_of,
     show_camera,
 )
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, SensorTopics, topic_in
+from bullet_gazebo.ros.plugins.sensor_topics import (
+    MODEL,
+    ContextPlugin,
+    SensorTopics,
+    TopicSource,
+    topic_in,
+)
 from bullet_gazebo.sensors.pinhole import KINECT, DepthSensor, PinholeCamera
 
 POINT_STEP = 32
@@ -31,9 +40,14 @@ POINT = np.dtype(
 )  # fmt: skip
 
 
-class DepthCameraPlugin(SensorPlugin):
+class DepthCameraPlugin(ContextPlugin):
     """Publishes depths along the optical axis [m], and clouds in optical axes: x right, y down, z ahead."""
 
+    source: ClassVar = TopicSource(
+        Image, "depth/image_raw", MODEL, tag="depthImageTopicName", rate=("updateRate", 0.0),
+        read=read_depth,
+    )  # fmt: skip
+    measurement: ClassVar = DepthSensor
     is_organised = False  # whether a cloud has the picture's rows
 
     def __init__(self, context: PluginContext) -> None:
@@ -53,7 +67,7 @@ class DepthCameraPlugin(SensorPlugin):
             return topic_in(scope, context.text(tag, default))
 
         pixels = camera.width * camera.height
-        depth = named("depthImageTopicName", "depth/image_raw")
+        depth = named(self.source.tag, self.source.topic)
         cloud = named("pointCloudTopicName", "points")
         self._depth = topics.advertise(depth, Image, content=4 * pixels)
         self._cloud = topics.advertise(cloud, PointCloud2, content=POINT_STEP * pixels)

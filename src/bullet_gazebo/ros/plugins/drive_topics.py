@@ -28,7 +28,7 @@ from bullet_gazebo.ros.common.messages import (
 )
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
-    SensorPlugin,
+    ContextPlugin,
     Topic,
     advertised,
     frame_of,
@@ -61,7 +61,7 @@ def length(context: PluginContext, tag: str, default: float) -> float:
     return found
 
 
-class DrivePlugin(SensorPlugin):
+class DrivePlugin(ContextPlugin):
     """Keeps the newest command, and reports odometry after each period and at once after moves.
 
     Subclasses have `update` and `sample`, and call `begin` when they are made.

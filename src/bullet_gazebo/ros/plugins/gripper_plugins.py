@@ -22,7 +22,7 @@ from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.world import Attachment
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
-    SensorPlugin,
+    ContextPlugin,
     SensorTopic,
     namespace_of,
     topic_in,
@@ -33,7 +33,7 @@ LOOKS, MOST_COUNT = 5.0, 10.0  # a second of simulated time
 ANGLE, RELEASE = 120.0, 0.005  # [°], [m]
 
 
-class MimicPlugin(SensorPlugin):
+class MimicPlugin(ContextPlugin):
     """Gives a joint that follows another one the PID that it asks for; without gains it keeps its gear."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -108,7 +108,7 @@ def _names(request: AttachRequest) -> tuple[str, ...]:
     return tuple(map(str, names))
 
 
-class GraspFixPlugin(SensorPlugin):
+class GraspFixPlugin(ContextPlugin):
     """Holds what each `<arm>` grips."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -143,7 +143,7 @@ class GraspFixPlugin(SensorPlugin):
                 hold.forget()
 
 
-class VacuumPlugin(SensorPlugin):
+class VacuumPlugin(ContextPlugin):
     """Suction at `bodyName`: services `on` and `off`, and whether something is held on `topicName`."""
 
     def __init__(self, context: PluginContext) -> None:

@@ -26,7 +26,7 @@ from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parame
 from bullet_gazebo.ros.common.messages import NANOSECONDS, to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
-    SensorPlugin,
+    ContextPlugin,
     advertised,
     namespace_of,
     offer_shared,
@@ -118,7 +118,7 @@ class HectorSensor(HectorTimer):
         )
 
 
-class HectorImuPlugin(SensorPlugin):
+class HectorImuPlugin(ContextPlugin):
     """Feels gravity: +9.8 m/s² upwards at rest."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -203,7 +203,7 @@ class HectorImuPlugin(SensorPlugin):
         )
 
 
-class HectorGpsPlugin(SensorPlugin):
+class HectorGpsPlugin(ContextPlugin):
     """Latitude, longitude [degrees] and altitude [m] on WGS84; velocities north, west and up [m/s]."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -258,7 +258,7 @@ class HectorGpsPlugin(SensorPlugin):
         return x * cosine + y * sine, -x * sine + y * cosine
 
 
-class HectorMagneticPlugin(SensorPlugin):
+class HectorMagneticPlugin(ContextPlugin):
     """The magnetic field of the earth in the sensor's axes, scaled to `magnitude`."""
 
     def __init__(self, context: PluginContext) -> None:
@@ -291,7 +291,7 @@ class HectorMagneticPlugin(SensorPlugin):
         self._publisher.publish(message)
 
 
-class HectorSonarPlugin(SensorPlugin):
+class HectorSonarPlugin(ContextPlugin):
     """The nearest range of a laser's rays."""
 
     def __init__(self, context: PluginContext) -> None:

@@ -6,6 +6,7 @@
   `topicName` (imu_data) are read. The slower of the two rates counts.
 """
 
+import numpy as np
 from sensor_msgs.msg import Imu as ImuMsg
 from std_srvs.srv import Empty, EmptyResponse
 
@@ -14,55 +15,68 @@ from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
     MODEL,
     SensorPlugin,
-    SensorTopic,
-    namespace_of,
+    TopicSource,
     offer_shared,
     topic_in,
 )
 from bullet_gazebo.sensors.imu import ImuSensor, ModelImu
 
 
-class ImuTopic(SensorPlugin):
-    """Publishes orientation, angular velocity and acceleration.
-
-    Args:
-        context: the plugin's.
-        imu: measures.
-        name: of the topic.
-        frame: of the header.
-    """
-
-    def __init__(self, context: PluginContext, imu: ModelImu, name: str, frame: str) -> None:
-        self._imu, self._frame = imu, frame.lstrip("/")
-        SensorTopic(context, name, ImuMsg, imu.rate, self._measure, at_once=False)
-
-    def _measure(self, now: int) -> ImuMsg | None:
-        sample = self._imu.measure(now)
-        return sample and to_imu(sample, now, self._frame, self._imu.deviation)
+def read_imu(message: ImuMsg) -> dict[str, np.ndarray]:
+    """Returns what an IMU's message says; a number that isn't finite is a ValueError."""
+    turn, spin, push = message.orientation, message.angular_velocity, message.linear_acceleration
+    found = {
+        "orientation": np.array([turn.x, turn.y, turn.z, turn.w]),
+        "angular_velocity": np.array([spin.x, spin.y, spin.z]),
+        "linear_acceleration": np.array([push.x, push.y, push.z]),
+    }
+    for name, numbers in found.items():
+        if not np.isfinite(numbers).all():
+            raise ValueError(f"{name} is {numbers.tolist()}")
+    return found
 
 
-class ImuPlugin(ImuTopic):
-    """What the IMU of a link measures."""
+class ImuPlugin(SensorPlugin):
+    """Publishes what the IMU of a link measures."""
 
-    def __init__(self, context: PluginContext) -> None:
-        imu, namespace = ModelImu(context), namespace_of(context, absent="", empty="/")
-        service = topic_in(namespace, context.text("serviceName", "/default_imu"))
-        # It does nothing, and another robot's may have the name.
-        offer_shared(context, service, Empty, lambda request: EmptyResponse())
-        topic = topic_in(namespace, context.text("topicName", "/default_imu"))
-        super().__init__(
-            context, imu, topic, context.text("frameName", context.text("bodyName", ""))
-        )
-
-
-class ImuSensorPlugin(ImuTopic):
-    """What an IMU measures, in its own axes."""
+    source = TopicSource(ImuMsg, "/default_imu", rate=("updateRate", 0.0), read=read_imu)
+    measurement = ModelImu
+    at_once = False
 
     def __init__(self, context: PluginContext) -> None:
-        imu, frame = ImuSensor(context), context.required("frameName")
-        namespace = namespace_of(context, absent=MODEL, empty="/")
-        topic = topic_in(namespace, context.text("topicName", "imu_data"))
-        super().__init__(context, imu, topic, frame)
+        super().__init__(context)
+        self.frame = self.frame_id()
+        self.offer_services()
+
+    def frame_id(self) -> str:
+        """Returns the frame of the header: neither plugin gives it a prefix."""
+        return self.context.text("frameName", self.context.text("bodyName", "")).lstrip("/")
+
+    def offer_services(self) -> None:
+        """Offers a service that does nothing; another robot's may have the name."""
+        service = topic_in(self.namespace, self.context.text("serviceName", "/default_imu"))
+        offer_shared(self.context, service, Empty, lambda request: EmptyResponse())
+
+    def measure(self, now: int) -> ImuMsg | None:
+        """Returns the message of a measurement at a time [ns]; None for the first."""
+        sample = self.sensor.measure(now)
+        return sample and to_imu(sample, now, self.frame, self.sensor.deviation)
+
+
+class ImuSensorPlugin(ImuPlugin):
+    """Publishes what an IMU measures, in its own axes."""
+
+    source = TopicSource(
+        ImuMsg, "imu_data", absent=MODEL, rate=("updateRateHZ", 1.0), read=read_imu
+    )
+    measurement = ImuSensor
+
+    def frame_id(self) -> str:
+        """Returns the frame of the header, which has to be named."""
+        return self.context.required("frameName").lstrip("/")
+
+    def offer_services(self) -> None:
+        """It has none."""
 
 
 LIBRARIES = {

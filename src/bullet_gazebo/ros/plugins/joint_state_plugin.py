@@ -12,13 +12,13 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.ros.common.messages import NANOSECONDS, to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, advertised
+from bullet_gazebo.ros.plugins.sensor_topics import ContextPlugin, advertised
 
 QUEUE = 1000
 RATE = "100.0"  # [Hz]
 
 
-class JointStatePlugin(SensorPlugin):
+class JointStatePlugin(ContextPlugin):
     """Publishes position [rad, m] and velocity of the named joints, in the order of the list."""
 
     def __init__(self, context: PluginContext) -> None:

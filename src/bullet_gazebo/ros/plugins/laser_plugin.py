@@ -12,6 +12,7 @@ collisions, a gpu laser visuals.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Point32
@@ -27,8 +28,8 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import MODEL, LaserTopic, SensorPlugin
-from bullet_gazebo.sensors.laser import Scan, nearest
+from bullet_gazebo.ros.plugins.sensor_topics import MODEL, SensorPlugin, TopicSource
+from bullet_gazebo.sensors.laser import LaserSensor, RangeSensor
 
 KINDS = {"<f4": PointField.FLOAT32, "<u2": PointField.UINT16}
 LAYOUT = {"x": "<f4", "y": "<f4", "z": "<f4", "intensity": "<f4", "ring": "<u2", "time": "<f4"}
@@ -39,16 +40,38 @@ FIELDS = [
 ]
 
 
+def read_scan(message: LaserScan) -> dict[str, np.ndarray]:
+    """Returns what a scan says."""
+    return {
+        name: np.array(getattr(message, name), np.float32) for name in ("ranges", "intensities")
+    }
+
+
+def read_range(message: Range) -> dict[str, np.ndarray]:
+    """Returns what a range says."""
+    return {"ranges": np.array([message.range], np.float32)}
+
+
 class LaserPlugin(SensorPlugin):
     """Publishes the scans of a laser."""
 
-    def __init__(self, context: PluginContext) -> None:
-        self._topic = LaserTopic(context, LaserScan, self._message, "/world", empty=MODEL)
+    source = TopicSource(LaserScan, "/world", MODEL, read=read_scan)
+    measurement = LaserSensor
+    default_frame = "/world"
 
-    def _message(self, scan: Scan, now: int, random: np.random.Generator) -> LaserScan:
-        laser = self._topic.laser
+    def topic_name(self) -> str:
+        """Returns the name of the topic; "" for an empty element."""
+        return str(self.context.plugin.element.findtext(self.source.tag, self.source.topic).strip())
+
+    def header(self, now: int) -> Header:
+        """Returns the header of a message at a time [ns]."""
+        return Header(stamp=to_time(now), frame_id=self.frame)
+
+    def measure(self, now: int) -> Any:
+        """Returns the message of a scan at a time [ns]."""
+        laser, (scan, _) = self.sensor.laser, self.sensor.measure(now)
         return LaserScan(
-            header=Header(stamp=to_time(now), frame_id=self._topic.frame),
+            header=self.header(now),
             angle_min=laser.horizontal.low,
             angle_max=laser.horizontal.high,
             angle_increment=laser.horizontal.increment,
@@ -59,57 +82,64 @@ class LaserPlugin(SensorPlugin):
         )
 
 
-class BlockLaserPlugin(SensorPlugin):
+class BlockLaserPlugin(LaserPlugin):
     """Publishes all rays' points and intensities; a ray that meets nothing ends at the largest range."""
 
+    source = TopicSource(PointCloud, "/world")
+
     def __init__(self, context: PluginContext) -> None:
-        self._topic = LaserTopic(context, PointCloud, self._message, "/world", empty="/")
+        super().__init__(context)
         self._deviation = context.deviation()
 
-    def _message(self, scan: Scan, now: int, random: np.random.Generator) -> PointCloud:
-        furthest = self._topic.laser.high
-        ranges, intensities = np.minimum(scan.ranges, furthest).ravel(), scan.intensities.ravel()
+    def measure(self, now: int) -> PointCloud:
+        """Returns the message of a scan at a time [ns]."""
+        laser, (scan, random) = self.sensor.laser, self.sensor.measure(now)
+        ranges, intensities = np.minimum(scan.ranges, laser.high).ravel(), scan.intensities.ravel()
         with np.errstate(invalid="ignore"):  # inf * 0
-            points = ranges[:, None] * self._topic.laser.directions.reshape(-1, 3)
+            points = ranges[:, None] * laser.directions.reshape(-1, 3)
         if self._deviation:
             draws = random.normal(0.0, self._deviation, (len(ranges), 4))
-            draws[~np.isfinite(ranges) | (ranges == furthest)] = 0.0
+            draws[~np.isfinite(ranges) | (ranges == laser.high)] = 0.0
             points, intensities = points + draws[:, :3], intensities + draws[:, 3]
         return PointCloud(
-            header=Header(stamp=to_time(now), frame_id=self._topic.frame),
+            header=self.header(now),
             points=[Point32(*point) for point in points.tolist()],
             channels=[ChannelFloat32("", intensities.tolist())],
         )
 
 
-class RangePlugin(SensorPlugin):
+class RangePlugin(LaserPlugin):
     """Publishes the smallest range, at most the largest that the sensor measures."""
 
+    source = TopicSource(Range, "/range", rate=("updateRate", 0.0), read=read_range)
+    measurement = RangeSensor
+
     def __init__(self, context: PluginContext) -> None:
-        own = context.rate()
-        self._topic = LaserTopic(context, Range, self._message, "/range", empty="/", own_rate=own)
-        self._deviation = context.deviation()
+        super().__init__(context)
         self._is_sound = context.text("radiation", "infrared") == "ultrasound"
         self._field_of_view = context.number("fov", 0.05)
 
-    def _message(self, scan: Scan, now: int, random: np.random.Generator) -> Range:
-        laser = self._topic.laser
+    def measure(self, now: int) -> Range:
+        """Returns the message of a range at a time [ns]."""
+        laser = self.sensor.laser
         return Range(
-            header=Header(stamp=to_time(now), frame_id=self._topic.frame),
+            header=self.header(now),
             radiation_type=Range.ULTRASOUND if self._is_sound else Range.INFRARED,
             field_of_view=self._field_of_view,
             min_range=laser.low,
             max_range=laser.high,
-            range=nearest(scan, laser, self._deviation, random),
+            range=self.sensor.nearest(now),
         )
 
 
-class VelodynePlugin(SensorPlugin):
+class VelodynePlugin(LaserPlugin):
     """Publishes the points that lie within the range, column by column, the lowest ring first."""
 
+    source = TopicSource(PointCloud2, "/points", empty="")
+
     def __init__(self, context: PluginContext) -> None:
-        self._topic = topic = LaserTopic(context, PointCloud2, self._message, "/points", empty="")
-        laser = topic.laser
+        super().__init__(context)
+        laser = self.sensor.laser
         self._low = max(context.number("min_range", 0.0), laser.low)
         self._high = min(context.number("max_range", math.inf), laser.high)
         self._least = context.number("min_intensity", -math.inf)
@@ -119,19 +149,21 @@ class VelodynePlugin(SensorPlugin):
             (laser.horizontal.readings, laser.vertical.readings),
         )
 
-    def _message(self, scan: Scan, now: int, random: np.random.Generator) -> PointCloud2:
+    def measure(self, now: int) -> PointCloud2:
+        """Returns the message of a scan at a time [ns]."""
+        scan, random = self.sensor.measure(now)
         ranges, intensities = scan.ranges.T, scan.intensities.T
         seen = self._within(ranges) & (intensities >= self._least)
         if self._deviation:
             ranges = ranges + random.normal(0.0, self._deviation, ranges.shape)
             seen &= self._within(ranges)
         points = np.zeros(int(seen.sum()), POINT)
-        directions = self._topic.laser.directions.transpose(1, 0, 2)
+        directions = self.sensor.laser.directions.transpose(1, 0, 2)
         places = ranges[seen][:, None] * directions[seen]
         points["x"], points["y"], points["z"] = places.T
         points["intensity"], points["ring"] = intensities[seen], self._rings[seen]
         return PointCloud2(
-            header=Header(stamp=to_time(now), frame_id=self._topic.frame),
+            header=self.header(now),
             height=1,
             width=len(points),
             fields=FIELDS,

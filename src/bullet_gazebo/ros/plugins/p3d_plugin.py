@@ -13,13 +13,7 @@ from bullet_gazebo.physics.files.elements import numbers
 from bullet_gazebo.physics.pose import add, conjugate, from_rpy, multiply, rotate, subtract
 from bullet_gazebo.ros.common.messages import to_time, to_twist_msg
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.ros.plugins.sensor_topics import (
-    SensorPlugin,
-    SensorTopic,
-    frame_of,
-    namespace_of,
-    topic_in,
-)
+from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, TopicSource
 from bullet_gazebo.sensors.imu import LinkMotion, motion_of
 
 WORLDS = ("world", "/world", "map", "/map")
@@ -28,33 +22,34 @@ WORLDS = ("world", "/world", "map", "/map")
 class P3dPlugin(SensorPlugin):
     """Publishes where a link is and how fast it moves, in the world or as seen from another link."""
 
+    source = TopicSource(Odometry)
+
     def __init__(self, context: PluginContext) -> None:
-        self._context = context
         self._link, self._child = context.link("bodyName"), context.text("bodyName", "")
-        topic = context.required("topicName")
         frame = context.text("frameName", "world")
         self._reference = None if frame in WORLDS else context.link_in_world("frameName")
         self._xyz = numbers(context.text("xyzOffset", "0 0 0"), "<xyzOffset>", 3)
         self._turn = from_rpy(*numbers(context.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
         self._deviation = context.deviation()
-        namespace = namespace_of(context, absent="", empty="/")
-        self._frame = frame_of(namespace, frame)
-        rate = context.rate()
-        SensorTopic(context, topic_in(namespace, topic), Odometry, rate, self._measure)
+        super().__init__(context)
 
-    def _measure(self, now: int) -> Odometry:
-        pose, linear, angular = self._relative(motion_of(self._context.model, self._link))
+    def rate(self) -> float:
+        """Returns the plugin's rate [Hz]; 0 is every step."""
+        return self.context.rate()
+
+    def measure(self, now: int) -> Odometry:
+        """Returns the message of the link's motion at a time [ns]."""
+        pose, linear, angular = self._relative(motion_of(self.context.model, self._link))
         x, y, z = self._xyz
         place, turn = add(pose.position, (x, y, z)), multiply(self._turn, pose.orientation)
         if self._deviation:
-            random = self._context.sensing.noise(self._context.model, self._context.key, now)
-            draws = random.normal(0.0, self._deviation, 6).tolist()
+            draws = self.context.random(now).normal(0.0, self._deviation, 6).tolist()
             linear = add(linear, (draws[0], draws[1], draws[2]))
             angular = add(angular, (draws[3], draws[4], draws[5]))
         covariance = [0.0] * 36
         covariance[::7] = [self._deviation**2] * 6
         return Odometry(
-            Header(stamp=to_time(now), frame_id=self._frame),
+            Header(stamp=to_time(now), frame_id=self.frame),
             self._child,
             PoseWithCovariance(PoseMsg(Point(*place), Quaternion(*turn)), covariance),
             TwistWithCovariance(to_twist_msg((linear, angular)), covariance),

@@ -6,7 +6,6 @@ called, SystemExit and KeyboardInterrupt included: a Ctrl-C raises nothing in th
 """
 
 import importlib
-import os
 import pkgutil
 import re
 import threading
@@ -297,7 +296,7 @@ def built_in(table: str) -> dict[str, Callable[[Any], Any]]:
     """Returns the plugins of this folder: each module's `table`, file names of libraries and a factory."""
     modules = [
         importlib.import_module(f"{__package__}.{found.name}")
-        for found in pkgutil.iter_modules([os.path.dirname(__file__)])
+        for found in pkgutil.iter_modules(importlib.import_module(__package__ or "").__path__)
     ]
     return {
         library: factory

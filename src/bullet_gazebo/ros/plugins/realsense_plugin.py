@@ -19,7 +19,7 @@ from bullet_gazebo.ros.plugins.camera_topics import QUEUE, CameraTopics, camera_
 from bullet_gazebo.ros.plugins.depth_camera_plugin import to_cloud, to_depth_image
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.ros.plugins.sensor_topics import (
-    SensorPlugin,
+    ContextPlugin,
     SensorTopics,
     frame_of,
     topic_in,
@@ -35,7 +35,7 @@ EYES = {  # by sensor: what its elements begin with, and its topic
 }
 
 
-class RealsensePlugin(SensorPlugin):
+class RealsensePlugin(ContextPlugin):
     """Publishes the pictures of those cameras that the model has, while somebody looks at them."""
 
     def __init__(self, context: PluginContext) -> None:

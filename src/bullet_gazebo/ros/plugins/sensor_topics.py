@@ -1,10 +1,10 @@
 """Names, frames and topics of sensors' plugins (docs/contract/sensors.md 0.2 to 0.4)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
-import numpy as np
 import rosgraph.names
 import rospy
 
@@ -12,9 +12,8 @@ from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.ros.plugins.control_plugin import find_param
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
-from bullet_gazebo.sensors.laser import LaserSensor, Scan
 from bullet_gazebo.sensors.schedule import SensorClock
-from bullet_gazebo.sensors.sensing import slower
+from bullet_gazebo.sensors.sensing import Measurement
 
 LOCKSTEP_QUEUE = 100  # messages of a sensor
 MOST_QUEUED = 32_000_000  # [bytes] of a topic
@@ -78,7 +77,7 @@ def offer_shared(
         context.closing(rospy.Service(name, kind, answer).shutdown)
 
 
-class SensorPlugin:
+class ContextPlugin:
     """A plugin whose topics, services and clocks are the context's, which closes them."""
 
     def shutdown(self) -> None:
@@ -227,40 +226,75 @@ class SensorTopic:
             self._topic.publish(message)
 
 
-class LaserTopic:
-    """The topic of a laser's plugin, which turns scans into messages.
+@dataclass(frozen=True)
+class TopicSource:
+    """Where the plugins of a library publish (docs/contract/sensors.md 0.2), and what they say there.
 
-    Args:
-        context: the plugin's.
-        kind: the message's type.
-        message: returns the message of a scan at a time [ns]; further noise is drawn from the generator.
-        name: the topic without `<topicName>`. With an empty one nothing is published.
-        empty: the namespace of an empty `<robotNamespace>`.
-        own_rate: the plugin's own [Hz]; the slower of this and the sensor's counts.
+    Attributes:
+        message: Type of the messages.
+        topic: Its name without the element `tag`; "" if that is required.
+        empty: The namespace of an empty `<robotNamespace>`; MODEL is the model's name.
+        absent: The one without the element.
+        tag: The element with the topic's name.
+        rate: The element with the plugin's own rate, and the rate without it [Hz].
+        read: Returns what a message says, by the fields of the measurement; raises ValueError for a message
+            that can't be read. None if tasks can't see it.
     """
 
-    def __init__(
-        self,
-        context: PluginContext,
-        kind: type,
-        message: Callable[[Scan, int, np.random.Generator], Any],
-        name: str,
-        empty: str,
-        own_rate: float = 0.0,
-    ) -> None:
-        self._message = message
-        self._sensor = sensor = LaserSensor(context)
-        self.laser = sensor.laser
-        namespace = namespace_of(context, absent="", empty=empty)
-        self.frame = frame_of(namespace, context.text("frameName", "/world"))
-        topic = context.plugin.element.findtext("topicName", name).strip()
-        if topic:
-            full, own = topic_in(namespace, topic), sensor.sensor
-            SensorTopic(context, full, kind, slower(own_rate, sensor.rate), self._measure)
-            context.show(full, kind, own.link, own.pose)
-        else:
-            rospy.logwarn("Sensor '%s': its <topicName> is empty", context.key)
+    message: type
+    topic: str = ""
+    empty: str = "/"
+    absent: str = ""
+    tag: str = "topicName"
+    rate: tuple[str, float] = ("", 0.0)
+    read: Callable[[Any], Mapping[str, Any]] | None = None
 
-    def _measure(self, now: int) -> Any:
-        scan, random = self._sensor.measure(now)
-        return self._message(scan, now, random)
+
+class SensorPlugin(ContextPlugin):
+    """A sensor's plugin with one topic, see `SensorTopic`.
+
+    Attributes:
+        source: Of its topic.
+        measurement: Makes `sensor`; None if `measure` does without.
+        default_frame: Without a `<frameName>`.
+        at_once: Whether a new subscriber gets a measurement at once.
+        frame: Of the messages.
+        topic: Full name of the topic; "" if there is none.
+    """
+
+    source: ClassVar[TopicSource]
+    measurement: ClassVar[type[Measurement] | None] = None
+    default_frame: ClassVar[str] = "world"
+    at_once: ClassVar[bool] = True
+
+    def __init__(self, context: PluginContext) -> None:
+        source, own = self.source, context.sensor
+        self.context = context
+        self.sensor: Any = self.measurement and self.measurement(context)
+        self.namespace = namespace_of(context, source.absent, source.empty)
+        self.frame = frame_of(self.namespace, context.text("frameName", self.default_frame))
+        name = self.topic_name()
+        self.topic = topic_in(self.namespace, name) if name else ""
+        if not name:
+            rospy.logwarn("Sensor '%s': its <%s> is empty", context.key, source.tag)
+            return
+        self._topic = SensorTopic(
+            context, self.topic, source.message, self.rate(), self.measure, self.at_once
+        )
+        if own is not None:
+            context.show(self.topic, source.message, own.link, own.pose)
+
+    def topic_name(self) -> str:
+        """Returns the name of the topic, in the plugin's namespace."""
+        source, context = self.source, self.context
+        return (
+            context.text(source.tag, source.topic) if source.topic else context.required(source.tag)
+        )
+
+    def rate(self) -> float:
+        """Returns the rate of measurements [Hz]; 0 is every step."""
+        return float(self.sensor.rate)
+
+    def measure(self, now: int) -> Any:
+        """Returns the message of a measurement at a time [ns]; None for nothing."""
+        raise NotImplementedError

@@ -1,5 +1,6 @@
 """The page's list of sensors' topics; what is switched on is subscribed to and drawn."""
 
+import html
 import io
 import math
 import time
@@ -7,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import roslib.message
 import rospy
 import viser
 from bullet_gazebo_msgs.msg import SceneSensor
@@ -26,13 +28,13 @@ from bullet_gazebo.pictures.page_batches import compose
 from bullet_gazebo.ros.common.messages import from_pose_msg
 
 PERIOD = 0.1  # [s of wall time] between two drawings of a topic
-MOST_POINTS, MOST_COLUMNS = 20_000, 320  # of what a page is sent
+MOST_POINTS, MOST_COLUMNS, MOST_CHARACTERS = 20_000, 320, 1000  # of what a page is sent
 BUFFER = 2**24  # [bytes] that a large message is received in
 CONE = 16  # readings that a range is drawn as
 RED, BLUE = (220, 30, 30), (40, 90, 220)
 POINT, LENGTH, EDGE = 0.02, 0.15, 0.006  # [m]; of points, of frustums and of their edges
 OPACITY = 0.2
-NOTHING = "<div style='padding: 0 0.8em'>no sensor has a topic that can be drawn</div>"
+NOTHING = "<div style='padding: 0 0.8em'>no sensor has a topic</div>"
 FAULTS = (
     ArithmeticError, LookupError, OSError, TypeError, ValueError, Image.DecompressionBombError,
 )  # fmt: skip
@@ -47,12 +49,14 @@ class Drawing(NamedTuple):
         colours: (n, 3) of uint8, if the points have any.
         faces: (m, 3) indices of 0, the origin, and of points counted from 1: what rays have passed.
         picture: (height, width, 3) of uint8.
+        text: of a message that has no place in the scene.
     """
 
     points: np.ndarray
     colours: np.ndarray | None = None
     faces: np.ndarray | None = None
     picture: np.ndarray | None = None
+    text: str = ""
 
 
 def draw_scan(message: LaserScan) -> Drawing:
@@ -125,6 +129,11 @@ def draw_depths(message: ImageMessage) -> Drawing:
     return Drawing(np.zeros((0, 3)), picture=np.repeat(grey[..., None], 3, axis=2))
 
 
+def draw_text(message: Any) -> Drawing:
+    """Draws any message as its text."""
+    return Drawing(np.zeros((0, 3)), text=str(message)[:MOST_CHARACTERS])
+
+
 def _thinned(points: np.ndarray, colours: np.ndarray | None) -> Drawing:
     met = np.flatnonzero(np.isfinite(points).all(axis=1))
     kept = met[:: max(1, math.ceil(len(met) / MOST_POINTS))]
@@ -138,6 +147,12 @@ DRAWN: dict[str, tuple[type, Callable[[Any], Drawing]]] = {
         (PointCloud2, draw_cloud), (CompressedImage, draw_jpeg), (ImageMessage, draw_depths),
     )
 }  # fmt: skip
+
+
+def drawn_as(kind: str) -> tuple[type, Callable[[Any], Drawing]] | None:
+    """Returns a message's type by its name, and what draws it; None if the type isn't known here."""
+    found = None if kind in DRAWN else roslib.message.get_message_class(kind)
+    return DRAWN.get(kind, found and (found, draw_text))
 
 
 class SensorPanel:
@@ -163,14 +178,21 @@ class SensorPanel:
                 view.remove()
         self._views = []
         for sensor in sensors:
-            if sensor.kind in DRAWN and sensor.topic not in [e.sensor.topic for e in self._views]:
-                self._views.append(kept.get(sensor.topic) or self._add(sensor))
+            if sensor.topic not in [each.sensor.topic for each in self._views]:
+                added = kept.get(sensor.topic) or self._add(sensor)
+                if added is not None:
+                    self._views.append(added)
         self._nothing.visible = not self._views
         self._folder.visible = bool(self._views)
 
-    def _add(self, sensor: SceneSensor) -> "SensorView":
+    def _add(self, sensor: SceneSensor) -> "SensorView | None":
+        """Returns the view of a topic; None if its type isn't known here."""
+        drawn = drawn_as(sensor.kind)
+        if drawn is None:
+            return None
         self._made += 1  # a removed node's name would come back
-        return SensorView(self._server, self._folder, sensor, f"{self._below}/sensor{self._made}")
+        name = f"{self._below}/sensor{self._made}"
+        return SensorView(self._server, self._folder, sensor, name, *drawn)
 
     def listen(self, watched: bool) -> None:
         """Subscribes to what is switched on, while a page is open."""
@@ -199,17 +221,20 @@ class SensorView:
         folder: viser.GuiFolderHandle,
         sensor: SceneSensor,
         name: str,
+        kind: type,
+        draw: Callable[[Any], Drawing],
     ) -> None:
-        """`folder` gets its checkbox and picture; `name` is that of its nodes."""
+        """`folder` gets its checkbox and picture, `name` is that of its nodes; `draw` draws a `kind`."""
         self.sensor = sensor
         self._server, self._folder, self._name = server, folder, name
         pose = from_pose_msg(sensor.pose)
         self._inner = np.array([(*pose.position, *pose.orientation)])
-        self._kind, self._draw = DRAWN[sensor.kind]
+        self._kind, self._draw = kind, draw
         with folder:
             label = shown(sensor.topic.removesuffix("/compressed"))
             self._box = server.gui.add_checkbox(label, False)
         self._picture: viser.GuiImageHandle | None = None
+        self._text: viser.GuiHtmlHandle | None = None
         self._frame: viser.FrameHandle | None = None
         self._frustum: viser.CameraFrustumHandle | None = None
         self._subscriber: rospy.Subscriber | None = None
@@ -254,7 +279,9 @@ class SensorView:
         except FAULTS as fault:
             rospy.logwarn_once(f"{self.sensor.topic} can't be drawn: {fault}")
             return
-        if drawing.picture is not None:
+        if drawing.text:
+            self._show_text(drawing.text)
+        elif drawing.picture is not None:
             self._show_picture(drawing.picture, place)
         else:
             self._show_points(drawing, place)
@@ -282,6 +309,14 @@ class SensorView:
                     opacity=OPACITY, side="double", cast_shadow=False, receive_shadow=False,
                 )  # fmt: skip
 
+    def _show_text(self, text: str) -> None:
+        content = f"<pre style='padding: 0 0.8em'>{html.escape(text)}</pre>"
+        if self._text is None:
+            with self._folder:
+                self._text = self._server.gui.add_html(content, order=self._box.order + 0.5)
+        else:
+            self._text.content = content
+
     def _show_picture(self, picture: np.ndarray, place: np.ndarray) -> None:
         if self._picture is None or self._frustum is None:
             with self._folder:
@@ -297,10 +332,10 @@ class SensorView:
             self._picture.image = picture
 
     def _clear(self) -> None:
-        for node in (self._frame, self._frustum, self._picture):
+        for node in (self._frame, self._frustum, self._picture, self._text):
             if node is not None:
                 node.remove()
-        self._frame = self._frustum = self._picture = None
+        self._frame = self._frustum = self._picture = self._text = None
 
     def remove(self) -> None:
         """Ends it."""

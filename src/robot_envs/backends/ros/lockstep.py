@@ -17,12 +17,12 @@ from bullet_gazebo_msgs.srv import (
     StepWorld,
     StepWorldRequest,
 )
-from gazebo_msgs.msg import ContactState
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
 from geometry_msgs.msg import Twist as TwistMsg
 
-from bullet_gazebo.physics.pose import Pose, Vector
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.ros.common.messages import from_contact_state
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.ros.bringup import full_name, ready
 from robot_envs.backends.ros.properties import RosVariation
@@ -40,7 +40,6 @@ from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.world_state import (
     Commands,
-    ContactPair,
     InitialState,
     LinkQuery,
     Links,
@@ -183,7 +182,7 @@ class LockstepWorld(RobotBackend):
             self._held,
             Links(zip(link_keys(self._query), motions[models:], strict=True)),
             Models(zip(answer.models, motions[:models], strict=True)),
-            [contact_of(each) for each in answer.contacts],
+            [from_contact_state(each) for each in answer.contacts],
             Sensors(
                 (name, self._reading(each))
                 for name, each in zip(self._query.sensors, answer.sensors, strict=True)
@@ -194,7 +193,7 @@ class LockstepWorld(RobotBackend):
         values: dict[str, Any] = {
             each.name: np.frombuffer(each.data, each.type).reshape(each.shape)
             for each in found.values
-        } or {"contacts": [contact_of(each) for each in found.contacts]}
+        } or {"contacts": [from_contact_state(each) for each in found.contacts]}
         return Reading((found.now - self._begun) / 1e9, values)
 
     def _send(self, names: StepNames, ticks: int, commands: Sequence[float]) -> None:
@@ -314,19 +313,3 @@ def _motions_of(numbers: Sequence[float]) -> Iterator[Motion]:
     for i in range(0, len(numbers), MOTION):
         x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz = numbers[i : i + MOTION]
         yield Motion(Pose((x, y, z), (qx, qy, qz, qw)), Twist((vx, vy, vz), (wx, wy, wz)))
-
-
-def contact_of(state: ContactState) -> ContactPair:
-    """Reads what touches."""
-    return ContactPair(
-        state.collision1_name,
-        state.collision2_name,
-        [_vector(each) for each in state.contact_positions],
-        [_vector(each) for each in state.contact_normals],
-        [(_vector(each.force), _vector(each.torque)) for each in state.wrenches],
-        list(state.depths),
-    )
-
-
-def _vector(message: Vector3) -> Vector:
-    return (message.x, message.y, message.z)

@@ -3,81 +3,26 @@
 import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
-import numpy as np
 import rospy
-from gazebo_msgs.msg import ContactsState
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Image, Imu, LaserScan, Range
+from sensor_msgs.msg import Image
 
 from bullet_gazebo.physics.description import DescriptionError, Plugin, library_of
 from bullet_gazebo.physics.files.sdf_parts import value
 from bullet_gazebo.physics.pose import normalized, rotate
-from bullet_gazebo.sensors.laser import KINDS as LASERS
-from bullet_gazebo.sensors.pinhole import DEPTH_KINDS
+from bullet_gazebo.ros.plugins.plugin_loader import built_in
+from bullet_gazebo.ros.plugins.sensor_topics import MODEL, TopicSource
 from bullet_gazebo.sensors.sensing import slower
 from file_access.text import did_you_mean
-from robot_envs.backends.ros.lockstep import contact_of
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.world_state import ODOMETRY, Motion, Pose, Reading, Sensors, Twist
 
 Values = Mapping[str, Any]
-COLOURS = {  # by encoding: the type of a channel, and where red, green and blue are
-    "rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2)), "bgra8": (4, (2, 1, 0)),
-    "mono8": (1, (0, 0, 0)),
-}  # fmt: skip
 LATE_PERIODS = 3  # of a sensor
-
-
-def _scan(message: LaserScan) -> Values:
-    names = ("ranges", "intensities")
-    return {name: np.array(getattr(message, name), np.float32) for name in names}
-
-
-def _range(message: Range) -> Values:
-    return {"ranges": np.array([message.range], np.float32)}
-
-
-def _imu(message: Imu) -> Values:
-    turn, spin, push = message.orientation, message.angular_velocity, message.linear_acceleration
-    found = {
-        "orientation": np.array([turn.x, turn.y, turn.z, turn.w]),
-        "angular_velocity": np.array([spin.x, spin.y, spin.z]),
-        "linear_acceleration": np.array([push.x, push.y, push.z]),
-    }
-    for name, numbers in found.items():
-        if not np.isfinite(numbers).all():
-            raise ValueError(f"{name} is {numbers.tolist()}")
-    return found
-
-
-def _image(message: Image) -> Values:
-    if message.encoding not in COLOURS:
-        raise ValueError(f"pictures are {message.encoding}; {', '.join(COLOURS)} can be read")
-    count, order = COLOURS[message.encoding]
-    pixels = _rows(message, np.dtype(np.uint8), count)
-    return {"image": np.ascontiguousarray(pixels[..., order])}
-
-
-def _depth(message: Image) -> Values:
-    if message.encoding == "32FC1":
-        return {"depth": _rows(message, np.dtype("<f4"), 1)[..., 0]}
-    if message.encoding != "16UC1":
-        raise ValueError(f"depths are {message.encoding}; 32FC1 and 16UC1 can be read")
-    depth = _rows(message, np.dtype("<u2"), 1)[..., 0] / np.float32(1000.0)
-    return {"depth": np.where(depth > 0.0, depth, np.float32(np.nan))}
-
-
-def _rows(message: Image, kind: np.dtype[Any], channels: int) -> np.ndarray:
-    rows = np.frombuffer(message.data, np.uint8).reshape(message.height, message.step)
-    used = np.ascontiguousarray(rows[:, : message.width * channels * kind.itemsize])
-    return used.view(kind).reshape(message.height, message.width, channels)
-
-
-def _contacts(message: ContactsState) -> Values:
-    return {"contacts": [contact_of(each) for each in message.states]}
 
 
 def _motion(message: Odometry) -> Values:
@@ -93,43 +38,19 @@ def _motion(message: Odometry) -> Values:
     return {ODOMETRY: Motion(pose, Twist(*(rotate(pose.orientation, each) for each in twist)))}
 
 
-class _Driver(NamedTuple):
-    """Where a library publishes (docs/contract/sensors.md 0.2), and how its messages are read."""
-
-    tag: str
-    topic: str  # without that element
-    empty: str | None  # namespace of an empty <robotNamespace>; None: the model's name
-    message: type
-    read: Callable[[Any], Values]
-    rate: tuple[str, float] = ("", 0.0)  # element of the plugin's own, and without it [Hz]
-
-
-_OWN_RATE = ("updateRate", 0.0)
-_LASER = _Driver("topicName", "/world", None, LaserScan, _scan)
-_CAMERA = _Driver("imageTopicName", "image_raw", None, Image, _image, _OWN_RATE)
-_DEPTH = _Driver("depthImageTopicName", "depth/image_raw", None, Image, _depth, _OWN_RATE)
-_DRIVERS = {
-    "libgazebo_ros_laser.so": _LASER,
-    "libgazebo_ros_gpu_laser.so": _LASER,
-    "libgazebo_ros_range.so": _Driver("topicName", "/range", "/", Range, _range, _OWN_RATE),
-    "libgazebo_ros_imu_sensor.so": _Driver(
-        "topicName", "imu_data", "/", Imu, _imu, ("updateRateHZ", 1.0)
-    ),
-    "libgazebo_ros_imu.so": _Driver("topicName", "/default_imu", "/", Imu, _imu, _OWN_RATE),
-    "libgazebo_ros_camera.so": _CAMERA,
-    "libgazebo_ros_depth_camera.so": _DEPTH,
-    "libgazebo_ros_openni_kinect.so": _DEPTH,
-    "libgazebo_ros_bumper.so": _Driver(
-        "bumperTopicName", "bumper_states", "/", ContactsState, _contacts
-    ),
-}
-_OF_KIND = {  # of a sensor whose plugin is another one, and whose topic the robot names
-    **dict.fromkeys(LASERS, _LASER),
-    **dict.fromkeys(DEPTH_KINDS, _DEPTH),
-    "camera": _CAMERA,
-    "imu": _DRIVERS["libgazebo_ros_imu_sensor.so"],
-    "contact": _DRIVERS["libgazebo_ros_bumper.so"],
-}
+@cache
+def sources() -> tuple[dict[str, TopicSource], dict[str, TopicSource]]:
+    """Returns the sources of what tasks can see, by library and by the kind of the sensor."""
+    plugins: dict[str, Any] = {
+        library: plugin
+        for library, plugin in built_in("LIBRARIES").items()
+        if getattr(getattr(plugin, "source", None), "read", None) is not None
+    }
+    kinds: dict[str, TopicSource] = {}
+    for plugin in plugins.values():
+        for kind in plugin.measurement.kinds:
+            kinds.setdefault(kind, plugin.source)
+    return {library: plugin.source for library, plugin in plugins.items()}, kinds
 
 
 class _Heard(NamedTuple):
@@ -183,7 +104,7 @@ class SensorListener:
 
         return rospy.Subscriber(topic, driver.message, receive, queue_size=1, tcp_nodelay=True)
 
-    def _take(self, name: str, driver: _Driver, message: Any) -> None:
+    def _take(self, name: str, driver: TopicSource, message: Any) -> None:
         stamp, now = message.header.stamp.to_sec(), self._clock()
         if self._off is not None and stamp:
             if abs(now - stamp) > self._off:
@@ -193,6 +114,7 @@ class SensorListener:
                 )
             if name in self._heard and stamp <= self._heard[name].stamp:
                 return
+        assert driver.read is not None
         self._heard[name] = _Heard(stamp, now, driver.read(message))
         self._faults.pop(name, None)
 
@@ -255,25 +177,26 @@ class SensorListener:
             each.unregister()
 
 
-def _source(robot: Robot, name: str) -> tuple[str, _Driver, float]:
+def _source(robot: Robot, name: str) -> tuple[str, TopicSource, float]:
     """Returns the topic of a sensor, how it is read, and the slower of its rate and the plugin's [Hz]."""
     if name == ODOMETRY and robot.odometry:
         topic = rospy.names.ns_join(f"/{robot.namespace.strip('/')}", robot.odometry)
-        return topic, _Driver("", "", None, Odometry, _motion), 0.0
+        return topic, TopicSource(Odometry, read=_motion), 0.0
+    libraries, kinds = sources()
     known = {
         each.name: (each.kind, next(iter(each.plugins), None), each.rate)
         for each in robot.links.sensors
     }
     for plugin in robot.links.plugins:
-        if library_of(plugin.filename) in _DRIVERS:
+        if library_of(plugin.filename) in libraries:
             known[plugin.name] = ("", plugin, 0.0)
     plain = name.removeprefix(f"{robot.model}::")
     if plain not in known:
         near = did_you_mean(plain, known) or f"; there are: {', '.join(known) or 'none'}"
         raise RobotEnvError(f"the robot '{robot.model}' has no sensor '{plain}'{near}")
     kind, of_sensor, rate = known[plain]
-    own = None if of_sensor is None else _DRIVERS.get(library_of(of_sensor.filename))
-    driver, given = own or _OF_KIND.get(kind), robot.sensor_topics.get(plain)
+    own = None if of_sensor is None else libraries.get(library_of(of_sensor.filename))
+    driver, given = own or kinds.get(kind), robot.sensor_topics.get(plain)
     if driver is None or not (given or own):
         raise RobotEnvError(
             f"the topic of the sensor '{plain}' isn't known: name it in the robot's sensor_topics"
@@ -290,13 +213,13 @@ def _source(robot: Robot, name: str) -> tuple[str, _Driver, float]:
     return _topic_of(robot, of_sensor, driver), driver, rate
 
 
-def _topic_of(robot: Robot, plugin: Plugin, driver: _Driver) -> str:
+def _topic_of(robot: Robot, plugin: Plugin, driver: TopicSource) -> str:
     def text(tag: str, default: str) -> str:
         return (plugin.element.findtext(tag) or "").strip() or default
 
     own = plugin.element.findtext("robotNamespace")
     given = f"/{robot.namespace.strip('/')}" if own is None else own.strip()
-    namespace = given or (robot.model if driver.empty is None else driver.empty)
+    namespace = given or (robot.model if driver.empty == MODEL else driver.empty)
     scope = text("cameraName", "")
     parts = [text(driver.tag, driver.topic)]
     for outer in (scope if driver.message is Image else "", namespace):
