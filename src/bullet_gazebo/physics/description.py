@@ -223,7 +223,7 @@ class Light:
     kind: str = "point"  # or directional, spot
 
 
-class Start(NamedTuple):
+class SavedMotion(NamedTuple):
     """How a model of a saved world begins: `pose` and `twist` of its root link, and its joints."""
 
     pose: Pose
@@ -263,7 +263,7 @@ class ModelDescription:
     mimics: dict[str, Mimic] = field(default_factory=dict)
     lumped: dict[str, tuple[str, Pose]] = field(default_factory=dict)
     initial_pose: Pose = Pose()
-    start: Start | None = None
+    start: SavedMotion | None = None
     static: bool = False
 
     @property

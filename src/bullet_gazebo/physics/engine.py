@@ -2,10 +2,10 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
-from bullet_gazebo.physics.description import Inertia, ModelDescription
+from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription
 from bullet_gazebo.physics.pose import Pose, Vector
 
 Twist = tuple[Vector, Vector]
@@ -162,6 +162,16 @@ class Engine(ABC):
         Raises:
             DescriptionError: if the engine can't take it.
         """
+
+    def load_all(
+        self, models: Sequence[tuple[ModelDescription, Pose]]
+    ) -> Iterator[Body | DescriptionError]:
+        """Adds models in order; yields each one's body, or why the engine can't take it."""
+        for description, pose in models:
+            try:
+                yield self.load(description, pose)
+            except DescriptionError as error:
+                yield error
 
     @abstractmethod
     def remove(self, body: Body) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any, NamedTuple
 
-from bullet_gazebo.physics.description import ModelDescription, Shape, Start
+from bullet_gazebo.physics.description import ModelDescription, SavedMotion, Shape
 from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero
 from bullet_gazebo.physics.engine import FASTEST, Body, Twist
 from bullet_gazebo.physics.lumping import WORLD
@@ -96,7 +96,7 @@ class Model:
         self.placed = pose
         self.body.reset_base(pose.compose(self.description.root_pose), twist)
 
-    def begin(self, start: Start) -> None:
+    def begin(self, start: SavedMotion) -> None:
         """Moves as in a saved world; the initial pose stays."""
         self.place(start.pose.compose(self.description.root_pose.inverse()), start.twist)
         for name, index in self._joints.items():

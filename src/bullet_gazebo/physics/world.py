@@ -121,7 +121,11 @@ class World:
             raise NameTaken(name)
         self._renew()
         body = self.engine.load(description, pose.compose(description.root_pose))
-        model = Model(name, description, body, pose)
+        return self.admit(Model(name, description, body, pose))
+
+    def admit(self, model: Model) -> Model:
+        """Adds a model whose body the engine has."""
+        description, body = model.description, model.body
         try:
             model.apply_damping(self.time_step)
             model.put_followers()
@@ -135,7 +139,7 @@ class World:
             description.warnings.append(
                 f"links that overlap in the initial pose don't collide with each other: {', '.join(pairs)}"
             )
-        self.models[name] = model
+        self.models[model.name] = model
         self._index(model)
         model.number = self.version
         return model

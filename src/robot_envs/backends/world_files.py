@@ -12,6 +12,7 @@ from bullet_gazebo.physics.files.world_file import (
     parse_world,
     read_entity,
 )
+from bullet_gazebo.physics.files.world_file import fill as fill_world
 from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.simulator import Simulator
 from robot_envs.errors import RobotEnvError
@@ -40,10 +41,8 @@ def fill(sim: Simulator, source: Source | None) -> None:
     sim.set_time_step(found.time_step)
     sim.world.set_gravity(found.gravity)
     sim.world.set_solver(found.solver)
-    for name, description in found.models.items():
-        try:
-            sim.world.spawn(name, description, description.initial_pose)
-        except DescriptionError as error:
+    for name, error in fill_world(sim.world, found.models):
+        if error is not None:
             raise RobotEnvError(f"world {_shown(source)}: model '{name}': {error}") from error
 
 

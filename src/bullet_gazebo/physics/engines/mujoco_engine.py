@@ -1,13 +1,13 @@
 """MuJoCo as physics engine: one model of the whole world, which is recompiled when it changes."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
 
 import mujoco
 import numpy as np
 
-from bullet_gazebo.physics.description import ModelDescription
+from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.engine import Body, Contact, Engine, LinkOf, Side
 from bullet_gazebo.physics.engine_form import check_bounds
 from bullet_gazebo.physics.engines.mujoco_body import MujocoBody
@@ -59,14 +59,28 @@ class MujocoEngine(Engine):
         self._configure()
 
     def load(self, description: ModelDescription, pose: Pose) -> MujocoBody:
-        check_bounds(description)
-        body = MujocoBody(self._state, description, pose, self._compile)
-        self._compile({f"{next(self._keys)}": body})
-        if description.collides_with_itself:
-            body.overlapping = self._state.overlapping(body.touching)
-            if body.overlapping:
-                self._compile()
-        return body
+        return self._load([(description, pose)])[0]
+
+    def load_all(
+        self, models: Sequence[tuple[ModelDescription, Pose]]
+    ) -> Iterator[Body | DescriptionError]:
+        """Compiles the world once for all of them."""
+        try:
+            yield from self._load(models)
+        except DescriptionError:
+            yield from super().load_all(models)
+
+    def _load(self, models: Sequence[tuple[ModelDescription, Pose]]) -> list[MujocoBody]:
+        for description, _ in models:
+            check_bounds(description)
+        fresh = [MujocoBody(self._state, *each, self._compile) for each in models]
+        self._compile({f"{next(self._keys)}": body for body in fresh})
+        for body in fresh:
+            if body.description.collides_with_itself:
+                body.overlapping = self._state.overlapping(body.touching)
+        if any(body.overlapping for body in fresh):
+            self._compile()
+        return fresh
 
     def remove(self, body: Body) -> None:
         self._bodies = {key: each for key, each in self._bodies.items() if each is not body}

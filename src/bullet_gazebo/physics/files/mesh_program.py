@@ -19,8 +19,10 @@ import numpy as np
 from bullet_gazebo.physics.description import DescriptionError, Mesh
 from bullet_gazebo.physics.files.elements import numbers, place, shown
 from bullet_gazebo.physics.files.hull import convex_pieces, hull_points
+from bullet_gazebo.physics.files.mesh_cache import kept, read_arrays, written
 from bullet_gazebo.physics.files.mesh_looks import meters_of, read_glb, read_parts
-from bullet_gazebo.physics.files.meshes import Submesh, read_arrays, written
+from bullet_gazebo.physics.files.meshes import Submesh
+from bullet_gazebo.physics.files.plain_obj import READ, plain_obj
 from file_access.content import FileError, read_file
 from file_access.xml_text import parse
 
@@ -28,6 +30,8 @@ MOST_BYTES = 200_000_000  # of a file: a million triangles as COLLADA writes the
 MOST_TRIANGLES = 1_000_000
 MOST_VERTICES = 3 * MOST_TRIANGLES
 MOST_PARTS = 256  # hulls of one mesh
+LARGE = 500_000  # [bytes] of a file that takes a tenth of a second
+KEPT = "mesh-1"  # begins the names of kept meshes; another one when others would come out
 LARGEST = 1e12  # of a coordinate, in the file's unit: 32-bit floats lose their digits beyond it
 MOST_NAMES = 10  # that an error lists
 
@@ -35,9 +39,6 @@ MOST_NAMES = 10  # that an error lists
 HEADER, FACET = 84, 50  # [bytes]
 NAME = re.compile(r"(?:^[ \t]*|\bend)solid(?:(?!facet)[^\r\n])*", re.IGNORECASE | re.MULTILINE)
 VERTEX = re.compile(r"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
-
-# OBJ
-READ = ("v", "f", "o", "g")
 
 # COLLADA
 SPACE = "http://www.collada.org/2005/11/COLLADASchema"
@@ -55,8 +56,8 @@ Part = tuple[np.ndarray, np.ndarray]
 def answer(request: bytes) -> bytes:
     """Answers a request of `meshes`: digest, vertices, faces and hulls of a file, its looks, or pieces."""
     head, _, data = request.partition(b"\n")
-    what, name, submesh = json.loads(head)
-    path, stream = Path(name), BytesIO()
+    what, name, submesh, cache = json.loads(head)
+    path = Path(name)
     if what == "glb":
         return read_glb(path)
     arrays: Iterable[np.ndarray]
@@ -65,20 +66,38 @@ def answer(request: bytes) -> bytes:
     elif what == "pieces":
         arrays = convex_pieces(*read_arrays(data))
     else:
-        mesh = load(path, Submesh(*submesh) if submesh else None)
-        stream.write(mesh.digest.encode())
-        arrays = (mesh.vertices, mesh.faces, *mesh.hulls)
-    return stream.getvalue() + written(arrays)
+        arrays = _load_once(path, Submesh(*submesh) if submesh else None, Path(cache))
+    return written(arrays)
 
 
-def load(path: Path, submesh: Submesh | None = None) -> Mesh:
-    """Returns the mesh of a file, or of one named part of it."""
-    readers: dict[str, Callable[[bytes, str], list[Part]]]
-    readers = {".stl": _read_stl, ".dae": _read_collada, ".obj": _read_obj}
+def _load_once(path: Path, submesh: Submesh | None, cache: Path) -> list[np.ndarray]:
+    """Returns digest, vertices, faces and hulls; those of large files are kept by their content."""
+    data = _read(path)
+
+    def compute() -> bytes:
+        mesh = load(path, submesh, data)
+        digest = np.frombuffer(mesh.digest.encode(), np.uint8)
+        return written((digest, mesh.vertices, mesh.faces, *mesh.hulls))
+
+    if len(data) < LARGE:
+        return read_arrays(compute())
+    content = hashlib.blake2b(data, digest_size=16, key=path.suffix.lower().encode())
+    content.update(repr(submesh).encode())
+    return kept(cache / f"{KEPT}-{content.hexdigest()}", compute)
+
+
+def _read(path: Path) -> bytes:
     try:
-        data = read_file(path, MOST_BYTES)
+        return read_file(path, MOST_BYTES)
     except FileError as error:
         raise DescriptionError(str(error)) from error
+
+
+def load(path: Path, submesh: Submesh | None = None, data: bytes | None = None) -> Mesh:
+    """Returns the mesh of a file, or of one named part of it; `data` is its content if it is read already."""
+    readers: dict[str, Callable[[bytes, str], list[Part]]]
+    readers = {".stl": _read_stl, ".dae": _read_collada, ".obj": _read_obj}
+    data = _read(path) if data is None else data
     with np.errstate(all="ignore"):  # what isn't finite is refused below
         try:
             parts = readers[path.suffix.lower()](data, submesh.name if submesh else "")
@@ -205,7 +224,10 @@ def _read_obj(data: bytes, only: str) -> list[Part]:
     """Returns a part for each object or group of the file, or for those named `only`."""
     from trimesh.exchange.obj import load_obj
 
-    text = "\n".join(_obj_lines(data.decode("utf-8-sig", "replace"), only))
+    content = data.decode("utf-8-sig", "replace")
+    if not only and (plain := plain_obj(content)) is not None:
+        return [plain]
+    text = "\n".join(_obj_lines(content, only))
     loaded = load_obj(
         StringIO(text), group_material=False, skip_materials=True, maintain_order=True,
         split_objects=True, split_groups=True,

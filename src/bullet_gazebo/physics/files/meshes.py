@@ -4,28 +4,23 @@ A limited child process reads them (`mesh_program`, `mesh_looks`) and takes them
 """
 
 import json
-import os
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
-from zipfile import BadZipFile
 
 import numpy as np
 
 from bullet_gazebo.physics.description import Color, DescriptionError, Mesh
 from bullet_gazebo.physics.files.elements import place
 from bullet_gazebo.physics.files.hull import is_solid
+from bullet_gazebo.physics.files.mesh_cache import cache_folder, kept, read_arrays, written
 from file_access.limited import LimitedProcess, Limits, RequestRefused
-from file_access.locks import scratch_folder
 
 SUFFIXES = (".stl", ".dae", ".obj")
 PLAIN = (".stl",)  # of files that have no materials
 LIMITS = Limits(processor_time=60, wall_time=120.0, memory=4 << 30, output=1 << 30)
-DIGEST = 32  # characters
 MOST_KEPT = 32  # files with their looks
 PIECES = "v-hacd-1"  # begins the names of kept pieces; another one when others would come out
 
@@ -86,7 +81,7 @@ class MeshLook:
         if self.path.suffix.lower() in PLAIN:
             return b""
         try:
-            return _process.ask(json.dumps([what, str(self.path), None]).encode())
+            return _process.ask(json.dumps([what, str(self.path), None, ""]).encode())
         except RequestRefused:
             return b""
 
@@ -100,13 +95,12 @@ def read_mesh(path: Path, submesh: Submesh | None = None) -> Mesh:
     check_mesh(path)
     with place(f"mesh '{path}'"):
         try:
-            data = _process.ask(json.dumps(["mesh", str(path), submesh]).encode())
+            request = ["mesh", str(path), submesh, str(cache_folder())]
+            data = _process.ask(json.dumps(request).encode())
         except RequestRefused as error:
             raise DescriptionError(str(error)) from error
-    stream = BytesIO(data)
-    digest = stream.read(DIGEST).decode()
-    vertices, faces, *hulls = read_arrays(stream.read())
-    return Mesh(vertices, faces, tuple(hulls), digest)
+    digest, vertices, faces, *hulls = read_arrays(data)
+    return Mesh(vertices, faces, tuple(hulls), digest.tobytes().decode())
 
 
 def in_pieces(mesh: Mesh) -> Mesh:
@@ -120,35 +114,20 @@ def in_pieces(mesh: Mesh) -> Mesh:
     """
     if len(mesh.hulls) > 1:
         return _of_pieces(mesh, mesh.hulls) if all(map(is_solid, mesh.hulls)) else mesh
-    cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    kept = Path(cache, "bullet_gazebo", "meshes", f"{PIECES}-{mesh.digest}")
+    data = json.dumps(["pieces", "", None, ""]).encode() + b"\n"
+
+    def compute() -> bytes:
+        return _process.ask(data + written((mesh.vertices, mesh.faces)))
+
     try:
-        mark, content = kept.read_bytes().split(b"\n", 1)
-        if mark != PIECES.encode():  # a file that was cut off
-            raise ValueError(mark)
-        pieces = read_arrays(content)
-    except (OSError, ValueError, EOFError, BadZipFile):
-        data = json.dumps(["pieces", "", None]).encode() + b"\n"
-        try:
-            answer = _process.ask(data + written((mesh.vertices, mesh.faces)))
-        except RequestRefused as error:
-            raise DescriptionError(str(error)) from error
-        _keep(kept, PIECES.encode() + b"\n" + answer)
-        pieces = read_arrays(answer)
+        pieces = kept(cache_folder() / f"{PIECES}-{mesh.digest}", compute)
+    except RequestRefused as error:
+        raise DescriptionError(str(error)) from error
     return _of_pieces(mesh, pieces) if pieces else mesh
 
 
 def _of_pieces(mesh: Mesh, pieces: Iterable[np.ndarray]) -> Mesh:
     return replace(mesh, hulls=tuple(pieces), digest=f"{mesh.digest}-pieces", in_pieces=True)
-
-
-def _keep(path: Path, data: bytes) -> None:
-    """Writes a file all at once; where that is not possible, none."""
-    with suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with scratch_folder(str(path.parent)) as folder:
-            (folder / path.name).write_bytes(data)
-            os.replace(folder / path.name, path)
 
 
 def read_look(path: str) -> MeshLook:
@@ -165,23 +144,6 @@ def read_look(path: str) -> MeshLook:
 @lru_cache(MOST_KEPT)
 def _look(path: Path, _changed: int, _size: int) -> MeshLook:
     return MeshLook(path, read_mesh(path))
-
-
-def written(arrays: Iterable[np.ndarray]) -> bytes:
-    """Returns arrays as bytes, one after the other."""
-    stream = BytesIO()
-    for array in arrays:
-        np.save(stream, array, allow_pickle=False)
-    return stream.getvalue()
-
-
-def read_arrays(data: bytes) -> list[np.ndarray]:
-    """Returns the arrays that `written` has written."""
-    stream, arrays = BytesIO(data), []
-    while stream.tell() < len(data):
-        arrays.append(np.load(stream, allow_pickle=False))
-        arrays[-1].setflags(write=False)
-    return arrays
 
 
 def check_mesh(path: Path) -> None:

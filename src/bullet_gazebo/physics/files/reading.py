@@ -1,5 +1,6 @@
 """What reading one model or world needs: the files that it names, and limits on their number and size."""
 
+import logging
 import os
 import time
 from collections.abc import Callable, Iterable
@@ -24,12 +25,17 @@ MeshFile = tuple[str, Mesh | None]
 
 # Limits on the text and all that it includes, counted each time it is included.
 MAX_FILES = 1000  # different ones
-MAX_MESH_BYTES = 400_000_000  # of different mesh files, which take about twice that of memory
+MAX_MESH_BYTES = (
+    400_000_000  # of a model's different mesh files, which take about twice that of memory
+)
 MAX_MODELS = 5000  # in a world, or nested in a model
 MAX_SPLITTING = (
     120.0  # [s] of wall time for a model's convex pieces; the other meshes keep their hulls
 )
-MAX_SECONDS = 60.0  # [s] of computing, however busy the machine is otherwise
+MAX_SECONDS = 60.0  # [s] of computing for a model, however busy the machine is otherwise
+TELLING = 5.0  # [s] between two lines on the progress
+
+logger = logging.getLogger(f"rosout.{__name__}")
 
 
 def _no_packages(name: str) -> str:
@@ -85,12 +91,26 @@ class Resources:
             return []
 
 
+class LoadProgress:
+    """Says in the log how far something has come that takes long."""
+
+    def __init__(self, what: str, total: int) -> None:
+        self._what, self._done, self._total = what, 0, total
+        self._next = time.monotonic() + TELLING
+
+    def one_more(self) -> None:
+        self._done += 1
+        if time.monotonic() > self._next:
+            logger.info("%d of %d %s", self._done, self._total, self._what)
+            self._next = time.monotonic() + TELLING
+
+
 class Reading:
     """Counts what reading one model or world takes, and ends it with LimitExceeded beyond a limit.
 
-    The limits are MAX_BYTES, MAX_ELEMENTS, MAX_FILES, MAX_MESH_BYTES, MAX_MODELS and MAX_SECONDS. Each file
-    is parsed once, but its elements count each time it is included. Each mesh file, or named part of one, is
-    read once.
+    The limits are MAX_BYTES, MAX_ELEMENTS, MAX_FILES, MAX_MODELS, and for each model of a world
+    MAX_MESH_BYTES and MAX_SECONDS. Each file is parsed once, but its elements count each time it is
+    included. Each mesh file, or named part of one, is read once.
     """
 
     def __init__(self, cancelled: Callable[[], bool] = lambda: False) -> None:
@@ -100,10 +120,15 @@ class Reading:
                 its processor time counts.
         """
         self._cancelled = cancelled
-        self._end = time.thread_time() + MAX_SECONDS
-        self._bytes = self._elements = self._models = self._mesh_bytes = 0
+        self._bytes = self._elements = self._models = 0
+        self.begin()
         self._files: dict[Path, Element] = {}
         self._meshes: dict[tuple[Path, Submesh | None], Mesh] = {}
+
+    def begin(self) -> None:
+        """Begins another model of a world."""
+        self._end = time.thread_time() + MAX_SECONDS
+        self._mesh_bytes = 0
 
     def parse(self, text: str | bytes) -> Element:
         """Returns the root element of an XML text or a file's content."""

@@ -13,22 +13,14 @@ from bullet_gazebo.physics.description import (
     Joint,
     Light,
     ModelDescription,
-    Start,
+    SavedMotion,
 )
 from bullet_gazebo.physics.dynamics import poses_at_zero
 from bullet_gazebo.physics.engine import FASTEST, Twist
 from bullet_gazebo.physics.engine_form import FURTHEST, rigid
 from bullet_gazebo.physics.files.elements import numbers, shown
 from bullet_gazebo.physics.files.sdf_parts import WORLD, read_pose
-from bullet_gazebo.physics.pose import (
-    ZERO,
-    Pose,
-    add,
-    cross,
-    rotate,
-    scale,
-    subtract,
-)
+from bullet_gazebo.physics.pose import ZERO, Pose, add, cross, rotate, scale, subtract
 
 SLACK = 0.01  # [m, rad]; so far solvers let links come apart
 MOST_NAMES = 5  # that a warning lists
@@ -44,26 +36,18 @@ def begin_as_saved(
     missing = []
     for element in state:
         name = element.get("name", "")
-        here = f"{element.tag} '{shown(name)}'"
-        where = f"<state>, {here}"
-        if element.tag not in ("model", "light"):
-            continue
+        where = f"<state>, {element.tag} '{shown(name)}'"
         try:
             if element.tag == "light" and name in lights:
                 lights[name].pose = _pose(element, where, lights[name].pose)
             elif element.tag == "model" and name in models:
                 yield from _begin(models[name], element, where)
-            else:
-                missing.append(here)
+            elif element.tag in ("model", "light"):
+                missing.append(f"{element.tag} '{shown(name)}'")
         except DescriptionError as error:
             yield f"{error}; it begins where the {element.tag} says"
     if missing:
-        yield f"<state>: {_listed(missing)} {'is' if len(missing) == 1 else 'are'} not in the world"
-
-
-def _listed(names: list[str]) -> str:
-    more = len(names) - MOST_NAMES
-    return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+        yield f"<state>: the world has no {', '.join(missing[:MOST_NAMES])}"
 
 
 def _pose(element: Element, where: str, default: Pose) -> Pose:
@@ -103,10 +87,10 @@ def _begin(model: ModelDescription, element: Element, where: str) -> Iterator[st
     links = {name: given.get(name, (pose, (ZERO, ZERO))) for name, pose in rest.items()}
     unknown = [f"'{shown(name)}'" for name in given if name not in rest]
     if unknown:
-        yield f"{where}: it has no link {_listed(unknown)}"
+        yield f"{where}: it has no link {', '.join(unknown[:MOST_NAMES])}"
     if model.static:
         _lay_out(model, links)
-        model.start = Start(links[model.root][0], (ZERO, ZERO), {})
+        model.start = SavedMotion(links[model.root][0], (ZERO, ZERO), {})
         return
     held = [each for each in model.joints.values() if each.parent == WORLD and each.child in given]
     if held:  # the model's frame has moved with its first link, the world hasn't
@@ -115,14 +99,14 @@ def _begin(model: ModelDescription, element: Element, where: str) -> Iterator[st
     root, twist = links[model.root]
     for joint in held[:1]:  # where somebody has put it meanwhile
         root = links[joint.child][0].compose(_motion(joint, joints[joint.name][0]).inverse())
-    model.start = Start(root, (ZERO, ZERO) if model.fixed_base else twist, joints)
+    model.start = SavedMotion(root, (ZERO, ZERO) if model.fixed_base else twist, joints)
     apart = [
         f"'{shown(name)}'"
         for name, pose in _placed(model, model.start)
         if name in given and _distance(pose, links[name][0]) > SLACK
     ]
     if apart:
-        yield f"{where}: its joints don't let link {_listed(apart)} be there"
+        yield f"{where}: its joints don't let link {', '.join(apart[:MOST_NAMES])} be there"
 
 
 def _lay_out(model: ModelDescription, links: dict[str, Saved]) -> None:
@@ -171,7 +155,7 @@ def _motion(joint: Joint, position: float) -> Pose:
     return joint.pose.compose(joint.anchor).compose(step).compose(joint.anchor.inverse())
 
 
-def _placed(model: ModelDescription, start: Start) -> Iterator[tuple[str, Pose]]:
+def _placed(model: ModelDescription, start: SavedMotion) -> Iterator[tuple[str, Pose]]:
     """Yields each link, and where the joints put it."""
     below, todo = model.joints_by_parent(), [(model.root, start.pose)]
     for name, pose in todo:

@@ -1,5 +1,6 @@
 """Reads SDF world files, and the models and lights of spawn requests, URDF or SDF."""
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from bullet_gazebo.physics.description import (
 from bullet_gazebo.physics.files import elements
 from bullet_gazebo.physics.files.elements import named, numbers, read_plugin, shown, truth
 from bullet_gazebo.physics.files.own_models import own_models
-from bullet_gazebo.physics.files.reading import Reading, Resources
+from bullet_gazebo.physics.files.reading import LoadProgress, Reading, Resources
 from bullet_gazebo.physics.files.saved_state import begin_as_saved
 from bullet_gazebo.physics.files.sdf import (
     FileContext,
@@ -27,8 +28,15 @@ from bullet_gazebo.physics.files.sdf import (
 )
 from bullet_gazebo.physics.files.sdf_parts import read_color, read_pose, value
 from bullet_gazebo.physics.files.urdf import read_urdf
+from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Vector
-from bullet_gazebo.physics.world import GRAVITY, TIME_STEP, SolverSettings, ground_plane
+from bullet_gazebo.physics.world import (
+    GRAVITY,
+    TIME_STEP,
+    SolverSettings,
+    World,
+    ground_plane,
+)
 
 UPDATE_RATE = 1000.0  # [Hz], SDF's default
 SOLVER = {
@@ -94,28 +102,25 @@ def _read(root: Element, context: FileContext) -> WorldDescription:
         raise DescriptionError("there is no <world>")
     world = WorldDescription(element.get("name", "") or "default")
     _read_physics(world, element)
+    progress = LoadProgress("entities of the world file are read", len(element))
     for child in element:
+        progress.one_more()
         if child.tag in ("model", "include", "light"):
+            context.reading.begin()
             _add(world, child, context)
         elif child.tag == "plugin":
             world.plugins.append(read_plugin(child))
         elif child.tag in NOT_SIMULATED:
             world.left_out.append(f"{child.tag} '{shown(child.get('name', ''))}'")
-    state = element.find("state")
+    state = element.find("state")  # the first one
     if state is not None:
-        _apply(world, state, context)
+        for child in state.iterfind("insertions/*"):
+            _add(world, child, context)
+        world.warnings += begin_as_saved(state, world.models, world.lights)
+        for name in [(each.text or "").strip() for each in state.iterfind("deletions/name")]:
+            world.models.pop(name, None)
+            world.lights.pop(name, None)
     return world
-
-
-def _apply(world: WorldDescription, state: Element, context: FileContext) -> None:
-    """Lets a world begin as it was saved."""
-    for child in state.iterfind("insertions/*"):
-        _add(world, child, context)
-    world.warnings += begin_as_saved(state, world.models, world.lights)
-    for each in state.iterfind("deletions/name"):
-        name = (each.text or "").strip()
-        world.models.pop(name, None)
-        world.lights.pop(name, None)
 
 
 def read_light(element: Element) -> Light:
@@ -191,6 +196,20 @@ def _read_solver(profile: Element | None) -> SolverSettings:
             raise DescriptionError(f"<physics>: {number} in <{path.split('/')[-1]}> is negative")
         read[name] = type(default)(number)
     return SolverSettings(**read)
+
+
+def fill(
+    world: World, models: Mapping[str, ModelDescription]
+) -> Iterator[tuple[str, DescriptionError | None]]:
+    """Adds a file's models to an empty world; yields the name of each, and why the engine can't take it."""
+    places = [each.initial_pose.compose(each.root_pose) for each in models.values()]
+    bodies = world.engine.load_all(list(zip(models.values(), places, strict=True)))
+    for (name, description), body in zip(models.items(), bodies, strict=True):
+        if isinstance(body, DescriptionError):
+            yield name, body
+        else:
+            world.admit(Model(name, description, body, description.initial_pose))
+            yield name, None
 
 
 class UnknownFormat(DescriptionError):

@@ -23,11 +23,12 @@ from bullet_gazebo.physics.description import (
     Plugin,
 )
 from bullet_gazebo.physics.files.elements import shown
-from bullet_gazebo.physics.files.reading import Reading, Resources
+from bullet_gazebo.physics.files.reading import LoadProgress, Reading, Resources
 from bullet_gazebo.physics.files.world_file import (
     UnknownFormat,
     WorldDescription,
     empty_world,
+    fill,
     load_world,
     read_entity,
 )
@@ -194,13 +195,13 @@ def fill_world(sim: Simulator, world: WorldDescription, interrupted: Callable[[]
         sim.world.set_gravity(world.gravity)
         sim.world.set_solver(world.solver)
         sim.world.lights.update(world.lights)
-        for name, description in world.models.items():
+        progress = LoadProgress("models are loaded", len(world.models))
+        for name, error in fill(sim.world, world.models):
+            if error is not None:
+                rospy.logwarn("Model '%s' is left out: %s", name, error)
             if interrupted():
                 return
-            try:
-                sim.world.spawn(name, description, description.initial_pose)
-            except DescriptionError as error:
-                rospy.logwarn("Model '%s' is left out: %s", name, error)
+            progress.one_more()
 
 
 def load_plugins(sim: Simulator, plugins: PluginRegistry, of_world: Sequence[Plugin] = ()) -> None:

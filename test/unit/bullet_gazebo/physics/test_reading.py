@@ -2,10 +2,12 @@
 
 import os
 
+import numpy as np
 import pytest
 from support.mutations.mesh_files import obj
 
 from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
+from bullet_gazebo.physics.files import mesh_cache, mesh_program
 from bullet_gazebo.physics.files import reading as limits
 from bullet_gazebo.physics.files.meshes import read_mesh
 from bullet_gazebo.physics.files.reading import Reading, Resources
@@ -242,3 +244,101 @@ def test_versions_of_any_length_are_versions_or_none(tmp_path):
     assert parse_sdf(
         MODEL.format("x", INCLUDE.format("m", "y")), resources=Resources(models=(tmp_path,))
     )
+
+
+def test_each_model_of_a_world_has_its_own_limits(tmp_path, monkeypatch):
+    """Many models that are read in time are read, however long all of them take."""
+    for name in "abc":
+        (tmp_path / f"{name}.obj").write_bytes(obj())
+        chair = CHAIR.format("", f"<uri>model://{name}.obj</uri>")
+        write_model(tmp_path, name, MODEL.format(name, chair))
+    includes = "".join(INCLUDE.format(name, name) for name in "abc")
+    monkeypatch.setattr(limits, "MAX_MESH_BYTES", len(obj()))
+    seconds = iter(range(0, 1000, 7))
+    monkeypatch.setattr(limits.time, "thread_time", lambda: float(next(seconds)))
+    assert len(read_world(includes, tmp_path).models) == 3
+    monkeypatch.setattr(limits, "MAX_SECONDS", 1.0)
+    with pytest.raises(LimitExceeded, match=r"more than 1 s \(MAX_SECONDS\)"):
+        read_world(includes, tmp_path)
+
+
+def test_long_reading_says_how_far_it_is(tmp_path, monkeypatch, caplog):
+    write_model(tmp_path, "a", MODEL.format("a", LINK))
+    monkeypatch.setattr(limits, "TELLING", -1.0)
+    with caplog.at_level("INFO", logger="rosout"):
+        read_world(INCLUDE.format("a", "x") + INCLUDE.format("a", "y"), tmp_path)
+    assert "2 of 2 entities of the world file are read" in caplog.messages
+
+
+@pytest.fixture
+def large(tmp_path, monkeypatch):
+    """A mesh file that is worth keeping, and the folder that keeps it."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = tmp_path / "large.obj"
+    path.write_bytes(obj() + b"# " + b"x" * 500_000)
+    return path, tmp_path / "cache" / "bullet_gazebo" / "meshes"
+
+
+def test_a_large_mesh_is_read_once_by_its_content(large):
+    path, cache = large
+    first = read_mesh(path)
+    (file,) = cache.iterdir()
+    before = file.stat().st_ino
+    other = path.with_name("copy.obj")
+    other.write_bytes(path.read_bytes())
+    for again in (read_mesh(path), read_mesh(other)):
+        assert again == first
+        for one, two in zip(
+            (first.vertices, first.faces, *first.hulls),
+            (again.vertices, again.faces, *again.hulls),
+            strict=True,
+        ):
+            assert one.tobytes() == two.tobytes()
+    assert [each.stat().st_ino for each in cache.iterdir()] == [before]
+    other.write_bytes(path.read_bytes().replace(b"v -1", b"v -2", 1))
+    assert read_mesh(other) != first
+    assert len(list(cache.iterdir())) == 2
+
+
+@pytest.mark.parametrize("damage", [b"", b"nonsense", None])
+def test_a_damaged_mesh_in_the_cache_is_read_anew(large, damage):
+    path, cache = large
+    first = read_mesh(path)
+    (file,) = cache.iterdir()
+    whole = file.read_bytes()
+    file.write_bytes(whole[:-40] if damage is None else damage)
+    assert read_mesh(path) == first
+    assert file.read_bytes() == whole
+
+
+def test_the_cache_has_a_bound(tmp_path, monkeypatch):
+    names = [tmp_path / name for name in "abc"]
+    for number, path in enumerate(names):
+        mesh_cache.kept(path, lambda: bytes(mesh_cache.written([np.zeros(1000)])))
+        os.utime(path, (number, number))
+    monkeypatch.setattr(mesh_cache, "MOST_BYTES", 20_000)
+    mesh_cache.kept(names[0], bytes)  # used now
+    mesh_cache.kept(tmp_path / "d", lambda: bytes(mesh_cache.written([np.zeros(100)])))
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a", "c", "d"]
+
+
+V = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+F = "f 1 2 3\nf 1 2 4\nf 2 3 4\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [V + F, "# x\no name\n" + V + F, V + "f 1 2 3\no late\nf 1 2 4\nf 2 3 4\n",
+     "  " + V.replace(" ", "\t") + F,
+     V + F.replace(" 4", " -1"), V + "f 1/5/1 2//7 3/1\nf 1 2 3 4\n", V + "v 5 5 5\n" + F, F + V,
+     V.replace("v 1 0 0", "v 1 0 0 0.5 0.5 0.5") + F, V.replace("v 1", "v 1e0") + "vn 0 0 1\nusemtl v\n" + F,
+     V.replace("1 0 0", "1 0 \\\n 0") + F, "g a\n" + V + "g b\n" + F],
+)  # fmt: skip
+def test_a_plain_obj_file_is_read_as_any_other(tmp_path, monkeypatch, text):
+    path = tmp_path / "it.obj"
+    path.write_text(text)
+    fast = mesh_program.load(path)
+    monkeypatch.setattr(mesh_program, "plain_obj", lambda text: None)
+    slow = mesh_program.load(path)
+    assert fast == slow
+    assert len(fast.faces) > 1

@@ -181,7 +181,7 @@ BEGINS = "it begins where the model says"
     ("state", "warning"),
     [
         ('<model name="ghost"><pose>1 2 3 0 0 0</pose></model><light name="moon"/>',
-         "<state>: model 'ghost', light 'moon' are not in the world"),
+         "<state>: the world has no model 'ghost', light 'moon'"),
         ('<model name="wall"><link name="x"><pose>1 2 3 0 0 0</pose></link><link name="b"/></model>',
          "<state>, model 'wall': it has no link 'x'"),
         ('<model name="wall"><pose>1 2 3 0 0</pose></model>',

@@ -7,9 +7,9 @@ from support.robots.worlds import run
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.reading import Resources
-from bullet_gazebo.physics.files.world_file import empty_world, load_world, parse_world
+from bullet_gazebo.physics.files.world_file import empty_world, fill, load_world, parse_world
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import SolverSettings
+from bullet_gazebo.physics.world import SolverSettings, World
 from bullet_gazebo.ros.services.spawn_services import fill_world, find_world, read_world
 
 EMPTY = Path(__file__).resolve().parents[4] / "companions/gazebo_ros/worlds/empty.world"
@@ -233,6 +233,34 @@ def test_a_world_is_not_read_or_filled_to_the_end_once_that_is_interrupted(tmp_p
     path.write_text(f'<sdf version="1.6"><world name="w">{box("a")}{box("b")}</world></sdf>')
     assert list(read_world(str(path), lambda: True).models) == ["ground_plane"]
     assert "reading was interrupted" in caplog.messages[0]
-    answers = iter([False, True])
-    fill_world(sim, read_world(str(path), lambda: False), lambda: next(answers))
+    fill_world(sim, read_world(str(path), lambda: False), lambda: True)
     assert list(sim.world.models) == ["a"]
+
+
+def test_a_world_that_is_filled_at_once_has_the_bits_of_one_filled_model_by_model(new_engine):
+    """Also where the engine refuses one of the models, which alone is left out."""
+    heavy = box("heavy").replace(
+        '<link name="link">', '<link name="link"><inertial><mass>1e12</mass></inertial>'
+    )
+    text = [
+        box("a", "0 0 1 0.3 0.2 0"),
+        heavy,
+        box("b", "0.2 0 3 0 0.1 0"),
+        box("c", "0 0.1 5 0 0 0"),
+    ]
+    seen = []
+    for at_once in (True, False):
+        found = world(*text, "<include><uri>model://ground_plane</uri></include>")
+        made = World(new_engine(), gravity=found.gravity, time_step=found.time_step)
+        if at_once:
+            refused = {name: error for name, error in fill(made, found.models) if error}
+            assert list(refused) == ["heavy"]
+            assert "1000000000000.0 kg is not between" in str(refused["heavy"])
+        else:
+            for name in ("a", "b", "c", "ground_plane"):
+                made.spawn(name, found.models[name], found.models[name].initial_pose)
+        for _ in range(1500):
+            made.step()
+        seen.append({name: model.state() for name, model in made.models.items()})
+        made.close()
+    assert seen[0] == seen[1]
