@@ -18,6 +18,8 @@ from bullet_gazebo.physics.description import (
     library_of,
 )
 from bullet_gazebo.physics.engines import installing
+from bullet_gazebo.physics.files.elements import truth
+from bullet_gazebo.physics.files.sdf_parts import MOMENTS
 from bullet_gazebo.physics.files.world_file import WorldDescription
 from package_writing.check_files import CannotUse, RobotFile
 from package_writing.check_motion import SECONDS, Trial, observe
@@ -25,7 +27,6 @@ from package_writing.trial import ENGINES
 from robot_envs import Robot, RobotEnvError, controllers, files
 
 SHOWN = 8  # lines and names of one kind
-MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 @dataclass
@@ -54,7 +55,6 @@ def examine(file: RobotFile, parameters: str | None) -> Findings:
     """
     page, content = Findings(str(file.path)), file.content
     page.notes += [f"without effect: {each}" for each in content.left_out]
-    page.wrong += _inertia_faults(file.root)
     interfaces: Mapping[str, str] = {}
     if isinstance(content, ModelDescription):
         page.notes += content.warnings
@@ -62,11 +62,12 @@ def examine(file: RobotFile, parameters: str | None) -> Findings:
         known = {*content.links, *content.lumped, "world"}
         lost = [each.get("name", "") for each in file.root.findall("link")]
         page.wrong += [f"link '{name}' is dropped: no mass" for name in lost if name not in known]
+        page.wrong += [] if content.static else _inertia_faults(file.root)
         _add_served(page, [content], [])
         if file.root.tag == "robot":
             interfaces = _control(page, file, content, parameters)
     else:
-        page.wrong += content.warnings  # of models that are left out
+        page.wrong += [*content.warnings, *_inertia_faults(file.root)]  # models that are left out
         models = list(content.models.values())
         page.notes += [f"model '{m.name}': {w}" for m in models for w in (*m.warnings, *m.left_out)]
         page.lines["world"] = f"{content.name}; models: {', '.join(content.models) or 'none'}"
@@ -120,23 +121,25 @@ def _contents(model: ModelDescription) -> Iterator[tuple[str, str]]:
 
 def _inertia_faults(root: Element) -> Iterator[str]:
     """Yields links whose moments of inertia no body has."""
-    for link in root.iter("link"):
+    moving = [each for each in root.iter("model") if not truth(each.findtext("static"))]
+    models, unsaid = (
+        ([root], dict.fromkeys(MOMENTS, 0.0)) if root.tag == "robot" else (moving, MOMENTS)
+    )
+    for link in (link for model in models for link in model.findall("link")):
         tensor = link.find("inertial/inertia")
         if tensor is None:
             continue
-        given = [tensor.get(key) or tensor.findtext(key) or "0" for key in MOMENTS]
+        given = [tensor.get(key) or tensor.findtext(key) or value for key, value in unsaid.items()]
         try:
             xx, xy, xz, yy, yz, zz = map(float, given)
         except ValueError:
             continue  # a warning says so
         low, middle, high = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        moments = (
-            f"link '{link.get('name')}': moments of inertia {low:.3g}, {middle:.3g}, {high:.3g}"
-        )
+        moments = f"{low:.3g}, {middle:.3g}, {high:.3g} kg m²"
         if not low > 0.0:
-            yield f"{moments} kg m² must be above 0"
+            yield f"link '{link.get('name')}': moments of inertia must be above 0: {moments}"
         elif low + middle < 0.999 * high:
-            yield f"{moments} kg m²: no body has one above the sum of the others"
+            yield f"link '{link.get('name')}': one moment of inertia exceeds the sum of the others: {moments}"
 
 
 def _add_served(
@@ -197,4 +200,7 @@ def _control(
     page.wrong += [each for found in faults.values() for each in found]
     if parameters is not None:
         page.lines["controllers"] = f"{len(good)} of {len(typed)} served: {', '.join(good)}"
+        if not typed:
+            where = f"in the namespace {namespace}" if namespace else "outside of namespaces"
+            page.wrong.append(f"{parameters} has no controller {where}, where the URDF has them")
     return interfaces

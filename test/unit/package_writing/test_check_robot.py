@@ -67,7 +67,7 @@ def test_a_sound_robot_is_fine_on_one_page(check):
                   SWING.replace('effort="20"', 'effort="0.01"')),
             "commands don't move 'swing': 0.01 N m are too little for its load",
         ),
-        (robot(BASE.replace('ixx="0.002"', 'ixx="0.9"')), "no body has one above the sum of the others"),
+        (robot(BASE.replace('ixx="0.002"', 'ixx="0.9"')), "one moment of inertia exceeds the sum of"),
         (robot(BASE.replace('ixx="0.002"', 'ixx="0"')), "must be above 0"),
         (robot(GROUNDED, '<link name="rod"/>', SWING), "link 'rod' is dropped: no mass"),
         (robot(LINK.format("base", BOX.format("0.3 0 0"))), "it falls (PyBullet and MuJoCo)"),
@@ -117,6 +117,9 @@ def test_controllers_are_served_or_named(check, tmp_path):
     assert "1 of 3 served: good (effort_controllers/JointEffortController)" in page
     assert "did you mean 'effort_controllers/JointEffortController'?" in page
     assert "there is no joint 'swong'; did you mean 'swing'?" in page
+    (tmp_path / "other.yaml").write_text("bot: {good: {type: x/Y}}")
+    code, page, _ = check("--controllers", tmp_path / "other.yaml", text=text)
+    assert code == 1 and "other.yaml has no controller outside of namespaces" in page
     code, page, refused = check("--controllers", tmp_path / "none.yaml", text=text)
     assert (code, page) == (2, "") and "none.yaml" in refused and refused.count("\n") == 1
 
@@ -188,6 +191,16 @@ def test_sdf_and_worlds(check):
     assert code == 0
     assert "  world       room; models: ground_plane, walls, boxes" in page.splitlines()
     assert page.count("nothing blows up") == 2 and "  model       crate: base free" in page
+
+
+def test_moments_that_sdf_leaves_out_are_its_own_and_static_ones_do_not_matter(check):
+    link = (
+        "<link name='l'><inertial><inertia><ixx>{0}</ixx></inertia></inertial><collision name='c'>"
+        "<geometry><box><size>1 1 1</size></box></geometry></collision></link>"
+    )
+    for moment, static, code in ((1, 0, 0), (0, 0, 1), (0, 1, 0)):
+        text = f"<model name='m'><static>{static}</static>{link.format(moment)}</model>"
+        assert check(text=f"<sdf version='1.6'>{text}</sdf>", name="m.sdf")[0] == code
 
 
 def test_a_model_that_a_world_lacks_is_a_fault(check):
