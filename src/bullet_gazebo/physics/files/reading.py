@@ -136,11 +136,6 @@ class Reading:
         self._end = time.thread_time() + MAX_SECONDS
         self._mesh_bytes = 0
 
-    def begin(self) -> None:
-        """Begins another model of a world."""
-        self._end = time.thread_time() + MAX_SECONDS
-        self._mesh_bytes = 0
-
     def parse(self, text: str | bytes) -> Element:
         """Returns the root element of an XML text or a file's content."""
         self._bytes += len(text)
