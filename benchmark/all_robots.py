@@ -26,9 +26,9 @@ import gymnasium
 import reporting
 
 import robot_envs.robots  # noqa: F401 - registers the environments
-from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from robot_envs.making import named
 from robot_envs.robot import Robot
+from robot_sim.physics.engines.quiet_pybullet import pybullet
 
 TARGET = 0.45  # of the loop's rate
 BATCH = 50  # steps between looks at the clock

@@ -18,11 +18,11 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))
 import reporting
 from support.robots import engine_runs as runs
 
-from bullet_gazebo.physics.engine import Engine
-from bullet_gazebo.physics.engines import make_engine
-from bullet_gazebo.physics.engines.mujoco_engine import MujocoEngine
-from bullet_gazebo.physics.world import World
-from bullet_gazebo.simulator import Simulator
+from robot_sim.physics.engine import Engine
+from robot_sim.physics.engines import make_engine
+from robot_sim.physics.engines.mujoco_engine import MujocoEngine
+from robot_sim.physics.world import World
+from robot_sim.simulator import Simulator
 
 NewEngine = Callable[[], Engine]
 ENGINES: dict[str, NewEngine] = {

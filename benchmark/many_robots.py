@@ -22,10 +22,10 @@ from realtime import factor, simulator_process
 from ticks import CART as CART_PARAMS
 from ticks import STATES, add_robot
 
-from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
-from bullet_gazebo.simulator import Simulator
+from robot_sim.physics.engines.bullet_engine import BulletEngine
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import World, ground_plane
+from robot_sim.simulator import Simulator
 from ros_utils import ros_urdf
 from ros_utils.simulation import Simulation
 from ros_utils.step_client import StepClient

@@ -23,10 +23,10 @@ import reporting
 import rosgraph
 
 import cartpole  # noqa: F401 - registers its environments
-from bullet_gazebo.physics.engines import make_engine
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
+from robot_sim.physics.engines import make_engine
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import World, ground_plane
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils.simulation import Simulation
 

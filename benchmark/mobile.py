@@ -22,11 +22,11 @@ from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from realtime import factor, processor_time, simulator_process
 from ticks import STATES, add_robot, per_call, steps, ticks
 
-from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
-from bullet_gazebo.simulator import Simulator
 from robot_envs.robots.rover import ROBOT
+from robot_sim.physics.engines.bullet_engine import BulletEngine
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import World, ground_plane
+from robot_sim.simulator import Simulator
 from ros_calls.service import ServiceClient
 from ros_utils import ros_gazebo
 from ros_utils.simulation import Simulation

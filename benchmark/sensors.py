@@ -23,14 +23,14 @@ import trimesh
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from realtime import listening, processor_time, simulator_process
 
-from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
-from bullet_gazebo.physics.files.sdf import parse_sdf
-from bullet_gazebo.physics.pose import Pose, from_rpy
-from bullet_gazebo.physics.world import World, ground_plane
-from bullet_gazebo.sensors.laser import Laser
-from bullet_gazebo.sensors.rays import RayScene
-from bullet_gazebo.sensors.sensing import Sensing, sensor_pose
-from bullet_gazebo.simulator import Simulator
+from robot_sim.physics.engines.bullet_engine import BulletEngine
+from robot_sim.physics.files.sdf import parse_sdf
+from robot_sim.physics.pose import Pose, from_rpy
+from robot_sim.physics.world import World, ground_plane
+from robot_sim.sensors.laser import Laser
+from robot_sim.sensors.rays import RayScene
+from robot_sim.sensors.sensing import Sensing, sensor_pose
+from robot_sim.simulator import Simulator
 from ros_calls.service import ServiceClient
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils.simulation import Simulation

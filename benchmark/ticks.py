@@ -14,16 +14,16 @@ from typing import Any
 
 import reporting
 
-from bullet_gazebo.control.controllers.base import Controller
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.control.transmissions import read_description
-from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import ControlledRobot
-from bullet_gazebo.simulator import Simulator
+from robot_sim.control.controllers.base import Controller
+from robot_sim.control.hardware import RobotHardware
+from robot_sim.control.manager import STRICT, ControllerManager
+from robot_sim.control.transmissions import read_description
+from robot_sim.physics.engines.bullet_engine import BulletEngine
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import World
+from robot_sim.robot import ControlledRobot
+from robot_sim.simulator import Simulator
 from ros_utils import ros_urdf
 
 GAINS = {"p": 100.0, "i": 0.01, "d": 10.0}

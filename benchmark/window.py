@@ -29,7 +29,7 @@ from ros_calls.service import ServiceClient
 from ros_utils import ros_gazebo
 from ros_utils.simulation import Simulation
 
-WINDOW = "import sys; from bullet_gazebo.ros.clients.gzclient import main; sys.exit(main())"
+WINDOW = "import sys; from bullet_gazebo.clients.gzclient import main; sys.exit(main())"
 VIEWER = "import sys; sys.path.insert(0, {!r}); import window; window.view({!r})"
 CAMERA = {
     "type": "ViewerCameraMessage", "wxyz": [1.0, 0.0, 0.0, 0.0], "position": [3.0, 0.0, 1.0], "fov": 1.0,

@@ -20,9 +20,9 @@ import numpy as np
 
 import cartpole  # noqa: F401  registers cartpole/SwingUp-v0
 import robot_envs.robots  # noqa: F401  registers robot_envs/Navigate-v0
-from bullet_gazebo.physics.pose import from_rpy
 from cartpole.tasks import ANGLE_LIMIT, CartPoleState
 from robot_envs import InitialState, Pose
+from robot_sim.physics.pose import from_rpy
 
 SECOND = 125  # steps of the cart-pole
 SPREAD = 1.5  # largest standard deviation of an action from the last plan's; actions end at 1

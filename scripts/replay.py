@@ -10,5 +10,5 @@ if __name__ == "__main__":
         from ros_calls.requirements import SIMULATOR, require
 
         require(SIMULATOR)
-        from bullet_gazebo.ros.node.replay_command import main
+        from bullet_gazebo.node.replay_command import main
     sys.exit(main())

@@ -13,5 +13,5 @@ if __name__ == "__main__":
         from ros_calls.requirements import SIMULATOR, require
 
         require(SIMULATOR)
-        from bullet_gazebo.ros.clients.shown_joints import main
+        from bullet_gazebo.clients.shown_joints import main
     sys.exit(main())

@@ -75,7 +75,7 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 @pytest.fixture(params=ENGINES)
 def new_engine(request: pytest.FixtureRequest) -> Callable:
     """Make a physics engine; a test with this fixture runs once for each of them."""
-    from bullet_gazebo.physics.engines import make_engine
+    from robot_sim.physics.engines import make_engine
 
     return partial(make_engine, request.param)
 

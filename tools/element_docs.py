@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "src"))
 
-from bullet_gazebo.physics.files.element_table import (  # noqa: E402
+from robot_sim.physics.files.element_table import (  # noqa: E402
     READ,
     WARNED,
     Row,
@@ -21,7 +21,9 @@ from bullet_gazebo.physics.files.element_table import (  # noqa: E402
 )
 
 PAGE = ROOT / "docs/files.md"
-START = "<!-- Made by tools/element_docs.py from elements.toml in src/bullet_gazebo/physics/files. -->\n"
+START = (
+    "<!-- Made by tools/element_docs.py from elements.toml in src/robot_sim/physics/files. -->\n"
+)
 
 
 def with_tables(page: str) -> str:

@@ -10,8 +10,8 @@ API=(
     "robot_envs.testing"
     "rl_workbench rl_workbench.agents.dqn_agent.DQNAgent rl_workbench.agents.settings rl_workbench.tools.policies
         rl_workbench.tools.runs"
-    "bullet_gazebo bullet_gazebo.ros.plugins.plugin_loader.PluginContext
-        bullet_gazebo.ros.plugins.sensor_topics.SensorPlugin"
+    "robot_sim"
+    "bullet_gazebo.plugins.plugin_loader.PluginContext bullet_gazebo.plugins.sensor_topics.SensorPlugin"
     "ros_utils ros_utils.readiness ros_utils.ros_controllers ros_utils.ros_gazebo ros_utils.ros_launch
         ros_utils.ros_node ros_utils.ros_params ros_utils.ros_spawn ros_utils.ros_urdf ros_utils.simulation
         ros_utils.step_client ros_utils.testing ros_calls.service"

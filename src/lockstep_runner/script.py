@@ -121,7 +121,7 @@ STANDARD = sysconfig.get_path("stdlib") + "/"
 # They wait for their own processes, sockets, files and threads: such waits stay wall time, as do those of
 # a package that says so itself, by WALL_TIME.
 LIBRARIES = frozenset(
-    ["bullet_gazebo", "catkin_pkg", "file_access", "genpy", "joblib", "lockstep_runner", "matplotlib",
+    ["catkin_pkg", "file_access", "genpy", "joblib", "lockstep_runner", "matplotlib",
      "multiprocess", "numpy", "optuna", "psutil", "pybullet", "ray", "ros_calls", "ros_utils", "rosgraph",
      "roslaunch", "roslib", "rosmaster", "rosnode", "rosparam", "rospkg", "rospy", "rosservice", "rostopic",
      "scipy", "tensorboard", "tensorboardX", "tensorflow", "torch", "tqdm", "wandb", "xacro", "xmlrpc"]

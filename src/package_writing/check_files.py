@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
-from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
-from bullet_gazebo.physics.files.reading import Reading, Resources
-from bullet_gazebo.physics.files.world_file import WorldDescription, parse_world, read_entity
 from file_access.content import FileError, read_file
 from file_access.xml_text import decode, parse
 from robot_envs import RobotEnvError, files
+from robot_sim.physics.description import DescriptionError, Light, ModelDescription
+from robot_sim.physics.files.reading import Reading, Resources
+from robot_sim.physics.files.world_file import WorldDescription, parse_world, read_entity
 
 SUFFIXES = (".urdf", ".xacro", ".sdf", ".world")
 

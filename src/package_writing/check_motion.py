@@ -5,16 +5,16 @@ from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from typing import NamedTuple
 
-from bullet_gazebo.control.hardware import EFFORT
-from bullet_gazebo.physics.description import Joint, ModelDescription
-from bullet_gazebo.physics.engines import make_engine
-from bullet_gazebo.physics.files.world_file import WorldDescription
-from bullet_gazebo.physics.model import Model
-from bullet_gazebo.physics.pose import Pose, conjugate, rotate
-from bullet_gazebo.physics.world import World, ground_plane
-from bullet_gazebo.simulator import Simulator
 from package_writing.standing import stance, standing_height
 from robot_envs.testing.episodes import LOWER, UPRIGHT
+from robot_sim.control.hardware import EFFORT
+from robot_sim.physics.description import Joint, ModelDescription
+from robot_sim.physics.engines import make_engine
+from robot_sim.physics.files.world_file import WorldDescription
+from robot_sim.physics.model import Model
+from robot_sim.physics.pose import Pose, conjugate, rotate
+from robot_sim.physics.world import World, ground_plane
+from robot_sim.simulator import Simulator
 
 SECONDS = 2.0  # for which it has to stand
 PUSH = 0.2  # [s] for which a joint is commanded

@@ -9,22 +9,22 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.physics.description import (
+from package_writing.check_files import CannotUse, RobotFile
+from package_writing.check_motion import SECONDS, Trial, observe
+from package_writing.trial import ENGINES
+from robot_envs import Robot, RobotEnvError, controllers, files
+from robot_sim.control.errors import ControlError
+from robot_sim.physics.description import (
     DescriptionError,
     ModelDescription,
     Plugin,
     is_control_plugin,
     library_of,
 )
-from bullet_gazebo.physics.engines import installing
-from bullet_gazebo.physics.files.elements import truth
-from bullet_gazebo.physics.files.sdf_parts import MOMENTS
-from bullet_gazebo.physics.files.world_file import WorldDescription
-from package_writing.check_files import CannotUse, RobotFile
-from package_writing.check_motion import SECONDS, Trial, observe
-from package_writing.trial import ENGINES
-from robot_envs import Robot, RobotEnvError, controllers, files
+from robot_sim.physics.engines import installing
+from robot_sim.physics.files.elements import truth
+from robot_sim.physics.files.sdf_parts import MOMENTS
+from robot_sim.physics.files.world_file import WorldDescription
 
 SHOWN = 8  # lines and names of one kind
 
@@ -147,7 +147,7 @@ def _add_served(
 ) -> None:
     known = None
     if importlib.util.find_spec("rospy") is not None:  # which plugins import
-        from bullet_gazebo.ros.plugins.plugin_loader import built_in
+        from bullet_gazebo.plugins.plugin_loader import built_in
 
         known = {*built_in("LIBRARIES"), *built_in("WORLD_LIBRARIES")}
 

@@ -3,10 +3,10 @@
 import math
 from collections.abc import Mapping
 
-from bullet_gazebo.physics.description import ModelDescription
-from bullet_gazebo.physics.dynamics import effective_inertias, most_inertias, poses_at_zero
-from bullet_gazebo.physics.pose import rotate
 from package_writing.standing import centre_of_mass, feet
+from robot_sim.physics.description import ModelDescription
+from robot_sim.physics.dynamics import effective_inertias, most_inertias, poses_at_zero
+from robot_sim.physics.pose import rotate
 
 # [rad/s], at least, of a joint on its p and d with all that it carries stretched out
 FREQUENCY = 12.0

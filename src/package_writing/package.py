@@ -11,7 +11,6 @@ from typing import Any
 
 import yaml
 
-from bullet_gazebo.physics.files.reading import Resources
 from package_writing import CannotWrite, contents
 from package_writing.gains import VELOCITY, effort_gains, wheel_gains
 from package_writing.standing import feet, stance, standing_height
@@ -20,6 +19,7 @@ from package_writing.trial import stands_note, try_out
 from package_writing.urdf_files import Copied, copy_urdf, expanded
 from package_writing.vehicle import DRIVE, find_base, scan_topic
 from robot_envs import Robot, RobotEnvError, controllers, files
+from robot_sim.physics.files.reading import Resources
 
 TREE = Path(__file__).resolve().parents[2]  # the source tree
 IS_CHECKOUT = (TREE / "ws").is_file()

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bullet_gazebo.physics.description import Joint, ModelDescription, Shape
-from bullet_gazebo.physics.dynamics import link_poses
-from bullet_gazebo.physics.pose import Pose, Vector, conjugate, multiply, rotate
+from robot_sim.physics.description import Joint, ModelDescription, Shape
+from robot_sim.physics.dynamics import link_poses
+from robot_sim.physics.pose import Pose, Vector, conjugate, multiply, rotate
 
 DOWN = (0.0, 0.0, -1.0)
 # Of the height at which a robot stands: how much higher than its lowest link feet may be.

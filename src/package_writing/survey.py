@@ -7,19 +7,19 @@ from dataclasses import dataclass
 
 import yaml
 
-from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.joint import JointHandle
-from bullet_gazebo.control.transmissions import RobotDescription, read_description
-from bullet_gazebo.physics.description import DescriptionError, ModelDescription, is_control_plugin
-from bullet_gazebo.physics.dynamics import link_poses
-from bullet_gazebo.physics.files.reading import Resources
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose, rotate
 from file_access.content import FileError
 from file_access.text import did_you_mean
 from file_access.xml_text import parse
 from package_writing import CannotWrite
 from package_writing.standing import FOOT, lows_of
+from robot_sim.control.errors import ControlError
+from robot_sim.control.joint import JointHandle
+from robot_sim.control.transmissions import RobotDescription, read_description
+from robot_sim.physics.description import DescriptionError, ModelDescription, is_control_plugin
+from robot_sim.physics.dynamics import link_poses
+from robot_sim.physics.files.reading import Resources
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose, rotate
 
 EFFORT, POSITION, VELOCITY = (
     f"{kind}JointInterface" for kind in ("Effort", "Position", "Velocity")

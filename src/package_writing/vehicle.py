@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bullet_gazebo.physics.description import DescriptionError, Sensor
-from bullet_gazebo.physics.dynamics import link_poses
-from bullet_gazebo.physics.engines import make_engine
-from bullet_gazebo.physics.pose import Pose, rotate
-from bullet_gazebo.physics.world import World
-from bullet_gazebo.sensors.laser import KINDS, Laser
-from bullet_gazebo.sensors.rays import RayScene
 from package_writing.standing import DOWN, reach
 from package_writing.survey import SHARE, VELOCITY, Motor, Survey
+from robot_sim.physics.description import DescriptionError, Sensor
+from robot_sim.physics.dynamics import link_poses
+from robot_sim.physics.engines import make_engine
+from robot_sim.physics.pose import Pose, rotate
+from robot_sim.physics.world import World
+from robot_sim.sensors.laser import KINDS, Laser
+from robot_sim.sensors.rays import RayScene
 
 DRIVE = "diff_drive_controller"
 ASKEW = 0.02  # of a wheel's axis, at most, off the base's y

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from file_access.lazy import attach
 
 if TYPE_CHECKING:
-    from bullet_gazebo.pictures.camera import Camera as Camera
     from robot_envs.environment import RobotEnv as RobotEnv
     from robot_envs.errors import RobotEnvError as RobotEnvError
     from robot_envs.errors import SimulatorError as SimulatorError
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from robot_envs.world_state import Reading as Reading
     from robot_envs.world_state import StateQuery as StateQuery
     from robot_envs.world_state import WorldState as WorldState
+    from robot_sim.pictures.camera import Camera as Camera
 
 __wall_time__ = True  # of its waits, also in a script whose time is simulated
 __getattr__, __dir__, __all__ = attach(__name__, __path__)

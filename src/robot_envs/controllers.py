@@ -4,13 +4,13 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from bullet_gazebo.control.controllers import find_type
-from bullet_gazebo.control.controllers.base import Controller
-from bullet_gazebo.control.controllers.vehicle import VehicleController
-from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.manager import STRICT, ControllerManager
 from file_access.text import did_you_mean, nearest_or_all
+from robot_sim.control.controllers import find_type
+from robot_sim.control.controllers.base import Controller
+from robot_sim.control.controllers.vehicle import VehicleController
+from robot_sim.control.errors import ControlError
+from robot_sim.control.hardware import RobotHardware
+from robot_sim.control.manager import STRICT, ControllerManager
 
 KINDS = ("Float64", "Float64MultiArray", "Twist")  # of command topics that take numbers
 QUANTITIES = ("position", "velocity", "effort")  # that they command

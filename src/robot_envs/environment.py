@@ -9,8 +9,6 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import data_equivalence
 
-from bullet_gazebo.held_state import HeldState, UnknownState
-from bullet_gazebo.pictures.camera import CameraLike
 from robot_envs import checks
 from robot_envs.backends import LOCKSTEP, OWN, REALTIME, make_backend
 from robot_envs.backends.backend import RobotBackend, side_by_side
@@ -23,6 +21,8 @@ from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Noise, Sensor
 from robot_envs.variation.randomisation import UniformRandomisation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState, both, part_of
+from robot_sim.held_state import HeldState, UnknownState
+from robot_sim.pictures.camera import CameraLike
 
 MOST_SEED = 2**32  # of the sensors' noise
 

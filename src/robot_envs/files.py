@@ -7,12 +7,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from bullet_gazebo.physics.files.reading import Resources
 from file_access.content import FileError, read_file
 from file_access.expansion import CannotExpand, expand
 from file_access.text import did_you_mean
 from file_access.yaml_text import load_documents
 from robot_envs.errors import RobotEnvError
+from robot_sim.physics.files.reading import Resources
 
 Source = str | Path
 """A file: a path or "package://PACKAGE/PLACE"; or its text, which begins with "<"."""

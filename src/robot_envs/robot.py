@@ -8,20 +8,20 @@ from functools import cached_property
 from numbers import Real
 from typing import Any, Self
 
-from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.joint import JointLimits
-from bullet_gazebo.control.transmissions import RobotDescription, read_description
-from bullet_gazebo.physics.description import DescriptionError, ModelDescription, is_control_plugin
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import TIME_STEP
-from bullet_gazebo.robot import control_period_of
 from file_access.text import did_you_mean, nearest_or_all
 from robot_envs import controllers, files
 from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError
 from robot_envs.files import Source
+from robot_sim.control.errors import ControlError
+from robot_sim.control.hardware import RobotHardware
+from robot_sim.control.joint import JointLimits
+from robot_sim.control.transmissions import RobotDescription, read_description
+from robot_sim.physics.description import DescriptionError, ModelDescription, is_control_plugin
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import TIME_STEP
+from robot_sim.robot import control_period_of
 
 logger = logging.getLogger(f"rosout.{__name__}")
 

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-from bullet_gazebo.physics.loops import closed
 from file_access.text import nearest_or_all
 from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError, TaskError
 from robot_envs.robot import Robot, unfit_pose
 from robot_envs.task import Object
 from robot_envs.world_state import Commands, InitialState, JointState, Motion, Pose
+from robot_sim.physics.loops import closed
 
 BEYOND = 0.01  # [rad, m] of a joint's stop, as a moving joint may be
 

@@ -11,9 +11,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from bullet_gazebo.physics.pose import Vector
 from robot_envs.files import Source
 from robot_envs.world_state import Commands, InitialState, Pose, StateQuery, WorldState
+from robot_sim.physics.pose import Vector
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
-from bullet_gazebo.physics.pose import ZERO, Pose, Vector
-from bullet_gazebo.physics.world import seen_from
-from bullet_gazebo.sensors.sensor_reading import Reading
-from bullet_gazebo.state import ContactPair, LinkQuery, StateQuery
 from file_access.text import did_you_mean
+from robot_sim.physics.pose import ZERO, Pose, Vector
+from robot_sim.physics.world import seen_from
+from robot_sim.sensors.sensor_reading import Reading
+from robot_sim.state import ContactPair, LinkQuery, StateQuery
 
 __all__ = [
     "Command",

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import trimesh
 
-from bullet_gazebo.physics.files.element_table import READ, element_table
+from robot_sim.physics.files.element_table import READ, element_table
 
 SCHEMAS = Path("/usr/share/sdformat12")
 URDF_SCHEMA = Path(trimesh.__file__).parent / "resources/schema/urdf.xsd"

@@ -1,1 +1,1 @@
-"""ros_control in pure Python: PID, joint limits, controllers and their manager. No ROS, no engine."""
+"""ros_control over ROS: the controller manager's services, controllers' topics and actions."""

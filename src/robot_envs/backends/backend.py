@@ -6,10 +6,10 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
-from bullet_gazebo.physics.pose import Pose
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
+from robot_sim.physics.pose import Pose
 
 PHYSICS_STEP = 0.001  # [s]; Gazebo's default, and that of a world in this process
 

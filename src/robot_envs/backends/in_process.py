@@ -6,32 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import starmap
 from typing import Any
 
-from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.joint import JointHandle
-from bullet_gazebo.control.manager import STRICT
-from bullet_gazebo.control.pid import Gains
-from bullet_gazebo.grippers import pid_followers
-from bullet_gazebo.held_state import UnknownState
-from bullet_gazebo.physics.description import DescriptionError, Inertia, is_control_plugin
-from bullet_gazebo.physics.engines import make_engine
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.model import Model
-from bullet_gazebo.physics.pose import Pose, Vector, normalized
-from bullet_gazebo.physics.properties import (
-    JointProperties,
-    PropertyError,
-    link_inertia,
-    set_joint_properties,
-    set_link_friction,
-    set_link_properties,
-)
-from bullet_gazebo.physics.world import NameTaken, SnapshotError, World
-from bullet_gazebo.robot import ControlledRobot, control_period_of
-from bullet_gazebo.sensors.sensing import Sensing
-from bullet_gazebo.sensors.sensor_readers import SensorReaders, offer_sensors
-from bullet_gazebo.simulator import NANOSECONDS, Simulator
-from bullet_gazebo.state import NOTHING, StateReader, UnknownName, find_link, find_model
 from robot_envs.backends.backend import PHYSICS_STEP, RobotBackend, ticks_per_action
 from robot_envs.backends.world_files import fill, loose_joints, spawn
 from robot_envs.controllers import Loaded, load
@@ -56,6 +30,32 @@ from robot_envs.world_state import (
     WorldState,
     link_keys,
 )
+from robot_sim.control.errors import ControlError
+from robot_sim.control.hardware import RobotHardware
+from robot_sim.control.joint import JointHandle
+from robot_sim.control.manager import STRICT
+from robot_sim.control.pid import Gains
+from robot_sim.grippers import pid_followers
+from robot_sim.held_state import UnknownState
+from robot_sim.physics.description import DescriptionError, Inertia, is_control_plugin
+from robot_sim.physics.engines import make_engine
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.model import Model
+from robot_sim.physics.pose import Pose, Vector, normalized
+from robot_sim.physics.properties import (
+    JointProperties,
+    PropertyError,
+    link_inertia,
+    set_joint_properties,
+    set_link_friction,
+    set_link_properties,
+)
+from robot_sim.physics.world import NameTaken, SnapshotError, World
+from robot_sim.robot import ControlledRobot, control_period_of
+from robot_sim.sensors.sensing import Sensing
+from robot_sim.sensors.sensor_readers import SensorReaders, offer_sensors
+from robot_sim.simulator import NANOSECONDS, Simulator
+from robot_sim.state import NOTHING, StateReader, UnknownName, find_link, find_model
 
 
 @contextlib.contextmanager
@@ -74,7 +74,7 @@ class InProcessWorld(RobotBackend):
     Args:
         scene: the robots and objects.
         control_period: simulated time [s] of one action.
-        engine: "bullet", or "mujoco"; see `bullet_gazebo.physics.engines`.
+        engine: "bullet", or "mujoco"; see `robot_sim.physics.engines`.
 
     Raises:
         ValueError: if the period isn't a whole number of physics steps, or the engine is unknown or not

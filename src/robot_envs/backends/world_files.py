@@ -3,22 +3,22 @@
 import logging
 from collections.abc import Sequence
 
-from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
-from bullet_gazebo.physics.files.reading import Reading
-from bullet_gazebo.physics.files.world_file import (
+from robot_envs.errors import RobotEnvError
+from robot_envs.files import Source, is_text, locate, need_file, read_text, resources
+from robot_envs.robot import EMPTY
+from robot_envs.task import Object
+from robot_sim.physics.description import DescriptionError, Light, ModelDescription
+from robot_sim.physics.files.reading import Reading
+from robot_sim.physics.files.world_file import (
     WorldDescription,
     empty_world,
     load_world,
     parse_world,
     read_entity,
 )
-from bullet_gazebo.physics.files.world_file import fill as fill_world
-from bullet_gazebo.physics.world import NameTaken, World
-from bullet_gazebo.simulator import Simulator
-from robot_envs.errors import RobotEnvError
-from robot_envs.files import Source, is_text, locate, need_file, read_text, resources
-from robot_envs.robot import EMPTY
-from robot_envs.task import Object
+from robot_sim.physics.files.world_file import fill as fill_world
+from robot_sim.physics.world import NameTaken, World
+from robot_sim.simulator import Simulator
 
 logger = logging.getLogger(f"rosout.{__name__}")
 

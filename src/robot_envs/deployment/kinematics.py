@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 
-from bullet_gazebo.physics.dynamics import link_poses
-from bullet_gazebo.physics.pose import Pose, conjugate, multiply, scale, subtract
-from bullet_gazebo.state import SCOPE
 from file_access.text import did_you_mean
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.world_state import ONLY_REWARDED, JointState, Motion, StateQuery, Twist, link_keys
+from robot_sim.physics.dynamics import link_poses
+from robot_sim.physics.pose import Pose, conjugate, multiply, scale, subtract
+from robot_sim.state import SCOPE
 
 INSTANT = 1e-5  # [s] either way, over which poses are differentiated
 AT_REST = Motion(Pose())  # the world

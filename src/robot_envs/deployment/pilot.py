@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from bullet_gazebo.control.joint import JointLimits
 from robot_envs import checks
 from robot_envs.controllers import TWIST, CommandPort
 from robot_envs.deployment.kinematics import LinkView
@@ -23,6 +22,7 @@ from robot_envs.world_state import (
     StateQuery,
     WorldState,
 )
+from robot_sim.control.joint import JointLimits
 
 
 class CommandLimits:

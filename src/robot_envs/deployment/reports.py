@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 import rospy
 from sensor_msgs.msg import JointState as JointStateMsg
 
-from bullet_gazebo.control.joint import JointLimits
 from robot_envs.backends.ros.bringup import full_name
 from robot_envs.deployment.pilot import impossible
 from robot_envs.robot import Robot
 from robot_envs.world_state import JointState
+from robot_sim.control.joint import JointLimits
 from ros_utils.readiness import controller_faults
 from ros_utils.service_client import ServiceFailed
 

@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 import numpy as np
 
-from bullet_gazebo.physics.pose import Pose, Vector, add
-from bullet_gazebo.pictures.camera import Camera, CameraLike
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.pictures.placement import Placement, Surroundings
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, WorldState
+from robot_sim.physics.pose import Pose, Vector, add
+from robot_sim.pictures.camera import Camera, CameraLike
 
 if TYPE_CHECKING:
     from viser import ViserServer
 
-    from bullet_gazebo.pictures.renderer import Renderer
     from robot_envs.pictures.page import LivePage, RobotOnPage
+    from robot_sim.pictures.renderer import Renderer
 
 __all__ = ["HEIGHT", "WIDTH", "Camera", "CameraLike", "DrawnEnv", "RobotPicture"]
 
@@ -80,7 +80,7 @@ class RobotPicture:
         return renderer.picture(camera, *self._size)
 
     def _load(self) -> tuple[Placement, Camera, "Renderer"]:
-        from bullet_gazebo.pictures.renderer import Renderer  # loads PyBullet
+        from robot_sim.pictures.renderer import Renderer  # loads PyBullet
 
         placement, renderer = self._place(), Renderer()
         for name, shapes in placement.models.items():

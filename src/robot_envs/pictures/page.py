@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import viser
 
-from bullet_gazebo.physics.description import Link, Shape
-from bullet_gazebo.physics.files.world_file import empty_world
-from bullet_gazebo.physics.pose import IDENTITY, ZERO
-from bullet_gazebo.pictures.camera import ASPECT, CameraLike, overview
-from bullet_gazebo.pictures.page import Picture
-from bullet_gazebo.pictures.visuals import VisibleModel, visible_model
 from robot_envs.pictures.placement import Placement
+from robot_sim.physics.description import Link, Shape
+from robot_sim.physics.files.world_file import empty_world
+from robot_sim.physics.pose import IDENTITY, ZERO
+from robot_sim.pictures.camera import ASPECT, CameraLike, overview
+from robot_sim.pictures.page import Picture
+from robot_sim.pictures.visuals import VisibleModel, visible_model
 from web_viewer.address import LOOPBACK, PortInUse, find_address
 from web_viewer.server import serve, stop
 

@@ -6,14 +6,14 @@ from math import pi
 
 import numpy as np
 
-from bullet_gazebo.physics.description import Joint, ModelDescription, Shape
-from bullet_gazebo.physics.dynamics import link_poses
-from bullet_gazebo.physics.pose import Pose, Vector, subtract
-from bullet_gazebo.pictures.camera import THIRD, Camera, CameraLike, overview
-from bullet_gazebo.pictures.visuals import boxes_of, moved, visible_shapes
 from robot_envs.backends.world_files import object_model, world_models
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
+from robot_sim.physics.description import Joint, ModelDescription, Shape
+from robot_sim.physics.dynamics import link_poses
+from robot_sim.physics.pose import Pose, Vector, subtract
+from robot_sim.pictures.camera import THIRD, Camera, CameraLike, overview
+from robot_sim.pictures.visuals import boxes_of, moved, visible_shapes
 
 GOAL = "goal of the task"  # model
 PINK = (0.9, 0.1, 0.5, 1.0)

@@ -8,9 +8,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from bullet_gazebo.physics.description import ModelDescription
-from bullet_gazebo.physics.dynamics import link_poses
-from bullet_gazebo.physics.pose import Pose, Vector, from_rpy, rotate, to_rpy
 from robot_envs.backends.world_files import world_models
 from robot_envs.controllers import TWIST, CommandPort
 from robot_envs.errors import TaskError
@@ -19,6 +16,9 @@ from robot_envs.robot import Robot
 from robot_envs.robots import actions, numbers
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, Motion, StateQuery, WorldState
+from robot_sim.physics.description import ModelDescription
+from robot_sim.physics.dynamics import link_poses
+from robot_sim.physics.pose import Pose, Vector, from_rpy, rotate, to_rpy
 
 UNIT = 0.3  # [m] that a range is compared with
 THERE = 0.3  # [m] from the goal: it is reached

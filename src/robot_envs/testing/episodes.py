@@ -8,7 +8,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from bullet_gazebo.physics.pose import conjugate, rotate
 from robot_envs.backends import make_backend
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
@@ -23,6 +22,7 @@ from robot_envs.testing.rollouts import (
     same,
 )
 from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
+from robot_sim.physics.pose import conjugate, rotate
 
 LOWER = 0.8  # of the height at which a robot starts: it hasn't sunk
 UPRIGHT = 0.9  # cosine of the largest tilt

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Protocol
 
-from bullet_gazebo.control.pid import Gains
-from bullet_gazebo.physics.description import Inertia
-from bullet_gazebo.physics.pose import Vector, scale
 from robot_envs.scene import Scene
 from robot_envs.variation.parts import Parts, RobotPart, varied
 from robot_envs.variation.variation import Variation, scaled
+from robot_sim.control.pid import Gains
+from robot_sim.physics.description import Inertia
+from robot_sim.physics.pose import Vector, scale
 
 
 class Changeable(Protocol):

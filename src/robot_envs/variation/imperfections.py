@@ -7,9 +7,9 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from bullet_gazebo.sensors.sensor_readers import noisy_fields
 from file_access.text import nearest_or_all
 from robot_envs.world_state import Joints, JointState, Reading, Sensors, WorldState
+from robot_sim.sensors.sensor_readers import noisy_fields
 
 
 def is_number(value: Any) -> bool:

@@ -6,14 +6,14 @@ Joints are named as in a state, controllers as in commands, and links like joint
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.pid import Gains
 from file_access.text import nearest_or_all
 from robot_envs.controllers import load
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.variation.variation import length_axis
+from robot_sim.control.errors import ControlError
+from robot_sim.control.pid import Gains
 
 # Of control_toolbox's server.
 MOST_GAINS = {"p": 1e5, "i": 1e5, "d": 1e3, "i_max": 1e5, "i_min": 1e5}

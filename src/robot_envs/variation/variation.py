@@ -6,9 +6,9 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from bullet_gazebo.physics.description import Inertia
-from bullet_gazebo.physics.dynamics import tensor_in
-from bullet_gazebo.physics.pose import IDENTITY, ZERO, Quaternion, Vector, conjugate
+from robot_sim.physics.description import Inertia
+from robot_sim.physics.dynamics import tensor_in
+from robot_sim.physics.pose import IDENTITY, ZERO, Quaternion, Vector, conjugate
 
 
 class LinkScale(NamedTuple):

@@ -1,6 +1,6 @@
 """A module that has a controller, and a fault at import."""
 
-from bullet_gazebo.control.controllers.base import Controller
+from robot_sim.control.controllers.base import Controller
 
 
 class Any(Controller):

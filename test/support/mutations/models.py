@@ -18,20 +18,20 @@ from hypothesis import strategies as st
 from support.mutations.xml_trees import MOST_CHANGES, mutated_xml
 from support.robots.cartpole import cartpole_urdf
 
-from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.hardware import GAINS, RobotHardware
-from bullet_gazebo.control.manager import ControllerManager
-from bullet_gazebo.control.transmissions import read_description
-from bullet_gazebo.physics.description import DescriptionError, ModelDescription
-from bullet_gazebo.physics.files.reading import Reading, Resources
-from bullet_gazebo.physics.files.sdf import parse_sdf
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.files.world_file import parse_world, read_entity
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World
 from file_access.content import FileError
 from file_access.expansion import CannotExpand, expand
 from file_access.yaml_text import load_parameters
+from robot_sim.control.errors import ControlError
+from robot_sim.control.hardware import GAINS, RobotHardware
+from robot_sim.control.manager import ControllerManager
+from robot_sim.control.transmissions import read_description
+from robot_sim.physics.description import DescriptionError, ModelDescription
+from robot_sim.physics.files.reading import Reading, Resources
+from robot_sim.physics.files.sdf import parse_sdf
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.files.world_file import parse_world, read_entity
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import World
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 LONGEST = 5000  # characters of a refusal

@@ -13,16 +13,16 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from bullet_gazebo.physics.description import Mesh, Shape
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.pictures.camera import Camera
-from bullet_gazebo.pictures.renderer import Renderer
-from bullet_gazebo.pictures.visuals import visible_shapes
-from bullet_gazebo.sensors.laser import Laser
 from rl_workbench.tools.policies import load_learned
 from rl_workbench.tools.runs import open_run
 from robot_envs import RobotEnv
 from robot_envs.robots.rover import ROBOT
+from robot_sim.physics.description import Mesh, Shape
+from robot_sim.physics.pose import Pose
+from robot_sim.pictures.camera import Camera
+from robot_sim.pictures.renderer import Renderer
+from robot_sim.pictures.visuals import visible_shapes
+from robot_sim.sensors.laser import Laser
 
 RED, BLUE = (0.9, 0.1, 0.1, 1.0), (0.2, 0.4, 0.95, 0.3)
 POINT = Shape("box", (0.06, 0.06, 0.06), rgba=RED)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from bullet_gazebo.physics.pose import Vector
-from bullet_gazebo.pictures.camera import Camera
+from robot_sim.physics.pose import Vector
+from robot_sim.pictures.camera import Camera
 
 
 def pixel(camera: Camera, point: Vector, width: float, height: float) -> tuple[float, float]:

@@ -7,13 +7,13 @@ from pathlib import Path
 import yaml
 from support.robots.worlds import add_robot, start
 
-from bullet_gazebo.physics.engine import Twist
-from bullet_gazebo.physics.engines import make_engine
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose, from_rpy
-from bullet_gazebo.physics.world import World, ground_plane
-from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.state import LinkQuery, StateAnswer, StateQuery, StateReader
+from robot_sim.physics.engine import Twist
+from robot_sim.physics.engines import make_engine
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose, from_rpy
+from robot_sim.physics.world import World, ground_plane
+from robot_sim.simulator import Simulator
+from robot_sim.state import LinkQuery, StateAnswer, StateQuery, StateReader
 
 FILES = Path(__file__).resolve().parents[2] / "data" / "robots"
 ARM = FILES / "two_link_arm.urdf"

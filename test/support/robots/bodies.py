@@ -1,7 +1,7 @@
 """Small models: a flying box and a turning wheel for the laws of motion, a rover for pictures."""
 
-from bullet_gazebo.physics.pose import Pose
 from robot_envs.robot import Robot
+from robot_sim.physics.pose import Pose
 
 BOX = """<robot name="box"><link name="body"><inertial><origin xyz="0.1 0 0.2"/>
 <mass value="2"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.15"/></inertial>

@@ -8,11 +8,11 @@ from scipy.integrate import solve_ivp
 from support.robots.cartpole import GRAVITY, CartPole, cartpole_urdf
 from support.robots.worlds import add_robot, start
 
-from bullet_gazebo.physics.engine import Engine
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World
-from bullet_gazebo.simulator import Simulator
+from robot_sim.physics.engine import Engine
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import World
+from robot_sim.simulator import Simulator
 
 PLANT = CartPole()
 SAMPLE = 0.02  # [s] between the samples of a trajectory

@@ -1,12 +1,12 @@
 """A cart-pole without physics: a backend for unit tests of environments."""
 
-from bullet_gazebo.physics.pose import Pose
 from cartpole.robot import CART_JOINT, CONTROLLER, POLE_JOINT, ROBOT
 from cartpole.tasks import CartPoleState
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, JointState, StateQuery, WorldState
+from robot_sim.physics.pose import Pose
 
 DT = 0.008  # [s]
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import xacro
 from support.robots.worlds import add_robot
 
-from bullet_gazebo.control.manager import STRICT
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.robot import ControlledRobot
-from bullet_gazebo.simulator import Simulator
+from robot_sim.control.manager import STRICT
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.robot import ControlledRobot
+from robot_sim.simulator import Simulator
 
 ROBOTS = Path(__file__).resolve().parents[2] / "data" / "robots"
 

@@ -1,13 +1,13 @@
 """A JointTrajectoryController on obedient joints, stepped tick by tick."""
 
-from bullet_gazebo.control.controllers import BUILT_IN
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.trajectory_goals import (
+from robot_sim.control.controllers import BUILT_IN
+from robot_sim.control.hardware import RobotHardware
+from robot_sim.control.trajectory_goals import (
     GoalRequest,
     Trajectory,
     TrajectoryPoint,
 )
-from bullet_gazebo.control.transmissions import read_description
+from robot_sim.control.transmissions import read_description
 
 MS, S = 1_000_000, 1_000_000_000  # [ns]
 DT = 0.001  # [s]

@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 from typing import Any
 
-from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.control.transmissions import read_description
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import ControlledRobot
-from bullet_gazebo.simulator import Simulator
+from robot_sim.control.hardware import RobotHardware
+from robot_sim.control.manager import STRICT, ControllerManager
+from robot_sim.control.transmissions import read_description
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import World
+from robot_sim.robot import ControlledRobot
+from robot_sim.simulator import Simulator
 
 ORIGIN = Pose()
 

@@ -10,10 +10,10 @@ from geometry_msgs.msg import Twist
 from support.robots.vehicles import RADIUS
 from support.ros.silent_topics import SilentPublisher, SilentSubscriber, silence
 
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose, to_rpy
-from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
-from bullet_gazebo.simulator import Simulator
+from bullet_gazebo.plugins.plugin_loader import PluginRegistry
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose, to_rpy
+from robot_sim.simulator import Simulator
 
 MS = 1_000_000
 

@@ -30,7 +30,7 @@ from hypothesis import strategies as st
 from std_srvs.srv import Empty
 from support.ros.odd_requests import BOX, SIMPLE, messages, requests
 
-from bullet_gazebo.ros.clients.gz import METHOD
+from bullet_gazebo.clients.gz import METHOD
 from cartpole.robot import ROBOT
 from robot_envs.backends.ros.bringup import bring_up
 from robot_envs.scene import Scene

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from support.robots.new_robots import FIXED
 
-from bullet_gazebo.physics.dynamics import link_poses
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose, rotate
 from package_writing.standing import centre_of_mass, feet
 from robot_envs import LinkQuery, RobotEnv, StateQuery
 from robot_envs.backends import make_backend
 from robot_envs.scene import Scene
 from robot_envs.testing import check_stands
 from robot_envs.world_state import InitialState
+from robot_sim.physics.dynamics import link_poses
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose, rotate
 
 QUADRUPED = Path(__file__).resolve().parents[2] / "data/robots/quadruped.urdf"
 BIPED = QUADRUPED.with_name("biped.urdf.xacro")

@@ -17,12 +17,12 @@ from support.robots.new_robots import (
 )
 from support.robots.vehicles import TRACK, four_wheels, three_wheels, two_wheels, wheel
 
-from bullet_gazebo.physics.files.urdf import parse_urdf
 from package_writing.standing import standing_height
 from package_writing.survey import look_at
 from package_writing.vehicle import DRIVE, Base, find_base
 from robot_envs import RobotEnv
 from robot_envs.files import resources
+from robot_sim.physics.files.urdf import parse_urdf
 
 ROUND = """<collision><origin rpy="1.5707963267948966 0 0"/><geometry>
 <cylinder radius="0.1" length="0.04"/></geometry></collision>"""

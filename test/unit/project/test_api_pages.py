@@ -7,11 +7,19 @@ from pathlib import Path
 
 import pytest
 
-LIBRARIES = ("bullet_gazebo", "cartpole", "rl_workbench", "robot_envs", "ros_calls", "ros_utils")
+LIBRARIES = (
+    "bullet_gazebo",
+    "cartpole",
+    "rl_workbench",
+    "robot_envs",
+    "robot_sim",
+    "ros_calls",
+    "ros_utils",
+)
 IMPORT = re.compile(rf"^ *from ((?:{'|'.join(LIBRARIES)})[\w.]*) import ([\w, ]+)$", re.MULTILINE)
 NOT_FOR_USERS = ("docs/architecture.md",)
 # Their classes are named by other names: controllers' types, ids of environments.
-NAMED_OTHERWISE = ("bullet_gazebo.", "robot_envs.robots.", "cartpole.tasks")
+NAMED_OTHERWISE = ("bullet_gazebo.", "robot_sim.", "robot_envs.robots.", "cartpole.tasks")
 SINGLE_WORDS = {"Reading", "Twist"}  # also words of ROS
 
 

@@ -22,11 +22,11 @@ ROS = ("rospy", "rosgraph", "rosnode", "roslib", "rosparam", "roslaunch", "rosse
 LINTER = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
 LAYERS = [set(layer.split(" | ")) for layer in LINTER["contracts"][0]["layers"]]
 # What still names higher libraries.
-NAMING = {"bullet_gazebo/held_state.py", "bullet_gazebo/physics/engines/__init__.py"}
+NAMING = {"robot_sim/held_state.py", "robot_sim/physics/engines/__init__.py"}
 WITHOUT_ROS = (
-    "bullet_gazebo.physics.world",
-    "bullet_gazebo.control.manager",
-    "bullet_gazebo.simulator",
+    "robot_sim.physics.world",
+    "robot_sim.control.manager",
+    "robot_sim.simulator",
     "cartpole.pg_train",
     "cartpole.workbench",
     "rl_workbench.cli",
@@ -96,9 +96,9 @@ def loaded_by(*names: str) -> set[str]:
 @pytest.mark.parametrize(
     ("module", "absent"),
     [
-        ("bullet_gazebo.ros.node.gzserver", LEARNING),
-        ("bullet_gazebo.ros.clients.gz", {"rospy", *LEARNING}),
-        ("bullet_gazebo.simulator", LEARNING),
+        ("bullet_gazebo.node.gzserver", LEARNING),
+        ("bullet_gazebo.clients.gz", {"rospy", *LEARNING}),
+        ("robot_sim.simulator", LEARNING),
     ],
 )
 def test_an_import_leaves_out_what_takes_seconds(module: str, absent: set[str]) -> None:

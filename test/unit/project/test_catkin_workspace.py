@@ -27,7 +27,7 @@ INSTALLED = Path(sys.prefix).parent / "base.txt"  # requirements/base.txt withou
 UNUSED = r"CMake Warning:\s+Manually-specified variables.*\s+Python_EXECUTABLE\s"
 MODULES = (
     "import bullet_gazebo_msgs.srv, cartpole.tasks, robot_envs.robot, rl_workbench.cli,"
-    " gazebo_msgs.srv, ros_utils, bullet_gazebo.control,"
+    " gazebo_msgs.srv, ros_utils, robot_sim.control,"
     " controller_manager.controller_manager_interface, controller_manager_msgs.utils"
 )
 

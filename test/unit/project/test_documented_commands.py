@@ -26,9 +26,9 @@ import yaml
 from bullet_gazebo_msgs.srv import RestoreStateRequest, SaveStateRequest, StepWorldRequest
 from gazebo_msgs.srv import GetWorldPropertiesRequest
 
-from bullet_gazebo.ros.clients import gzclient
-from bullet_gazebo.ros.journal import journal_output
-from bullet_gazebo.ros.node import replay_command
+from bullet_gazebo.clients import gzclient
+from bullet_gazebo.journal import journal_output
+from bullet_gazebo.node import replay_command
 from cartpole import dqn_train, pg_train, policy_node, workbench
 from lockstep_runner import launcher as lockstep_launcher
 from package_writing import check_cli as check_robot

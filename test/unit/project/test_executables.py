@@ -13,7 +13,7 @@ pytestmark = pytest.mark.slow
 
 BOUND = 60.0  # [s]
 SCRIPTS = Path(__file__).parents[3] / "scripts"
-MAIN = "import sys; from bullet_gazebo.ros.{} import {} as main; sys.exit(main())"
+MAIN = "import sys; from bullet_gazebo.{} import {} as main; sys.exit(main())"
 PROGRAMS = {  # module and function: arguments, exit code after Ctrl-C
     "clients.spawner main": (["a_controller"], 0),
     "clients.spawner unspawner_main": (["a_controller"], 0),

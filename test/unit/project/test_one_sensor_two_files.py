@@ -14,23 +14,23 @@ from support.ros.silent_topics import SilentPublisher, SilentSubscriber, silence
 from support.scenes.rover import PARTS, ROVER
 from support.scenes.seeing_rover import Look, sensor
 
-import bullet_gazebo.ros.plugins
-import bullet_gazebo.sensors
-from bullet_gazebo.physics.engines import make_engine
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World
-from bullet_gazebo.ros.common.messages import to_reading
-from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
-from bullet_gazebo.ros.window.sensor_panel import drawn_as
-from bullet_gazebo.sensors.sensing import Sensing
-from bullet_gazebo.sensors.sensor_readers import SensorReaders, measurements
-from bullet_gazebo.simulator import Simulator
+import bullet_gazebo.plugins
+import robot_sim.sensors
+from bullet_gazebo.common.messages import to_reading
+from bullet_gazebo.plugins.plugin_loader import PluginRegistry
+from bullet_gazebo.window.sensor_panel import drawn_as
 from robot_envs import RobotEnv, StateQuery
 from robot_envs.backends.ros import sensor_listener
 from robot_envs.backends.ros.sensor_listener import SensorListener
+from robot_sim.physics.engines import make_engine
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import World
+from robot_sim.sensors.sensing import Sensing
+from robot_sim.sensors.sensor_readers import SensorReaders, measurements
+from robot_sim.simulator import Simulator
 
-FOLDERS = {bullet_gazebo.sensors: "sensors", bullet_gazebo.ros.plugins: "plugins"}
+FOLDERS = {robot_sim.sensors: "sensors", bullet_gazebo.plugins: "plugins"}
 WARM = sensor("warm", "thermometer", 50, "", "x").replace("libgazebo_ros_x.so", "libthermometer.so")
 ROBOT = replace(ROVER, urdf=f'<robot name="warm">{"".join([*PARTS, WARM])}</robot>')
 WANTED = 300.0 - 10.0 * 0.22

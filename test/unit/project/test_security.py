@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.files.reading import Reading, Resources
-from bullet_gazebo.physics.files.world_file import read_entity
+from robot_sim.physics.description import DescriptionError
+from robot_sim.physics.files.reading import Reading, Resources
+from robot_sim.physics.files.world_file import read_entity
 
 ROOT = Path(__file__).resolve().parents[3]
 MODULES = sorted(
@@ -22,7 +22,7 @@ DANGEROUS = {
 # The launcher runs the script that its user names, as `python3 script.py` does.
 RUNS_A_SCRIPT = {("src/lockstep_runner/script.py", name) for name in ("compile", "exec")}
 # The process that draws a video reads what its own parent writes into their pipe.
-READS_ITS_PARENT = {("src/bullet_gazebo/pictures/films.py", "pickle.load")}
+READS_ITS_PARENT = {("src/robot_sim/pictures/films.py", "pickle.load")}
 MODEL = '<sdf version="1.6"><model name="m">{}</model></sdf>'
 INCLUDE = "<include><uri>{}</uri></include>"
 MESH = """<link name="l"><collision name="c"><geometry><mesh><uri>{}</uri></mesh></geometry></collision>

@@ -90,7 +90,7 @@ def test_there_is_no_ros(python: Path, tmp_path: Path) -> None:
 
 
 def test_all_libraries_come_from_the_wheel(python: Path, tmp_path: Path) -> None:
-    code = "import cartpole, robot_envs, rl_workbench, bullet_gazebo.simulator as s; print(cartpole, s)"
+    code = "import cartpole, robot_envs, rl_workbench, robot_sim.simulator as s; print(cartpole, s)"
     printed = run(python, "-c", code, cwd=tmp_path)
     assert printed.count(str(python.parents[1] / "lib")) == 2
 

@@ -12,9 +12,9 @@ from support.pages.viser_recording import Recording
 from support.robots.bodies import ROVER_ROBOT
 
 import cartpole  # noqa: F401 - registers its environments
-from bullet_gazebo.physics.pose import Pose
 from robot_envs.pictures import page
 from robot_envs.pictures.drawn import Camera, RobotPicture
+from robot_sim.physics.pose import Pose
 from web_viewer.address import LOOPBACK, Address
 
 

@@ -10,11 +10,11 @@ from support.robots.bodies import ROVER, ROVER_ROBOT
 from support.robots.pendulum import PENDULUM
 
 import cartpole  # noqa: F401 - registers its environments
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.pictures.camera import Camera
 from robot_envs.errors import RobotEnvError
 from robot_envs.pictures.drawn import RobotPicture
 from robot_envs.robots.hopper import ROBOT as HOPPER
+from robot_sim.physics.pose import Pose
+from robot_sim.pictures.camera import Camera
 
 
 def where(picture: np.ndarray, channel: int) -> np.ndarray:

@@ -5,11 +5,11 @@ import math
 import pytest
 from support.robots.pendulum import MOTOR, PENDULUM, hanging
 
-from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.world_state import InitialState, LinkQuery, Motion, StateQuery
+from robot_sim.physics.pose import Pose
 
 HINGE, PERIOD = 1.0, 0.01  # [m] above the model, [s]
 ROD = StateQuery(links=(LinkQuery("rod"),), models=("pendulum",), all_contacts=True)

@@ -22,9 +22,9 @@ SRC = ROOT / "src"
 INSTALLED = Path(sys.prefix).parent / "base.txt"  # requirements/base.txt without what Debian has
 STARTED = "\n".join(
     [
-        "import sys, bullet_gazebo.ros.node.gzserver",
-        "from bullet_gazebo.physics.engines import make_engine",
-        "import bullet_gazebo.physics.files.mesh_program",
+        "import sys, bullet_gazebo.node.gzserver",
+        "from robot_sim.physics.engines import make_engine",
+        "import robot_sim.physics.files.mesh_program",
         "make_engine()",
         "print(*sys.modules)",
     ]

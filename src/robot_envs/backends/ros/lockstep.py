@@ -21,8 +21,7 @@ from geometry_msgs.msg import Point, Quaternion, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
 from geometry_msgs.msg import Twist as TwistMsg
 
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.ros.common.messages import from_contact_state
+from bullet_gazebo.common.messages import from_contact_state
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.ros.bringup import full_name, ready
 from robot_envs.backends.ros.properties import RosVariation
@@ -52,6 +51,7 @@ from robot_envs.world_state import (
     WorldState,
     link_keys,
 )
+from robot_sim.physics.pose import Pose
 from ros_calls.service import TIMEOUT
 from ros_utils.step_client import MOTION, PreparedSteps, StepAnswer, StepNames, StepRefused, time_of
 

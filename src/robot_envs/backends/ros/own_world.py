@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.simulator import NANOSECONDS
 from robot_envs.backends import backend
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.ros.bringup import bring_up
@@ -19,6 +17,8 @@ from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, Sim
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
+from robot_sim.physics.pose import Pose
+from robot_sim.simulator import NANOSECONDS
 from ros_calls import master
 
 DEADLINE = (

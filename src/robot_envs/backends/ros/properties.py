@@ -20,11 +20,6 @@ from gazebo_msgs.srv import (
 )
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 
-from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.pid import Gains
-from bullet_gazebo.physics.description import Inertia
-from bullet_gazebo.physics.pose import IDENTITY, Vector
-from bullet_gazebo.physics.pose import Pose as Frame
 from robot_envs.backends.ros.bringup import full_name
 from robot_envs.backends.ros.running import SimulatorService, check_success
 from robot_envs.errors import SimulatorError
@@ -32,6 +27,11 @@ from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.variation.applying import Applier
 from robot_envs.variation.parts import RobotPart, gains_of
+from robot_sim.control.errors import ControlError
+from robot_sim.control.pid import Gains
+from robot_sim.physics.description import Inertia
+from robot_sim.physics.pose import IDENTITY, Vector
+from robot_sim.physics.pose import Pose as Frame
 from ros_calls import master
 from ros_calls.master import NoAnswer, Refused
 from ros_calls.service import TIMEOUT

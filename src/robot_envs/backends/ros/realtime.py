@@ -15,7 +15,6 @@ from geometry_msgs.msg import Pose as PoseMsg
 from sensor_msgs.msg import JointState as JointStateMsg
 from std_srvs.srv import Empty
 
-from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.ros.bringup import command_message, command_publisher, full_name, ready
 from robot_envs.backends.ros.properties import RosVariation
@@ -41,6 +40,7 @@ from robot_envs.world_state import (
     StateQuery,
     WorldState,
 )
+from robot_sim.physics.pose import Pose
 from ros_calls.waiting import wait_until
 
 STATE_TIMEOUT = 5.0  # [s] of wall time without a joint state

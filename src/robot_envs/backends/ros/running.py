@@ -13,7 +13,6 @@ from geometry_msgs.msg import Point, Quaternion
 from geometry_msgs.msg import Pose as PoseMsg
 from sensor_msgs.msg import JointState as JointStateMsg
 
-from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.ros import node
 from robot_envs.backends.world_files import world_models
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, SimulatorHangs
@@ -22,6 +21,7 @@ from robot_envs.robot import EMPTY, Robot
 from robot_envs.scene import Scene
 from robot_envs.task import Object
 from robot_envs.world_state import Joints, JointState
+from robot_sim.physics.pose import Pose
 from ros_calls import master, service
 from ros_calls.master import NoAnswer, Refused, living_address
 from ros_utils import ros_gazebo

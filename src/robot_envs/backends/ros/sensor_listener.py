@@ -10,16 +10,16 @@ import rospy
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image
 
-from bullet_gazebo.physics.description import DescriptionError, Plugin, library_of
-from bullet_gazebo.physics.files.sdf_parts import value
-from bullet_gazebo.physics.pose import normalized, rotate
-from bullet_gazebo.ros.plugins.plugin_loader import built_in
-from bullet_gazebo.ros.plugins.sensor_topics import MODEL, TopicSource
-from bullet_gazebo.sensors.sensing import slower
+from bullet_gazebo.plugins.plugin_loader import built_in
+from bullet_gazebo.plugins.sensor_topics import MODEL, TopicSource
 from file_access.text import did_you_mean
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.world_state import ODOMETRY, Motion, Pose, Reading, Sensors, Twist
+from robot_sim.physics.description import DescriptionError, Plugin, library_of
+from robot_sim.physics.files.sdf_parts import value
+from robot_sim.physics.pose import normalized, rotate
+from robot_sim.sensors.sensing import slower
 
 Values = Mapping[str, Any]
 LATE_PERIODS = 3  # of a sensor

@@ -24,7 +24,7 @@ import ctypes, os, signal, sys
 ctypes.CDLL(None).prctl({PR_SET_PDEATHSIG}, signal.SIGKILL)
 if os.getppid() != int(sys.argv.pop(1)):
     sys.exit(1)
-from bullet_gazebo.ros.node.gzserver import main
+from bullet_gazebo.node.gzserver import main
 sys.exit(main())
 """
 

@@ -2,7 +2,7 @@
 
 from geometry_msgs.msg import Vector3
 
-from bullet_gazebo.control.controllers.base import (
+from robot_sim.control.controllers.base import (
     Controller,
     Input,
     Output,

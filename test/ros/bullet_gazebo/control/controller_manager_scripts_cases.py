@@ -17,8 +17,8 @@ from controller_manager import controller_manager_interface as interface
 from support.ros.calls import BOUND, delete_model, executable
 from support.ros.manager import STRICT, Manager
 
-from bullet_gazebo.ros.clients.manager_commands import group_main
-from bullet_gazebo.ros.clients.manager_commands import main as manager_main
+from bullet_gazebo.clients.manager_commands import group_main
+from bullet_gazebo.clients.manager_commands import main as manager_main
 
 GROUPS = {"upper": ["pole"], "lower": ["cart", "pole"], "other": ["cart2", "pole"], "empty": []}
 NONE = "No controllers are loaded in mechanism control\n"

@@ -22,7 +22,7 @@ WITHOUT = """
 import importlib.util, sys
 find = importlib.util.find_spec
 importlib.util.find_spec = lambda name, *more: None if name == "mujoco" else find(name, *more)
-from bullet_gazebo.ros.node.gzserver import main
+from bullet_gazebo.node.gzserver import main
 sys.exit(main(["gzserver", "-e", "mujoco", "__name:=lonely"]))
 """
 

@@ -18,7 +18,7 @@ import rosgraph
 import rospkg
 import rostest
 
-from bullet_gazebo.ros.clients.gz import RemoteWorld
+from bullet_gazebo.clients.gz import RemoteWorld
 from ros_calls.waiting import wait_until
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils.simulation import Simulation, reserved_port

@@ -18,6 +18,7 @@ class Workspace(unittest.TestCase):
             "controller_manager_msgs.srv",
             "bullet_gazebo_msgs.srv",
             "bullet_gazebo",
+            "robot_sim",
             "ros_utils",
         ):
             with self.subTest(name):

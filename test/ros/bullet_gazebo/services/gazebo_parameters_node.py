@@ -10,7 +10,7 @@ import rospy
 import rostest
 from rosgraph_msgs.msg import Clock
 
-from bullet_gazebo.ros.clients.gz import RemoteWorld
+from bullet_gazebo.clients.gz import RemoteWorld
 
 BOUND = 60.0  # [s of wall time]
 PERIOD = 10_000_000  # [ns] of the 100 Hz that the launch file asks for

@@ -10,7 +10,7 @@ from geometry_msgs.msg import Point, Pose, Vector3
 from std_srvs.srv import Empty
 from support.ros.calls import BOUND
 
-from bullet_gazebo.ros.clients.gz import RemoteWorld
+from bullet_gazebo.clients.gz import RemoteWorld
 
 NAN, INF = float("nan"), float("inf")
 SCOPE = "did you forget to scope the link by model name?"

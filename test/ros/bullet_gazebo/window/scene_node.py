@@ -22,7 +22,7 @@ from gazebo_msgs.srv import (
 from support.ros.calls import BOUND
 from support.ros.subscribed import Listener
 
-from bullet_gazebo.ros.clients.gz import RemoteWorld
+from bullet_gazebo.clients.gz import RemoteWorld
 
 BALL = """<robot name="ball"><link name="ball">
 <inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>

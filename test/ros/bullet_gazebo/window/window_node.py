@@ -16,12 +16,12 @@ from PIL import Image
 from support.pages.browser import wait_for
 from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count, proxy
 
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.pictures.camera import ASPECT, THIRD, overview
-from bullet_gazebo.pictures.renderer import Renderer
-from bullet_gazebo.pictures.visuals import visible_shapes
-from bullet_gazebo.ros.common.messages import from_pose_msg
-from bullet_gazebo.ros.window.window import CAMERA
+from bullet_gazebo.common.messages import from_pose_msg
+from bullet_gazebo.window.window import CAMERA
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.pictures.camera import ASPECT, THIRD, overview
+from robot_sim.pictures.renderer import Renderer
+from robot_sim.pictures.visuals import visible_shapes
 from ros_calls import master
 
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}

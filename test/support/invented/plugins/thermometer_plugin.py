@@ -4,9 +4,9 @@ import numpy as np
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Header
 
-from bullet_gazebo.ros.common.messages import to_time
-from bullet_gazebo.ros.plugins.sensor_topics import SensorPlugin, TopicSource
-from bullet_gazebo.sensors.thermometer import Thermometer
+from bullet_gazebo.common.messages import to_time
+from bullet_gazebo.plugins.sensor_topics import SensorPlugin, TopicSource
+from robot_sim.sensors.thermometer import Thermometer
 
 
 def read(message: Temperature) -> dict[str, np.ndarray]:

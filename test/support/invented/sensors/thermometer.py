@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bullet_gazebo.sensors.sensing import Field, Measurement, Mount, sensor_of, sensor_pose
+from robot_sim.sensors.sensing import Field, Measurement, Mount, sensor_of, sensor_pose
 
 LAPSE = 10.0  # [K/m], so that heights of a room show
 

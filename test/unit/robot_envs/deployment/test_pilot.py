@@ -9,11 +9,11 @@ import pytest
 from support.scenes.rover import ROVER, Roll
 
 import cartpole  # noqa: F401 - registers the environments
-from bullet_gazebo.control.joint import JointLimits
 from robot_envs import GoalTask, JointState, LinkQuery, Robot, RobotEnv, StateQuery
 from robot_envs.deployment.pilot import CommandLimits, Pilot, impossible
 from robot_envs.errors import RobotEnvError
 from robot_envs.robots.rover import ROBOT as TWO_WHEELED
+from robot_sim.control.joint import JointLimits
 
 FILES = Path(__file__).resolve().parents[3] / "data" / "robots"
 PERIOD = 0.008  # [s] of the cart-pole's actions

@@ -6,9 +6,9 @@ import pytest
 import rospy
 from sensor_msgs.msg import JointState as JointStateMsg
 
-from bullet_gazebo.control.joint import JointLimits
 from robot_envs.deployment import reports
 from robot_envs.world_state import JointState
+from robot_sim.control.joint import JointLimits
 
 
 class Clock:

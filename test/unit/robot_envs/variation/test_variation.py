@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bullet_gazebo.physics.description import Inertia
-from bullet_gazebo.physics.dynamics import tensor_in
-from bullet_gazebo.physics.pose import IDENTITY, Pose
 from robot_envs.variation import LinkScale, Variation
 from robot_envs.variation.variation import length_axis, scaled
+from robot_sim.physics.description import Inertia
+from robot_sim.physics.dynamics import tensor_in
+from robot_sim.physics.pose import IDENTITY, Pose
 
 ROD = Inertia(2.0, Pose((0.0, 0.0, 0.5)), ixx=1.0, iyy=1.0, izz=0.1)
 UP = (math.sin(math.pi / 4), 0.0, 0.0, math.cos(math.pi / 4))  # a quarter about x: z to -y

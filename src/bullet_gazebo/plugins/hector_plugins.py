@@ -1,0 +1,345 @@
+"""hector_gazebo_plugins' IMU, GPS, magnetometer and sonar (docs/contract/sensors.md 12.1).
+
+They publish without subscribers, at multiples of `updatePeriod` [s] or of that of `updateRate` (absent: every
+step) after `updateOffset` [s], and have errors that drift.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
+from typing import Any
+
+import numpy as np
+import rospy
+from dynamic_reconfigure.encoding import Config
+from geometry_msgs.msg import Quaternion, Vector3, Vector3Stamped
+from hector_gazebo_plugins.srv import SetBias
+from sensor_msgs.msg import Imu as ImuMsg
+from sensor_msgs.msg import MagneticField, NavSatFix, NavSatStatus, Range
+from std_msgs.msg import Header
+from std_srvs.srv import Empty
+
+from bullet_gazebo.common.dynamic_server import FIRST, DynamicServer, Parameter
+from bullet_gazebo.common.messages import NANOSECONDS, to_time
+from bullet_gazebo.plugins.plugin_loader import PluginContext
+from bullet_gazebo.plugins.sensor_topics import (
+    ContextPlugin,
+    advertised,
+    namespace_of,
+    offer_shared,
+    topic_in,
+)
+from robot_sim.physics.files.elements import numbers, truth
+from robot_sim.physics.pose import conjugate, from_rpy, multiply, rotate
+from robot_sim.sensors.drift import DriftingError
+from robot_sim.sensors.imu import Imu, LinkMotion, motion_of
+from robot_sim.sensors.laser import LaserSensor, nearest
+from robot_sim.sensors.noise import checked_deviation
+
+MOST = 1e6  # that dynamic_reconfigure sets
+EQUATOR = 6378137.0  # [m], radius of WGS84
+FLATTENING = 1.0 / 298.257223563
+GPS_RATE = 4.0  # [Hz]
+SONAR_RATE = 10.0  # [Hz]
+GRAVITY = 9.8065  # [m/s²]
+ATTRIBUTES = {
+    "gaussian_noise": "noise", "offset": "offset", "drift": "drift", "drift_frequency": "frequency",
+    "scale_error": "scale",
+}  # fmt: skip
+MODEL = [
+    Parameter(name, "double", 0.0, 0.0 if name == "drift_frequency" else -MOST, MOST)
+    for name in ATTRIBUTES
+]
+
+
+class HectorTimer:
+    """What they have in common: a clock that is always heard.
+
+    Args:
+        context: the plugin's.
+        default: rate [Hz] without `<updateRate>`; 0 is every step.
+        errors: whose drift begins again when time does, and with a new seed.
+        send: publishes the measurement at a time [ns], some time [s] after the last one.
+    """
+
+    def __init__(
+        self,
+        context: PluginContext,
+        default: float,
+        errors: Sequence[DriftingError],
+        send: Callable[[int, float], None],
+    ) -> None:
+        self._context = context
+        self._send = send
+        self.namespace = namespace_of(context, absent="", empty="")
+        self._errors = errors
+        self._seeds = context.sensing.seeds
+        self._last = context.sim.now
+        period = context.number("updatePeriod", 0.0)
+        self.rate = 1.0 / period if period > 0.0 else context.rate("updateRate", default)
+        clock = context.clock(self.rate, self._measure, at_once=False)
+        ticks = max(clock.period, 1)
+        offset = math.fmod(context.number("updateOffset", 0.0), ticks / NANOSECONDS)
+        clock.set_rate(self.rate, round(offset * NANOSECONDS) - ticks, self._last)
+
+    def random(self, now: int) -> np.random.Generator:
+        """Returns what draws the errors of a measurement at a time [ns]."""
+        return self._context.sensing.noise(self._context.model, self._context.key, now)
+
+    def _measure(self, now: int) -> None:
+        seeds = self._context.sensing.seeds
+        if now < self._last or seeds != self._seeds:
+            self._seeds = seeds
+            for error in self._errors:
+                error.restart()
+        seconds = max(now - self._last, 0) / NANOSECONDS
+        self._last = now
+        self._send(now, seconds)
+
+
+class HectorSensor(HectorTimer):
+    """One that measures the motion of a link."""
+
+    def __init__(
+        self,
+        context: PluginContext,
+        default: float,
+        errors: Sequence[DriftingError],
+        send: Callable[[LinkMotion, int, float], None],
+    ) -> None:
+        self.link = context.link("bodyName", required=False)
+        self.frame = context.text("frameId", context.text("bodyName", self.link))
+        super().__init__(
+            context,
+            default,
+            errors,
+            lambda now, seconds: send(motion_of(context.model, self.link), now, seconds),
+        )
+
+
+class HectorImuPlugin(ContextPlugin):
+    """Feels gravity: +9.8 m/s² upwards at rest."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self._context = context
+        self._accel, self._rate, self._yaw = (
+            DriftingError(_reader(context), prefix) for prefix in ("accel", "rate", "yaw")
+        )
+        self._turn = from_rpy(*numbers(context.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
+        self._sensor = sensor = HectorSensor(
+            context, 0.0, (self._accel, self._rate, self._yaw), self._publish
+        )
+        self._imu = Imu(True, sensor.rate)
+        self._frame = sensor.frame.lstrip("/")
+        topic = topic_in(sensor.namespace, context.text("topicName", "imu"))
+        bias = topic_in(sensor.namespace, context.text("biasTopicName", f"{topic}/bias"))
+        self._publisher, self._bias = (
+            advertised(context, name, ImuMsg, 10) for name in (topic, bias)
+        )
+        calibrate = context.text("serviceName", f"{topic}/calibrate")
+        self._offer(topic_in(sensor.namespace, calibrate), Empty, self._rate)
+        self._offer(f"{topic}/set_accel_bias", SetBias, self._accel)
+        self._offer(f"{topic}/set_rate_bias", SetBias, self._rate)
+        for name, error in (("accel", self._accel), ("rate", self._rate), ("yaw", self._yaw)):
+            with suppress(rospy.ServiceException):
+                server = DynamicServer(MODEL, partial(self._configure, error), f"{topic}/{name}")
+                context.closing(server.shutdown)
+
+    def _offer(self, name: str, kind: Any, error: DriftingError) -> None:
+        """Offers a service that sets the drift of `error`: to zero if the request has no bias."""
+
+        def answer(request: Any) -> Any:
+            vector = getattr(request, "bias", Vector3())
+            bias = (vector.x, vector.y, vector.z)
+            if not all(map(math.isfinite, bias)):
+                raise rospy.ServiceException(f"the bias is not finite: {bias}")
+            with self._context.sim.lock:
+                error.restart(bias)
+            return kind._response_class()
+
+        offer_shared(self._context, name, kind, answer)
+
+    def _configure(self, error: DriftingError, wanted: Config, level: int) -> Config:
+        """Sets an error model; the first call asks for the file's, a number that isn't finite is left out."""
+        with self._context.sim.lock:
+            for name, attribute in ATTRIBUTES.items():
+                if level == FIRST or not math.isfinite(wanted[name]):
+                    wanted[name] = float(getattr(error, attribute)[0])
+                else:
+                    setattr(error, attribute, np.full(3, wanted[name]))
+        return wanted
+
+    def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
+        sim, model = self._context.sim, self._context.model
+        moves, _ = self._context.sensing.schedule.last_move(model)
+        # The offset turns the axes of all that is measured, not just the orientation.
+        pose = motion.pose._replace(orientation=multiply(self._turn, motion.pose.orientation))
+        sample = self._imu.measure(now, moves, motion._replace(pose=pose), sim.world.gravity)
+        if sample is None:
+            return
+        random = self._sensor.random(now)
+        acceleration = self._accel.applied(np.array(sample.linear_acceleration), seconds, random)
+        rate = self._rate.applied(np.array(sample.angular_velocity), seconds, random)
+        yaw = float(self._yaw.applied(np.zeros(3), seconds, random)[2])
+        turned = multiply(from_rpy(0.0, 0.0, yaw), sample.orientation)
+        tilt = self._accel.noise[:2] ** 2 / GRAVITY**2
+        header = Header(stamp=to_time(now), frame_id=self._frame)
+        if self._bias.is_heard:
+            drifts = (Vector3(*error.bias) for error in (self._rate, self._accel))
+            bias = ImuMsg(header=header, orientation=Quaternion(w=1.0))
+            bias.angular_velocity, bias.linear_acceleration = drifts
+            self._bias.publish(bias)
+        self._publisher.publish(
+            ImuMsg(
+                header=header,
+                orientation=Quaternion(*turned),
+                orientation_covariance=_diagonal([*tilt, self._yaw.noise[2] ** 2]),
+                angular_velocity=Vector3(*rate),
+                angular_velocity_covariance=_diagonal(self._rate.noise**2),
+                linear_acceleration=Vector3(*acceleration),
+                linear_acceleration_covariance=_diagonal(self._accel.noise**2),
+            )
+        )
+
+
+class HectorGpsPlugin(ContextPlugin):
+    """Latitude, longitude [degrees] and altitude [m] on WGS84; velocities north, west and up [m/s]."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self._latitude, self._longitude, heading, self._altitude = (
+            context.number(f"reference{name}", default)
+            for name, default in (
+                ("Latitude", 49.9), ("Longitude", 8.9), ("Heading", 0.0), ("Altitude", 0.0),
+            )
+        )  # fmt: skip
+        self._heading = math.radians(heading)
+        sine = math.sin(math.radians(self._latitude))
+        squared = FLATTENING * (2.0 - FLATTENING)
+        share = 1.0 - squared * sine**2
+        self._north = EQUATOR * (1.0 - squared) / share**1.5  # [m/rad]
+        self._east = EQUATOR / math.sqrt(share) * math.cos(math.radians(self._latitude))
+        self._error = DriftingError(_reader(context), "")
+        self._velocity_error = DriftingError(_reader(context), "velocity")
+        self._sensor = sensor = HectorSensor(
+            context, GPS_RATE, (self._error, self._velocity_error), self._publish
+        )
+        self._frame = context.text("frameId", "/world")
+        fix = topic_in(sensor.namespace, context.text("topicName", "fix"))
+        self._fix = advertised(context, fix, NavSatFix, 10)
+        velocity = topic_in(sensor.namespace, context.text("velocityTopicName", "fix_velocity"))
+        self._velocity = advertised(context, velocity, Vector3Stamped, 10)
+
+    def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
+        random = self._sensor.random(now)
+        place = self._error.applied(np.array(motion.pose.position), seconds, random)
+        speed = self._velocity_error.applied(np.array(motion.linear), seconds, random)
+        north, west = self._turned(place)
+        header = Header(stamp=to_time(now), frame_id=self._frame)
+        self._fix.publish(
+            NavSatFix(
+                header=header,
+                status=NavSatStatus(NavSatStatus.STATUS_FIX, 0),
+                latitude=self._latitude + math.degrees(north / self._north),
+                longitude=self._longitude - math.degrees(west / self._east),
+                altitude=self._altitude + float(place[2]),
+                position_covariance=_diagonal(self._error.drift**2 + self._error.noise**2),
+                position_covariance_type=NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN,
+            )
+        )
+        self._velocity.publish(
+            Vector3Stamped(header, Vector3(*self._turned(speed), float(speed[2])))
+        )
+
+    def _turned(self, values: np.ndarray) -> tuple[float, float]:
+        """Returns the parts to the north and to the west."""
+        x, y = float(values[0]), float(values[1])
+        cosine, sine = math.cos(self._heading), math.sin(self._heading)
+        return x * cosine + y * sine, -x * sine + y * cosine
+
+
+class HectorMagneticPlugin(ContextPlugin):
+    """The magnetic field of the earth in the sensor's axes, scaled to `magnitude`."""
+
+    def __init__(self, context: PluginContext) -> None:
+        def angle(tag: str, default: float) -> float:
+            return math.radians(context.number(tag, default))
+
+        declination, inclination = angle("declination", 0.0), angle("inclination", 60.0)
+        heading = angle("referenceHeading", 0.0)
+        across = context.number("magnitude", 1.0) * math.cos(inclination)
+        down = -context.number("magnitude", 1.0) * math.sin(inclination)
+        turn = heading - declination
+        self._field = (across * math.cos(turn), across * math.sin(turn), down)
+        self._error = DriftingError(_reader(context), "")
+        self._sensor = sensor = HectorSensor(context, 0.0, (self._error,), self._publish)
+        self._frame = sensor.frame.lstrip("/")
+        self._is_field = truth(context.text("useMagneticFieldMsgs", "false"))
+        topic = topic_in(sensor.namespace, context.text("topicName", "magnetic"))
+        kind = MagneticField if self._is_field else Vector3Stamped
+        self._publisher = advertised(context, topic, kind, 1)
+
+    def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
+        field = rotate(conjugate(motion.pose.orientation), self._field)
+        seen = Vector3(*self._error.applied(np.array(field), seconds, self._sensor.random(now)))
+        header = Header(stamp=to_time(now), frame_id=self._frame)
+        message = (
+            MagneticField(header, seen, [0.0] * 9)
+            if self._is_field
+            else Vector3Stamped(header, seen)
+        )
+        self._publisher.publish(message)
+
+
+class HectorSonarPlugin(ContextPlugin):
+    """The nearest range of a laser's rays."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self._sensor = LaserSensor(context)
+        self._error = DriftingError(_reader(context), "")
+        self._timer = timer = HectorTimer(context, SONAR_RATE, (self._error,), self._publish)
+        self._frame = context.text("frameId", "/sonar_link")
+        topic = topic_in(timer.namespace, context.text("topicName", "sonar"))
+        self._publisher = advertised(context, topic, Range, 1)
+        context.show(topic, Range, self._sensor.sensor.link, self._sensor.sensor.pose)
+
+    def _publish(self, now: int, seconds: float) -> None:
+        laser, random = self._sensor.laser, self._timer.random(now)
+        exact = nearest(self._sensor.scan(random), laser, 0.0, random)
+        found = float(self._error.applied(np.full(3, exact), seconds, random)[0])
+        self._publisher.publish(
+            Range(
+                header=Header(stamp=to_time(now), frame_id=self._frame),
+                radiation_type=Range.ULTRASOUND,
+                field_of_view=min(fan.high - fan.low for fan in (laser.horizontal, laser.vertical)),
+                min_range=laser.low,
+                max_range=laser.high,
+                range=min(max(found, laser.low), laser.high),
+            )
+        )
+
+
+def _reader(context: PluginContext) -> Callable[[str, float], np.ndarray]:
+    """Returns a reader of elements with one number or three."""
+
+    def read(tag: str, default: float) -> np.ndarray:
+        words = context.text(tag, str(default)).split()
+        count = 1 if len(words) == 1 else 3
+        found = numbers(" ".join(words), f"<{tag}>", count)
+        for number in found:
+            checked_deviation(abs(number), f"<{tag}>")
+        return np.broadcast_to(found, 3)
+
+    return read
+
+
+def _diagonal(values: np.ndarray | list[float]) -> list[float]:
+    return [float(each) for each in np.diag(values).ravel()]
+
+
+LIBRARIES = {
+    "libhector_gazebo_ros_imu.so": HectorImuPlugin,
+    "libhector_gazebo_ros_gps.so": HectorGpsPlugin,
+    "libhector_gazebo_ros_magnetic.so": HectorMagneticPlugin,
+    "libhector_gazebo_ros_sonar.so": HectorSonarPlugin,
+}

@@ -1,1 +1,0 @@
-"""Adapters between the simulator and ROS: the only place of the stand-in that imports rospy."""

@@ -1,0 +1,104 @@
+"""joint_state_controller/JointStateController: reports joints, drives none.
+
+See docs/contract/ros_control.md 3.1.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from robot_sim.control.controllers.base import Controller, Output, number_param
+from robot_sim.control.errors import ControlError
+from robot_sim.control.hardware import STATE, RobotHardware
+from robot_sim.control.joint import JointHandle
+
+NANOSECONDS = 1_000_000_000
+SLOWEST = 1e-6  # [Hz]; below it, as at 0, nothing is ever published
+Extra = tuple[str, tuple[float, ...]]  # a constant joint: name; position, velocity, effort
+EXTRA_FIELDS = ("position", "velocity", "effort")
+
+
+class JointStateSample(NamedTuple):
+    """sensor_msgs/JointState: positions [rad, m], velocities [rad/s, m/s], efforts [N m, N]."""
+
+    stamp: int  # [ns]
+    names: tuple[str, ...]
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...]
+    efforts: tuple[float, ...]
+
+
+class JointStateController(Controller):
+    """Publishes `joint_states` at `publish_rate` [Hz of simulated time], phase-locked to the first one."""
+
+    type_name = "joint_state_controller/JointStateController"
+    interface = STATE
+
+    def __init__(
+        self, name: str, joints: list[JointHandle], rate: float, extra: list[Extra]
+    ) -> None:
+        super().__init__(name)
+        self._joints = joints
+        self._period = round(NANOSECONDS / rate) if rate > SLOWEST else None
+        self._last = 0
+        self._names = tuple(j.name for j in joints) + tuple(e[0] for e in extra)
+        self._extra = [tuple(values[part] for _, values in extra) for part in range(3)]
+        self._output = Output("joint_states", "JointState", shared=True)
+        self.outputs = [self._output]
+
+    @classmethod
+    def create(
+        cls, name: str, params: Mapping[str, object], hardware: RobotHardware
+    ) -> "JointStateController":
+        rate = number_param(params, "publish_rate", name)
+        wanted = params.get("joints", list(hardware.joints))
+        if not isinstance(wanted, list) or not all(isinstance(joint, str) for joint in wanted):
+            raise ControlError(f"parameter {name}/joints must be a list of joint names: {wanted!r}")
+        unknown = [joint for joint in wanted if joint not in hardware.joints]
+        if unknown:
+            raise ControlError(f"parameter {name}/joints: the robot has no joint {unknown}")
+        extra = _extra_joints(params.get("extra_joints", []), wanted)
+        return cls(name, [hardware.joints[joint] for joint in wanted], rate, extra)
+
+    def starting(self, now: int) -> None:
+        if self._period is not None:
+            self._last = now - self._period  # the next tick publishes
+
+    def update(self, now: int, dt: float) -> None:
+        if self._period is not None and self._last + self._period < now:
+            self._last += self._period
+            self._report(now)
+
+    def joints_moved(self, now: int) -> None:
+        """Reports at once, so that no reader of the topic acts on an old state."""
+        if self._period is not None:
+            self._last = now
+            self._report(now)
+
+    def _report(self, now: int) -> None:
+        if self._output.wanted:
+            self._output.send(self.sample(now))
+
+    def sample(self, now: int) -> JointStateSample:
+        """Returns the joints' state, extra joints last."""
+        joints, extra = self._joints, self._extra
+        return JointStateSample(
+            now,
+            self._names,
+            tuple(j.position for j in joints) + extra[0],
+            tuple(j.velocity for j in joints) + extra[1],
+            tuple(j.effort for j in joints) + extra[2],
+        )
+
+
+def _extra_joints(entries: object, names: list[str]) -> list[Extra]:
+    """Returns constant joints (name, position, velocity, effort). Bad and repeated ones are left out."""
+    extra: list[Extra] = []
+    seen = set(names)
+    for entry in entries if isinstance(entries, list) else []:
+        values = [entry.get(key, 0.0) for key in EXTRA_FIELDS] if isinstance(entry, Mapping) else []
+        if not values or not all(isinstance(value, float) for value in values):
+            continue
+        if isinstance(entry.get("name"), str) and entry["name"] not in seen:
+            seen.add(entry["name"])
+            extra.append((entry["name"], tuple(values)))
+    return extra

@@ -1,0 +1,293 @@
+"""JointTrajectoryController for effort, position and velocity interfaces.
+
+See docs/contract/ros_control.md 3.5.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Self
+
+from robot_sim.control.controllers.base import Controller, Output, joints_param, number_param
+from robot_sim.control.errors import ControlError
+from robot_sim.control.hardware import EFFORT, POSITION, VELOCITY, RobotHardware
+from robot_sim.control.joint import JointHandle
+from robot_sim.control.pid import Loop, Pid
+from robot_sim.control.trajectory import NANOSECONDS, Axis, State
+from robot_sim.control.trajectory_goals import (
+    CANCELED,
+    INVALID_GOAL,
+    Constraints,
+    Goal,
+    GoalObserver,
+    GoalOutcome,
+    GoalRequest,
+    Tolerance,
+    Trajectory,
+    TrajectoryRefused,
+    TrajectorySample,
+    check_joints,
+    check_points,
+    check_tolerances,
+    dropped_points,
+    monitored_joints,
+)
+
+SLOWEST = 1e-6  # [Hz]; below it, as at 0, no state is published
+STOPPED_VELOCITY = 0.01  # [rad/s, m/s]
+FOR_EVER = 1e12  # [s]; longer durations are cut
+
+
+class Settings(NamedTuple):
+    """The parameters that aren't about one joint. Times in [ns]."""
+
+    state_period: int  # 0: no state is published
+    monitor_period: int
+    stop_duration: int
+    partial: bool
+    constraints: Constraints
+
+
+def read_settings(
+    params: Mapping[str, object], joints: Sequence[JointHandle], name: str
+) -> Settings:
+    """Reads the settings of controller `name`."""
+    state_rate = _number(params, "state_publish_rate", 50.0, name)
+    monitor_rate = _number(params, "action_monitor_rate", 20.0, name)
+    if monitor_rate <= SLOWEST:
+        raise ControlError(f"parameter {name}/action_monitor_rate must be more than 0 [Hz]")
+    partial = params.get("allow_partial_joints_goal", False)
+    if not isinstance(partial, bool):
+        raise ControlError(
+            f"parameter {name}/allow_partial_joints_goal must be true or false: {partial!r}"
+        )
+    return Settings(
+        round(NANOSECONDS / state_rate) if state_rate > SLOWEST else 0,
+        round(NANOSECONDS / monitor_rate),
+        _duration(params, "stop_trajectory_duration", name),
+        partial,
+        _constraints(_tree(params, "constraints", name), joints, f"{name}/constraints"),
+    )
+
+
+def read_axes(params: Mapping[str, object], joints: Sequence[JointHandle], name: str) -> list[Axis]:
+    """Makes axes with a PID from `gains` and `velocity_ff`."""
+    gains, feed = _tree(params, "gains", name), _tree(params, "velocity_ff", name)
+    axes = []
+    for joint in joints:
+        pid = Pid.from_params(gains.get(joint.name), f"{name}/gains/{joint.name}")
+        axes.append(Axis(joint, pid, _number(feed, joint.name, 0.0, f"{name}/velocity_ff")))
+    return axes
+
+
+def _constraints(
+    params: Mapping[str, object], joints: Sequence[JointHandle], place: str
+) -> Constraints:
+    stopped = _number(params, "stopped_velocity_tolerance", STOPPED_VELOCITY, place)
+    path, goal = [], []
+    for joint in joints:
+        own, where = _tree(params, joint.name, place), f"{place}/{joint.name}"
+        path.append(Tolerance(_number(own, "trajectory", 0.0, where)))
+        goal.append(Tolerance(_number(own, "goal", 0.0, where), stopped))
+    return Constraints(tuple(path), tuple(goal), _duration(params, "goal_time", place))
+
+
+def _duration(params: Mapping[str, object], key: str, place: str) -> int:
+    return round(min(max(0.0, _number(params, key, 0.0, place)), FOR_EVER) * NANOSECONDS)
+
+
+def _tree(params: Mapping[str, object], key: str, place: str) -> Mapping[str, object]:
+    tree = params.get(key, {})
+    if not isinstance(tree, Mapping):
+        raise ControlError(f"parameter {place}/{key} must hold parameters by name: {tree!r}")
+    return tree
+
+
+def _number(params: Mapping[str, object], key: str, default: float, place: str) -> float:
+    return number_param(params, key, place) if key in params else default
+
+
+class JointTrajectoryController(Controller):
+    """Moves joints along trajectories, and holds them when there is none.
+
+    Its time is uptime [ns], the sum of its periods since it was started: the clock may jump.
+    """
+
+    of_the_present = ("_goal",)  # its client knows nothing of snapshots
+
+    def __init__(self, name: str, axes: list[Axis], settings: Settings) -> None:
+        super().__init__(name)
+        self.joint_names = tuple(axis.joint.name for axis in axes)
+        self.claimed = tuple(sorted(self.joint_names))
+        self.pids = {f"gains/{axis.joint.name}": axis.pid for axis in axes if axis.pid is not None}
+        if self.interface == EFFORT:
+            self.loops = [Loop(a.joint.name, a.pid) for a in axes if a.pid is not None]
+        self._state = Output("state", "TrajectorySample")
+        self.outputs = [self._state]
+        self._axes = axes
+        self._settings = settings
+        self._goal: Goal | None = None
+        self._now = self._uptime = self._period = 0
+        self._next_state = self._next_report = 0
+
+    @classmethod
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
+        joints = joints_param(params, name, cls.interface, hardware)
+        settings = read_settings(params, joints, name)
+        if cls.interface == POSITION:
+            return cls(name, [Axis(joint) for joint in joints], settings)
+        return cls(name, read_axes(params, joints, name), settings)
+
+    def starting(self, now: int) -> None:
+        self._end_goal("the controller started over: it was restarted, or its joints were moved")
+        self._now = now
+        self._uptime = 0
+        self._next_state = 0
+        for axis in self._axes:
+            axis.begin(self._settings.stop_duration)
+
+    def stopping(self) -> None:
+        self._end_goal("the controller was stopped")
+
+    def joints_moved(self, now: int) -> None:
+        self._now = now  # stamps count from here, also after the clock was set back
+
+    def restored(self) -> None:
+        self._end_goal("the world has returned to a snapshot")
+
+    def update(self, now: int, dt: float) -> None:
+        self._now = now
+        self._period = round(dt * NANOSECONDS)
+        self._uptime = uptime = self._uptime + self._period
+        for axis in self._axes:
+            axis.update(uptime, dt)
+        if self._goal is not None:
+            self._monitor(self._goal)
+        if self._settings.state_period and uptime >= self._next_state:
+            self._next_state = max(self._next_state + self._settings.state_period, uptime)
+            if self._state.wanted:
+                self._state.send(self.sample())
+
+    def sample(self) -> TrajectorySample:
+        """Returns desired and actual state of the joints in the last tick."""
+        axes = self._axes
+        positions, velocities, accelerations = zip(*(axis.desired for axis in axes), strict=True)
+        return TrajectorySample(
+            self._now,
+            self.joint_names,
+            (positions, velocities, accelerations),
+            (tuple(a.joint.position for a in axes), tuple(a.joint.velocity for a in axes)),
+            (tuple(a.position_error for a in axes), tuple(a.velocity_error for a in axes)),
+        )
+
+    def follow(self, trajectory: Trajectory) -> str:
+        """Follows a trajectory of the topic `command`; one without points holds the joints.
+
+        Returns:
+            A warning for the log, empty if there is none.
+
+        Raises:
+            TrajectoryRefused: if it can't be followed; nothing changes then.
+        """
+        self._check_running("take a trajectory")
+        if trajectory.points:
+            check_joints(trajectory.names, self.joint_names, self._settings.partial)
+        _, warning = self._lead(trajectory)
+        self._end_goal("a trajectory came by the command topic")
+        return warning
+
+    def pursue(self, key: str, request: GoalRequest, listener: GoalObserver) -> str:
+        """Pursues a goal of follow_joint_trajectory; returns and raises like follow()."""
+        self._check_running("take a goal")
+        check_joints(request.trajectory.names, self.joint_names, self._settings.partial)
+        check_tolerances(request)
+        start, warning = self._lead(request.trajectory)
+        self._end_goal("another goal came")
+        monitored, late = monitored_joints(request, self._axes, self._settings.constraints)
+        self._goal = Goal(key, listener, monitored, start, late)
+        self._next_report = self._uptime + self._settings.monitor_period
+        return warning
+
+    def cancel(self, key: str) -> None:
+        """Holds the joints if `key` is the active goal."""
+        if self._goal is not None and self._goal.key == key:
+            self._hold()
+            self._end_goal("canceled by its client")
+
+    def query(self, time: int) -> list[State]:
+        """Returns the desired states of the joints at `time` [ns] of the clock, in order of joint_names.
+
+        Raises:
+            TrajectoryRefused: if the controller isn't running.
+        """
+        self._check_running("sample its trajectory")
+        uptime = self._uptime + time - self._now
+        return [axis.spline.at(uptime) for axis in self._axes]
+
+    def _check_running(self, what: str) -> None:
+        if self.state != "running":
+            raise TrajectoryRefused(
+                INVALID_GOAL, f"Controller '{self.name}' can't {what}: it is not running"
+            )
+
+    def _lead(self, trajectory: Trajectory) -> tuple[int, str]:
+        """Starts a trajectory; returns the uptime at which it begins [ns], and a warning."""
+        tick = self._uptime + self._period  # the period is 0 before the first tick
+        if not trajectory.points:
+            self._hold()
+            return tick, ""
+        check_points(trajectory)
+        begins = self._uptime + trajectory.stamp - self._now if trajectory.stamp else tick
+        dropped, warning = dropped_points(trajectory, tick - begins)
+        start = max(tick, begins)
+        for index, name in enumerate(trajectory.names):
+            way = [
+                (begins + point.time, point.waypoint(index))
+                for point in trajectory.points[dropped:]
+            ]
+            self._axes[self.joint_names.index(name)].follow(tick, start, way)
+        return start, warning
+
+    def _hold(self) -> None:
+        for axis in self._axes:
+            axis.hold(self._uptime + self._period, self._settings.stop_duration)
+
+    def _monitor(self, goal: Goal) -> None:
+        """Aborts a goal at once; reports progress and success at the monitor's rate."""
+        if goal.outcome is None:
+            goal.outcome = goal.check(self._uptime)
+            if goal.outcome is not None and goal.outcome.code:
+                self._end_goal("")
+                return
+        if self._uptime < self._next_report:
+            return
+        self._next_report = max(self._next_report + self._settings.monitor_period, self._uptime)
+        if goal.outcome is None:
+            goal.listener.feedback(self.sample())
+        else:
+            self._end_goal("")
+
+    def _end_goal(self, reason: str) -> None:
+        """Ends the active goal with its outcome; without one, as canceled for `reason`."""
+        goal, self._goal = self._goal, None
+        if goal is not None:
+            goal.listener.finished(goal.outcome or GoalOutcome(CANCELED, text=reason))
+
+
+class EffortTrajectory(JointTrajectoryController):
+    """Follows trajectories by a PID from the errors of position and velocity to an effort."""
+
+    type_name = "effort_controllers/JointTrajectoryController"
+    interface = EFFORT
+
+
+class PositionTrajectory(JointTrajectoryController):
+    """Follows trajectories by commanding positions."""
+
+    type_name = "position_controllers/JointTrajectoryController"
+    interface = POSITION
+
+
+class VelocityTrajectory(JointTrajectoryController):
+    """Follows trajectories by a PID from the errors of position and velocity to a velocity."""
+
+    type_name = "velocity_controllers/JointTrajectoryController"
+    interface = VELOCITY

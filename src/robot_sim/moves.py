@@ -1,0 +1,86 @@
+"""Moves of bodies by something other than time, and who is told of them."""
+
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+
+from robot_sim.physics.model import Model
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import World
+
+NEAR = 1e-3  # [m, rad / 2] by which attached links may be off
+Moved = Collection[Model] | None
+"""The models that were moved, with what is attached to them; None for all, after a reset."""
+
+
+class Moves:
+    """Tells of moves. The caller of each method holds the simulator's lock."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self.listeners: list[Callable[[Moved], None]] = []
+        self._open = 0  # blocks of `as_one`
+        self._pending: Moved = ()
+
+    def tell(self, moved: Moved) -> None:
+        """Tells of a move, or of all of a block's at its end."""
+        pending = self._pending
+        pending = None if moved is None or pending is None else {*pending, *moved}
+        self._pending = pending if self._open else ()
+        if self._open == 0 and pending != set():
+            found = pending
+            if pending is not None:
+                _carry(self._world, pending)
+                found = self._world.with_attached(pending)
+            for listener in self.listeners:
+                listener(found)
+
+    @contextmanager
+    def as_one(self) -> Iterator[None]:
+        """Tells of all moves in the block at its end, as one."""
+        self._open += 1
+        try:
+            yield
+        finally:
+            self._open -= 1
+            self.tell(())
+
+    def on_move_of(self, model: Model, call: Callable[[], None]) -> Callable[[Moved], None]:
+        """Calls a function when a model was moved, or all were; returns the listener, for `forget`."""
+
+        def listener(moved: Moved) -> None:
+            if moved is None or model in moved:
+                call()
+
+        # A new list: the old one may be in use by whoever forgets a listener.
+        self.listeners = [*self.listeners, listener]
+        return listener
+
+    def forget(self, listener: Callable[[Moved], None]) -> None:
+        self.listeners = [each for each in self.listeners if each is not listener]
+
+
+def _carry(world: World, moved: Collection[Model]) -> None:
+    """Moves what is attached to moved models along; what is fixed, or was moved as well, is detached."""
+    stay = {*moved, *(each for each in world.models.values() if each.description.fixed_base)}
+    waiting = list(moved)
+    while waiting:
+        model = waiting.pop()
+        for each in [attachment for attachment in world.attachments if attachment.joins(model)]:
+            (one, link), (other, its) = each.first, each.second
+            pose, wanted = other.link_state(its)[0], one.link_state(link)[0].compose(each.pose)
+            if one is other or _near(pose, wanted):
+                continue
+            if model is other:
+                wanted, pose = pose.compose(each.pose.inverse()), one.link_state(link)[0]
+                other = one
+            if other in stay:
+                world.detach(each)
+                continue
+            other.place(wanted.compose(other.state()[0].relative_to(pose)))
+            stay.add(other)
+            waiting.append(other)
+
+
+def _near(pose: Pose, other: Pose) -> bool:
+    gap = pose.relative_to(other)
+    return max(map(abs, (*gap.position, *gap.orientation[:3]))) < NEAR

@@ -1,0 +1,359 @@
+"""PyBullet behind the engine interface."""
+
+import contextlib
+import locale
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from file_access.locks import scratch_folder
+from robot_sim.heap import give_back
+from robot_sim.physics.description import DescriptionError, ModelDescription
+from robot_sim.physics.engine import Body, Contact, Engine, LinkOf, Side
+from robot_sim.physics.engine_form import at_joints, parents_first
+from robot_sim.physics.engines.bullet_body import BASE, BulletBody
+from robot_sim.physics.engines.bullet_constraints import add_weld, weld_of
+from robot_sim.physics.engines.bullet_contacts import Separation
+from robot_sim.physics.engines.bullet_files import is_plane, write_urdf
+from robot_sim.physics.engines.quiet_pybullet import pybullet
+from robot_sim.physics.pose import ZERO, Pose, Vector, add, scale
+
+MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
+ALL = 2**31 - 1  # constraints of a world
+PLANE = 1200  # [bytes] of a file, if it had been loaded from one
+MOST_WASTE = 1_000_000  # [bytes] of files that removed bodies were loaded from: 5 MB of memory
+
+
+@dataclass
+class BulletSettings:
+    """Gravity [m/s²], length of a step [s], iterations of the solver; the defaults are PyBullet's."""
+
+    gravity: Vector = ZERO
+    time_step: float = 1.0 / 240.0
+    iterations: int = 50
+    separation: float = math.inf  # [m/s], the fastest
+
+
+class Fastening(NamedTuple):
+    """Two links that are fixed to each other: PyBullet's constraint, what it was made of, and the bodies and
+    links that don't meet meanwhile."""
+
+    constraint: int
+    made_of: Sequence[Any]
+    apart: Sequence[tuple[int, int, int, int]]
+
+
+class BulletClient:
+    """A PyBullet world in this process, without a window.
+
+    `live` and `waste` are the sizes of the files that present and removed bodies were loaded from [bytes].
+    """
+
+    def __init__(self, settings: BulletSettings) -> None:
+        self._client = pybullet.connect(pybullet.DIRECT)
+        # The solver's result depends on the order of contact pairs, and on which bodies it solves together:
+        # make both the same in every run. Bodies that come near each other may share an island or not,
+        # depending on earlier episodes, so all islands are one (test_robots.py shows it with a gripper and
+        # its cube). Each body has its own files, so caching them is of no use.
+        pybullet.setPhysicsEngineParameter(
+            deterministicOverlappingPairs=1, minimumSolverIslandSize=ALL, enableFileCaching=0,
+            physicsClientId=self._client,
+        )  # fmt: skip
+        self._step = partial(pybullet.stepSimulation, self._client)
+        self._separation = Separation(self._client)
+        self._gravity: Vector = ZERO
+        self._time_step = 0.0
+        self._bodies: dict[int, BulletBody] = {}
+        self._sides: dict[tuple[int, int], Side] = {}  # by body and link
+        self._weightless: set[tuple[int, int]] = set()  # body and link, where gravity doesn't act
+        self._sizes: dict[int, int] = {}  # [bytes] by body
+        self.fastened: dict[int, Fastening] = {}
+        self._count = count()  # of what was fastened
+        self.waste = 0
+        self.apply(settings)
+
+    @property
+    def bodies(self) -> list[BulletBody]:
+        """In the order in which they were loaded."""
+        return list(self._bodies.values())
+
+    @property
+    def live(self) -> int:
+        return sum(self._sizes.values())
+
+    def apply(self, settings: BulletSettings) -> None:
+        """Applies settings to the world."""
+        self._gravity, self._time_step = settings.gravity, settings.time_step
+        self._separation.fastest = settings.separation
+        iterations = max(1, min(settings.iterations, MOST_ITERATIONS))
+        pybullet.setGravity(*settings.gravity, physicsClientId=self._client)
+        pybullet.setTimeStep(settings.time_step, physicsClientId=self._client)
+        pybullet.setPhysicsEngineParameter(
+            numSolverIterations=iterations, physicsClientId=self._client
+        )
+        for body in self._bodies.values():
+            body.set_time_step(settings.time_step)
+
+    def load(self, description: ModelDescription, pose: Pose) -> BulletBody:
+        """See `Engine.load`."""
+        if is_plane(description):
+            return self._load_plane(description, pose)
+        engine_form, offsets = at_joints(description)
+        flags = (
+            pybullet.URDF_USE_INERTIA_FROM_FILE
+            | pybullet.URDF_MAINTAIN_LINK_ORDER
+            | pybullet.URDF_USE_IMPLICIT_CYLINDER  # with 32 sides a wheel would rock
+        )
+        if description.collides_with_itself:
+            flags |= (
+                pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
+            )
+        body = self._load_files(engine_form, pose, flags)
+        try:
+            made = BulletBody(
+                self._client, body, engine_form, pose, self._weightless, self._separation, offsets
+            )
+        except DescriptionError:
+            self.remove(body)
+            raise
+        return self._keep(made)
+
+    def _load_files(self, model: ModelDescription, pose: Pose, flags: int) -> int:
+        """Loads a model in the engine's form by way of files; returns PyBullet's number of the body."""
+        try:
+            with scratch_folder() as folder:
+                path = folder / "model.urdf"
+                path.write_text(write_urdf(parents_first(model), folder), encoding="utf-8")
+                size = _size(folder)
+                with _decimal_points():
+                    body: int = pybullet.loadURDF(
+                        str(path), pose.position, pose.orientation, useFixedBase=model.fixed_base,
+                        flags=flags, physicsClientId=self._client,
+                    )  # fmt: skip
+        except pybullet.error as error:
+            self.waste += size
+            raise DescriptionError(f"the physics engine can't load the model: {error}") from error
+        except OSError as error:  # a full disk
+            raise DescriptionError(
+                f"the physics engine's files can't be written: {error.strerror or error}"
+            ) from error
+        self._sizes[body] = size
+        return body
+
+    def _load_plane(self, description: ModelDescription, pose: Pose) -> BulletBody:
+        shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
+        plane = pose.compose(description.links[description.root].collisions[0].pose)
+        body = pybullet.createMultiBody(
+            0.0, shape, -1, plane.position, plane.orientation, physicsClientId=self._client
+        )
+        self._sizes[body] = PLANE
+        return self._keep(
+            BulletBody(
+                self._client, body, description, pose, self._weightless, self._separation, {}
+            )
+        )
+
+    def _keep(self, body: BulletBody) -> BulletBody:
+        body.set_time_step(self._time_step)
+        self._bodies[body.id] = body
+        for index, touching in body.touching.items():
+            self._sides[body.id, index] = Side(body, *touching)
+        return body
+
+    def remove(self, body: int) -> None:
+        """Takes a body out of the world."""
+        pybullet.removeBody(body, physicsClientId=self._client)
+        self._weightless -= {key for key in self._weightless if key[0] == body}
+        self.waste += self._sizes.pop(body)
+        self._bodies.pop(body, None)
+        self._separation.remove(body)
+        self._sides = {key: side for key, side in self._sides.items() if key[0] != body}
+
+    def step(self) -> None:
+        """Integrates by one time step."""
+        if self._separation.placed:
+            self._separation.ease(self._time_step)
+        if self._weightless:
+            self._hold_up()
+        self._step()
+
+    def contacts(self) -> list[Contact]:
+        """Returns where bodies touched in the last step, without those that were only near."""
+        found = pybullet.getContactPoints(physicsClientId=self._client)
+        return [_contact(each, self._sides) for each in found if each[9] > 0.0]
+
+    def refasten(self, fastened: Mapping[int, Fastening]) -> None:
+        """See `Engine.refasten`; the solver's result depends on the order of constraints."""
+        for number in list(self.fastened):
+            self.unfasten(number)
+        for number, fastening in fastened.items():
+            self._fix(number, fastening.made_of, fastening.apart)
+
+    def forget_contacts(self) -> None:
+        """See `Engine.forget_contacts`."""
+        self._separation.placed = True
+        for body in self._bodies.values():
+            body.forget_contacts()
+
+    def fasten(self, first: LinkOf, second: LinkOf, pose: Pose) -> int:
+        """See `Engine.fasten`."""
+        (one, link), (other, its) = first, second
+        assert isinstance(one, BulletBody)
+        assert isinstance(other, BulletBody)
+        centre = other.centre_of_mass(its).relative_to(other.link_state(its)[0])
+        wanted = one.link_state(link)[0].compose(pose).compose(centre)
+        place = wanted.relative_to(one.centre_of_mass(link))
+        pairs = [(a, b) for a in one.pieces(link) for b in other.pieces(its)]
+        made_of = weld_of((one.id, pairs[0][0]), (other.id, pairs[0][1]), place)
+        number = next(self._count)
+        self._fix(number, made_of, [(one.id, other.id, a, b) for a, b in pairs])
+        return number
+
+    def _fix(
+        self, number: int, made_of: Sequence[Any], apart: Sequence[tuple[int, int, int, int]]
+    ) -> None:
+        constraint = add_weld(self._client, made_of)
+        self.fastened[number] = Fastening(constraint, made_of, apart)
+        self._let_meet(number, False)
+
+    def unfasten(self, number: int) -> None:
+        """See `Engine.unfasten`."""
+        self._let_meet(number, True)
+        self._separation.placed = True
+        pybullet.removeConstraint(self.fastened.pop(number).constraint, self._client)
+
+    def _let_meet(self, number: int, on: bool) -> None:
+        for pair in self.fastened[number].apart:
+            pybullet.setCollisionFilterPair(*pair, int(on), self._client)
+
+    def _hold_up(self) -> None:
+        """Cancels gravity on weightless links by a force: PyBullet's gravity acts on all of them."""
+        for body, link in self._weightless:
+            mass = pybullet.getDynamicsInfo(body, link, self._client)[0]
+            if link == BASE:
+                com = pybullet.getBasePositionAndOrientation(body, self._client)[0]
+            else:
+                com = pybullet.getLinkState(body, link, 0, 1, self._client)[0]
+            pybullet.applyExternalForce(
+                body, link, scale(self._gravity, -mass), com, pybullet.WORLD_FRAME, self._client
+            )
+
+    def close(self) -> None:
+        """Frees the world's memory."""
+        pybullet.disconnect(self._client)
+
+
+@contextlib.contextmanager
+def _decimal_points() -> Iterator[None]:
+    """Has the C library read 0.5 as one half.
+
+    If Qt or a user's code has set a locale with decimal commas, it would read 0.
+    """
+    before = locale.setlocale(locale.LC_NUMERIC)
+    locale.setlocale(locale.LC_NUMERIC, "C")
+    try:
+        yield
+    finally:
+        locale.setlocale(locale.LC_NUMERIC, before)
+
+
+def _size(folder: Path) -> int:
+    """Returns the size of the files in `folder` [bytes]."""
+    return sum(path.stat().st_size for path in folder.iterdir())
+
+
+class BulletEngine(Engine):
+    """PyBullet worlds, one after the other: a new one frees the memory that removed bodies leave behind."""
+
+    def __init__(self) -> None:
+        self._settings = BulletSettings()
+        self._client = BulletClient(self._settings)
+        self._most_waste = MOST_WASTE
+
+    def load(self, description: ModelDescription, pose: Pose) -> BulletBody:
+        return self._client.load(description, pose)
+
+    def remove(self, body: Body) -> None:
+        assert isinstance(body, BulletBody)
+        self._client.remove(body.id)
+
+    def renewed(self, bodies: Sequence[tuple[ModelDescription, Body]]) -> list[Body]:
+        if self._client.waste <= max(self._most_waste, self._client.live):
+            return super().renewed(bodies)
+        fresh = BulletClient(self._settings)
+        try:
+            moved = [_moved(description, body, fresh) for description, body in bodies]
+        except DescriptionError:  # no space for their files: the old world continues
+            fresh.close()
+            self._most_waste = 2 * self._client.waste
+            return super().renewed(bodies)
+        self._client.close()
+        give_back()
+        self._client, self._most_waste = fresh, MOST_WASTE
+        return moved
+
+    def fasten(self, first: LinkOf, second: LinkOf, pose: Pose) -> int:
+        return self._client.fasten(first, second, pose)
+
+    def unfasten(self, number: int) -> None:
+        self._client.unfasten(number)
+
+    def order(self) -> list[BulletBody]:
+        return self._client.bodies
+
+    def fastened(self) -> dict[int, Fastening]:
+        return dict(self._client.fastened)
+
+    def refasten(self, fastened: Mapping[int, Fastening]) -> None:
+        self._client.refasten(fastened)
+
+    def set_gravity(self, gravity: Vector) -> None:
+        self._settings.gravity = gravity
+        self._client.apply(self._settings)
+
+    def set_time_step(self, dt: float) -> None:
+        self._settings.time_step = dt
+        self._client.apply(self._settings)
+
+    def set_iterations(self, count: int) -> None:
+        self._settings.iterations = count
+        self._client.apply(self._settings)
+
+    def set_fastest_separation(self, speed: float) -> None:
+        self._settings.separation = speed
+        self._client.apply(self._settings)
+
+    def step(self) -> None:
+        self._client.step()
+
+    def forget_contacts(self) -> None:
+        self._client.forget_contacts()
+
+    def contacts(self) -> list[Contact]:
+        return self._client.contacts()
+
+    def close(self) -> None:
+        self._client.close()
+
+
+def _moved(description: ModelDescription, body: Body, client: BulletClient) -> Body:
+    """Returns `body` reloaded into another world, in the same state."""
+    assert isinstance(body, BulletBody)
+    fresh = client.load(description, body.link_state(description.root)[0])
+    fresh.move(body.motion())
+    return fresh
+
+
+def _contact(found: Sequence[Any], sides: Mapping[tuple[int, int], Side]) -> Contact:
+    """PyBullet has links, not shapes; the point on the second body, and the normal towards the first."""
+    _, first, second, first_link, second_link, _, point, normal, distance, force = found[:10]
+    along, direction, across, other = found[10:14]
+    friction: Vector = add(scale(direction, along), scale(other, across))
+    return Contact(
+        point, scale(normal, force), friction, normal, -distance,
+        sides[first, first_link], sides[second, second_link],
+    )  # fmt: skip

@@ -1,0 +1,398 @@
+"""What the child process of `meshes` runs: STL, COLLADA and OBJ files into arrays that engines can take.
+
+trimesh reads COLLADA, OBJ and binary STL. What it leaves to its caller is done here: units and axes, named
+parts, and the check that every face has finite corners.
+"""
+
+import hashlib
+import json
+import re
+import struct
+from collections.abc import Callable, Iterable
+from io import BytesIO, StringIO
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from file_access.content import FileError, read_file
+from file_access.xml_text import parse
+from robot_sim.physics.description import DescriptionError, Mesh
+from robot_sim.physics.files.elements import numbers, place, shown
+from robot_sim.physics.files.hull import convex_pieces, hull_points
+from robot_sim.physics.files.mesh_cache import kept, read_arrays, written
+from robot_sim.physics.files.mesh_looks import meters_of, read_glb, read_parts
+from robot_sim.physics.files.meshes import IMAGES, Selection, Submesh
+from robot_sim.physics.files.plain_obj import READ, plain_obj
+from robot_sim.physics.files.shape_meshes import MADE, heightmap
+
+MOST_BYTES = 200_000_000  # of a file: a million triangles as COLLADA writes them
+MOST_TRIANGLES = 1_000_000
+MOST_VERTICES = 3 * MOST_TRIANGLES
+MOST_PARTS = 256  # hulls of one mesh
+LARGE = 500_000  # [bytes] of a file that takes a tenth of a second
+KEPT = "mesh-1"  # begins the names of kept meshes; another one when others would come out
+LARGEST = 1e12  # of a coordinate, in the file's unit: 32-bit floats lose their digits beyond it
+MOST_NAMES = 10  # that an error lists
+
+# STL
+HEADER, FACET = 84, 50  # [bytes]
+NAME = re.compile(r"(?:^[ \t]*|\bend)solid(?:(?!facet)[^\r\n])*", re.IGNORECASE | re.MULTILINE)
+VERTEX = re.compile(r"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
+
+# COLLADA
+SPACE = "http://www.collada.org/2005/11/COLLADASchema"
+FACES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
+OF_NODES = ("node", "instance_node", "instance_geometry",
+            "matrix", "translate", "rotate", "scale", "lookat", "skew")  # fmt: skip
+OF_SCENES = ("library_geometries", "library_nodes", "library_visual_scenes", "scene")
+NO_INDEX = re.compile(r"[^0-9\s]|[0-9]{10}", re.ASCII)
+NO_NUMBER = re.compile(r"[^0-9\s.eE+-]", re.ASCII)
+
+Part = tuple[np.ndarray, np.ndarray]
+"""Vertices and faces."""
+
+
+def answer(request: bytes) -> bytes:
+    """Answers a request of `meshes`: digest, vertices, faces and hulls of a file, its looks, or pieces."""
+    head, _, data = request.partition(b"\n")
+    what, name, given, cache = json.loads(head)
+    path = Path(name)
+    if what == "glb":
+        return read_glb(path)
+    arrays: Iterable[np.ndarray]
+    if what == "parts":
+        arrays = read_parts(path)
+    elif what == "pieces":
+        arrays = convex_pieces(*read_arrays(data))
+    else:
+        if what in MADE:
+            return _as_bytes(_hashed(*MADE[what](*given)))
+        arrays = _load_once(
+            path, Submesh(*given) if isinstance(given, list) else given, Path(cache)
+        )
+    return written(arrays)
+
+
+def _load_once(path: Path, selection: Selection, cache: Path) -> list[np.ndarray]:
+    """Returns digest, vertices, faces and hulls; those of large files are kept by their content."""
+    data = _read(path)
+
+    def compute() -> bytes:
+        return _as_bytes(load(path, selection, data))
+
+    if len(data) < LARGE:
+        return read_arrays(compute())
+    content = hashlib.blake2b(data, digest_size=16, key=path.suffix.lower().encode())
+    content.update(repr(selection).encode())
+    return kept(cache / f"{KEPT}-{content.hexdigest()}", compute)
+
+
+def _as_bytes(mesh: Mesh) -> bytes:
+    digest = np.frombuffer(mesh.digest.encode(), np.uint8)
+    return written((digest, mesh.vertices, mesh.faces, *mesh.hulls))
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return read_file(path, MOST_BYTES)
+    except FileError as error:
+        raise DescriptionError(str(error)) from error
+
+
+def load(path: Path, selection: Selection = None, data: bytes | None = None) -> Mesh:
+    """Returns the mesh of a file, or of one named part of it; `data` is its content if it is read already."""
+    if path.suffix.lower() in IMAGES:
+        return _hashed(*heightmap(path, selection))
+    submesh = selection if isinstance(selection, Submesh) else None
+    readers: dict[str, Callable[[bytes, str], list[Part]]]
+    readers = {".stl": _read_stl, ".dae": _read_collada, ".obj": _read_obj}
+    data = _read(path) if data is None else data
+    with np.errstate(all="ignore"):  # what isn't finite is refused below
+        try:
+            parts = readers[path.suffix.lower()](data, submesh.name if submesh else "")
+        except DescriptionError:
+            raise
+        except Exception as error:
+            text = shown(str(getattr(error, "msg", error)))  # pycollada's, without its class
+            raise DescriptionError(f"it can't be read: {text or type(error).__name__}") from error
+        if submesh and submesh.centred:
+            parts = _centred(parts)
+        return _make_mesh(parts)
+
+
+def _make_mesh(parts: list[Part]) -> Mesh:
+    """Returns the mesh made of `parts`: vertices (n, 3) and faces (m, 3 or more) of each."""
+    checked = [_checked(vertices, faces) for vertices, faces in parts if len(faces)]
+    if not checked:
+        raise DescriptionError("it holds no faces")
+    if len(checked) > MOST_PARTS:
+        checked = [_joined(checked)]
+    vertices, faces = _joined(checked)
+    hulls = tuple(hull_points(points) for points, _ in checked)
+    if max(map(len, hulls)) < 3:
+        raise DescriptionError("the physics engine finds nothing to touch in it")
+    return _hashed(vertices, faces, hulls)
+
+
+def _hashed(vertices: np.ndarray, faces: np.ndarray, hulls: tuple[np.ndarray, ...]) -> Mesh:
+    state = hashlib.blake2b(digest_size=16)
+    for array in (vertices, faces, *hulls):
+        state.update(repr(array.shape).encode())
+        state.update(array.tobytes())
+    return Mesh(vertices, faces, hulls, state.hexdigest())
+
+
+def _checked(vertices: np.ndarray, faces: np.ndarray) -> Part:
+    """Returns triangles, and of the vertices those that they use."""
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise DescriptionError("its vertices don't have three coordinates each")
+    if faces.ndim != 2 or faces.shape[1] < 3:
+        raise DescriptionError("it has faces of fewer than three corners")
+    if len(vertices) > MOST_VERTICES or len(faces) * (faces.shape[1] - 2) > MOST_TRIANGLES:
+        raise DescriptionError(f"it has more than {MOST_TRIANGLES} triangles")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        wrong = faces.min() if faces.min() < 0 else faces.max()
+        raise DescriptionError(f"a face names vertex {wrong}: there are {len(vertices)}, from 0 on")
+    used, triangles = np.unique(_triangles(faces), return_inverse=True)
+    vertices = np.ascontiguousarray(vertices[used], dtype=np.float64)
+    outside = ~(np.abs(vertices) <= LARGEST).all(axis=1)
+    if outside.any():
+        first = " ".join(f"{x:g}" for x in vertices[outside][0])
+        raise DescriptionError(f"a vertex lies at {first}: no coordinate may be beyond {LARGEST:g}")
+    return vertices, np.ascontiguousarray(triangles.reshape(-1, 3), dtype=np.int32)
+
+
+def _triangles(faces: np.ndarray) -> np.ndarray:
+    """Returns polygons of more corners as fans of triangles."""
+    fans = [faces[:, [0, i, i + 1]] for i in range(1, faces.shape[1] - 1)]
+    return np.stack(fans, axis=1).reshape(-1, 3)
+
+
+def _joined(parts: list[Part]) -> Part:
+    if sum(len(faces) for _, faces in parts) > MOST_TRIANGLES:
+        raise DescriptionError(f"it has more than {MOST_TRIANGLES} triangles")
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
+    faces = [each + start for (_, each), start in zip(parts, starts[:-1], strict=True)]
+    vertices = np.concatenate([vertices for vertices, _ in parts])
+    return vertices, np.concatenate(faces).astype(np.int32)
+
+
+def _centred(parts: list[Part]) -> list[Part]:
+    """Moves the middle of the bounding box to the origin."""
+    used = [vertices[np.unique(faces)] for vertices, faces in parts if len(faces)]
+    if not used:
+        return parts
+    points = np.concatenate(used)
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    return [(vertices - middle, faces) for vertices, faces in parts]
+
+
+def _not_found(name: str, known: Iterable[str]) -> DescriptionError:
+    """Returns the error for a named part that doesn't exist."""
+    others = sorted({each for each in known if each})
+    names = ", ".join(f"'{shown(each)}'" for each in others[:MOST_NAMES])
+    more = " and others" if len(others) > MOST_NAMES else ""
+    return DescriptionError(
+        f"it has no submesh '{shown(name)}', but {names or 'none with a name'}{more}"
+    )
+
+
+def _read_stl(data: bytes, only: str) -> list[Part]:
+    """Returns the facets of all solids, corner by corner, as one part. STL has no named parts."""
+    if only:
+        raise _not_found(only, [])
+    facets = struct.unpack_from("<I", data, HEADER - 4)[0] if len(data) >= HEADER else 0
+    size = HEADER + FACET * facets
+    if HEADER < size <= len(data):
+        from trimesh.exchange.stl import load_stl_binary
+
+        loaded = load_stl_binary(BytesIO(data[:size]))  # some programs write more behind it
+        return [(loaded["vertices"], loaded["faces"])]
+    text = data.decode("utf-8-sig", "replace")
+    if text.lstrip()[:5].lower() != "solid":
+        raise DescriptionError("the STL file is cut short or damaged")
+    text = NAME.sub("", text)  # a name may hold any words
+    try:
+        vertices = np.array(VERTEX.findall(text), dtype=np.float64).reshape(-1, 3)
+    except ValueError:
+        vertices = np.zeros((0, 3))
+    if not 0 < len(vertices) == text.lower().count("vertex") or len(vertices) % 3:
+        raise DescriptionError(_stl_fault(text))
+    return [(vertices, np.arange(len(vertices)).reshape(-1, 3))]
+
+
+def _stl_fault(text: str) -> str:
+    """Returns what is wrong with the facets of an STL text."""
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.split()
+        if words[:1] == ["vertex"]:
+            try:
+                numbers(" ".join(words[1:]), f"line {number}: a vertex", 3)
+            except DescriptionError as error:
+                return str(error)
+    return "its facets don't have three vertices each"
+
+
+def _read_obj(data: bytes, only: str) -> list[Part]:
+    """Returns a part for each object or group of the file, or for those named `only`."""
+    from trimesh.exchange.obj import load_obj
+
+    content = data.decode("utf-8-sig", "replace")
+    if not only and (plain := plain_obj(content)) is not None:
+        return [plain]
+    text = "\n".join(_obj_lines(content, only))
+    loaded = load_obj(
+        StringIO(text), group_material=False, skip_materials=True, maintain_order=True,
+        split_objects=True, split_groups=True,
+    )  # fmt: skip
+    parts = reversed(loaded.get("geometry", {}).values())  # trimesh begins with the last one
+    return [(np.asarray(part["vertices"]), np.asarray(part["faces"])) for part in parts]
+
+
+def _obj_lines(text: str, only: str) -> list[str]:
+    """Returns the lines that make the shape, with indices counted from 1 from the start of the file.
+
+    trimesh takes an index of 0 for the first vertex, counts a negative one back from the end of the file
+    instead of from its own line, and confuses corners that have textures with corners that have none.
+    """
+    lines: list[str] = []
+    faces: list[tuple[int, int]] = []  # the highest vertex of each face, and its line
+    count, name, others = 0, "", set()
+    joined = text.replace("\\\r\n", " ").replace("\\\n", " ")
+    for number, line in enumerate(joined.splitlines(), 1):
+        words = line.split()
+        if not words or words[0] not in READ:
+            continue
+        if words[0] == "v":
+            count += 1
+            words[4:] = []  # a weight or a colour
+            numbers(" ".join(words[1:]), f"line {number}: a vertex", 3)
+        elif words[0] == "f":
+            corners = [_obj_index(word, count, number) for word in words[1:]]
+            if len(corners) < 3:
+                raise DescriptionError(f"line {number}: a face has {len(corners)} corners")
+            faces.append((max(corners), number))
+            if only and name != only:
+                others.add(name)
+                continue
+            words[1:] = map(str, corners)
+        else:
+            name = " ".join(words[1:])
+        lines.append(" ".join(words))
+    for corner, number in faces:
+        if corner > count:
+            raise DescriptionError(f"line {number}: a face names vertex {corner} of {count}")
+    if only and not any(line.startswith("f ") for line in lines):
+        raise _not_found(only, others)
+    return lines
+
+
+def _obj_index(word: str, count: int, number: int) -> int:
+    """Returns the vertex of a corner in line `number`, before which there are `count` vertices."""
+    try:
+        index = int(word.partition("/")[0])
+    except ValueError as error:
+        raise DescriptionError(
+            f"line {number}: '{shown(word)}' is not a corner of a face"
+        ) from error
+    if index == 0 or index < -count:
+        raise DescriptionError(f"line {number}: a face names vertex {index} of {count}")
+    return index if index > 0 else count + 1 + index
+
+
+def _read_collada(data: bytes, only: str) -> list[Part]:
+    """Returns all that the scene shows, or its nodes named `only`, as one part [m]."""
+    from trimesh.exchange.dae import load_collada
+
+    try:
+        root = parse(data)
+    except FileError as error:
+        raise DescriptionError(str(error)) from error
+    for element in root.iter():
+        element.tag = element.tag.rpartition("}")[2]
+    if root.tag != "COLLADA":
+        raise DescriptionError("it is not COLLADA")
+    meters = meters_of(root)
+    _leave_shapes(root)
+    if only:
+        _leave_node(root, only)
+    root.set("xmlns", SPACE)
+    loaded = load_collada(BytesIO(ElementTree.tostring(root)), ignore_broken=False)
+    vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), int)], 0
+    for instance in loaded["graph"]:
+        part, frame = loaded["geometry"][instance["geometry"]], instance["matrix"]
+        points = part["vertices"].astype(float)
+        vertices.append((points @ frame[:3, :3].T + frame[:3, 3]) * meters)
+        faces.append(part["faces"] + count)
+        count += len(points)
+    return [(np.concatenate(vertices), np.concatenate(faces))]
+
+
+def _leave_shapes(root: Element) -> None:
+    """Removes materials, normals and colours: a broken one would refuse the rest."""
+    for child in [child for child in root if child.tag not in OF_SCENES]:
+        root.remove(child)
+    for node in (each for kind in ("visual_scene", "node") for each in root.iter(kind)):
+        node[:] = [child for child in node if child.tag in OF_NODES]
+        for child in node:
+            if child.tag.startswith("instance"):
+                child[:] = []  # materials
+    for geometry in root.iter("geometry"):
+        for mesh in geometry.iter("mesh"):
+            with place(f"geometry '{shown(geometry.get('id', ''))}'"):
+                _leave_positions(mesh)
+    if root.find("scene/instance_visual_scene") is None:
+        first = root.find("library_visual_scenes/visual_scene")
+        if first is None:
+            raise DescriptionError("it shows nothing: it has no <visual_scene>")
+        first.set("id", first.get("id", "scene"))
+        scene = ElementTree.SubElement(root, "scene")
+        ElementTree.SubElement(scene, "instance_visual_scene", url=f"#{first.get('id')}")
+
+
+def _leave_positions(mesh: Element) -> None:
+    """Leaves the vertices' positions, and lists of faces that name nothing else."""
+    vertices = mesh.find("vertices")
+    position = None if vertices is None else vertices.find("input[@semantic='POSITION']")
+    if vertices is None or position is None:
+        raise DescriptionError("its <vertices> have no POSITION")
+    vertices[:] = [position]
+    name = position.get("source", "")[1:]
+    sources = [e for e in mesh if e.tag == "source" and e.get("id") == name][:1]
+    if not sources:
+        raise DescriptionError(f"the source '{shown(name)}' of its positions is missing")
+    # NumPy silently stops at anything else.
+    if NO_NUMBER.search(sources[0].findtext("float_array", "")):
+        raise DescriptionError(f"source '{shown(name)}' holds something that isn't a number")
+    lists = [each for each in mesh if each.tag in FACES]
+    for each in (element for faces in lists for element in faces.iter()):
+        if each.tag in ("p", "vcount") and NO_INDEX.search(each.text or ""):
+            raise DescriptionError(f"a <{each.tag}> holds something that isn't an index")
+        if each.tag == "input" and each.get("semantic") != "VERTEX":
+            # It only tells how many indices a corner has; its own source may be missing.
+            each.set("semantic", "TANGENT")
+            each.set("source", f"#{name}")
+    mesh[:] = [*sources, vertices, *lists]
+
+
+def _leave_node(root: Element, name: str) -> None:
+    """Removes the geometries of nodes with other names. A node without a name has its parent's."""
+    known: set[str] = set()
+
+    def prune(element: Element, inherited: str) -> bool:
+        own = element.get("name", inherited) if element.tag == "node" else inherited
+        kept = False
+        for child in list(element):
+            if child.tag != "instance_geometry":
+                kept |= prune(child, own)
+            elif own == name:
+                kept = True
+            else:
+                known.add(own)
+                element.remove(child)
+        return kept
+
+    if not prune(root, ""):
+        raise _not_found(name, known)

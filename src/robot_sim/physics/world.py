@@ -1,0 +1,403 @@
+"""The physics world: models by name, Gazebo's name look-up, and the step that integrates them all."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from robot_sim.physics.description import (
+    DescriptionError,
+    Inertia,
+    Light,
+    Link,
+    ModelDescription,
+    Shape,
+)
+from robot_sim.physics.engine import Contact, Engine, Twist
+from robot_sim.physics.model import AT_REST, Model, ModelState
+from robot_sim.physics.pose import Pose, Vector, conjugate, rotate, subtract
+
+GRAVITY: Vector = (0.0, 0.0, -9.8)  # [m/s²], Gazebo's default
+TIME_STEP = 0.001  # [s], Gazebo's default
+WORLD_FRAMES = ("", "world", "map", "/map")
+
+
+PROPERTIES = ("inertia or gravity of a link", "stop or damping of a joint", "damping of a joint by its gains",
+              "friction of a link")  # fmt: skip
+"""What `Model.properties` returns, in order."""
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """ODE's solver parameters, with sdformat's defaults (docs/contract/gazebo.md 2.20).
+
+    Our engines have other solvers: only `iterations` and `contact_max_correcting_vel` have an effect.
+    Clients read the others back.
+    """
+
+    auto_disable_bodies: bool = False
+    precon_iterations: int = 0
+    iterations: int = 50
+    sor: float = 1.3
+    contact_surface_layer: float = 0.001  # [m]
+    contact_max_correcting_vel: float = 100.0  # [m/s]
+    cfm: float = 0.0
+    erp: float = 0.2
+    max_contacts: int = 20
+
+
+@dataclass(eq=False)
+class Attachment:
+    """Two links that are fixed to each other; the second one is at `pose` in the first one's frame."""
+
+    first: tuple[Model, str]
+    second: tuple[Model, str]
+    pose: Pose
+    number: int = 0  # the engine's
+
+    def joins(self, model: Model) -> bool:
+        """Returns whether one of the links is of that model."""
+        return model in (self.first[0], self.second[0])
+
+
+class WorldSnapshot(NamedTuple):
+    """What `World.save_state` returns; `settings` are gravity, time step and solver."""
+
+    models: list[tuple[Model, ModelState]]
+    order: list[Model]  # in the engine
+    settings: tuple[object, ...]
+    attachments: list[Attachment]
+    fastened: Mapping[int, Any]  # the engine's
+    contacts: Sequence[Contact]
+
+
+class SnapshotError(ValueError):
+    """A snapshot can't be restored; the text says why."""
+
+
+class NameTaken(ValueError):
+    """The world already has a model of that name."""
+
+
+class Entity(NamedTuple):
+    """What a name refers to: `kind` is model, link, collision or joint; `name` is plain.
+
+    `link` is the link of a collision.
+    """
+
+    kind: str
+    model: Model
+    name: str
+    link: str = ""
+
+
+class World:
+    """All models, and the engine that simulates them. Not thread-safe: its owner serialises access."""
+
+    def __init__(
+        self, engine: Engine, gravity: Vector = GRAVITY, time_step: float = TIME_STEP
+    ) -> None:
+        self.engine = engine
+        self.models: dict[str, Model] = {}
+        self.lights: dict[str, Light] = {}
+        self.attachments: list[Attachment] = []
+        self.version = 0  # counts what changes the look of the world: models and lights
+        self._entities: dict[str, Entity] = {}
+        self._joints: dict[str, Entity] = {}
+        self._special: list[Model] = []  # with springs, decay or a kinematic link
+        self._recalled: Sequence[Contact] | None = None  # until the next step
+        self.time_step = time_step
+        self.gravity = gravity
+        engine.set_gravity(gravity)
+        engine.set_time_step(time_step)
+        self.set_solver(SolverSettings())
+
+    def spawn(self, name: str, description: ModelDescription, pose: Pose) -> Model:
+        """Adds a model with its frame at `pose`.
+
+        Raises:
+            NameTaken: if there is a model of that name.
+            DescriptionError: if the engine can't take it.
+        """
+        if name in self.models:
+            raise NameTaken(name)
+        self._renew()
+        body = self.engine.load(description, pose.compose(description.root_pose))
+        return self.admit(Model(name, description, body, pose))
+
+    def admit(self, model: Model) -> Model:
+        """Adds a model whose body the engine has."""
+        description, body = model.description, model.body
+        try:
+            model.apply_damping(self.time_step)
+            model.put_followers()
+            model.close_loops((), model.joint_states())
+            if description.start is not None:
+                model.begin(description.start)
+        except Exception:
+            self.engine.remove(body)
+            raise
+        if model.softened:
+            joints = ", ".join(sorted(model.softened))
+            description.warnings.append(f"springs too stiff for the step are softened: {joints}")
+        if body.overlapping:
+            pairs = sorted(" and ".join(sorted(pair)) for pair in body.overlapping)
+            description.warnings.append(
+                f"links that overlap in the initial pose don't collide with each other: {', '.join(pairs)}"
+            )
+        self.models[model.name] = model
+        self._index(model)
+        model.number = self.version
+        return model
+
+    def delete(self, name: str) -> None:
+        """Takes model `name` out of the world."""
+        model = self.models.pop(name)
+        for each in self._of(model):
+            self.detach(each)
+        self.engine.remove(model.body)
+        self._entities, self._joints = {}, {}
+        self._index(*self.models.values())
+
+    def model(self, name: str) -> Model | None:
+        """Returns what the name look-up finds, if it is a model (docs/contract/gazebo.md 2.0)."""
+        entity = self._entities.get(name)
+        return entity.model if entity is not None and entity.kind == "model" else None
+
+    def link(self, name: str) -> tuple[Model, str] | None:
+        """Returns model and plain name of what the name look-up finds, if it is a link."""
+        entity = self._entities.get(name)
+        return (entity.model, entity.name) if entity is not None and entity.kind == "link" else None
+
+    def joint(self, name: str) -> tuple[Model, str] | None:
+        """Returns the first model that has joint `name` (plain or scoped), and the joint's plain name."""
+        entity = self._joints.get(name)
+        return None if entity is None else (entity.model, entity.name)
+
+    def frame(self, name: str) -> tuple[Pose, Twist] | None:
+        """Returns pose and twist of the named model, link or collision, or of the world; None if unknown."""
+        entity = self._entities.get(name)
+        if entity is None or entity.kind == "joint":
+            return (Pose(), AT_REST) if entity is None and name in WORLD_FRAMES else None
+        if entity.kind == "model":
+            return entity.model.state()
+        if entity.kind == "link":
+            return entity.model.link_state(entity.name)
+        pose, twist = entity.model.link_state(entity.link)
+        return pose.compose(entity.model.collisions(entity.link)[entity.name].pose), twist
+
+    def is_world_frame(self, name: str) -> bool:
+        """Returns whether `name` refers to the world itself: an entity of that name takes precedence."""
+        return name in WORLD_FRAMES and name not in self._entities
+
+    def attach(self, first: tuple[Model, str], second: tuple[Model, str]) -> Attachment:
+        """Fixes a link to another one where they are now, until `detach`, a reset, or one's deletion."""
+        poses = [model.link_state(link)[0] for model, link in (first, second)]
+        made = Attachment(first, second, poses[1].relative_to(poses[0]))
+        self._fasten(made)
+        self.attachments.append(made)
+        return made
+
+    def detach(self, attachment: Attachment) -> None:
+        """Ends an attachment."""
+        self.attachments.remove(attachment)
+        self.engine.unfasten(attachment.number)
+
+    def _fasten(self, attachment: Attachment) -> None:
+        (one, link), (other, its) = attachment.first, attachment.second
+        attachment.number = self.engine.fasten((one.body, link), (other.body, its), attachment.pose)
+
+    def _of(self, model: Model) -> list[Attachment]:
+        return [each for each in self.attachments if each.joins(model)]
+
+    def with_attached(self, models: Iterable[Model]) -> set[Model]:
+        """Returns models, and all that is attached to them, also by way of others."""
+        found = set(models)
+        waiting = list(found)
+        while waiting:
+            for each in self._of(waiting.pop()):
+                fresh = {each.first[0], each.second[0]} - found
+                found |= fresh
+                waiting += fresh
+        return found
+
+    def set_gravity(self, gravity: Vector) -> None:
+        """Sets the acceleration of gravity [m/s²]."""
+        self.gravity = gravity
+        self.engine.set_gravity(gravity)
+
+    def set_time_step(self, time_step: float) -> None:
+        """Sets the length of a physics step [s]."""
+        self.time_step = time_step
+        self.engine.set_time_step(time_step)
+        for model in self.models.values():
+            model.apply_damping(time_step)
+
+    def set_solver(self, solver: SolverSettings) -> None:
+        """Stores the solver's settings, and sets those that the engine has."""
+        self.solver = solver
+        self.engine.set_iterations(solver.iterations)
+        self.engine.set_fastest_separation(solver.contact_max_correcting_vel)
+
+    def set_inertia(self, model: Model, link: str, inertia: Inertia) -> None:
+        """Gives a link of `model` another inertia; poses and velocities stay.
+
+        Raises:
+            DescriptionError: if the engine can't take it; the model is as it was then.
+        """
+        self._renew()  # from descriptions that are still those of the bodies
+        record = model.description.links[link]
+        old, record.inertia = record.inertia, inertia
+        if model.description.static or record.kinematic:
+            return
+        if not model.body.set_inertia(link, old, inertia):
+            try:
+                fresh = self.engine.load(model.description, model.root_state()[0])
+            except DescriptionError:
+                record.inertia = old
+                raise
+            stale = model.body
+            for each in self._of(model):
+                self.engine.unfasten(each.number)
+            model.move_into(fresh)
+            self.engine.remove(stale)
+            for each in self._of(model):
+                self._fasten(each)
+        model.apply_damping(self.time_step)
+
+    def step(self) -> None:
+        """Integrates all models by one time step."""
+        self._recalled = None
+        if not self._special:
+            self.engine.step()
+            return
+        for model in self._special:
+            model.apply_passive_forces()
+        held = [(model, model.kinematic_twist()) for model in self._special if model.kinematic]
+        self.engine.step()
+        for model, twist in held:
+            model.set_kinematic_twist(twist)
+
+    def contacts(self) -> Sequence[Contact]:
+        """Returns where bodies touched in the last step; after a restore, in that before the snapshot."""
+        return self.engine.contacts() if self._recalled is None else self._recalled
+
+    def reset(self, joints: bool) -> None:
+        """Returns every model to where it was spawned, at rest; with `joints`, every joint to zero.
+
+        Nothing is attached any more.
+        """
+        for attachment in list(self.attachments):
+            self.detach(attachment)
+        self.engine.forget_contacts()
+        self._recalled = None
+        for model in self.models.values():
+            model.reset(joints)
+
+    def save_state(self) -> WorldSnapshot:
+        """Returns all from which it steps on, but what services set once: properties and models.
+
+        Engines can't save contacts. So those begin anew, now and after each restore: the next step finds
+        them again, but the solver of PyBullet starts without the forces of the last one.
+        """
+        contacts, fastened = self.contacts(), self.engine.fastened()
+        self.engine.refasten(fastened)  # in the order that a restore leads to
+        snapshot = WorldSnapshot(
+            [(model, model.save_state()) for model in self.models.values()],
+            self._order(),
+            (self.gravity, self.time_step, self.solver),
+            list(self.attachments),
+            fastened,
+            contacts,
+        )
+        self._recall(contacts)
+        return snapshot
+
+    def _order(self) -> list[Model]:
+        models = {id(model.body): model for model in self.models.values()}
+        return [models[id(body)] for body in self.engine.order()]
+
+    def _recall(self, contacts: Sequence[Contact]) -> None:
+        self.engine.forget_contacts()
+        self._recalled = contacts
+
+    def restore_state(self, snapshot: WorldSnapshot) -> None:
+        """Returns to what `save_state` has returned; no model has come or gone since.
+
+        Raises:
+            SnapshotError: if models have other properties now; nothing changes then.
+        """
+        if (self.gravity, self.time_step, self.solver) != snapshot.settings:
+            raise SnapshotError("gravity, time step or solver have changed since the snapshot")
+        if self._order() != snapshot.order:
+            raise SnapshotError(
+                "links have been changed since the snapshot, and the engine takes the models in another order"
+            )
+        for model, state in snapshot.models:
+            now = zip(PROPERTIES, model.properties(), state.properties, strict=True)
+            if changed := [name for name, one, other in now if one != other]:
+                raise SnapshotError(
+                    f"model '{model.name}' has another {' and '.join(changed)} than in the snapshot"
+                )
+            attached = any(each.joins(model) for each in snapshot.attachments)
+            if attached and model.body is not state.body:
+                raise SnapshotError(
+                    f"model '{model.name}' was attached, and its links have been changed since the snapshot"
+                )
+        self.engine.refasten(snapshot.fastened)
+        self.attachments = list(snapshot.attachments)
+        for model, state in snapshot.models:
+            model.restore_state(state)
+        self._recall(snapshot.contacts)
+
+    def close(self) -> None:
+        self.models.clear()
+        self.engine.close()
+
+    def _renew(self) -> None:
+        """Lets the engine free the memory of removed bodies."""
+        models = list(self.models.values())
+        bodies = self.engine.renewed([(model.description, model.body) for model in models])
+        fresh = [(m, body) for m, body in zip(models, bodies, strict=True) if body is not m.body]
+        for model, body in fresh:
+            model.go_on_in(body)
+        for each in self.attachments if fresh else ():  # all are in another world of the engine
+            self._fasten(each)
+
+    def _index(self, *models: Model) -> None:
+        """Maps plain and scoped names of new models to what a depth-first search from the world's root finds.
+
+        It finds new models last, so existing entries stay.
+        """
+        self.version += 1
+        self._special = [model for model in self.models.values() if model.special]
+        for model in models:
+            self._entities.setdefault(model.name, Entity("model", model, model.name))
+            for link in model.link_names:
+                self._enter(Entity("link", model, link), f"{model.name}::{link}")
+                for name in model.collisions(link):
+                    scoped = f"{model.name}::{link}::{name}"
+                    self._enter(Entity("collision", model, name, link), scoped)
+            for name in model.all_joints:
+                joint, scoped = Entity("joint", model, name), f"{model.name}::{name}"
+                self._enter(joint, scoped)
+                for key in (scoped, name):
+                    self._joints.setdefault(key, joint)
+
+    def _enter(self, entity: Entity, scoped: str) -> None:
+        for key in (scoped, entity.name):
+            self._entities.setdefault(key, entity)
+
+
+def seen_from(state: tuple[Pose, Twist], frame: tuple[Pose, Twist]) -> tuple[Pose, Twist]:
+    """Returns a state relative to a frame, as Gazebo does: without the ω × r term."""
+    back = conjugate(frame[0].orientation)
+    linear, angular = (
+        rotate(back, subtract(own, other)) for own, other in zip(state[1], frame[1], strict=True)
+    )
+    return state[0].relative_to(frame[0]), (linear, angular)
+
+
+def ground_plane() -> ModelDescription:
+    """Returns Gazebo's `ground_plane`: a static infinite plane through the origin."""
+    link = Link("link", collisions=[Shape("plane", name="collision")])
+    return ModelDescription("ground_plane", {"link": link}, {}, root="link", static=True)

@@ -1,0 +1,184 @@
+"""Draws what `recording.py` sends: a video, a page in 3-D, or a picture; in a process of its own."""
+
+import logging
+import pickle
+import queue
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, BinaryIO
+
+import numpy as np
+from PIL import Image
+
+from robot_sim.physics.files.world_file import empty_world
+from robot_sim.physics.pose import ZERO, Pose, Vector, add, subtract
+from robot_sim.pictures.camera import ASPECT, Camera, overview
+from robot_sim.pictures.recording import RecordedModel, RecordingOptions
+from robot_sim.pictures.renderer import Renderer
+from web_viewer.video import EncoderFailed, Mp4Writer
+
+NUMBERS = 7  # of a pose
+ROOM = 1.25  # factor on the camera's distance: things move
+END = 1.0  # [s] for which a page shows its last moment before it begins again
+
+Frames = Iterable[tuple[list[RecordedModel] | None, Sequence[float]]]
+"""Models, None while they are those of the frame before, and the poses of their links."""
+
+logger = logging.getLogger(f"rosout.{__name__}")
+
+
+class FrameDrawer:
+    """Draws the frames: the recorded models in a renderer, and a camera that looks at them."""
+
+    def __init__(self, options: RecordingOptions, renderer: Renderer) -> None:
+        self._options = options
+        self._renderer = renderer
+        self._models: list[RecordedModel] = []
+        self._camera: Camera | None = None
+        self._followed, self._offset = "", ZERO
+
+    def change(self, models: list[RecordedModel]) -> None:
+        """Replaces the models; the next frame places the camera from scratch."""
+        for model in self._models:
+            self._renderer.remove(model.seen.name)
+        for model in models:
+            self._renderer.add(model.seen.name, model.shapes)
+        self._models, self._camera = models, None
+
+    def frame(self, poses: Sequence[float]) -> np.ndarray:
+        """Draws the models with their links at these poses, 7 numbers each."""
+        rows = iter(np.reshape(np.asarray(poses), (-1, NUMBERS)).tolist())
+        places: dict[str, Vector] = {}
+        for model, _ in self._models:
+            found = []
+            for _ in model.links:
+                x, y, z, *turn = next(rows)
+                found.append(Pose((x, y, z), (turn[0], turn[1], turn[2], turn[3])))
+            named = {link.name: pose for link, pose in zip(model.links, found, strict=True)}
+            self._renderer.place(model.name, named)
+            places[model.name] = found[model.root].position if found else ZERO
+        width, height = self._options.width, self._options.height
+        if self._camera is None:
+            self._camera = self._aim(places, width / height)
+        if self._followed:
+            self._camera = self._camera.at(add(places[self._followed], self._offset))
+        return self._renderer.picture(self._camera, width, height)
+
+    def _aim(self, places: dict[str, Vector], aspect: float) -> Camera:
+        movable = [model.name for model, _ in self._models if not model.static]
+        named = [self._options.model] if self._options.model in places else []
+        names = named or movable or list(places)
+        corners = [np.zeros((0, 3)), *(self._renderer.corners(name) for name in names)]
+        camera = overview(np.concatenate(corners), aspect)
+        self._followed = names[0] if len(names) == 1 else ""
+        if self._followed:
+            self._offset = subtract(camera.target, places[self._followed])
+        return Camera(camera.target, ROOM * camera.distance, camera.yaw, camera.pitch, camera.view)
+
+
+def write_video(options: RecordingOptions, frames: Frames) -> None:
+    """Writes an MP4 file, drawn as frames come."""
+    drawer, writer = FrameDrawer(options, Renderer()), Mp4Writer(options.path, options.rate)
+    for models, poses in frames:
+        if models is not None:
+            drawer.change(models)
+        writer.add(drawer.frame(poses))
+    writer.close()
+
+
+def write_picture(options: RecordingOptions, frames: Frames) -> None:
+    """Writes a PNG file of the last frame."""
+    shown: list[RecordedModel] = []
+    last: Sequence[float] | None = None
+    for models, poses in frames:
+        shown, last = shown if models is None else models, poses
+    if last is None:
+        return
+    drawer = FrameDrawer(options, Renderer())
+    drawer.change(shown)
+    picture = drawer.frame(last)
+    with options.path.open("wb") as file:
+        Image.fromarray(picture).save(file, "PNG")
+
+
+def write_page(options: RecordingOptions, frames: Frames) -> None:
+    """Writes an HTML file that plays the frames in 3-D, in any browser and without a network."""
+    from robot_sim.pictures.page import Picture
+    from web_viewer.server import hidden_page
+
+    shown: list[RecordedModel] = []
+    last: Sequence[float] | None = None
+    with hidden_page() as server:
+        picture, recording = Picture(server, logger.warning), server.get_scene_serializer()
+        for models, last in frames:
+            if models is not None:
+                shown = models
+                picture.draw([each.seen for each in shown], empty_world().lights.values())
+            picture.move(np.reshape(np.asarray(last), (-1, NUMBERS)))
+            recording.insert_sleep(1.0 / options.rate)
+        if last is None:
+            return
+        links = picture.links
+        movable = [seen for seen, _ in shown if not seen.static]
+        corners = [each.corners(links[each.name]) for each in movable if each.name in links]
+        camera = overview(np.concatenate([np.zeros((0, 3)), *corners]), ASPECT)
+        x, y, z = camera.eye.tolist()
+        server.initial_camera.position, server.initial_camera.look_at = (x, y, z), camera.target
+        recording.insert_sleep(END)
+        options.path.write_text(recording.as_html(), encoding="utf-8")
+
+
+FILMS: dict[str, Callable[[RecordingOptions, Frames], None]] = {
+    ".mp4": write_video,
+    ".html": write_page,
+    ".png": write_picture,
+}
+
+
+def main() -> int:
+    """Draws until standard input ends; SIGTERM drops the frames that aren't drawn yet."""
+    logging.basicConfig(format="recording: %(message)s")
+    options: RecordingOptions = pickle.load(sys.stdin.buffer)
+    try:
+        count = _draw(options)
+    except (EncoderFailed, OSError) as error:
+        print(f"recording: {options.path}: {error}", file=sys.stderr, flush=True)
+        return 1
+    length = f"{count} frames, {count / options.rate:.1f} s" if count else "no time has passed"
+    print(f"recording: {options.path}: {length}", flush=True)
+    return 0
+
+
+def _draw(options: RecordingOptions) -> int:
+    """Draws what comes by standard input; returns the number of frames."""
+    inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    stopping = False
+
+    def stop(*_: object) -> None:
+        nonlocal stopping
+        stopping = True
+        inbox.put(None)
+
+    signal.signal(signal.SIGTERM, stop)
+    # In a thread, so that the simulator never waits for a frame.
+    threading.Thread(target=_read, args=(sys.stdin.buffer, inbox), daemon=True).start()
+    count = 0
+
+    def frames() -> Iterator[Any]:
+        nonlocal count
+        while (message := inbox.get()) is not None and not stopping:
+            count += 1
+            yield message
+
+    FILMS[options.path.suffix.lower()](options, frames())
+    return count
+
+
+def _read(stream: BinaryIO, inbox: "queue.SimpleQueue[Any]") -> None:
+    try:
+        while True:
+            inbox.put(pickle.load(stream))
+    except (EOFError, pickle.UnpicklingError):  # the end; a killed simulator leaves half a message
+        inbox.put(None)

@@ -1,0 +1,400 @@
+"""What rays of light or sound meet first in a world, by Embree where it is installed.
+
+All shapes that never move are one Embree scene, which is built when one comes, goes or is moved. What moves,
+balls, and large meshes are met in their own frames, into which rays are brought: meshes by Embree scenes that
+are kept, the others analytically. So nothing is built while things move, and no ball waits for trimesh. A ray
+is only compared with shapes whose bounding ball it meets. Worlds of one process share equal Embree scenes.
+"""
+
+import hashlib
+import importlib.util
+import logging
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+from weakref import WeakValueDictionary
+
+import numpy as np
+
+from robot_sim.physics.description import DescriptionError, Link, Shape
+from robot_sim.physics.model import Model
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import World
+from robot_sim.pictures.visuals import Piece, pieces_of, solid_of
+from robot_sim.sensors.intersection import DISTANCES, NORMALS, reach
+
+logger = logging.getLogger(f"rosout.{__name__}")
+LARGE = 2000  # triangles of a mesh that isn't built anew with its neighbours
+NONE = -1
+MARGIN = 1e-5  # [m], and relative: of the comparison of rays and balls, in float32
+
+
+class Target(NamedTuple):
+    """A shape that rays meet; a visual mesh has a target for each of its colours and textures."""
+
+    model: Model
+    link: str
+    shape: Shape
+    piece: Piece | None = None
+    number: int = 0  # of the piece in its file
+
+    def corners(self) -> np.ndarray:
+        """Returns the corners (3 n, 3) of its triangles, in the shape's frame [m]."""
+        return (self.piece.solid if self.piece else solid_of(self.shape)).corners
+
+
+class Hits(NamedTuple):
+    """What rays meet first.
+
+    Attributes:
+        distances: (n,) [m]; inf for nothing.
+        targets: (n,) indices of targets; -1 for none.
+        triangles: (n,) index of the target's triangle, where triangles were met.
+        weights: (n, 2) of its second and third corner at the point that is met.
+    """
+
+    distances: np.ndarray
+    targets: np.ndarray
+    triangles: np.ndarray
+    weights: np.ndarray
+
+    def improve(self, rays: np.ndarray, targets: Any, distances: np.ndarray) -> np.ndarray:
+        """Takes over nearer hits, of several of a ray the nearest one; returns which are taken."""
+        nearer = (distances < self.distances[rays]).nonzero()[0]
+        if not len(nearer):
+            return nearer
+        order = nearer[np.argsort(-distances[nearer], kind="stable")]  # the last one assigned holds
+        self.distances[rays[order]] = distances[order]
+        self.targets[rays[order]] = np.broadcast_to(targets, distances.shape)[order]
+        return order
+
+
+class RayScene:
+    """The shapes of a world's models, for rays. The caller holds the world's lock.
+
+    Args:
+        world: whose models are met.
+        visuals: whether rays meet visuals, as those of cameras do, or collisions, as those of lasers.
+    """
+
+    def __init__(self, world: World, visuals: bool = False) -> None:
+        self.world = world
+        self._visuals = visuals
+        self.targets: list[Target] = []
+        self.retro = np.zeros(1)  # reflectivity of each target
+        self._targets_of: dict[Model, list[Target]] = {}
+        self._key: object = None
+        self._is_fresh = False
+        self._apart_meshes: dict[int, Any] = {}
+
+    def expire(self) -> None:
+        """Says that things may have moved: the next cast looks where they are."""
+        self._is_fresh = False
+
+    def _refresh(self) -> None:
+        models = self.world.models.values()
+        key = self.world.version, [model.placed for model in models if model.description.static]
+        if key != self._key:
+            self._build()
+            self._key = key
+        if len(self._moving):
+            self._place(self._moving)
+            self._find_centres()
+        self._is_fresh = True
+
+    @np.errstate(over="ignore", invalid="ignore")  # of what is light years away
+    def cast(
+        self, origin: np.ndarray, directions: np.ndarray, near: Any = 0.0, far: Any = math.inf
+    ) -> Hits:
+        """Returns what rays meet first.
+
+        A ray that starts inside a shape meets it where it leaves.
+
+        Args:
+            origin: (3,) in the world [m].
+            directions: (n, 3) of length 1, in world axes.
+            near: where rays start, as a distance from the origin [m]; of each ray (n,), or of all.
+            far: where they end.
+        """
+        if not self._is_fresh:
+            self._refresh()
+        starts = origin + np.reshape(near, (-1, 1)) * directions
+        found = self._meet_still(starts, directions)
+        rays = np.arange(len(directions))
+        for target in self._planes:
+            found.improve(rays, target, self._plane_distances(target, starts, directions))
+        targets, rays = self._pairs(origin, directions, np.max(far))
+        for kind in self._analytic:
+            some = self._kinds[targets] == kind
+            distances = self._distances(
+                kind, targets[some], starts[rays[some]], directions[rays[some]]
+            )
+            found.improve(rays[some], targets[some], distances)
+        for target, triangles in self._apart_meshes.items():
+            self._meet_mesh(found, target, triangles, rays[targets == target], starts, directions)
+        found.distances[:] += near
+        beyond = found.distances > far
+        found.distances[beyond], found.targets[beyond] = np.inf, NONE
+        return found
+
+    def normals(self, target: int, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+        """Returns the normals (k, 3), in world axes, of a target at points (k, 3) of its surface."""
+        turn, kind = self._turns[target], self._kinds[target]
+        if kind == "mesh":
+            corners = self.targets[target].corners().reshape(-1, 3, 3)[triangles]
+            own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            length = np.linalg.norm(own, axis=1, keepdims=True)
+            own = own / np.where(length > 0.0, length, 1.0)
+        else:
+            own = NORMALS[kind]((points - self._places[target]) @ turn, self._sizes[target])
+        return np.asarray(own @ turn.T)
+
+    def _meet_still(self, starts: np.ndarray, directions: np.ndarray) -> Hits:
+        met = self._still_triangles.first(starts, directions)
+        targets = self._still[met.parts]  # the last one is NONE
+        found = Hits(met.distances, targets, met.triangles, met.weights)
+        some = np.flatnonzero(self._are_cylinders[targets])  # their triangles lie within them
+        exact = self._distances("cylinder", targets[some], starts[some], directions[some])
+        found.distances[some] = np.where(exact < np.inf, exact, found.distances[some])
+        return found
+
+    def _meet_mesh(
+        self, found: Hits, target: int, triangles: Any, rays: np.ndarray,
+        starts: np.ndarray, directions: np.ndarray,
+    ) -> None:  # fmt: skip
+        if not len(rays):
+            return
+        turn, place = self._turns[target], self._places[target]
+        met = triangles.first((starts[rays] - place) @ turn, directions[rays] @ turn)
+        some = found.improve(rays, target, met.distances)
+        found.triangles[rays[some]] = met.triangles[some]
+        found.weights[rays[some]] = met.weights[some]
+
+    def _pairs(
+        self, origin: np.ndarray, directions: np.ndarray, far: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns which targets' bounding balls are met by which rays: two arrays of indices."""
+        apart = self._apart
+        ways = self._apart_centres - origin
+        room = np.einsum("ij,ij->i", ways, ways) - self._radii[apart] ** 2
+        # A ray meets a ball if it lies within the cone of tangents. All do that start in it.
+        tangents = np.where(room > 0.0, np.sqrt(np.maximum(room, 0.0)), -np.inf)
+        least = (tangents - MARGIN * (1.0 + np.abs(tangents))).astype(np.float32)
+        least[tangents > far] = np.inf
+        (x, y, z), (dx, dy, dz) = (
+            ways.astype(np.float32).T[..., None],
+            directions.astype(np.float32).T,
+        )
+        along = x * dx
+        along += y * dy
+        along += z * dz
+        which, rays = (along >= least[:, None]).nonzero()
+        return apart[which], rays
+
+    def _distances(
+        self, kind: str, targets: np.ndarray, starts: np.ndarray, directions: np.ndarray
+    ) -> np.ndarray:
+        """Returns the distances of pairs of a target and a ray: inputs and result (k, ...)."""
+        turns = self._turns[targets]
+        origins = np.einsum("kji,kj->ki", turns, starts - self._places[targets])
+        return DISTANCES[kind](
+            origins, np.einsum("kji,kj->ki", turns, directions), self._sizes[targets]
+        )
+
+    def _plane_distances(
+        self, target: int, starts: np.ndarray, directions: np.ndarray
+    ) -> np.ndarray:
+        normal = self._turns[target][:, 2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distances = ((self._places[target] - starts) @ normal) / (directions @ normal)
+        return np.where(distances >= 0.0, distances, np.inf)
+
+    # --- what there is --------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        read, known = _seen if self._visuals else _solid, self._targets_of
+        self._targets_of = {
+            model: known.get(model)
+            or [target for link in model.description.links.values() for target in read(model, link)]
+            for model in self.world.models.values()
+        }
+        self.targets = targets = [each for found in self._targets_of.values() for each in found]
+        count = len(targets)
+        self.retro = np.array([*(target.shape.retro for target in targets), 0.0])  # of NONE, too
+        self._kinds = np.array([*(target.shape.kind for target in targets), ""])
+        self._sizes = np.zeros((count, 3))
+        self._own_turns, self._own_places = frames([target.shape.pose for target in targets])
+        self._turns, self._places = np.zeros((count, 3, 3)), np.zeros((count, 3))
+        self._centres, self._radii = np.zeros((count, 3)), np.zeros(count)
+        self._place(np.arange(count))
+        self._planes = [i for i in range(count) if self._kinds[i] == "plane"]
+        still, triangles, apart, meshes = [], [], [], {}
+        for index, target in enumerate(targets):
+            shape = target.shape
+            if shape.kind == "plane":
+                continue
+            self._sizes[index, : len(shape.size)] = shape.size
+            is_still = target.model.description.static and shape.kind != "sphere"
+            if shape.kind != "mesh" and not is_still:
+                apart.append(index)
+                self._radii[index] = reach(shape.kind, shape.size)
+                continue
+            corners = target.corners()
+            is_large = shape.kind == "mesh" and len(corners) > 3 * LARGE
+            if target.model.description.static and not is_large:
+                still.append(index)
+                triangles.append(corners @ self._turns[index].T + self._places[index])
+                continue
+            apart.append(index)
+            self._surround(index, corners)
+            meshes[index] = _built([corners])
+        self._still, self._apart = np.array([*still, NONE]), np.array(apart, int)
+        self._apart_meshes, self._still_triangles = meshes, _built(triangles)
+        self._are_cylinders = self._kinds == "cylinder"
+        self._analytic = [kind for kind in DISTANCES if kind in self._kinds[apart]]
+        moves = [not targets[index].model.description.static for index in apart]
+        self._moving = self._apart[np.array(moves, bool)]
+        self._find_centres()
+
+    def _find_centres(self) -> None:
+        """Finds where the balls are around what isn't part of the still scene."""
+        turns, apart = self._turns[self._apart], self._apart
+        self._apart_centres = self._places[apart] + np.einsum(
+            "kij,kj->ki", turns, self._centres[apart]
+        )
+
+    def _surround(self, index: int, corners: np.ndarray) -> None:
+        """Sets the ball around a target, in the target's frame."""
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        self._centres[index] = (low + high) / 2.0
+        self._radii[index] = np.linalg.norm(high - low) / 2.0
+
+    def _place(self, targets: np.ndarray) -> None:
+        """Reads where `targets` are."""
+        poses: dict[Model, dict[str, Pose]] = {}
+        links = []
+        for index in targets.tolist():
+            model, link = self.targets[index][:2]
+            if model not in poses:
+                poses[model] = model.body.link_poses()
+            links.append(poses[model][link])
+        turns, places = frames(links)
+        self._turns[targets] = turns @ self._own_turns[targets]
+        own = np.einsum("kij,kj->ki", turns, self._own_places[targets])
+        self._places[targets] = places + own
+
+
+def frames(poses: Sequence[Pose]) -> tuple[np.ndarray, np.ndarray]:
+    """Returns rotation matrices (n, 3, 3) and positions (n, 3) of poses."""
+    x, y, z, w = np.array([pose.orientation for pose in poses]).reshape(-1, 4).T
+    rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+    places = np.array([pose.position for pose in poses]).reshape(-1, 3)
+    return np.array(rows).transpose(2, 0, 1), places
+
+
+def _solid(model: Model, link: Link) -> list[Target]:
+    return [Target(model, link.name, shape) for shape in link.collisions]
+
+
+def _seen(model: Model, link: Link) -> Iterator[Target]:
+    """Yields what is visible of a link. A plane is read as a collision only."""
+    planes = [shape for shape in link.collisions if shape.kind == "plane"]
+    for shape in [*link.visuals, *planes]:
+        if shape.kind != "mesh":
+            yield Target(model, link.name, shape)
+            continue
+        try:
+            for number, piece in enumerate(pieces_of(shape)):
+                yield Target(model, link.name, shape, piece, number)
+        except DescriptionError as error:
+            logger.warning(
+                "model '%s', link '%s' isn't seen whole: %s", model.name, link.name, error
+            )
+
+
+class _Met(NamedTuple):
+    """What Embree finds: see `Hits`; `parts` (n,) are -1 for none."""
+
+    distances: np.ndarray
+    parts: np.ndarray
+    triangles: np.ndarray
+    weights: np.ndarray
+
+
+class _Embree:
+    """The triangles of some parts, each given by their corners (3 n, 3)."""
+
+    def __init__(self, parts: list[np.ndarray]) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        self._scene = EmbreeScene(robust=True)  # no ray slips through an edge
+        for corners in parts:
+            TriangleMesh(self._scene, corners.reshape(-1, 3, 3).astype(np.float32))
+
+    def first(self, starts: np.ndarray, directions: np.ndarray) -> _Met:
+        """Returns what rays (n, 3) meet first."""
+        found = self._scene.run(
+            np.ascontiguousarray(starts, np.float32), np.ascontiguousarray(directions, np.float32),
+            query="INTERSECT", output=True,
+        )  # fmt: skip
+        parts = found["geomID"]
+        distances = found["tfar"].astype(float)
+        distances[parts == NONE] = np.inf
+        return _Met(distances, parts, found["primID"], np.column_stack([found["u"], found["v"]]))
+
+
+class _EachTriangle:
+    """As `_Embree`, where it has no wheels: every ray is compared with every triangle."""
+
+    def __init__(self, parts: list[np.ndarray]) -> None:
+        triangles = [corners.reshape(-1, 3, 3) for corners in parts]
+        counts = [len(each) for each in triangles]
+        self._parts = np.repeat(np.arange(len(parts)), counts)
+        self._indices = np.concatenate([np.arange(count) for count in counts] or [np.zeros(0, int)])
+        self._corners = np.concatenate(triangles or [np.zeros((0, 3, 3))])
+
+    def first(self, starts: np.ndarray, directions: np.ndarray) -> _Met:
+        """Returns what rays (n, 3) meet first, by the method of Möller and Trumbore (1997)."""
+        found = _Met(
+            np.full(len(starts), np.inf), np.full(len(starts), NONE), np.zeros(len(starts), int),
+            np.zeros((len(starts), 2)),
+        )  # fmt: skip
+        origin, *ends = self._corners.transpose(1, 0, 2)
+        first, second = (end - origin for end in ends)
+        for ray, (start, way) in enumerate(zip(starts, directions, strict=True)):
+            across = np.cross(way, second)
+            to_start = start - origin
+            turned = np.cross(to_start, first)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                scale = 1.0 / np.einsum("ij,ij->i", first, across)
+                u = scale * np.einsum("ij,ij->i", to_start, across)
+                v = scale * (turned @ way)
+                distance = scale * np.einsum("ij,ij->i", second, turned)
+                hit = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance >= 0.0)
+            if hit.any():
+                best = int(np.where(hit, distance, np.inf).argmin())
+                found.distances[ray], found.parts[ray] = distance[best], self._parts[best]
+                found.triangles[ray], found.weights[ray] = self._indices[best], (u[best], v[best])
+        return found
+
+
+Triangles = _Embree if importlib.util.find_spec("embreex") else _EachTriangle
+BUILT: WeakValueDictionary[bytes, Any] = WeakValueDictionary()  # by the corners of its parts
+
+
+def _built(parts: list[np.ndarray]) -> Any:
+    """Returns the triangles of some parts: for equal ones the same, so worlds of a process share them."""
+    digest = hashlib.blake2b(Triangles.__name__.encode(), digest_size=16)
+    for corners in parts:
+        digest.update(repr(corners.shape).encode())
+        digest.update(np.ascontiguousarray(corners).data)
+    key = digest.digest()
+    found = BUILT.get(key)
+    if found is None:
+        found = BUILT[key] = Triangles(parts)
+    return found

@@ -1,0 +1,377 @@
+"""The clockwork: ties physics and control together, tick by tick (docs/architecture.md, "One tick")."""
+
+import threading
+from collections.abc import Callable, Mapping
+from typing import NamedTuple, Protocol
+
+from robot_sim.applied_forces import AppliedForces
+from robot_sim.held_state import HeldState
+from robot_sim.moves import Moves
+from robot_sim.physics.engine import Twist
+from robot_sim.physics.model import Model
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.projection import place_link
+from robot_sim.physics.world import SnapshotError, World, WorldSnapshot
+from robot_sim.robot import ControlledRobot
+from robot_sim.timing import FairLock, Holds, Pacer
+
+NANOSECONDS = 1_000_000_000
+STALL_CHECK = 100_000_000  # [ns]
+IDLE_POLL = 0.2  # [s]; how soon an idle run() notices stop()
+
+
+class Outbox(Protocol):
+    """Sends clients what a tick has produced, after the tick."""
+
+    def has_messages(self) -> bool:
+        """Returns whether there is something to send. The caller holds the lock."""
+
+    def deliver(self) -> None:
+        """Sends it. The caller doesn't hold the lock."""
+
+
+class Snapshot(NamedTuple):
+    """What `Simulator.save_state` returns."""
+
+    of: "Simulator"
+    layout: tuple[object, ...]
+    now: int  # [ns]
+    resets: int
+    world: WorldSnapshot
+    held: HeldState
+
+
+class NotInLockstep(RuntimeError):
+    """A client wants to step a world whose time runs by itself."""
+
+
+class Simulator:
+    """Time, the world and its robots, under one lock that everybody holds who touches them.
+
+    There are two modes. Either time runs by itself in run(), at most `max_update_rate` ticks a second of
+    wall time (0: as fast as possible), or in lock-step, where only advance() moves it.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        lockstep: bool = False,
+        max_update_rate: float = 1000.0,
+        relatch: bool = True,
+    ) -> None:
+        """
+        Args:
+            world: all models.
+            lockstep: whether only advance() moves time.
+            max_update_rate: ticks a second of wall time; 0 is as fast as possible.
+            relatch: whether controllers start over when a service moves joints or resets the world.
+        """
+        self.world = world
+        self.lock = FairLock()
+        self.lockstep = lockstep
+        self.max_update_rate = max_update_rate
+        self.relatch = relatch
+        self.now = 0  # [ns] of simulated time
+        self.elapsed = 0  # [ns] of simulated time in all; no reset sets it back
+        self.robots: list[ControlledRobot] = []
+        self._robots_of: dict[Model, list[ControlledRobot]] = {}
+        self._robots_version = 0
+        self.applied = AppliedForces()
+        # Called with `now` before each physics step, under the lock: topics, plugins and sensors.
+        self.listeners: list[Callable[[int], None]] = []
+        self.moves = Moves(world)
+        # Whose state snapshots save, beside that of robots and callbacks.
+        self.parts: list[object] = []
+        self.restored: list[Callable[[], None]] = []  # called under the lock after a restore
+        self.before_advance: list[Callable[[], None]] = []  # called under the lock
+        self.resets = 0  # of the world or the simulation
+        # Called under the lock with a seed from which all random numbers start again.
+        self.reseeded: list[Callable[[int], None]] = []
+        # What sends messages after the ticks, and whether those who step the world call them.
+        self.outboxes: list[Outbox] = []
+        self.deliver_with_steps = False
+        self._period = round(world.time_step * NANOSECONDS)
+        self.paused = False  # by `pause` and `unpause` alone
+        self._flowing = threading.Event()  # set while time runs by itself
+        self._stopping = threading.Event()
+        self.holds = Holds(self.lock, self._update_flow)
+        self._update_flow()
+
+    @property
+    def sim_time(self) -> float:
+        """Simulated time [s]."""
+        return self.now / NANOSECONDS
+
+    @property
+    def version(self) -> tuple[int, int, int]:
+        """Changes whenever models, robots or controllers come or go. The caller holds the lock."""
+        controllers = sum([robot.manager.version for robot in self.robots])
+        return self.world.version, self._robots_version, controllers
+
+    @property
+    def outruns_the_clock(self) -> bool:
+        """Whether ticks may come faster than real time: in lock-step, by step(), and beyond factor 1."""
+        rate = self.max_update_rate
+        return self.lockstep or self.paused or rate <= 0.0 or rate * self.world.time_step > 1.0001
+
+    def pause(self) -> None:
+        """Stops time; no step is in progress once this returns."""
+        with self.lock:
+            self.paused = True
+            self._update_flow()
+
+    def unpause(self) -> None:
+        """Lets time run, unless it runs in lock-step."""
+        with self.lock:
+            self.paused = False
+            self._update_flow()
+
+    def run(self) -> None:
+        """Lets time pass until stop(), in a thread of its own."""
+        pacer = Pacer()
+        while not self._stopping.is_set():
+            if not self._flowing.is_set():
+                self._flowing.wait(IDLE_POLL)
+                pacer.restart()
+                continue
+            with self.lock:
+                if self._flowing.is_set():
+                    self._tick()
+            self._keep_pace(pacer)
+
+    def _keep_pace(self, pacer: Pacer) -> None:
+        """Waits until the next tick is due, or a service changes the rate or stops time."""
+        rate = self.max_update_rate
+        due = pacer.wait(1.0 / rate if rate > 0.0 else 0.0, IDLE_POLL)
+        while not due:
+            due = pacer.wait_on(IDLE_POLL)
+            if (
+                rate != self.max_update_rate
+                or self._stopping.is_set()
+                or not self._flowing.is_set()
+            ):
+                pacer.restart()
+                return
+
+    def stop(self) -> None:
+        """Makes run() return after the tick in progress."""
+        self._stopping.set()
+
+    def advance(self, ticks: int, until: Callable[[], bool] | None = None) -> int:
+        """Moves time by `ticks` physics steps. The caller holds the lock.
+
+        Args:
+            ticks: at least 1.
+            until: called after each tick; it ends the advance when it returns true.
+
+        Returns:
+            The number of ticks that have passed.
+
+        Raises:
+            NotInLockstep: if time runs by itself.
+            ValueError: for less than one tick.
+        """
+        if not self.lockstep:
+            raise NotInLockstep(
+                "the world runs in real time; start it with lockstep:=true to step it"
+            )
+        if ticks < 1:
+            raise ValueError(f"ticks is {ticks}: at least 1 is needed")
+        for prepare in self.before_advance:
+            prepare()
+        passed = 0
+        for passed in range(1, ticks + 1):  # noqa: B007 - used behind the loop
+            self._tick()
+            if until is not None and until():
+                break
+        for robot in self.robots:
+            robot.read_ahead()
+        return passed
+
+    def step(self, ticks: int) -> None:
+        """Pauses the world and moves it by `ticks` physics steps, as fast as they can be computed.
+
+        The lock is taken for each tick, so services are answered in between.
+        """
+        self.pause()
+        for done in range(ticks):
+            if self._stopping.is_set():
+                return
+            if done:
+                self.lock.between()
+            with self.lock:
+                self.await_holds()
+                self._tick()
+        with self.lock:
+            for robot in self.robots:
+                robot.read_ahead()
+
+    def await_holds(self) -> None:
+        """Waits until no one holds time. The caller steps the world; its lock is released meanwhile."""
+        if self.holds:
+            self.holds.await_end(self._stopping)
+
+    def add_robot(self, robot: ControlledRobot) -> None:
+        """Puts a robot under control; the caller holds the lock."""
+        # Its controllers may start before time moves on.
+        robot.joints_moved(self.now, relatch=False)
+        self.robots.append(robot)
+        self._robots_of.setdefault(robot.model, []).append(robot)
+        self._robots_version += 1
+
+    def remove_robot(self, robot: ControlledRobot) -> None:
+        """Ends control of a robot; the caller holds the lock."""
+        self.robots.remove(robot)
+        same = self._robots_of[robot.model]
+        same.remove(robot)
+        if not same:
+            del self._robots_of[robot.model]
+        self._robots_version += 1
+
+    def set_joint_positions(self, model: Model, positions: Mapping[str, float]) -> None:
+        """Puts joints of `model` at `positions` [rad, m], at rest; the caller holds the lock."""
+        model.set_joint_positions(positions)
+        self._joints_moved(model)
+        self.moves.tell([model])
+
+    def set_joint_states(
+        self, model: Model, positions: Mapping[str, float], velocities: Mapping[str, float]
+    ) -> None:
+        """Begins an episode with joints of `model` at `positions` [rad, m] and `velocities` [rad/s, m/s].
+
+        What the joints carry is at rest, but for joints in `velocities`. The caller holds the lock.
+        """
+        model.set_joint_positions(positions)
+        model.set_joint_velocities(velocities)
+        self._joints_moved(model)
+        self.moves.tell([model])
+
+    def place_model(self, model: Model, pose: Pose, twist: Twist) -> None:
+        """Moves `model` rigidly, its joints at rest as in Gazebo; the caller holds the lock."""
+        before = model.joint_states()
+        model.place(pose, twist)
+        model.rest_joints()
+        if model.joint_states() != before:
+            self._joints_moved(model)
+        self.moves.tell([model])
+
+    def place_link(self, model: Model, link: str, pose: Pose, twist: Twist) -> None:
+        """Moves one link as near as the joints that carry it allow; the caller holds the lock."""
+        before = model.joint_states()
+        place_link(model, link, pose, twist)
+        if model.joint_states() != before:
+            self._joints_moved(model)
+        self.moves.tell([model])
+
+    def delete_model(self, model: Model) -> None:
+        """Takes a model out of the world, and what acts on it; the caller holds the lock."""
+        self.applied.forget(model)
+        self.world.delete(model.name)
+
+    def set_time_step(self, time_step: float) -> None:
+        """Sets the length of a tick [s], to the nanosecond; the caller holds the lock."""
+        self._period = round(time_step * NANOSECONDS)
+        self.world.set_time_step(time_step)
+        for robot in self.robots:
+            robot.review_gains()
+
+    def reset_world(self) -> None:
+        """Returns models to their initial poses, at rest; time and joint positions stay."""
+        with self.lock:
+            self.reset(everything=False)
+
+    def reset_simulation(self) -> None:
+        """As reset_world, and time and joint positions return to zero."""
+        with self.lock:
+            self.reset(everything=True)
+
+    def reset_time(self) -> None:
+        """Sets the time to zero; models and controllers continue from where they are."""
+        with self.lock:
+            self.now = 0
+            for robot in self.robots:
+                robot.joints_moved(self.now, relatch=False)
+            self.moves.tell(None)
+
+    def save_state(self) -> Snapshot:
+        """Returns all that decides the future; the caller holds the lock.
+
+        Raises:
+            UnknownState: if the state of a user's controller or plugin can't be read.
+        """
+        callbacks = (*self.listeners, *self.moves.listeners, *self.reseeded)
+        world = self.world.save_state()
+        held = HeldState((self.applied, *self.robots, *self.parts, *callbacks))
+        return Snapshot(self, self._layout, self.now, self.resets, world, held)
+
+    def restore_state(self, snapshot: Snapshot) -> None:
+        """Returns to what `save_state` has returned: the same commands lead to the same bits.
+
+        The caller holds the lock.
+
+        Raises:
+            SnapshotError: if it is another simulator's, or models, robots, running controllers or properties
+                aren't those of the snapshot; nothing changes then.
+            UnknownState: if a user's `restore_state` has raised; all else is restored then.
+        """
+        if snapshot.of is not self:
+            raise SnapshotError("the snapshot is of another simulator")
+        if snapshot.layout != self._layout:
+            raise SnapshotError("models or controllers have come or gone, or been switched")
+        self.world.restore_state(snapshot.world)
+        self.now, self.resets = snapshot.now, snapshot.resets
+        snapshot.held.recall()
+        for robot in self.robots:
+            robot.manager.restored()
+        for listener in self.restored:
+            listener()
+
+    @property
+    def _layout(self) -> tuple[object, ...]:
+        running = [each for robot in self.robots for each in robot.manager.running]
+        return self.version, running
+
+    def reseed(self, seed: int) -> None:
+        """Lets what draws random numbers start from `seed`; the caller holds the lock."""
+        for listener in self.reseeded:
+            listener(seed)
+
+    def _joints_moved(self, model: Model) -> None:
+        for robot in self._robots_of.get(model, ()):
+            robot.joints_moved(self.now, self.relatch)
+
+    def reset(self, everything: bool) -> None:
+        """Resets the world, or the simulation with `everything`; the caller holds the lock."""
+        if everything:
+            self.now = 0
+        self.resets += 1
+        self.world.reset(joints=everything)
+        for robot in self.robots:
+            robot.joints_moved(self.now, self.relatch)
+        self.moves.tell(None)
+
+    def _update_flow(self) -> None:
+        if self.paused or self.lockstep or self.holds:
+            self._flowing.clear()
+        else:
+            self._flowing.set()
+
+    def _tick(self) -> None:
+        """One physics step, in Gazebo's order: the state before the step carries the time after it."""
+        self.now = now = self.now + self._period
+        self.elapsed += self._period
+        dt = self.world.time_step
+        applied = self.applied
+        if applied.efforts or applied.wrenches:
+            applied.apply(now)
+        for robot in self.robots:
+            robot.update(now, dt)
+        if now % STALL_CHECK < self._period:
+            for robot in self.robots:
+                robot.watch.report_stalls(now, self.world.contacts)
+        for listener in self.listeners:
+            listener(now)
+        for robot in self.robots:
+            robot.write(dt)
+        self.world.step()

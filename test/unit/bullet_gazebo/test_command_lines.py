@@ -1,0 +1,146 @@
+"""The command lines of gzserver, gzclient, gz and spawn_model, and the paths of models."""
+
+import random
+
+import numpy as np
+import pytest
+
+from bullet_gazebo.clients import gz, gzclient, spawn_model, spawner
+from bullet_gazebo.clients.spawn_model import parse
+from bullet_gazebo.common.node_process import seed_random_numbers
+from bullet_gazebo.node.gzserver import parse_args
+from bullet_gazebo.services.spawn_services import model_paths
+from ros_calls.service import ServiceFailed, ServiceGone
+
+
+def test_options_stand_in_any_order():
+    line = "physics:=ode -s libx.so --seed 7 w.world __name:=g -u --verbose -e dart --lockstep -r"
+    args = parse_args(line.split())
+    assert (args.world, args.paused, args.physics) == ("w.world", True, "dart")
+    assert (args.lockstep, args.seed, args.ignored) == (True, 7, [])
+
+
+@pytest.mark.parametrize("line", ["-o a.world", "-o fast a.world", "--nix 5 a.world", "a.world -o"])
+def test_the_world_is_found(line):
+    assert parse_args(line.split()).world == "a.world"
+
+
+def test_a_video_has_its_options():
+    line = "--video a.mp4 --video-size 320 240 w.world --video-rate 60"
+    args = parse_args(line.split())
+    assert (args.video, args.video_size, args.video_rate) == (["a.mp4"], [320, 240], 60.0)
+    assert (args.video_model, args.world) == ("", "w.world")
+
+
+def test_the_seed_decides_random_numbers():
+    drawn = []
+    for _ in range(2):
+        seed_random_numbers(5)
+        drawn.append((random.random(), np.random.rand()))
+    assert drawn[0] == drawn[1]
+
+
+def test_negative_numbers_of_spawn_model():
+    line = "-urdf -param p -model m -x -1e-05 -R -1.5 -J hinge -2e-1"
+    options = parse(line.split())
+    assert (options.x, options.R, options.joints) == (-1e-05, -1.5, [("hinge", -0.2)])
+
+
+def test_spawn_model_waits_for_the_service_that_unpauses(monkeypatch):
+    done = []
+    monkeypatch.setattr(spawn_model, "wait_for_service", lambda name: done.append(f"wait {name}"))
+    monkeypatch.setattr(spawn_model, "_call", lambda name, kind: done.append(name))
+    monkeypatch.setattr(spawn_model, "_read", lambda *_: "<robot/>")
+    monkeypatch.setattr(spawn_model, "_spawn", lambda *_: done.append("spawn"))
+    options = spawn_model.parse(["-urdf", "-param", "r", "-model", "m", "-unpause"])
+    assert spawn_model._run(options, b"") == 0
+    unpause = "/gazebo/unpause_physics"
+    assert done == ["wait /gazebo/spawn_urdf_model", "spawn", f"wait {unpause}", unpause]
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["-urdf -model m", "-param p -model m", "-urdf -sdf -param p -model m", "-urdf -param p",
+     "-gazebo -urdf -param p -model m", "-urdf -param p -model m -J hinge far"],
+)  # fmt: skip
+def test_a_wrong_command_line_of_spawn_model(line):
+    with pytest.raises(SystemExit) as end:
+        parse(line.split())
+    assert end.value.code == 2
+
+
+@pytest.mark.parametrize("line", ["gz", "gz world", "gz world -m 0", "gz world -p 2", "gz nix"])
+def test_a_wrong_command_line_of_gz(line):
+    with pytest.raises(SystemExit) as end:
+        gz.main(line.split())
+    assert end.value.code == 2
+
+
+@pytest.mark.parametrize("line", ["gz sdf -p robot.urdf", "gz model -m bot -i", "gz stats"])
+def test_another_tool_of_gz_says_what_there_is(line, capsys):
+    assert gz.main(line.split()) == 2
+    told = capsys.readouterr().err
+    assert f"there is no '{' '.join(line.split()[:2])}': " in told
+    assert told.count("\n") == 1
+
+
+def test_gz_without_a_master(monkeypatch, capsys):
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    assert gz.main(["gz", "world", "-s"]) == 1
+    assert "127.0.0.1:1" in capsys.readouterr().err
+
+
+def test_model_paths_of_the_environment_and_of_packages(tmp_path, monkeypatch):
+    for name in ("a", "mine/models", "mine"):
+        (tmp_path / name).mkdir(parents=True, exist_ok=True)
+    (tmp_path / "mine/package.xml").write_text(
+        "<package><name>mine</name><version>1.0.0</version><description>d</description>"
+        "<maintainer email='a@b.c'>m</maintainer><license>BSD</license>"
+        "<export><gazebo_ros gazebo_model_path='${prefix}/models:${prefix}/nix'/></export></package>"
+    )
+    monkeypatch.setenv("GAZEBO_MODEL_PATH", f"{tmp_path}/a:/nix")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    assert model_paths() == [f"{tmp_path}/a", f"{tmp_path}/mine/models"]
+
+
+@pytest.mark.parametrize(
+    ("line", "dead", "living", "anonymous"),
+    [
+        ("", [], [], False),
+        ("", ["/gazebo_gui"], [], False),
+        ("", [], ["/gazebo_gui"], True),
+        ("__name:=gazebo_gui", [], ["/gazebo_gui"], False),
+        ("__ns:=/second", [], ["/gazebo_gui"], False),
+        ("__ns:=/second", [], ["/second/gazebo_gui"], True),
+    ],
+)
+def test_another_window_keeps_its_name(line, dead, living, anonymous, master, monkeypatch):
+    monkeypatch.delenv("ROS_NAMESPACE", raising=False)
+    master.nodes.update(dict.fromkeys(dead, "http://127.0.0.1:1"))
+    master.nodes.update(dict.fromkeys(living, master.uri))
+    taken = []
+    monkeypatch.setattr(gzclient, "init_node", lambda name, _, anonymous: taken.append(anonymous))
+    gzclient.become_node(["gzclient", *line.split()])
+    assert taken == [anonymous]
+
+
+@pytest.mark.parametrize(("fault", "warns"), [(ServiceGone, False), (ServiceFailed, True)])
+def test_a_spawner_that_ends_with_the_simulator_has_nothing_to_complain_of(
+    monkeypatch, fault, warns
+):
+    """roslaunch and rostest end both at the same time."""
+
+    class Manager:
+        def load(self, name):
+            return True
+
+        def running(self, timeout):
+            raise fault("gone")
+
+    told, leave = [], []
+    monkeypatch.setattr(spawner.rospy, "logwarn", lambda *text: told.append(text))
+    monkeypatch.setattr(spawner.rospy, "on_shutdown", leave.append)
+    monkeypatch.setattr(spawner.rospy, "spin", lambda: None)
+    spawner._Spawner(Manager()).run(["arm_controller"], stopped=True)
+    leave[0]()
+    assert bool(told) == warns

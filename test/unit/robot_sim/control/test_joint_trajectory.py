@@ -1,0 +1,250 @@
+"""JointTrajectoryController, tick by tick: parameters, law, time, joints.
+
+See docs/contract/ros_control.md 3.5.
+"""
+
+import math
+
+import pytest
+from support.robots.trajectory_rig import GAINS, KINDS, MS, Rig, S, move
+
+from robot_sim.control.controllers import BUILT_IN
+from robot_sim.control.errors import ControlError
+from robot_sim.control.trajectory import Segment, Waypoint
+from robot_sim.control.trajectory_goals import (
+    INVALID_GOAL,
+    GoalOutcome,
+    Tolerance,
+    Trajectory,
+    TrajectoryRefused,
+)
+
+# parameters
+
+
+def test_there_is_one_for_each_interface():
+    for interface in ("Effort", "Position", "Velocity"):
+        rig = Rig(interface, ("wrist", "shoulder"))
+        assert rig.controller.claimed == ("shoulder", "wrist")
+        assert rig.controller.joint_names == ("wrist", "shoulder")
+        assert rig.controller.interface == f"{interface}JointInterface"
+    assert list(Rig("Effort").controller.pids) == ["gains/shoulder"]
+    assert Rig("Position").controller.pids == {}
+
+
+def test_loading_touches_no_joint():
+    rig = Rig("Position")
+    rig.joints["shoulder"].position = 1.0
+    rig.controller.create("other", {"joints": ["shoulder"]}, rig.hardware)
+    assert rig.joints["shoulder"].command == 0.0
+
+
+@pytest.mark.parametrize(
+    ("params", "text"),
+    [
+        ({"joints": None}, "joints must be a list"),
+        ({"joints": []}, "joints must be a list"),
+        ({"joints": ["elbow"]}, "joint 'elbow' is not in"),
+        ({"joints": ["shoulder", "shoulder"]}, "twice"),
+        ({"gains": {}}, "No p gain specified for pid. Namespace: arm/gains/shoulder"),
+        ({"gains": {"shoulder": {"i": 1.0}}}, "No p gain specified"),
+        ({"gains": {"shoulder": {"p": math.nan}}}, "arm/gains/shoulder/p is nan"),
+        ({"gains": 3}, "arm/gains must hold parameters"),
+        ({"velocity_ff": {"shoulder": "1"}}, "arm/velocity_ff/shoulder"),
+        ({"state_publish_rate": "50"}, "arm/state_publish_rate"),
+        ({"action_monitor_rate": 0}, "action_monitor_rate must be more than 0"),
+        ({"stop_trajectory_duration": math.inf}, "stop_trajectory_duration"),
+        ({"allow_partial_joints_goal": 1}, "allow_partial_joints_goal must be true or false"),
+        ({"constraints": []}, "arm/constraints must hold"),
+        ({"constraints": {"goal_time": "1"}}, "arm/constraints/goal_time"),
+        ({"constraints": {"shoulder": 1.0}}, "arm/constraints/shoulder must hold"),
+        ({"constraints": {"shoulder": {"goal": True}}}, "arm/constraints/shoulder/goal"),
+    ],
+)
+def test_bad_parameters_are_refused(params, text):
+    with pytest.raises(ControlError, match=text):
+        Rig("Effort", **params)
+
+
+def test_a_robot_without_the_interface_is_refused():
+    with pytest.raises(ControlError, match="has hardware_interface::EffortJointInterface"):
+        BUILT_IN["velocity_controllers/JointTrajectoryController"].create(
+            "arm", {"joints": ["shoulder"], "gains": GAINS}, Rig("Effort").hardware
+        )
+
+
+# the law
+
+
+@pytest.mark.parametrize("interface", ["Effort", "Velocity"])
+def test_effort_and_velocity_are_feed_forward_and_pid_on_both_errors(interface):
+    rig = Rig(interface, velocity_ff={"shoulder": 3.0}).start()
+    rig.run()
+    rig.controller.follow(move((1.0, (1.0,))))
+    joint = rig.joints["shoulder"]
+    joint.position, joint.velocity = 0.1, 0.2
+    rig.run(500)
+    wanted = Segment(0, Waypoint(0.0, 0.0, 0.0), S, Waypoint(1.0, 0.0, 0.0)).sample(499 * MS)
+    errors = wanted.position - 0.1, wanted.velocity - 0.2
+    assert joint.command == pytest.approx(
+        3.0 * wanted.velocity + 10.0 * errors[0] + 2.0 * errors[1]
+    )
+
+
+def test_position_is_commanded_as_it_is_wanted():
+    rig = Rig().start()
+    rig.controller.follow(move((1.0, (1.0,))))
+    rig.run(501)  # stamp 0 is the next tick, at which it begins
+    assert rig.joints["shoulder"].command == pytest.approx(0.5, abs=2e-3)
+    rig.run(5000)
+    assert rig.joints["shoulder"].command == 1.0
+
+
+def test_errors_are_the_shortest_turn_but_on_a_rail_the_whole_way():
+    rig = Rig("Effort", tuple(KINDS)).start()
+    for name in KINDS:
+        rig.joints[name].position = 4.0
+    rig.run()
+    short = 10.0 * (2 * math.pi - 4.0)
+    commands = [rig.joints[name].command for name in KINDS]
+    assert commands == pytest.approx([short, short, -40.0])
+
+
+# start, hold, stop
+
+
+def test_it_starts_by_holding_what_it_finds():
+    rig = Rig("Effort")
+    joint = rig.joints["shoulder"]
+    joint.position, joint.command = 0.7, 5.0
+    rig.start()
+    assert joint.command == 0.0
+    rig.run(10)
+    assert joint.command == 0.0
+    assert rig.controller.query(rig.now)[0] == (0.7, 0.0, 0.0)
+
+
+def test_with_a_stop_duration_a_moving_joint_is_slowed_down():
+    rig = Rig("Position", stop_trajectory_duration=0.5)
+    joint = rig.joints["shoulder"]
+    joint.position, joint.velocity = 0.2, 1.0
+    rig.start()
+    rig.run()
+    assert joint.command == pytest.approx(0.201, abs=1e-5)
+    rig.run(1000)
+    assert joint.command == pytest.approx(0.2 + 0.625 * 0.5)
+
+
+def test_no_points_hold_the_joints_where_they_are():
+    rig = Rig("Effort").start()
+    rig.controller.follow(move((1.0, (1.0,))))
+    rig.run(500)
+    rig.joints["shoulder"].position = 0.4
+    rig.controller.follow(Trajectory((), ()))
+    rig.run()
+    assert rig.controller.sample().desired == ((0.4,), (0.0,), (0.0,))
+
+
+def test_a_ramp_goes_on_from_what_was_wanted():
+    rig = Rig("Effort", stop_trajectory_duration=1.0).start()
+    rig.controller.follow(move((1.0, (1.0,))))
+    rig.run(501)
+    (position,), (velocity,), _ = rig.controller.sample().desired
+    rig.controller.follow(Trajectory((), ()))
+    rig.run(2000)
+    assert rig.controller.sample().desired[0][0] == pytest.approx(
+        position + 0.625 * velocity, abs=5e-3
+    )
+
+
+# time
+
+
+def test_a_stamp_in_the_future_waits_and_the_old_trajectory_goes_on():
+    rig = Rig().start()
+    rig.run()
+    rig.controller.follow(move((1.0, (1.0,))))
+    rig.controller.follow(move((1.0, (5.0,)), stamp=rig.now + 2 * S))
+    rig.run(1002)
+    assert rig.joints["shoulder"].command == 1.0
+    rig.run(1000)
+    assert rig.joints["shoulder"].command == pytest.approx(1.0, abs=1e-6)
+    rig.run(1000)
+    assert rig.joints["shoulder"].command == pytest.approx(5.0, abs=1e-6)
+
+
+def test_a_stamp_in_the_past_joins_what_is_left_of_the_trajectory():
+    rig = Rig().start()
+    rig.run()
+    warning = rig.controller.follow(move((1.0, (1.0,)), (2.0, (2.0,)), stamp=rig.now - 1500 * MS))
+    assert warning == "The first 1 of 2 points lie in the past: left out"
+    rig.run(501)
+    assert rig.joints["shoulder"].command == pytest.approx(2.0, abs=1e-6)
+    with pytest.raises(TrajectoryRefused, match="All 1 points"):
+        rig.controller.follow(move((1.0, (7.0,)), stamp=rig.now - 2 * S))
+    rig.run()
+    assert rig.joints["shoulder"].command == 2.0
+
+
+def test_a_jump_of_the_clock_does_not_touch_a_trajectory():
+    rig = Rig().start()
+    samples = rig.collect()
+    rig.controller.follow(move((1.0, (1.0,))))
+    rig.run(401)
+    rig.now = 0
+    rig.controller.joints_moved(0)
+    rig.controller.follow(move((0.6, (1.0,)), stamp=1))
+    rig.run(600)
+    assert rig.joints["shoulder"].command == pytest.approx(1.0)
+    assert len(samples) == 51
+
+
+def test_state_comes_at_its_rate_and_not_at_all_for_a_rate_of_0():
+    rig = Rig(state_publish_rate=120).start()
+    samples = rig.collect()
+    rig.run(10_000)
+    assert len(samples) in (1200, 1201)
+    assert (samples[0].stamp, samples[0].names) == (100 * S + MS, ("shoulder",))
+    rig = Rig(state_publish_rate=0).start()
+    samples = rig.collect()
+    rig.run(1000)
+    assert samples == []
+
+
+# joints
+
+
+def test_joints_may_come_in_another_order():
+    rig = Rig(joints=("shoulder", "rail")).start()
+    rig.controller.follow(move((1.0, (2.0, 1.0)), names=("rail", "shoulder")))
+    rig.run(1100)
+    assert [rig.joints[name].position for name in ("shoulder", "rail")] == [1.0, 2.0]
+
+
+def test_joints_that_are_not_named_go_on():
+    rig = Rig(joints=("shoulder", "rail"), allow_partial_joints_goal=True).start()
+    rig.controller.follow(move((2.0, (1.0,))))
+    rig.run(500)
+    told = rig.pursue(move((0.5, (2.0,)), names=("rail",)))
+    rig.run(600)
+    assert told.outcomes == [GoalOutcome("succeeded")]
+    rig.run(1000)
+    assert [rig.joints[name].position for name in ("shoulder", "rail")] == [1.0, 2.0]
+
+
+def test_a_tolerance_that_is_no_number_is_refused():
+    rig = Rig().start()
+    for tolerances in (
+        {"path": {"shoulder": Tolerance(math.nan)}},
+        {"goal": {"x": Tolerance(0, math.nan)}},
+    ):
+        with pytest.raises(TrajectoryRefused, match="not a number") as refusal:
+            rig.pursue(move((1.0, (1.0,))), **tolerances)
+        assert refusal.value.code == INVALID_GOAL
+
+
+def test_a_continuous_joint_goes_the_short_way():
+    rig = Rig(joints=("wrist",)).start()
+    rig.controller.follow(move((1.0, (2 * math.pi - 0.5,)), names=("wrist",)))
+    rig.run(1100)
+    assert rig.joints["wrist"].position == pytest.approx(-0.5)

@@ -1,0 +1,134 @@
+"""The physics engines against each other and against the equations of motion."""
+
+import importlib.util
+import math
+import subprocess
+import sys
+from functools import partial
+
+import numpy as np
+import pytest
+from support.robots import engine_runs as runs
+
+from robot_sim.physics.engines import BULLET, EngineError, make_engine
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import World
+
+
+@pytest.mark.parametrize("step", [0.001, 0.0005])
+def test_growth_rate_and_period(new_engine, step):
+    assert runs.growth_rate(new_engine, step) == pytest.approx(runs.rate(), rel=0.3 * step)
+    period = 2.0 * math.pi / runs.rate()
+    assert runs.hanging_period(new_engine, step) == pytest.approx(period, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("error", "most"), [(runs.fall_error, 0.02), (runs.push_error, 5e-4), (runs.loop_error, 2e-4)]
+)
+def test_trajectories_come_nearer_with_the_first_order_of_the_step(new_engine, error, most):
+    coarse, fine = error(new_engine, 0.001), error(new_engine, 0.0005)
+    assert coarse < most
+    assert math.log2(coarse / fine) == pytest.approx(1.0, abs=0.25)
+
+
+def test_a_wide_swing_loses_energy_with_the_first_order_of_the_step(new_engine):
+    """Semi-implicit Euler in joint coordinates is not symplectic: the mass matrix turns with the pole."""
+    coarse = runs.energy_error(new_engine, 0.001, 5.0)[0]
+    fine = runs.energy_error(new_engine, 0.0005, 5.0)[0]
+    assert coarse < 0.1
+    assert math.log2(coarse / fine) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.extras("mujoco")
+@pytest.mark.parametrize(("state", "force"), [(runs.FALL, 0.0), (runs.SWING, runs.PUSH)])
+def test_both_engines_go_the_same_way(state, force):
+    tracks = [
+        runs.Run(make_engine(name), 0.001, state).track(1.0, force) for name in ("ode", "mujoco")
+    ]
+    assert np.abs(tracks[0] - tracks[1]).max() < 1e-9
+
+
+@pytest.mark.extras("mujoco")
+def test_what_is_left_of_the_error_is_the_step():
+    """Integrated by RK4, MuJoCo's model gives what the equations of motion do: the figures are the same."""
+    from robot_sim.physics.engines.mujoco_engine import MujocoEngine
+
+    exact = partial(MujocoEngine, runge_kutta=True)
+    assert runs.fall_error(exact, 0.001) < 1e-8
+    assert runs.push_error(exact, 0.001) < 1e-9
+    assert runs.loop_error(exact, 0.001) < 1e-8
+    assert max(map(abs, runs.energy_error(exact, 0.001, 5.0))) < 1e-8
+
+
+def test_an_unknown_engine_is_named():
+    with pytest.raises(EngineError, match="'havok' is not known; there are ode, bullet, .* mujoco"):
+        make_engine("havok")
+
+
+@pytest.mark.parametrize("name", BULLET)
+def test_names_of_gazebos_engines_mean_pybullet_which_needs_no_mujoco(name):
+    code = (
+        "import sys; from robot_sim.physics.engines import make_engine;"
+        f" print(type(make_engine({name!r})).__name__, 'mujoco' in sys.modules)"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert answer.stdout.split() == ["BulletEngine", "False"]
+
+
+def test_an_engine_that_is_not_installed_is_named_with_the_command_that_installs_it(monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(EngineError, match="'mujoco' is not installed; '.*/ws extras'") as raised:
+        make_engine("mujoco")
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.extras("mujoco")
+def test_mujoco_stands_in_where_there_is_no_pybullet_and_says_so():
+    """As on aarch64, in a process that can't import PyBullet."""
+    code = (
+        "import sys; sys.modules['pybullet'] = None; import gymnasium, cartpole;"
+        "from robot_sim.physics.engines import make_engine; print(type(make_engine()).__name__);"
+        "env = gymnasium.make('cartpole/Balance-v0'); env.reset(seed=0); print(len(env.step(0)[0]))"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert answer.stdout.split() == ["MujocoEngine", "4"], answer.stderr
+    assert "There is no PyBullet for " in answer.stderr
+
+
+CHAIN = """<robot name="chain"><link name="base"><inertial><mass value="1"/>
+  <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+  <link name="slider"><inertial><mass value="1"/>
+  <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+  <joint name="rail" type="prismatic"><parent link="base"/><child link="slider"/><axis xyz="1 0 0"/>
+  <limit lower="-1e6" upper="1e6" effort="0" velocity="0"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("step", [0.001, 0.01])
+def test_a_joint_goes_no_further_than_3_14_in_a_step(make_world, step):
+    world = make_world(time_step=0.005, gravity=(0.0, 0.0, 0.0))
+    model = world.spawn("chain", parse_urdf(CHAIN), Pose())
+    world.set_time_step(step)
+    model.body.reset_joint(0, 0.0, 1.9 * math.pi / step)
+    world.step()
+    assert model.joint_state("rail") == pytest.approx((math.pi, math.pi / step), rel=1e-9)
+    model.body.reset_joint(0, 0.0, -0.9 * math.pi / step)
+    world.step()
+    assert model.joint_state("rail")[0] == pytest.approx(-0.9 * math.pi, rel=1e-6)
+
+
+@pytest.mark.extras("mujoco")
+def test_in_mujoco_many_fast_joints_that_are_each_slow_enough_go_on():
+    world = World(make_engine("mujoco"), gravity=(0.0, 0.0, 0.0))
+    models = [
+        world.spawn(f"chain{n}", parse_urdf(CHAIN), Pose((0.0, 3.0 * n, 0.0))) for n in range(4)
+    ]
+    for model in models:
+        model.body.reset_joint(0, 0.0, 3000.0)
+    world.step()
+    assert [model.joint_state("rail")[1] for model in models] == pytest.approx([3000.0] * 4)
+    world.close()

@@ -1,0 +1,218 @@
+"""Kinematic links: no force moves them, and they move others."""
+
+import math
+
+import pytest
+from support.robots.worlds import run
+
+from robot_sim.physics.description import Inertia
+from robot_sim.physics.dynamics import effective_inertias, poses_at_zero
+from robot_sim.physics.files.sdf import parse_sdf
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose, from_rpy
+from robot_sim.physics.properties import link_inertia, set_link_properties
+
+REST = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def box(name, size="1 1 0.2", kinematic=True, com="0 0 0", mass=1.0, more=""):
+    own = "<kinematic>1</kinematic>" if kinematic else ""
+    return f"""<link name="{name}">{own}<inertial><pose>{com} 0 0 0</pose><mass>{mass}</mass><inertia>
+      <ixx>0.01</ixx><iyy>0.02</iyy><izz>0.02</izz></inertia></inertial><collision name="c"><geometry><box>
+      <size>{size}</size></box></geometry></collision>{more}</link>"""
+
+
+def sdf(*parts, static=False):
+    return parse_sdf(
+        f'<sdf version="1.6"><model name="m"><static>{int(static)}</static>{"".join(parts)}</model></sdf>'
+    )
+
+
+def close(a, b, tolerance):
+    """Compares two poses; quaternions by the angle between them."""
+    dot = abs(sum(x * y for x, y in zip(a.orientation, b.orientation, strict=True)))
+    assert a.position == pytest.approx(b.position, abs=tolerance)
+    assert 2.0 * math.acos(min(1.0, dot)) < tolerance + 1e-7
+
+
+def test_neither_weight_nor_loads_move_it(world):
+    pose = Pose((0.0, 0.0, 2.0), from_rpy(0.0, 0.0, 0.3))
+    shelf = world.spawn("shelf", sdf(box("link")), pose)
+    load = world.spawn("load", sdf(box("link", "0.2 0.2 0.2", False, mass=50.0)), Pose((0, 0, 2.3)))
+    for _ in range(3000):
+        shelf.body.add_wrench("link", (100.0, 0.0, 50.0), (0.0, 30.0, 0.0))
+        world.step()
+    close(shelf.state()[0], pose, 1e-8)
+    assert load.state()[0].position == pytest.approx((0.0, 0.0, 2.2), abs=2e-3)
+    assert load.state()[1][0] == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
+    assert {side.body for each in world.contacts() for side in (each.first, each.second)} == {
+        shelf.body,
+        load.body,
+    }
+
+
+def test_it_keeps_its_twist(world):
+    """Its centre of mass moves straight on, and it turns about that, through the ground as well."""
+    model = world.spawn("m", sdf(box("link", com="0.5 0 0")), Pose((0.0, 0.0, 0.3)))
+    model.place(Pose((0.0, 0.0, 0.3)), ((0.2, 0.0, -0.3), (0.0, 0.0, 2.0)))
+    run(world, 2000)
+    pose, (linear, angular) = model.state()
+    # The centre begins at (0.5, 0, 0.3), with (0.2, 2 · 0.5, -0.3).
+    turned = (0.5 * math.cos(4.0), 0.5 * math.sin(4.0))
+    wanted = Pose((0.9 - turned[0], 2.0 - turned[1], -0.3), from_rpy(0.0, 0.0, 4.0))
+    close(pose, wanted, 1e-3)
+    assert angular == pytest.approx((0.0, 0.0, 2.0), abs=1e-6)
+    assert linear[2] == pytest.approx(-0.3, abs=1e-6)
+    model.place(Pose((0.0, 0.0, 0.3)))
+    run(world, 100)
+    close(model.state()[0], Pose((0.0, 0.0, 0.3)), 1e-9)
+
+
+def test_a_spin_about_any_axis_goes_on(make_world):
+    world = make_world()
+    model = world.spawn("m", sdf(box("link")), Pose((0.0, 0.0, 2.0)))
+    spin = (1.0, 2.0, -0.5)
+    model.place(Pose((0.0, 0.0, 2.0)), ((0.0, 0.0, 0.0), spin))
+    run(world, 3000)
+    assert model.state()[1][1] == pytest.approx(spin, abs=1e-6)
+
+
+def test_it_pushes_and_carries_others(world):
+    paddle = world.spawn("paddle", sdf(box("link", "0.2 1 1")), Pose((-0.5, 0.0, 0.6)))
+    crate = world.spawn(
+        "crate", sdf(box("link", "0.4 0.4 0.4", False, mass=20.0)), Pose((0, 0, 0.2))
+    )
+    lift = world.spawn("lift", sdf(box("link")), Pose((5.0, 0.0, 0.5)))
+    load = world.spawn("load", sdf(box("link", "0.4 0.4 0.4", False)), Pose((5.0, 0.0, 0.8)))
+    run(world, 500)
+    paddle.place(paddle.state()[0], ((0.5, 0.0, 0.0), REST[1]))
+    lift.place(lift.state()[0], ((0.3, 0.0, 0.2), REST[1]))
+    run(world, 2000)
+    assert paddle.state()[0].position == pytest.approx((0.5, 0.0, 0.6), abs=1e-6)
+    assert crate.state()[0].position[0] == pytest.approx(0.8, abs=0.02)
+    assert load.state()[0].position == pytest.approx((5.6, 0.0, 1.2), abs=0.02)
+    assert load.state()[1][0] == pytest.approx((0.3, 0.0, 0.2), abs=0.01)
+
+
+def test_kinematic_and_static_ones_do_not_touch(world):
+    wall = [
+        box("a", kinematic=False),
+        box("b", kinematic=False, more="<pose>3 0 0 0 0 0</pose>"),
+    ]
+    world.spawn("wall", sdf(*wall, static=True), Pose((0.0, 0.0, 1.0)))
+    models = [
+        world.spawn(f"m{x}", sdf(box("link")), Pose((x, 0.1, 1.05))) for x in (0.0, 3.0, 3.05)
+    ]
+    world.reset(joints=True)
+    for model in models:
+        model.place(model.state()[0], ((0.1, 0.0, 0.0), REST[1]))
+    run(world, 500)
+    for model, x in zip(models, (0.05, 3.05, 3.1), strict=True):
+        assert model.state()[0].position == pytest.approx((x, 0.1, 1.05), abs=1e-9)
+    assert world.contacts() == []
+
+
+ARM = """<joint name="j" type="revolute"><pose>{at} 0 0 0</pose><parent>base</parent><child>arm</child>
+  <axis><xyz>0 1 0</xyz></axis></joint>"""
+
+
+def test_a_tree_hangs_from_it(world):
+    """A pendulum on a kinematic base swings as on the world, and as fast as the base moves it."""
+    arm = box("arm", kinematic=False, com="0 0 -0.5", more="<pose>0 0 0 0 0 0</pose>")
+    parts = [arm.replace('name="c"', 'name="d"'), ARM.format(at="0 0 0")]
+    fixed = '<joint name="fix" type="fixed"><parent>world</parent><child>base</child></joint>'
+    free = world.spawn("free", sdf(box("base"), *parts), Pose((0.0, 0.0, 3.0)))
+    bound = world.spawn("bound", sdf(box("base"), *parts, fixed), Pose((5.0, 0.0, 3.0)))
+    for model in (free, bound):
+        model.set_joint_positions({"j": 0.5})
+    inertias = [
+        effective_inertias(model.description, poses_at_zero(model.description))["j"]
+        for model in (free, bound)
+    ]
+    assert inertias[0] == pytest.approx(inertias[1])
+    for _ in range(5):
+        run(world, 300)
+        assert free.joint_state("j") == pytest.approx(bound.joint_state("j"), abs=1e-6)
+    close(free.state()[0], Pose((0.0, 0.0, 3.0)), 1e-8)
+
+
+def test_properties(world):
+    """Services see the file's mass and gravity, and change nothing of how it moves."""
+    model = world.spawn("m", sdf(box("link")), Pose((0.0, 0.0, 2.0)))
+    assert link_inertia(model, "link").mass == 1.0
+    assert model.description.links["link"].gravity
+    heavier = Inertia(mass=3.0, com=Pose((0.1, 0.0, 0.0)), ixx=1.0, iyy=1.0, izz=1.0)
+    set_link_properties(world, model, "link", heavier, True)
+    assert link_inertia(model, "link") == heavier
+    run(world, 500)
+    close(model.state()[0], Pose((0.0, 0.0, 2.0)), 1e-9)
+
+
+def test_its_velocity_decays(world):
+    decay = "<velocity_decay><linear>0.01</linear><angular>0.01</angular></velocity_decay>"
+    model = world.spawn("m", sdf(box("link", more=decay)), Pose((0.0, 0.0, 2.0)))
+    model.place(model.state()[0], ((1.0, 0.0, 0.0), (0.0, 2.0, 0.0)))
+    run(world, 100)
+    left = 0.99**100
+    assert model.state()[1][0] == pytest.approx((left, 0.0, 0.0), rel=1e-6, abs=1e-9)
+    assert model.state()[1][1] == pytest.approx((0.0, 2.0 * left, 0.0), rel=1e-6, abs=1e-9)
+
+
+def test_snapshots_and_engines_that_begin_anew(make_world):
+    world = make_world(ground=True)
+    model = world.spawn("m", sdf(box("link")), Pose((0.0, 0.0, 2.0)))
+    load = world.spawn("load", sdf(box("link", "0.2 0.2 0.2", False)), Pose((0.0, 0.0, 2.25)))
+    model.place(model.state()[0], ((0.1, 0.0, 0.0), (0.0, 0.0, 0.2)))
+    run(world, 300)
+    snapshot = world.save_state()
+    run(world, 100)
+    first = model.state(), load.state()
+    world.restore_state(snapshot)
+    run(world, 100)
+    assert (model.state(), load.state()) == first
+    world.engine._most_waste = 0  # of PyBullet: it begins anew
+    world.spawn("other", sdf(box("link")), Pose((5.0, 0.0, 2.0)))
+    world.delete("other")
+    world.spawn("again", sdf(box("link")), Pose((5.0, 0.0, 2.0)))
+    before = model.state()[0].position
+    run(world, 1000)
+    after = model.state()[0].position
+    assert after == pytest.approx((before[0] + 0.1, before[1], 2.0), abs=1e-6)
+    assert load.state()[0].position[2] == pytest.approx(2.2, abs=2e-3)
+
+
+BODY = """<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>
+  </inertial>"""
+
+
+@pytest.mark.parametrize("link", ["base", "welded"])
+def test_urdf(world, link):
+    text = f"""<robot name="u"><link name="base">{BODY}</link><link name="welded">{BODY}</link>
+      <joint name="w" type="fixed"><parent link="base"/><child link="welded"/></joint>
+      <gazebo reference="{link}"><kinematic>1</kinematic></gazebo></robot>"""
+    model = world.spawn("u", parse_urdf(text), Pose((0.0, 0.0, 2.0)))
+    run(world, 500)
+    close(model.state()[0], Pose((0.0, 0.0, 2.0)), 1e-9)
+    assert not model.description.warnings
+
+
+def test_one_that_a_joint_moves_is_told(world):
+    arm = box("arm", more="<pose>2 0 0 0 0 0</pose>")
+    model = world.spawn(
+        "m", sdf(box("base", kinematic=False), arm, ARM.format(at="0 0 0")), Pose((0.0, 0.0, 5.0))
+    )
+    assert model.description.warnings == [
+        "link 'arm', kinematic: left out, since joint 'j' moves it"
+    ]
+    run(world, 100)
+    assert model.state()[0].position[2] < 4.97
+
+
+def test_one_that_is_fixed_to_the_root_holds_it(world):
+    fixed = '<joint name="f" type="fixed"><parent>base</parent><child>tip</child></joint>'
+    model = world.spawn(
+        "m", sdf(box("base", kinematic=False), box("tip"), fixed), Pose((0.0, 0.0, 5.0))
+    )
+    run(world, 100)
+    assert not model.description.warnings
+    close(model.state()[0], Pose((0.0, 0.0, 5.0)), 1e-9)

@@ -1,0 +1,470 @@
+"""Closed loops of joints, and fixed joints that give a link two parents, on each engine."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.robots.grippers import transmission
+from support.robots.linkages import CRANK, GROUND, ROCKER, START, angles, four_bar, hinge, rod
+from support.robots.worlds import add_robot, run, start
+
+from robot_sim.physics.description import DescriptionError, Inertia
+from robot_sim.physics.files.sdf import parse_sdf
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose, add, cross, from_rpy, subtract
+from robot_sim.physics.projection import place_link
+from robot_sim.physics.properties import (
+    JointProperties,
+    link_inertia,
+    set_joint_properties,
+    set_link_properties,
+)
+from robot_sim.sensors.force_torque import JointForces
+from robot_sim.simulator import Simulator
+
+ROBOTS = Path(__file__).resolve().parents[3] / "data/robots"
+GRIPPER = (ROBOTS / "four_bar_gripper.urdf").read_text()
+CUBE = 0.2  # [m]
+AT_START = dict(zip(("coupler", "rocker"), angles(START), strict=True))
+
+
+def cube(name: str, x: float, y: float, size: float = CUBE, mass: float = 1.0) -> str:
+    moment = mass * size**2 / 6.0
+    return f"""<link name="{name}"><pose>{x} {y} {size / 2.0} 0 0 0</pose><inertial><mass>{mass}</mass>
+      <inertia><ixx>{moment}</ixx><iyy>{moment}</iyy><izz>{moment}</izz></inertia></inertial>
+      <collision name="c"><geometry><box><size>{size} {size} {size}</size></box></geometry></collision>
+    </link>"""
+
+
+def weld(name: str, parent: str, child: str) -> str:
+    return (
+        f'<joint name="{name}" type="fixed"><parent>{parent}</parent><child>{child}</child></joint>'
+    )
+
+
+def sdf(*parts: str, static: int = 0) -> str:
+    text = "".join(parts)
+    return f'<sdf version="1.6"><model name="m"><static>{static}</static>{text}</model></sdf>'
+
+
+CUBES = [cube("a", 0, 0), cube("b", CUBE, 0), cube("c", CUBE, CUBE), cube("d", 0, CUBE)]
+WELDS = {
+    "ring": ["ab", "bc", "dc", "ad"],
+    "two parents": ["ab", "cb", "cd"],
+    "twice": ["ab", "ab", "bc", "cd"],
+    "circle": ["ab", "bc", "cd", "da"],
+    "to the first": ["ba", "ca", "da"],
+}
+
+
+def welded(which: str, static: int = 0) -> str:
+    joints = [weld(f"{n}{pair}", *pair) for n, pair in enumerate(WELDS[which])]
+    return sdf(*CUBES, *joints, static=static)
+
+
+@pytest.fixture
+def slab(make_world):
+    """A world with a single box in place of the four cubes, beside which they move alike."""
+
+    def spawn(which: str, pose: Pose, ground: bool):
+        models = []
+        for text in (welded(which), sdf(cube("a", 0, 0))):
+            world = make_world(ground=ground)
+            description = parse_sdf(text)
+            if len(description.links) == 1:
+                x, y, z = (2 * CUBE, 2 * CUBE, CUBE)
+                link = description.links["a"]
+                com = Pose((CUBE / 2.0, CUBE / 2.0, 0.0))
+                link.inertia = Inertia(4.0, com, ixx=(y * y + z * z) / 3.0, iyy=(x * x + z * z) / 3.0,
+                                       izz=(x * x + y * y) / 3.0)  # fmt: skip
+                shape = type(link.collisions[0])("box", (x, y, z), com, name="c")
+                link.collisions = [shape]
+            models.append((world, world.spawn("m", description, pose)))
+        return models
+
+    return spawn
+
+
+@pytest.mark.parametrize("which", WELDS)
+def test_welded_links_fly_as_one_body(slab, which):
+    ends = []
+    for world, model in slab(which, Pose((0.0, 0.0, 9.0), from_rpy(0.1, 0.2, 0.3)), False):
+        root, turning = model.link_state(model.description.root)[0], (3.0, -2.0, 1.0)
+        arm = subtract(root.position, model.link_state("a")[0].position)
+        model.body.reset_base(root, (cross(turning, arm), turning))
+        run(world, 500)
+        ends.append(model.link_state("a")[0])
+    assert ends[0].position == pytest.approx(ends[1].position, abs=1e-3)
+    assert ends[0].orientation == pytest.approx(ends[1].orientation, abs=1e-6)
+
+
+def test_welded_links_stand_and_tip_as_one_body(slab):
+    for torque, tips in (
+        (7.5, False),
+        (8.2, True),
+    ):  # [N m]; it tips beyond 4 kg * 9.8 m/s² * 0.2 m
+        turned = []
+        for world, model in slab("ring", Pose(), True):
+            run(world, 300)
+            assert model.link_state("a")[0].position == pytest.approx((0.0, 0.0, 0.1), abs=1e-3)
+            for _ in range(300):
+                model.body.add_wrench("a", (0.0, 0.0, 0.0), (torque, 0.0, 0.0))
+                world.step()
+            turned.append(model.link_state("a")[0].orientation[0])
+        assert [each > 0.01 for each in turned] == [tips, tips]
+        assert turned[0] == pytest.approx(turned[1], abs=5e-3)
+
+
+@pytest.mark.parametrize("static", [0, 1])
+@pytest.mark.parametrize("which", WELDS)
+def test_welded_links_and_joints_keep_names_and_poses(world, which, static):
+    model = world.spawn("m", parse_sdf(welded(which, static)), Pose((0.0, 0.0, 0.01)))
+    assert model.link_names == ["a", "b", "c", "d"]
+    assert model.all_joints == [f"{n}{pair}" for n, pair in enumerate(WELDS[which])]
+    assert [model.joint_state(name) for name in model.all_joints] == [(0.0, 0.0)] * len(
+        WELDS[which]
+    )
+    run(world, 10)
+    places = [pose.position for pose in model.link_poses()]
+    assert subtract(places[2], places[0]) == pytest.approx((CUBE, CUBE, 0.0), abs=1e-6)
+    assert link_inertia(model, "c").mass == 1.0
+
+
+def test_a_bench_stands(world):
+    description = parse_sdf((ROBOTS / "bench.sdf").read_text())
+    model = world.spawn("bench", description, Pose())
+    run(world, 500)
+    assert model.state()[0].position == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
+    assert sum(link.inertia.mass for link in description.links.values() if link.inertia) == 20.0
+
+
+def test_what_stays_apart_or_joins_itself_is_refused():
+    with pytest.raises(DescriptionError, match="not joined"):
+        parse_sdf(sdf(*CUBES, weld("j", "a", "b")))
+    with pytest.raises(DescriptionError, match="joins link 'a' to itself"):
+        parse_sdf(sdf(*CUBES, weld("j", "a", "a")))
+
+
+def gap(model) -> float:
+    """The distance [m] between the ends of coupler and rocker."""
+    poses = dict(zip(model.link_names, model.link_poses(), strict=True))
+    coupler = poses["coupler"].compose(Pose((1.0, 0.0, 0.0))).position
+    return math.dist(coupler, poses["rocker"].compose(Pose((ROCKER, 0.0, 0.0))).position)
+
+
+def missed(model) -> float:
+    """How far the rocker is off the closed form [rad]."""
+    wanted = angles(START + model.joint_state("drive")[0])[1] - AT_START["rocker"]
+    return abs(wanted - model.joint_state("pivot")[0])
+
+
+@pytest.fixture
+def linkage(make_world):
+    def spawn(*args, **options):
+        world = make_world()
+        return world, world.spawn("m", parse_sdf(four_bar(*args, **options)), Pose())
+
+    return spawn
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_driven_four_bar_keeps_to_its_closed_form(linkage, order):
+    world, model = linkage(order=order)
+    assert model.joint_names == ("drive", "pin", "pivot", "tip")[::order]
+    model.set_motor("drive", 2.0, 1e9)
+    worst = drift = 0.0
+    for _ in range(7000):
+        world.step()
+        worst, drift = max(worst, missed(model)), max(drift, gap(model))
+    assert worst < 1e-4
+    assert drift < 1e-4
+    coupler, rocker = angles(START + model.joint_state("drive")[0])
+    tip = (rocker - AT_START["rocker"]) - (coupler - AT_START["coupler"])
+    assert model.joint_state("tip")[0] == pytest.approx(tip, abs=1e-4)
+
+
+@pytest.mark.slow
+def test_a_four_bar_does_not_drift(linkage):
+    world, model = linkage()
+    model.set_motor("drive", 2.0, 1e9)
+    run(world, 60_000)
+    assert gap(model) < 1e-4
+    assert missed(model) < 1e-4
+
+
+@pytest.mark.parametrize("rooted", [True, False])
+def test_a_ball_joint_closes_a_loop(make_world, rooted):
+    world = make_world()
+    text = four_bar(rooted=rooted).replace('name="tip" type="revolute"', 'name="tip" type="ball"')
+    model = world.spawn("m", parse_sdf(text), Pose())
+    assert model.all_joints[-1] == "tip"
+    assert model.joint_names == ("drive", "pin", "pivot")
+    model.set_motor("drive", 2.0, 1e9)
+    run(world, 2000)
+    assert max(gap(model), missed(model)) < 1e-4
+    model.set_joint_positions({"drive": 1.0})
+    assert max(gap(model), missed(model)) < 1e-5
+
+
+def test_what_is_not_simulated_is_left_out_of_a_loop_and_refused_elsewhere():
+    text = four_bar().replace('name="tip" type="revolute"', 'name="tip" type="universal"')
+    model = parse_sdf(text)
+    assert model.warnings == ["joint 'tip': type 'universal' is left out of its loop"]
+    assert list(model.joints) == ["drive", "pin", "pivot"]
+    with pytest.raises(DescriptionError, match="'drive': type 'ball' is not simulated; revolute"):
+        parse_sdf(text.replace('name="drive" type="revolute"', 'name="drive" type="ball"'))
+    assert len(parse_sdf(text.replace("<static>0", "<static>1")).joints) == 4
+
+
+def test_a_slider_crank_keeps_to_its_closed_form(make_world):
+    """Whichever of its joints closes the loop."""
+    length, start = 0.6, 1.0
+
+    def slide(angle: float) -> float:
+        x, z = 0.2 * math.cos(angle), 0.2 * math.sin(angle)
+        return x + math.sqrt(length**2 - z**2)
+
+    joints = [
+        hinge("wrist", "rod", "block"),
+        '<joint name="slide" type="prismatic"><parent>ground</parent><child>block</child>'
+        "<axis><xyz>1 0 0</xyz></axis></joint>",
+    ]
+    pin = 0.2 * math.cos(start), 0.2 * math.sin(start)
+    for order in (1, -1):
+        world = make_world()
+        text = sdf(
+            rod("ground", 1.0, (0.0, 0.0), 0.0), rod("crank", 0.2, (0.0, 0.0), start),
+            rod("rod", length, pin, math.atan2(-pin[1], slide(start) - pin[0])),
+            rod("block", 0.1, (slide(start), 0.0), 0.0), weld("foot", "world", "ground"),
+            hinge("drive", "ground", "crank"), hinge("pin", "crank", "rod"), *joints[::order],
+        )  # fmt: skip
+        model = world.spawn("m", parse_sdf(text), Pose())
+        model.set_motor("drive", 5.0, 1e9)
+        run(world, 2000)
+        wanted = slide(start + model.joint_state("drive")[0]) - slide(start)
+        assert model.joint_state("slide")[0] == pytest.approx(wanted, abs=1e-4)
+
+
+def test_joints_move_above_welded_links(make_world):
+    """A drawer of two boards that are welded twice."""
+    world = make_world(gravity=(0.0, 0.0, 0.0))
+    joints = [weld(f"w{number}", "b", "c") for number in range(2)]
+    slide = '<joint name="s" type="prismatic"><parent>a</parent><child>b</child></joint>'
+    model = world.spawn("m", parse_sdf(sdf(*CUBES[:3], slide, *joints)), Pose())
+    model.set_joint_positions({"s": 0.5})
+    assert model.link_state("c")[0].position == pytest.approx((CUBE, CUBE, 0.6), abs=1e-6)
+
+
+def energy(model) -> float:
+    """Kinetic and potential energy [J] of a planar linkage."""
+    total = 0.0
+    for name in model.link_names:
+        inertia, (pose, (linear, angular)) = link_inertia(model, name), model.link_state(name)
+        centre = pose.compose(inertia.com).position
+        moves = add(linear, cross(angular, subtract(centre, pose.position)))
+        total += 0.5 * inertia.mass * sum(x * x for x in moves)
+        total += 0.5 * inertia.iyy * angular[1] ** 2 + inertia.mass * 9.8 * centre[2]
+    return total
+
+
+def test_a_free_four_bar_keeps_its_energy(linkage):
+    world, model = linkage()
+    before = energy(model)
+    run(world, 5000)
+    assert energy(model) == pytest.approx(before, rel=0.01)
+
+
+def test_a_four_bar_without_a_root_falls_and_a_static_one_stays(linkage):
+    world, model = linkage(rooted=False)
+    run(world, 500)
+    height = model.link_state("ground")[0].position[2]
+    assert height < -0.5
+    assert gap(model) < 1e-4
+    world, model = linkage(static=True)
+    assert model.link_names == ["ground", "crank", "coupler", "rocker"]
+    assert model.all_joints == ["drive", "pin", "pivot", "tip"]
+    before = model.link_poses()
+    run(world, 100)
+    assert model.link_poses() == before
+
+
+def test_the_closing_joint_has_stops_damping_and_efforts(linkage):
+    world, model = linkage("<limit><lower>-0.1</lower><upper>0.1</upper></limit>")
+    assert model.description.joints["tip"].child == "rocker::tip"
+    run(world, 1000)
+    assert abs(model.joint_state("tip")[0]) < 0.11
+    world, model = linkage("<dynamics><damping>200</damping></dynamics>")
+    run(world, 300)
+    assert abs(model.joint_state("drive")[1]) < 0.3  # 6 without
+    set_joint_properties(model, "tip", JointProperties(damping=0.0), 0.001)
+    world.set_gravity((0.0, 0.0, 0.0))
+    model.rest_joints()
+    for _ in range(200):
+        model.body.add_effort(model.joint_index("tip"), 1.0)
+        world.step()
+    moved = (model.joint_state("tip")[1], missed(model), gap(model))
+    assert moved[0] > 0.01
+    assert max(moved[1:]) < 1e-4
+
+
+def test_joints_that_a_service_moves_leave_the_loop_closed(linkage, caplog):
+    world, model = linkage()
+    model.set_joint_positions({"drive": 1.5})
+    assert model.joint_state("drive") == (pytest.approx(1.5), 0.0)
+    assert (missed(model), gap(model)) == pytest.approx((0.0, 0.0), abs=1e-6)
+    model.set_joint_velocities({"drive": 1.0})
+    before = model.joint_state("pivot")
+    world.step()
+    assert model.joint_state("pivot")[1] == pytest.approx(before[1], abs=0.02)
+    assert before[1] != 0.0
+    model.rest_joints()
+    states = model.joint_states()
+    model.set_joint_positions({"pivot": 2.5})  # beyond its dead centre
+    assert np.array(model.joint_states()) == pytest.approx(np.array(states))
+    assert "its loops don't close on the way to pivot = 2.5; they stay" in caplog.text
+    pose, _ = model.link_state("coupler")
+    place_link(
+        model,
+        "coupler",
+        Pose(add(pose.position, (0.1, 0.0, 0.1)), pose.orientation),
+        ((0.0,) * 3,) * 2,
+    )
+    assert gap(model) < 1e-6
+    world.reset(joints=True)
+    assert model.joint_states() == [(0.0, 0.0)] * 4
+
+
+def test_all_joints_of_a_loop_may_be_placed_at_once(linkage):
+    world, model = linkage()
+    model.set_joint_positions({"drive": 1.0})
+    states = model.joint_states()
+    world.reset(joints=True)
+    model.set_joint_positions(
+        dict(zip(model.joint_names, (each[0] for each in states), strict=True))
+    )
+    assert np.array(model.joint_states()) == pytest.approx(np.array(states), abs=1e-6)
+
+
+def test_snapshots_and_new_worlds_repeat_to_the_bit(linkage):
+    def future():
+        run(world, 300)
+        return model.joint_states()
+
+    ends = []
+    for _ in range(2):
+        world, model = linkage()
+        model.set_motor("drive", 3.0, 1e9)
+        ends.append(future())
+        snapshot = world.save_state()
+        ends += [future()]
+        world.restore_state(snapshot)
+        assert future() == ends[-1]
+    assert ends[:2] == ends[2:]
+
+
+def test_it_stays_closed_when_the_world_changes(linkage):
+    world, model = linkage()
+    world.engine._most_waste = 0  # of PyBullet: it begins anew
+    run(world, 300)
+    heavy = Inertia(5.0, Pose((0.4, 0.0, 0.0)), ixx=0.1, iyy=0.3, izz=0.3)
+    world.set_inertia(model, "rocker", heavy)
+    assert link_inertia(model, "rocker") == heavy
+    set_link_properties(world, model, "rocker", heavy, False)
+    for name in ("other", "again"):
+        other = world.spawn(name, parse_sdf(four_bar()), Pose((3.0, 0.0, 0.0)))
+        run(world, 300)
+        assert max(gap(model), gap(other), missed(model)) < 2e-4
+        if name == "other":
+            world.delete(name)
+    assert not model.description.links["rocker"].gravity
+
+
+def test_a_gripper_of_four_bars_holds_a_box(world):
+    model = world.spawn("gripper", parse_urdf(GRIPPER), Pose())
+    box = world.spawn(
+        "box", parse_sdf(sdf(cube("l", 0, 0, size=0.04, mass=0.2))), Pose((0.0, 0.0, 0.11))
+    )
+    for tick in range(2500):
+        model.body.add_effort(model.joint_index("left_drive"), 1.0)
+        if tick < 500:
+            box.place(Pose((0.0, 0.0, 0.11)))
+        world.step()
+    assert box.state()[0].position == pytest.approx((0.0, 0.0, 0.11), abs=2e-3)
+    for side in ("left", "right"):
+        finger, palm = (model.link_state(name)[0] for name in (f"{side}_finger", "palm"))
+        assert finger.orientation == pytest.approx(palm.orientation, abs=2e-3)
+    assert model.all_joints[-2:] == ["left_tip", "right_tip"]
+
+
+def test_a_controller_moves_the_joint_that_closes_a_loop(make_world):
+    sim = Simulator(make_world(gravity=(0.0, 0.0, 0.0)), lockstep=True)
+    text = GRIPPER.replace("</robot>", transmission("left_tip", "Effort") + "</robot>")
+    robot = add_robot(sim, "gripper", text)
+    pid = {"type": "effort_controllers/JointPositionController", "joint": "left_tip"}
+    start(robot, {"tip": pid | {"pid": {"p": 5.0, "d": 0.05}}})
+    with sim.lock:
+        sim.advance(10)
+        robot.manager.loaded[0].inputs[0].receive(0.3)
+        sim.advance(3000)
+    assert robot.model.joint_state("left_tip")[0] == pytest.approx(0.3, abs=1e-3)
+    assert robot.model.joint_state("right_drive")[0] == pytest.approx(0.3, abs=2e-3)
+
+
+def test_the_force_in_a_loop_is_not_known(make_world):
+    sim = Simulator(make_world(), lockstep=True)
+    model = sim.world.spawn("m", parse_sdf(four_bar()), Pose())
+    with pytest.raises(DescriptionError, match="'pivot' is part of a closed loop"):
+        JointForces(sim, model, "pivot")
+    JointForces(sim, model, "foot")
+
+
+def test_joints_in_a_urdfs_extension():
+    """They fix it to the world, lead to lumped links, or are left out with a warning."""
+
+    def read(*joints: str):
+        body = """<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
+          </inertial>"""
+        links = "".join(f'<link name="{name}">{body}</link>' for name in "abc")
+        return parse_urdf(f"""<robot name="r">{links}
+          <joint name="j" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/></joint>
+          <joint name="k" type="fixed"><parent link="b"/><child link="c"/><origin xyz="1 0 0"/></joint>
+          <gazebo>{"".join(joints)}</gazebo></robot>""")
+
+    model = read(weld("foot", "world", "a"))
+    assert (model.fixed_base, model.root, model.world_joints) == (True, "a", ["foot"])
+    model = read(weld("foot", "world", "c"))
+    assert model.root == "b"
+    assert model.joints["j"].child == "a"
+    model = read(hinge("tip", "a", "c", "0.5 0 0 0 0 0"))
+    joint = model.joints["tip"]
+    assert model.links[joint.child].part_of == "b"
+    assert joint.anchor.position == pytest.approx((1.5, 0.0, 0.0))
+    assert joint.pose.position == pytest.approx((0.0, 0.0, 0.0))
+    for wrong, why in (
+        (hinge("tip", "a", "nobody"), "nobody"),
+        (hinge("j", "a", "b"), "is there twice"),
+        ('<joint name="s" type="screw"><parent>a</parent><child>b</child></joint>', "screw"),
+        (hinge("tip", "a", "world"), "not its child"),
+    ):
+        model = read(wrong)
+        assert list(model.joints) == ["j"]
+        assert any(why in line for line in model.warnings)
+
+
+def test_the_ground_may_be_the_world(make_world):
+    """And what the joints' names say of parents and children doesn't matter."""
+    coupler, rocker = angles(START)
+    world = make_world()
+    text = sdf(
+        rod("crank", CRANK, (0.0, 0.0), START),
+        rod("coupler", 1.0, (CRANK * math.cos(START), CRANK * math.sin(START)), coupler),
+        rod("rocker", ROCKER, (GROUND, 0.0), rocker),
+        hinge("pivot", "world", "rocker"), hinge("drive", "world", "crank"),
+        hinge("pin", "crank", "coupler"), hinge("tip", "rocker", "coupler", "1 0 0 0 0 0"),
+    )  # fmt: skip
+    model = world.spawn("m", parse_sdf(text), Pose())
+    model.set_motor("drive", 2.0, 1e9)
+    run(world, 3000)
+    assert missed(model) < 1e-4
+    assert gap(model) < 1e-4

@@ -1,0 +1,205 @@
+"""Mesh files: found by every kind of URI, and really colliding."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.mutations.mesh_files import (
+    CORNERS,
+    FACES,
+    ascii_stl,
+    binary_stl,
+    dae,
+    library,
+    obj,
+    polylist,
+)
+from support.robots.worlds import run
+
+from robot_sim.physics.description import DescriptionError
+from robot_sim.physics.files import mesh_program
+from robot_sim.physics.files.reading import Resources
+from robot_sim.physics.files.sdf import parse_sdf
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.world import ground_plane
+
+SRC = os.pathsep.join(filter(None, sys.path))
+BALL = (
+    '<sdf version="1.6"><model name="b"><link name="l"><collision name="c"><geometry><sphere>'
+    "<radius>{}</radius></sphere></geometry></collision></link></model></sdf>"
+)
+FILES = {
+    "cube.stl": binary_stl(),
+    "ascii.stl": ascii_stl(),
+    "cube.obj": obj(),
+    "cube.dae": dae(),
+    "cube.DAE": dae(),
+    "polylist.dae": polylist(),
+    "millimetres.dae": dae(unit="0.001"),
+    "y_up.dae": dae(up="Y_UP"),
+    "library.dae": library(),
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name, data in FILES.items():
+        (tmp_path / name).write_bytes(data)
+    return tmp_path
+
+
+def urdf(mesh, scale="0.1 0.1 0.2", tag="collision"):
+    return (
+        '<robot name="r"><link name="b"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" '
+        f'izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial><{tag}><geometry><mesh filename="{mesh}" '
+        f'scale="{scale}"/></geometry></{tag}></link></robot>'
+    )
+
+
+def rest_height(world, description, start=0.5):
+    model = world.spawn("box", description, Pose((0.0, 0.0, start)))
+    run(world, 1500)
+    pose, (linear, _) = model.state()
+    assert linear == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
+    return pose.position[2]
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_mesh_box_comes_to_rest_at_half_its_height(sim, folder, name):
+    scale = "100 100 200" if name.startswith("milli") else "0.1 0.1 0.2"
+    sim.world.spawn("ground_plane", ground_plane(), Pose())
+    box = parse_urdf(urdf(folder / name, scale))
+    assert rest_height(sim.world, box) == pytest.approx(0.2, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "uri", ["package://pack/{}", "model://pack/{}", "file://{folder}/pack/{}", "{folder}/pack/{}"]
+)
+def test_meshes_are_found_by_every_uri(tmp_path, uri):
+    pack = tmp_path / "pack"
+    pack.mkdir()
+    (pack / "cube.stl").write_bytes(binary_stl())
+
+    def package(name):
+        if name != "pack":
+            raise LookupError(name)
+        return str(pack)
+
+    text = urdf(uri.format("cube.stl", folder=tmp_path))
+    model = parse_urdf(text, resources=Resources(package=package))
+    assert model.links["b"].collisions[0].mesh == str(pack / "cube.stl")
+
+
+P3DX = {  # sizes [m]
+    "p3dx/chassis.stl": (0.42, 0.28, 0.18),
+    "p3dx/top.stl": (0.44, 0.38, 0.01),
+    "laser/hokuyo.dae": (0.05, 0.05, 0.07),
+    **{f"p3dx/{side}_wheel.stl": (0.18, 0.04, 0.18) for side in ("left", "right")},
+    **{f"p3dx/{side}_hubcap.stl": (0.1, 0.042, 0.1) for side in ("left", "right")},
+    **{f"p3dx/{end}_sonar.stl": (0.04, 0.24, 0.04) for end in ("front", "back")},
+    **{f"p3dx/{end}_rim.stl": (0.02, 0.28, 0.05) for end in ("front", "back")},
+    "p3dx/center_wheel.stl": (0.075, 0.018, 0.075),
+    "p3dx/center_hubcap.stl": (0.03, 0.02, 0.03),
+    "p3dx/swivel.stl": (0.06, 0.04, 0.05),
+}
+
+
+@pytest.mark.parametrize("name", P3DX)
+def test_what_robots_refer_to_in_gazebo_plugins_has_the_right_size(name):
+    folder = Path(__file__).parents[4] / "companions/gazebo_plugins"
+    mesh = mesh_program.load(folder / "test/multi_robot_scenario/meshes" / name)
+    sizes = mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)
+    assert sizes == pytest.approx(np.array(P3DX[name]), abs=2e-3)
+
+
+def test_a_static_mesh_is_hollow_where_it_is_hollow(sim, tmp_path):
+    """A trough of two slopes: its convex hull would be full."""
+    (tmp_path / "trough.obj").write_text(
+        "v -1 -1 1\nv -1 1 1\nv 0 -1 0\nv 0 1 0\nv 1 -1 1\nv 1 1 1\n"
+        "f 1 3 2\nf 2 3 4\nf 3 5 4\nf 4 5 6\n"
+    )
+    mesh = f"<mesh><uri>{tmp_path}/trough.obj</uri></mesh>"
+    trough = parse_sdf(
+        '<sdf version="1.6"><model name="t"><static>1</static><link name="l"><collision name="c">'
+        f"<geometry>{mesh}</geometry></collision></link></model></sdf>"
+    )
+    sim.world.spawn("t", trough, Pose())
+    height = rest_height(sim.world, parse_sdf(BALL.format(0.1)), 0.6)
+    assert height == pytest.approx(0.1 * 2**0.5, abs=0.03)
+
+
+def test_a_mesh_has_the_shape_that_it_had_on_disk_when_it_was_spawned(world, tmp_path):
+    path = tmp_path / "cube.stl"
+    for size in (1.0, 0.5, 2.0):  # the engine has seen the name before
+        path.write_bytes(binary_stl(size))
+        height = rest_height(world, parse_urdf(urdf(path, "0.1 0.1 0.1")), 0.3)
+        assert height == pytest.approx(0.1 * size, abs=0.005)
+        world.delete("box")
+
+
+@pytest.mark.parametrize("static", [False, True])
+def test_an_engine_opens_no_mesh_file(world, tmp_path, static):
+    """All of it is read before the world has to wait."""
+    path = tmp_path / "cube.stl"
+    path.write_bytes(binary_stl())
+    description = parse_urdf(urdf(path))
+    description.static = static
+    path.unlink()
+    world.spawn("box", description, Pose())
+    world.step()
+
+
+def test_each_object_of_a_file_has_a_hull_of_its_own(sim, tmp_path):
+    """A ball lies between two posts: one hull around both would carry it."""
+    posts = [[(x + dx, y, z) for x, y, z in CORNERS] for dx in (-3.0, 3.0)]
+    (tmp_path / "posts.obj").write_text(
+        "".join(
+            f"o post\ng {number}\n"
+            + "".join(f"v {x} {y} {z}\n" for x, y, z in corners)
+            + "".join(f"f {a - 8} {b - 8} {c - 8}\n" for a, b, c in FACES)
+            for number, corners in enumerate(posts)
+        )
+    )
+    world = sim.world
+    world.spawn("ground_plane", ground_plane(), Pose())
+    world.spawn("posts", parse_urdf(urdf(tmp_path / "posts.obj", "1 1 1")), Pose((0.0, 0.0, 1.01)))
+    assert rest_height(world, parse_sdf(BALL.format(0.5)), 3.0) == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_world_without_meshes_does_not_pay_for_them():
+    code = (
+        "import sys\nfrom robot_sim.physics import world\n"
+        "from robot_sim.physics.engines.bullet_engine import BulletEngine\n"
+        "from robot_sim.physics.files.sdf import parse_sdf\n"
+        "there = world.World(BulletEngine())\n"
+        "there.spawn('m', parse_sdf(sys.argv[1]), world.Pose())\n"
+        "assert not {'trimesh', 'collada', 'manifold3d'} & set(sys.modules)"
+    )
+    subprocess.run(
+        [sys.executable, "-c", code, BALL.format(1)],
+        check=True,
+        env=os.environ | {"PYTHONPATH": SRC},
+    )
+
+
+@pytest.mark.parametrize(
+    "uri",
+    ["package://std/" + "a" * 300, "model://" + "a" * 300, "file:///" + "x/" * 3000, "a" * 300,
+     "~" + "a" * 300, "file:///a%00b", "~a%00b/x", "package://std/a%00b", "model://a%00b", "~\ud800", "model://\ud800",
+     "file:///proc/self/root/proc/self/mem/x"],
+)  # fmt: skip
+def test_a_name_that_no_file_has_is_not_found(tmp_path, uri):
+    resources = Resources((tmp_path,), (tmp_path,), {"std": str(tmp_path)}.__getitem__)
+    with pytest.raises(DescriptionError, match="is not found"):
+        resources.find(uri, tmp_path)
+
+
+def test_a_name_too_long_in_one_folder_is_looked_for_in_the_next(tmp_path):
+    (tmp_path / "model").mkdir()
+    deep = tmp_path / ("x" * 250) / ("x" * 250) / ("x" * 250)
+    resources = Resources((Path(str(deep) + "/x" * 2000), tmp_path))
+    assert resources.find("model://model") == tmp_path / "model"

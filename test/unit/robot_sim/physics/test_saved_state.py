@@ -1,0 +1,207 @@
+"""Saved worlds: they begin as their `<state>` says, and a reset returns to what their models say."""
+
+from math import cos, pi, sin
+
+import pytest
+
+from bullet_gazebo.services.spawn_services import fill_world
+from robot_sim.physics.files.reading import Resources
+from robot_sim.physics.files.world_file import parse_world
+from robot_sim.physics.pose import from_rpy
+from robot_sim.physics.world import World
+from robot_sim.simulator import Simulator
+
+BODY = "<collision name='c'><geometry><box><size>0.1 0.1 0.1</size></box></geometry></collision>"
+CRATE = f'<model name="crate"><pose>0 0 0.5 0 0 0</pose><link name="link">{BODY}</link></model>'
+WALL = f"""<model name="wall"><static>1</static><pose>0 5 0.5 0 0 0</pose>
+    <link name="a">{BODY}</link><link name="b"><pose>1 0 0 0 0 0</pose>{BODY}</link></model>"""
+SUN = '<light name="sun" type="directional"><pose>0 0 10 0 0 0</pose></light>'
+ANGLE = 0.7  # [rad]
+
+
+@pytest.fixture
+def begun(new_engine):
+    """Starts a world with models and the children of a `<state>`."""
+    open_worlds = []
+
+    def begin(models, *states):
+        given = "".join(f"<state world_name='w'>{state}</state>" for state in states)
+        text = f'<sdf version="1.6"><world name="w">{models}{given}</world></sdf>'
+        found = parse_world(text, Resources())
+        sim = Simulator(World(new_engine()), lockstep=True)
+        open_worlds.append(sim.world)
+        fill_world(sim, found, lambda: False)
+        sim.warnings = found.warnings
+        return sim
+
+    yield begin
+    for world in open_worlds:
+        world.close()
+
+
+def near(pose, position, rpy=(0.0, 0.0, 0.0)):
+    assert pose.position == pytest.approx(position, abs=1e-5)
+    # A quaternion and its negative are the same rotation.
+    assert abs(sum(a * b for a, b in zip(pose.orientation, from_rpy(*rpy), strict=True))) == (
+        pytest.approx(1.0, abs=1e-7)
+    )
+
+
+def place_of(sim, name):
+    return sim.world.frame(name)[0]
+
+
+def test_models_links_and_lights_begin_where_the_first_state_has_them(begun):
+    sim = begun(
+        CRATE + WALL + SUN,
+        """<sim_time>12 0</sim_time>
+        <model name="crate"><pose>3 2 0.5 0 0 0.8</pose><scale>1 1 1</scale>
+          <link name="link"><pose>3 2 0.5 0 0 0.8</pose><velocity>1 0 0 0 0 2</velocity>
+            <acceleration>9 9 9 0 0 0</acceleration><wrench>9 9 9 0 0 0</wrench></link></model>
+        <model name="wall"><pose>-2 -2 0.5 0 0 1.570796</pose></model>
+        <light name="sun"><pose>1 2 3 0 0 0</pose></light>""",
+        '<model name="crate"><pose>9 9 9 0 0 0</pose></model>',
+    )
+    assert sim.warnings == []
+    near(place_of(sim, "crate"), (3.0, 2.0, 0.5), (0.0, 0.0, 0.8))
+    twist = sim.world.models["crate"].link_state("link")[1]
+    assert twist[0] + twist[1] == pytest.approx((1.0, 0.0, 0.0, 0.0, 0.0, 2.0), abs=1e-6)
+    near(place_of(sim, "wall"), (-2.0, -2.0, 0.5), (0.0, 0.0, pi / 2))
+    near(place_of(sim, "wall::b"), (-2.0, -1.0, 0.5), (0.0, 0.0, pi / 2))
+    assert sim.world.lights["sun"].pose.position == (1.0, 2.0, 3.0)
+    sim.reset_world()
+    near(place_of(sim, "crate"), (0.0, 0.0, 0.5))
+    near(place_of(sim, "wall::b"), (1.0, 5.0, 0.5))
+    assert sim.world.models["crate"].link_state("link")[1][0] == pytest.approx((0.0, 0.0, 0.0))
+
+
+def test_a_static_models_links_lie_where_the_state_has_them(begun):
+    state = """<model name="wall"><pose>0 5 0.5 0 0 0</pose><link name="a"><pose>1 1 1 0 0 0</pose></link>
+        <link name="b"><pose>4 4 4 0 0 1</pose></link></model>"""
+    sim = begun(WALL, state)
+    near(place_of(sim, "wall::a"), (1.0, 1.0, 1.0))
+    near(place_of(sim, "wall::b"), (4.0, 4.0, 4.0), (0.0, 0.0, 1.0))
+
+
+def pendulum(anchor):
+    """Two bars of 1 m, hanging from (0, 0, 2), which turn about x at their upper ends."""
+    bar = '<link name="{}"><pose>0 0 {} 0 0 0</pose>{}</link>'
+    joint = """<joint name="{0}" type="revolute"><parent>{1}</parent><child>{2}</child>
+        <pose>0 0 0.5 0 0 0</pose><axis><xyz>1 0 0</xyz></axis></joint>"""
+    return f"""<model name="p"><pose>0 0 2 0 0 0</pose>{anchor}
+        {bar.format("one", -0.5, BODY)}{bar.format("two", -1.5, BODY)}
+        {joint.format("upper", "base" if anchor else "world", "one")}
+        {joint.format("lower", "one", "two")}</model>"""
+
+
+BASE = """<link name="base"/>
+    <joint name="held" type="fixed"><parent>world</parent><child>base</child></joint>"""
+FREE = '<link name="base"><inertial><mass>1e6</mass></inertial></link>'
+
+
+@pytest.mark.parametrize("anchor", [BASE, FREE, ""], ids=["fixed", "free", "world"])
+def test_joints_stand_as_the_poses_of_their_links(begun, anchor):
+    """Both bars hang turned: the joints' angles are those of geometry, not zero."""
+    two = ANGLE - 0.3  # of the lower bar, from the vertical
+    hinge = (0.0, sin(ANGLE), 2.0 - cos(ANGLE))
+    ends = {
+        "one": ((0.0, 0.5 * sin(ANGLE), 2.0 - 0.5 * cos(ANGLE)), ANGLE),
+        "two": ((0.0, hinge[1] + 0.5 * sin(two), hinge[2] - 0.5 * cos(two)), two),
+    }
+    links = "".join(
+        f'<link name="{name}"><pose>{x} {y} {z} {roll} 0 0</pose>'
+        f"<velocity>0 {speed} 0 {rate} 0 0</velocity></link>"
+        for (name, ((x, y, z), roll)), speed, rate in zip(
+            ends.items(), (0.0, 0.0), (2.0, 3.0), strict=True
+        )
+    )
+    # Gazebo's model goes where its first link goes.
+    model = "0 0 2 0 0 0" if anchor else f"0 0 2 {ANGLE} 0 0"
+    sim = begun(pendulum(anchor), f'<model name="p"><pose>{model}</pose>{links}</model>')
+    assert sim.warnings == []
+    for name, (position, roll) in ends.items():
+        near(place_of(sim, f"p::{name}"), position, (roll, 0.0, 0.0))
+    p = sim.world.models["p"]
+    assert p.joint_state("upper") == pytest.approx((ANGLE, 2.0), abs=1e-6)
+    assert p.joint_state("lower") == pytest.approx((-0.3, 1.0), abs=1e-6)
+    sim.reset_simulation()
+    near(place_of(sim, "p::two"), (0.0, 0.0, 0.5))
+    assert p.joint_state("upper") == pytest.approx((0.0, 0.0), abs=1e-6)
+
+
+def test_slides_and_turns_beyond_half_a_circle_are_within_their_limits(begun):
+    parts = [
+        f'<link name="{name}">{BODY}<inertial><mass>{mass}</mass></inertial></link>'
+        for name, mass in (("base", 1e6), ("slide", 1), ("arm", 1))
+    ]
+    joint = (
+        '<joint name="{0}" type="{1}"><parent>{2}</parent><child>{3}</child><axis><xyz>{4}</xyz>'
+        "<limit><lower>{5}</lower><upper>{6}</upper></limit></axis></joint>"
+    )
+    parts += [
+        joint.format("rail", "prismatic", "base", "slide", "0 1 0", -1, 1),
+        joint.format("turn", "revolute", "slide", "arm", "0 0 1", 0, 6),
+    ]
+    state = """<model name="m"><pose>1 0 0 0 0 0</pose><link name="base"><pose>1 0 0 0 0 0</pose></link>
+        <link name="slide"><pose>1 0.4 0 0 0 0</pose></link>
+        <link name="arm"><pose>1 0.4 0 0 0 -1</pose></link></model>"""
+    sim = begun(f'<model name="m">{"".join(parts)}</model>', state)
+    assert sim.world.models["m"].joint_state("rail")[0] == pytest.approx(0.4)
+    assert sim.world.models["m"].joint_state("turn")[0] == pytest.approx(2 * pi - 1)
+
+
+NESTED = f"""<model name="m"><link name="l">{BODY}</link><model name="in"><pose>1 0 0 0 0 0</pose>
+    <link name="l">{BODY}</link></model><joint name="j" type="revolute"><parent>l</parent>
+    <child>in::l</child><axis><xyz>0 0 1</xyz></axis></joint></model>"""
+
+
+def test_nested_models_have_their_own_states(begun):
+    state = """<model name="m"><pose>0 0 1 0 0 0</pose><link name="l"><pose>0 0 1 0 0 0</pose></link>
+        <model name="in"><pose>1 0 1 0 0 0.5</pose><link name="l"><pose>1 0 1 0 0 0.5</pose></link>
+        </model></model>"""
+    sim = begun(NESTED, state)
+    near(place_of(sim, "m::in::l"), (1.0, 0.0, 1.0), (0.0, 0.0, 0.5))
+    assert sim.world.models["m"].joint_state("j")[0] == pytest.approx(0.5)
+
+
+def test_what_a_state_inserts_and_deletes(begun):
+    state = f"""<insertions>{CRATE.replace('"crate"', '"new"')}</insertions>
+        <deletions><name>wall</name><name>sun</name></deletions>
+        <model name="new"><pose>7 0 0 0 0 0</pose></model>"""
+    sim = begun(CRATE + WALL + SUN, state)
+    assert list(sim.world.models) == ["crate", "new"]
+    assert not sim.world.lights
+    near(place_of(sim, "new"), (7.0, 0.0, 0.0))
+
+
+BEGINS = "it begins where the model says"
+
+
+@pytest.mark.parametrize(
+    ("state", "warning"),
+    [
+        ('<model name="ghost"><pose>1 2 3 0 0 0</pose></model><light name="moon"/>',
+         "<state>: the world has no model 'ghost', light 'moon'"),
+        ('<model name="wall"><link name="x"><pose>1 2 3 0 0 0</pose></link><link name="b"/></model>',
+         "<state>, model 'wall': it has no link 'x'"),
+        ('<model name="wall"><pose>1 2 3 0 0</pose></model>',
+         "<state>, model 'wall': <pose> must hold 6 numbers, not '1 2 3 0 0'; " + BEGINS),
+        ('<model name="wall"><pose>1 2 inf 0 0 0</pose></model>',
+         "<state>, model 'wall': <pose>: 'inf' is not finite; " + BEGINS),
+        ('<model name="wall"><link name="a"><pose>1e200 2 0 0 0 0</pose></link></model>',
+         "<state>, model 'wall', link 'a': 1e+200 m is beyond 1e+07 m; " + BEGINS),
+        ('<model name="wall"><link name="a"><velocity>0 0 0 0 1e10 0</velocity></link></model>',
+         "<state>, model 'wall', link 'a': <velocity> is beyond 1e+09 m/s; " + BEGINS),
+        ('<model name="p"><pose>0 0 2 0 0 0</pose><link name="two"><pose>0 3 0 0 0 0</pose></link></model>',
+         "<state>, model 'p': its joints don't let link 'two' be there"),
+    ],
+)  # fmt: skip
+def test_a_damaged_state_is_one_line_and_the_rest_stands(begun, state, warning):
+    sim = begun(
+        WALL + CRATE + pendulum(FREE),
+        state + '<model name="crate"><pose>3 2 1 0 0 0</pose></model>',
+    )
+    assert sim.warnings == [warning]
+    near(place_of(sim, "crate"), (3.0, 2.0, 1.0))
+    if "wall" in warning:
+        near(place_of(sim, "wall"), (0.0, 5.0, 0.5))

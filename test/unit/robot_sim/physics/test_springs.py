@@ -1,0 +1,225 @@
+"""Springs of joints against closed forms."""
+
+import math
+
+import pytest
+from support.robots.worlds import run
+
+from robot_sim.physics.description import DescriptionError, Inertia
+from robot_sim.physics.files.sdf import parse_sdf
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose
+from robot_sim.physics.properties import JointProperties, set_joint_properties
+
+MASS, MOMENT, STIFFNESS, REFERENCE = 2.0, 0.01, 200.0, 0.1  # [kg], [kg m²], [N/m], [m]
+G = 9.8  # [m/s²]
+VERSIONS = ["1.4", "1.5", "1.6", "1.7"]
+
+
+def inertial(mass=MASS, moment=MOMENT):
+    return f"""<inertial><mass>{mass}</mass><inertia><ixx>{moment}</ixx><iyy>{moment}</iyy>
+      <izz>{moment}</izz></inertia></inertial>"""
+
+
+def on_a_spring(
+    kind="prismatic", stiffness=STIFFNESS, reference=REFERENCE, damping=0.0, version="1.6",
+    base='<joint name="fix" type="fixed"><parent>world</parent><child>base</child></joint>',
+):  # fmt: skip
+    """A mass on a base, on a joint along the vertical with a spring."""
+    limits = "" if kind == "continuous" else "<limit><lower>-3</lower><upper>3</upper></limit>"
+    kind = "revolute" if kind == "continuous" else kind
+    return f"""<sdf version="{version}"><model name="m">
+      <link name="base">{inertial()}</link><link name="mass">{inertial()}</link>{base}
+      <joint name="j" type="{kind}"><parent>base</parent><child>mass</child>
+      <axis><xyz>0 0 1</xyz>{limits}<dynamics><damping>{damping}</damping>
+      <spring_reference>{reference}</spring_reference><spring_stiffness>{stiffness}</spring_stiffness>
+      </dynamics></axis></joint></model></sdf>"""
+
+
+def spawned(world, **options):
+    return world.spawn("m", parse_sdf(on_a_spring(**options)), Pose((0.0, 0.0, 5.0)))
+
+
+def positions(world, model, ticks):
+    seen = []
+    for _ in range(ticks):
+        world.step()
+        seen.append(model.joint_state("j")[0])
+    return seen
+
+
+def period(positions, about, dt=0.001):
+    """The time between upward crossings of a position."""
+    ups = []
+    for tick, (a, b) in enumerate(zip(positions, positions[1:], strict=False)):
+        if a < about <= b:
+            ups.append(tick + (about - a) / (b - a))
+    return (ups[-1] - ups[0]) / (len(ups) - 1) * dt
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_mass_rests_where_the_spring_carries_it(world, version):
+    model = spawned(world, damping=20.0, version=version)
+    run(world, 4000)
+    assert not model.description.warnings
+    rest = REFERENCE - MASS * G / STIFFNESS
+    assert model.joint_state("j")[0] == pytest.approx(rest, abs=1e-4 * MASS * G / STIFFNESS)
+
+
+@pytest.mark.parametrize(
+    "value", ["<spring{0}>{1}</spring{0}>", '<spring{0} value="{1}"/>'], ids=["text", "value"]
+)
+def test_urdf(world, value):
+    body = """<inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0"
+      iyz="0"/></inertial>"""
+    spring = value.format("Stiffness", STIFFNESS) + value.format("Reference", REFERENCE)
+    text = f"""<robot name="r"><link name="world"/><link name="base">{body}</link>
+      <link name="mass">{body}</link><link name="lumped">{body}</link>
+      <joint name="fix" type="fixed"><parent link="world"/><child link="base"/></joint>
+      <joint name="weld" type="fixed"><parent link="base"/><child link="lumped"/></joint>
+      <joint name="j" type="prismatic"><parent link="base"/><child link="mass"/><axis xyz="0 0 1"/>
+      <limit lower="-1" upper="1" effort="9" velocity="9"/><dynamics damping="20"/></joint>
+      <gazebo reference="j">{spring}<implicitSpringDamper>1</implicitSpringDamper></gazebo>
+      <gazebo reference="weld">{spring}</gazebo></robot>"""
+    model = world.spawn("r", parse_urdf(text), Pose((0.0, 0.0, 5.0)))
+    run(world, 4000)
+    assert not model.description.warnings
+    rest = REFERENCE - MASS * G / STIFFNESS
+    assert model.joint_state("j")[0] == pytest.approx(rest, abs=1e-4 * MASS * G / STIFFNESS)
+
+
+@pytest.mark.parametrize("kind", ["prismatic", "revolute", "continuous"])
+def test_it_swings_with_its_period_and_gains_no_energy(world, kind):
+    slides = kind == "prismatic"
+    inertia, force = (MASS, MASS * G) if slides else (MOMENT, 0.0)
+    stiffness = 200.0 if slides else 1.0
+    model = spawned(world, kind=kind, stiffness=stiffness)
+    rest = REFERENCE - force / stiffness
+
+    def energy():
+        position, speed = model.joint_state("j")
+        return 0.5 * (stiffness * (position - rest) ** 2 + inertia * speed**2)
+
+    seen = positions(world, model, 10_000)
+    assert period(seen, rest) == pytest.approx(
+        2.0 * math.pi * math.sqrt(inertia / stiffness), rel=1e-3
+    )
+    first = max(energies(world, energy, 1000))
+    run(world, 90_000)  # 100 s in all
+    last = max(energies(world, energy, 1000))
+    assert last == pytest.approx(first, rel=1e-3)
+    assert max(positions(world, model, 1000)) == pytest.approx(
+        2.0 * rest if rest > 0 else 0.0, abs=1e-2
+    )
+
+
+def energies(world, energy, ticks):
+    seen = []
+    for _ in range(ticks):
+        world.step()
+        seen.append(energy())
+    return seen
+
+
+def test_a_damped_swing(world):
+    damping = 4.0
+    model = spawned(world, damping=damping)
+    decay = damping / (2.0 * MASS)
+    omega = math.sqrt(STIFFNESS / MASS - decay**2)
+    rest = REFERENCE - MASS * G / STIFFNESS
+    for tick, position in enumerate(positions(world, model, 2000), 1):
+        t = tick * 0.001
+        swing = math.cos(omega * t) + decay / omega * math.sin(omega * t)
+        assert position - rest == pytest.approx(
+            -rest * math.exp(-decay * t) * swing, abs=0.01 * abs(rest)
+        )
+
+
+@pytest.mark.parametrize("kind", ["prismatic", "revolute"])
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize("stiffness", [1e5, 1e7, 1e12])
+def test_stiff_springs_hold(world, kind, free, stiffness):
+    options = {"base": ""} if free else {}
+    model = spawned(world, kind=kind, stiffness=stiffness, reference=0.3, **options)
+    seen = positions(world, model, 3000)
+    assert max(map(abs, seen)) < 0.7
+    told = ["springs too stiff for the step are softened: j"]
+    most = 0.25 * (MASS if kind == "prismatic" else MOMENT) / 0.001**2
+    cut = stiffness > most and not model.body.implicit_damping
+    assert model.description.warnings == (told if cut else [])
+    if stiffness > 1e6:
+        assert seen[-1] == pytest.approx(0.3, abs=1e-4)
+
+
+def test_a_chain_of_stiff_springs(world):
+    """Flexible beams are modelled so. Where springs are cut, they bend and sway a little."""
+    links = "".join(
+        f'<link name="l{i}"><pose>{0.1 * i} 0 0 0 0 0</pose>{inertial(0.05, 1e-4)}</link>'
+        for i in range(9)
+    )
+    joints = "".join(
+        f"""<joint name="j{i}" type="revolute"><parent>l{i}</parent><child>l{i + 1}</child><axis>
+        <xyz>0 1 0</xyz><dynamics><spring_stiffness>1e12</spring_stiffness></dynamics></axis></joint>"""
+        for i in range(8)
+    )
+    fix = '<joint name="fix" type="fixed"><parent>world</parent><child>l0</child></joint>'
+    text = f'<sdf version="1.6"><model name="m">{links}{joints}{fix}</model></sdf>'
+    model = world.spawn("beam", parse_sdf(text), Pose((0.0, 0.0, 5.0)))
+    run(world, 3000)
+    assert max(abs(position) for position, _ in model.joint_states()) < 0.05
+    assert max(abs(speed) for _, speed in model.joint_states()) < 1.0
+
+
+def test_efforts_add_up(world):
+    model = spawned(world, damping=20.0)
+    for _ in range(4000):
+        model.body.apply_efforts([MASS * G])
+        world.step()
+    assert model.joint_state("j")[0] == pytest.approx(REFERENCE, abs=1e-6)
+
+
+def test_it_stays_when_the_world_changes(make_world):
+    """Other steps, masses and dampings, engines that begin anew to free memory, and resets."""
+    world = make_world()
+    model = spawned(world, damping=20.0)
+    world.engine._most_waste = 0  # of PyBullet: it begins anew
+    world.set_time_step(0.002)
+    heavier = Inertia(
+        mass=2.0 * MASS, com=Pose((0.01, 0.0, 0.0)), ixx=MOMENT, iyy=MOMENT, izz=MOMENT
+    )
+    world.set_inertia(model, "mass", heavier)
+    set_joint_properties(model, "j", JointProperties(damping=30.0), 0.002)
+    world.spawn("other", parse_sdf(on_a_spring()), Pose((2.0, 0.0, 5.0)))
+    world.delete("other")
+    world.spawn("again", parse_sdf(on_a_spring()), Pose((2.0, 0.0, 5.0)))
+    run(world, 3000)
+    rest = REFERENCE - 2.0 * MASS * G / STIFFNESS
+    assert model.joint_state("j")[0] == pytest.approx(rest, abs=1e-5)
+    world.reset(joints=True)
+    model.set_joint_positions({"j": 0.5})
+    assert model.joint_state("j") == (0.5, 0.0)
+    run(world, 3000)
+    assert model.joint_state("j")[0] == pytest.approx(rest, abs=1e-5)
+
+
+def test_snapshots(world):
+    model = spawned(world)
+    run(world, 100)
+    snapshot = world.save_state()
+    first = positions(world, model, 100)
+    world.restore_state(snapshot)
+    assert positions(world, model, 100) == first
+
+
+@pytest.mark.parametrize(
+    ("options", "fault"),
+    [
+        ({"stiffness": -1.0}, "a spring_stiffness of -1.0 is not between 0 and 1e"),
+        ({"stiffness": 1e13}, "a spring_stiffness of 10000000000000.0 is not between"),
+        ({"reference": 1e8}, "a spring_reference of 100000000.0 is beyond 1e"),
+        ({"stiffness": "nan"}, "spring_stiffness"),
+    ],
+)
+def test_faults(world, options, fault):
+    with pytest.raises(DescriptionError, match=fault):
+        spawned(world, **options)

@@ -1,0 +1,213 @@
+"""What pictures show, and that taking them changes nothing."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from support.pages.pictures import pixel
+from support.robots.cartpole import cartpole_urdf
+
+from robot_sim.physics.dynamics import link_poses
+from robot_sim.physics.engines import make_engine
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose, from_rpy
+from robot_sim.physics.world import World
+from robot_sim.pictures.camera import Camera
+from robot_sim.pictures.renderer import Renderer
+from robot_sim.pictures.visuals import visible_shapes
+
+WIDTH, HEIGHT = 160, 120
+CAMERA = Camera(target=(0.0, 0.0, 1.0), distance=3.0, yaw=0.0, pitch=-10.0)
+RED, GREEN = "1 0 0 1", "0 1 0 1"
+
+
+def body(shape: str, colour: str = RED, tag: str = "visual") -> str:
+    return f"""<robot name="it"><link name="base">
+      <inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+      <{tag}><geometry>{shape}</geometry><material name=""><color rgba="{colour}"/></material></{tag}>
+    </link></robot>"""
+
+
+BOX = '<box size="0.4 0.4 0.4"/>'
+
+
+@pytest.fixture
+def scene():
+    made = Renderer()
+    yield made
+    made.close()
+
+
+def shown(scene: Renderer, camera: Camera = CAMERA) -> np.ndarray:
+    return scene.picture(camera, WIDTH, HEIGHT).astype(int)
+
+
+def where(picture: np.ndarray, channel: int) -> np.ndarray:
+    """Columns and rows [pixels] of what has only this colour, (n, 2)."""
+    others = [each for each in range(3) if each != channel]
+    strong = picture[..., channel] > 60 + picture[..., others].max(axis=-1)
+    return np.argwhere(strong)[:, ::-1] + 0.5
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0, 1.0), (0.6, 0.3, 1.4), (-0.7, -0.5, 0.6)])
+@pytest.mark.parametrize(
+    "shape", [BOX, '<sphere radius="0.2"/>', '<cylinder radius="0.2" length="0.4"/>']
+)
+def test_a_shape_is_seen_where_it_is_in_its_colour(scene, shape, place):
+    scene.add("it", visible_shapes(parse_urdf(body(shape))))
+    scene.place("it", {"base": Pose(place)})
+    found = where(shown(scene), 0)
+    assert len(found) > 50
+    assert found.mean(axis=0) == pytest.approx(pixel(CAMERA, place, WIDTH, HEIGHT), abs=2.0)
+    assert len(where(shown(scene), 1)) == len(where(shown(scene), 2)) == 0
+
+
+def test_it_turns_with_its_link(scene):
+    scene.add("it", visible_shapes(parse_urdf(body('<box size="0.1 0.1 0.8"/>'))))
+    spans = []
+    for lean in (0.0, math.pi / 2):
+        scene.place("it", {"base": Pose((0.0, 0.0, 1.0), from_rpy(0.0, lean, 0.0))})
+        spans.append(np.ptp(where(shown(scene), 0), axis=0))
+    assert spans[0][1] > 4 * spans[0][0] and spans[1][0] > 3 * spans[1][1]
+
+
+def test_what_is_nearer_hides_what_is_behind_and_the_ground_what_is_below(scene):
+    scene.add("near", visible_shapes(parse_urdf(body(BOX))))
+    scene.add("far", visible_shapes(parse_urdf(body(BOX, GREEN))))
+    scene.place("near", {"base": Pose((0.0, -0.5, 1.0))})
+    scene.place("far", {"base": Pose((0.0, 0.5, 1.0))})
+    hidden = len(where(shown(scene), 1))
+    scene.remove("near")
+    assert hidden < 0.3 * len(where(shown(scene), 1))
+    scene.place("far", {"base": Pose((0.0, 0.0, -0.3))})
+    assert len(where(shown(scene), 1)) == 0
+
+
+def test_what_is_seen_through_is_not_drawn_and_collisions_stand_for_missing_visuals(scene):
+    scene.add("it", visible_shapes(parse_urdf(body(BOX, "1 0 0 0"))))
+    scene.place("it", {"base": Pose((0.0, 0.0, 1.0))})
+    assert len(where(shown(scene), 0)) == 0
+    scene.add("it", visible_shapes(parse_urdf(body(BOX, RED, "collision"))))
+    scene.place("it", {"base": Pose((0.0, 0.0, 1.0))})
+    assert len(where(shown(scene), 0)) > 50
+
+
+def ball_stl(rows: int) -> str:
+    """Triangles of a ball of radius 0.2: 2 rows² of them, as text."""
+    angles = np.linspace(0.0, math.pi, rows + 1)
+    turns = np.linspace(0.0, 2 * math.pi, rows + 1)
+    at: Callable[[int, int], np.ndarray] = lambda i, j: 0.2 * np.array(  # noqa: E731
+        [math.sin(angles[i]) * math.cos(turns[j]), math.sin(angles[i]) * math.sin(turns[j]),
+         math.cos(angles[i])]
+    )  # fmt: skip
+    lines = ["solid ball"]
+    for i in range(rows):
+        for j in range(rows):
+            a, b, c, d = at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)
+            for corners in ((a, b, c), (a, c, d)):
+                lines += ["facet normal 0 0 0", "outer loop"]
+                lines += [f"vertex {x} {y} {z}" for x, y, z in corners]
+                lines += ["endloop", "endfacet"]
+    return "\n".join([*lines, "endsolid ball"])
+
+
+@pytest.mark.slow
+def test_a_mesh_of_more_triangles_than_the_renderer_takes_at_once(scene, tmp_path):
+    path = tmp_path / "ball.stl"
+    path.write_text(ball_stl(135))  # 36450 triangles
+    scene.add("it", visible_shapes(parse_urdf(body(f'<mesh filename="{path}" scale="2 2 2"/>'))))
+    scene.place("it", {"base": Pose((0.0, 0.0, 1.0))})
+    radius = np.ptp(where(shown(scene), 0), axis=0) / 2.0
+    assert radius == pytest.approx(0.4 / 3.0 * HEIGHT / (2 * CAMERA.slope), abs=2.0)
+
+
+def test_a_mesh_that_cannot_be_read_is_left_out_with_a_line(scene, tmp_path, caplog):
+    path = tmp_path / "broken.stl"
+    path.write_bytes(b"solid what is this")
+    scene.add("it", visible_shapes(parse_urdf(body(f'<mesh filename="{path}"/>'))))
+    assert len(where(shown(scene), 0)) == 0
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert "model 'it', link 'base' isn't drawn whole" in line and "broken.stl" in line
+
+
+def test_what_is_lost_in_space_stays_where_it_was_seen_last(scene):
+    scene.add("it", visible_shapes(parse_urdf(body(BOX))))
+    scene.place("it", {"base": Pose((0.0, 0.0, 1.0))})
+    before = shown(scene)
+    for place in ((math.nan, 0.0, 0.0), (math.inf, 0.0, 0.0), (1e30, 0.0, 0.0)):
+        scene.place("it", {"base": Pose(place)})
+        assert np.array_equal(shown(scene), before)
+
+
+def test_pictures_are_the_callers_own_and_the_same_each_time(scene):
+    scene.add("it", visible_shapes(parse_urdf(body(BOX))))
+    first = scene.picture(CAMERA, WIDTH, HEIGHT)
+    kept = first.copy()
+    first[:] = 0
+    assert np.array_equal(scene.picture(CAMERA, WIDTH, HEIGHT), kept)
+
+
+@pytest.mark.parametrize("engine", ["ode", "mujoco"])
+def test_taking_pictures_changes_no_bit_of_the_simulation(engine):
+    if engine == "mujoco":
+        pytest.importorskip("mujoco")
+    finals = []
+    for looking in (False, True):
+        world, scene = World(make_engine(engine)), Renderer()
+        model = world.spawn("it", parse_urdf(cartpole_urdf()), Pose())
+        model.set_joint_positions({"cart_pole": 0.1})
+        scene.add("it", visible_shapes(model.description))
+        for _ in range(40):
+            world.step()
+            if looking:
+                poses = {name: model.link_state(name)[0] for name in model.link_names}
+                scene.place("it", poses)
+                scene.picture(CAMERA, 32, 24)
+        finals.append(model.joint_states())
+        world.close()
+        scene.close()
+    assert finals[0] == finals[1]
+
+
+ANCHORED = """<sdf version="1.6"><model name="it"><pose>0.3 0 1 0 0 0.4</pose>
+  <link name="a"><pose>0.1 0 0 0.2 0 0</pose></link>
+  <link name="b"><pose>0.4 0.2 0.5 0 0.3 0</pose></link>
+  <link name="c"><pose>0.9 0 0.5 0 0 0.7</pose></link>
+  <joint name="turn" type="revolute"><pose>0.1 -0.2 0 0 0 0.5</pose><parent>a</parent><child>b</child>
+    <axis><xyz>0 0.6 0.8</xyz></axis></joint>
+  <joint name="slide" type="prismatic"><pose>0 0 0.1 0.3 0 0</pose><parent>b</parent><child>c</child>
+    <axis><xyz>1 0 0</xyz></axis></joint>
+</model></sdf>"""
+
+
+def test_links_are_where_the_engine_has_them():
+    from robot_sim.physics.files.reading import Reading, Resources
+    from robot_sim.physics.files.world_file import read_entity
+
+    world, joints = World(make_engine()), {"turn": 0.7, "slide": -0.3}
+    model = world.spawn("it", read_entity(ANCHORED, "it", Resources(), Reading()), Pose())
+    model.set_joint_positions(joints)
+    found = link_poses(model.description, model.root_state()[0], joints)
+    assert set(found) == set(model.link_names) == {"a", "b", "c"}
+    for name, pose in found.items():
+        there = model.link_state(name)[0]
+        assert pose.position == pytest.approx(there.position, abs=1e-6)
+        same = abs(sum(x * y for x, y in zip(pose.orientation, there.orientation, strict=True)))
+        assert same == pytest.approx(1.0, abs=1e-6)
+    world.close()
+
+
+@pytest.mark.parametrize(
+    "place", [(0.0, 0.0, 1.0), (1.2, 0.3, 1.9), (-1.3, -0.5, 0.1), (0.0, -2.9, 1.3)]
+)
+def test_the_part_that_is_rendered_has_all_of_it(scene, place, monkeypatch):
+    """Also at the edges, and where the camera stands within."""
+    scene.add("it", visible_shapes(parse_urdf(body('<box size="0.9 0.3 0.5"/>'))))
+    scene.place("it", {"base": Pose(place, from_rpy(0.3, 0.2, 0.9))})
+    part = shown(scene)
+    monkeypatch.setattr(
+        Renderer, "_region", lambda self, camera, width, height: (0, 0, width, height)
+    )
+    assert np.abs(part - shown(scene)).max() <= 60  # of edges, whose samples lie elsewhere
+    assert (np.abs(part - shown(scene)).max(axis=-1) > 8).sum() < 20

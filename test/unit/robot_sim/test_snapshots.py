@@ -1,0 +1,398 @@
+"""Snapshots of a simulator: the same commands lead to the same bits, or the snapshot is refused."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from support.robots.cartpole import CONTROLLERS, cartpole_urdf
+from support.robots.grippers import cube, gripper
+from support.robots.trajectory_rig import Listener
+from support.robots.worlds import add_robot, start
+
+from robot_sim.applied_forces import ActingTime, AppliedEffort, AppliedWrench
+from robot_sim.control.trajectory_goals import GoalRequest, Trajectory, TrajectoryPoint
+from robot_sim.physics.engines import make_engine
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose, from_rpy
+from robot_sim.physics.properties import JointProperties, set_joint_properties
+from robot_sim.physics.world import SnapshotError, World, ground_plane
+from robot_sim.sensors.schedule import Schedule
+from robot_sim.sensors.sensing import Sensing
+from robot_sim.sensors.sensor_readers import SensorReaders
+from robot_sim.simulator import Simulator
+
+S = 1_000_000_000  # [ns]
+OFF_CENTRE = Pose((0.01, 0.0, 0.0))
+
+
+@pytest.fixture
+def sim(new_engine):
+    """A world in lock-step with ground, on each engine."""
+    simulator = Simulator(World(new_engine()), lockstep=True)
+    simulator.world.spawn("ground_plane", ground_plane(), Pose())
+    yield simulator
+    simulator.world.close()
+
+
+def future(sim, ticks=150):
+    """What a number of ticks leads to, tick by tick."""
+    seen = []
+    for _ in range(ticks):
+        with sim.lock:
+            sim.advance(1)
+        models = sim.world.models.values()
+        states = [(m.joint_states(), [m.link_state(link) for link in m.link_names]) for m in models]
+        contacts = [each[:5] for each in sim.world.contacts()]
+        efforts = [j.effort for r in sim.robots for j in r.hardware.joints.values()]
+        seen.append((sim.now, states, contacts, efforts))
+    return seen
+
+
+def check_branches(sim, between, act=lambda: None, ticks=150):
+    """Checks that the future is the same after `between`, in which anything happens."""
+    with sim.lock:
+        snapshot = sim.save_state()
+    act()
+    first = future(sim, ticks)
+    for _ in range(2):
+        between()
+        with sim.lock:
+            sim.restore_state(snapshot)
+        act()
+        assert future(sim, ticks) == first
+    return first
+
+
+def test_a_controlled_robot_goes_on_as_before(sim):
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    start(robot, CONTROLLERS)
+    robot.manager.get("cart").command(0.3)
+    future(sim, 37)
+
+    def between():
+        robot.manager.get("cart").command(-0.2)
+        sim.reset_simulation()
+        future(sim, 11)
+
+    first = check_branches(sim, between)
+    assert first[-1][3] != first[0][3]
+
+
+def check_that_snapshots_change_nothing(sim, begin):
+    """Returns what happens after `begin`, which starts again."""
+    runs = []
+    for saves in (False, True):
+        begin()
+        runs.append([])
+        for _ in range(30):
+            runs[-1] += future(sim, 10)
+            if saves:
+                with sim.lock:
+                    sim.save_state()
+    assert runs[0] == runs[1]
+    return runs[0]
+
+
+def test_a_snapshot_changes_nothing_where_nothing_touches(sim):
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    start(robot, CONTROLLERS)
+
+    def begin():
+        sim.reset_simulation()
+        robot.manager.get("cart").command(0.3)
+
+    check_that_snapshots_change_nothing(sim, begin)
+
+
+@pytest.mark.extras("mujoco")
+def test_in_mujoco_it_changes_nothing_where_bodies_tumble_either():
+    sim = Simulator(World(make_engine("mujoco")), lockstep=True)
+    sim.world.spawn("ground_plane", ground_plane(), Pose())
+    sim.world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 0.06), from_rpy(0.4, 0.3, 0.2)))
+    run = check_that_snapshots_change_nothing(sim, sim.reset_simulation)
+    assert any(contacts for _, _, contacts, _ in run)
+    sim.world.close()
+
+
+def test_bodies_that_tumble_and_touch(sim):
+    for number in range(4):
+        pose = Pose((0.02 * number, 0.01 * number, 0.1 + 0.09 * number))
+        sim.world.spawn(f"cube_{number}", parse_urdf(cube()), pose)
+    while not sim.world.contacts():
+        future(sim, 1)
+    first = check_branches(sim, lambda: sim.reset_world() or future(sim, 30))
+    assert any(contacts for _, _, contacts, _ in first)
+
+
+def test_contacts_are_those_of_the_saved_tick_until_the_next_one(sim):
+    sim.world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 0.05)))
+    while not sim.world.contacts():
+        future(sim, 1)
+    before = sim.world.contacts()
+    with sim.lock:
+        snapshot = sim.save_state()
+        assert sim.world.contacts() == before != []
+        sim.place_model(sim.world.models["cube"], Pose((0.0, 0.0, 5.0)), ((0.0,) * 3, (0.0,) * 3))
+    future(sim, 2)
+    assert not sim.world.contacts()
+    with sim.lock:
+        sim.restore_state(snapshot)
+    assert sim.world.contacts() == before
+
+
+def test_what_is_attached_comes_back_and_what_was_not_goes(sim):
+    robot = sim.world.spawn("gripper", parse_urdf(gripper()), Pose((0.0, 0.0, 0.3)))
+    box = sim.world.spawn("cube", parse_urdf(cube()), Pose((0.15, 0.0, 0.6)))
+    ends = (robot, "lift_link"), (box, "cube_link")
+
+    def attach():
+        sim.world.attach(*ends)
+
+    def detach():
+        sim.world.detach(sim.world.attachments[0])
+
+    attach()
+    future(sim, 20)
+    check_branches(sim, detach)
+    check_branches(sim, lambda: [detach(), attach()])
+    detach()
+    check_branches(sim, attach)
+    assert not sim.world.attachments
+
+
+def chain_of_cubes(sim):
+    names = [f"cube_{number}" for number in range(5)]
+    cubes = [
+        sim.world.spawn(name, parse_urdf(cube()), Pose((0.06 * k, 0.01 * k, 0.06 + 0.02 * k)))
+        for k, name in enumerate(names)
+    ]
+    ends = [(each, "cube_link") for each in cubes]
+    for first, second in pairwise(ends):
+        sim.world.attach(first, second)
+    return ends
+
+
+def test_attachments_of_which_one_was_released_before(sim):
+    chain_of_cubes(sim)
+    future(sim, 20)
+    sim.world.detach(sim.world.attachments[0])
+    future(sim, 30)
+    check_branches(sim, lambda: sim.world.detach(sim.world.attachments[0]) or future(sim, 10))
+
+
+def test_a_link_that_is_another_one_to_the_engine_since_is_refused_while_attached(sim):
+    *_, (model, link) = chain_of_cubes(sim)  # the engine takes it last then, too
+    with sim.lock:
+        snapshot = sim.save_state()
+    inertia = model.description.links[link].inertia
+    sim.world.set_inertia(model, link, replace(inertia, com=OFF_CENTRE))
+    sim.world.set_inertia(model, link, inertia)
+    is_loaded_again = model.body is not snapshot.world.models[-1][1].body
+    sim.reset_world()
+    with sim.lock:
+        if is_loaded_again:
+            with pytest.raises(SnapshotError, match="attached"):
+                sim.restore_state(snapshot)
+            assert not sim.world.attachments
+        else:
+            sim.restore_state(snapshot)
+            assert len(sim.world.attachments) == 4
+    for each in list(sim.world.attachments):
+        sim.world.detach(each)
+
+
+def test_models_in_another_order_of_the_engine_are_refused(sim):
+    """A link with another centre of mass is loaded anew, and meets the others in another order."""
+    lower, upper = (
+        sim.world.spawn(name, parse_urdf(cube()), Pose((0.01, 0.0, height)))
+        for name, height in (("lower", 0.03), ("upper", 0.085))
+    )
+    future(sim, 40)
+
+    def change(model):
+        body, inertia = model.body, model.description.links["cube_link"].inertia
+        sim.world.set_inertia(model, "cube_link", replace(inertia, com=OFF_CENTRE))
+        sim.world.set_inertia(model, "cube_link", inertia)
+        return model.body is not body
+
+    check_branches(sim, lambda: change(upper))
+    with sim.lock:
+        snapshot = sim.save_state()
+        if change(lower):
+            with pytest.raises(SnapshotError, match="order"):
+                sim.restore_state(snapshot)
+            change(upper)
+        sim.restore_state(snapshot)
+
+
+def test_motors_efforts_and_wrenches_that_act_for_a_time(sim):
+    robot = sim.world.spawn("gripper", parse_urdf(gripper()), Pose((0.0, 0.0, 0.5)))
+    robot.set_motor("lift", 0.1, 50.0)
+    box = sim.world.spawn("cube", parse_urdf(cube()), Pose((1.0, 0.0, 0.1)))
+    sim.applied.efforts.append(AppliedEffort(robot, "lift", 20.0, ActingTime(0, S // 20)))
+    push = ((0.5, 0.0, 0.0), (0.0, 0.0, 0.01))
+    sim.applied.wrenches.append(AppliedWrench(box, "cube_link", push, ActingTime(0, S // 10)))
+    future(sim, 20)
+
+    def between():
+        future(sim, 200)
+        assert not sim.applied.efforts and not sim.applied.wrenches
+        robot.set_motor("lift", -0.3, 10.0)
+
+    check_branches(sim, between)
+
+
+def test_a_trajectory_is_followed_from_where_it_was(sim):
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    joint = {"joints": ["stand_cart"], "gains": {"stand_cart": {"p": 500.0, "i": 10.0, "d": 20.0}}}
+    start(robot, {"arm": {"type": "effort_controllers/JointTrajectoryController", **joint}})
+    arm = robot.manager.get("arm")
+
+    def way(*places):
+        points = [TrajectoryPoint((k + 1) * S // 5, [x]) for k, x in enumerate(places)]
+        arm.follow(Trajectory(["stand_cart"], points))
+
+    way(0.1, -0.2, 0.2)
+    future(sim, 150)
+    first = check_branches(sim, lambda: way(-0.3) or future(sim, 50), ticks=300)
+    assert max(abs(states[1][0][0][0]) for _, states, *_ in first) > 0.1
+
+
+def test_goals_are_their_clients_who_are_told_that_they_end(sim):
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    joint = {"joints": ["stand_cart"], "gains": {"stand_cart": {"p": 500.0, "i": 10.0, "d": 20.0}}}
+    start(robot, {"arm": {"type": "effort_controllers/JointTrajectoryController", **joint}})
+    arm = robot.manager.get("arm")
+
+    def pursue(key, place):
+        told = Listener()
+        trajectory = Trajectory(["stand_cart"], [TrajectoryPoint(S // 5, [place])])
+        arm.pursue(key, GoalRequest(trajectory), told)
+        return told
+
+    first = pursue("first", 0.1)
+    future(sim, 50)
+    with sim.lock:
+        snapshot = sim.save_state()
+    after = future(sim, 400)
+    assert [each.kind for each in first.outcomes] == ["succeeded"]
+    second = pursue("second", -0.1)
+    future(sim, 20)
+    with sim.lock:
+        sim.restore_state(snapshot)
+    assert [each.kind for each in second.outcomes] == ["canceled"]
+    assert future(sim, 400) == after
+    assert len(first.outcomes) == len(second.outcomes) == 1
+
+
+IMU = (
+    '<gazebo reference="cart"><sensor type="imu" name="feel"><always_on>1</always_on>'
+    "<update_rate>100</update_rate><imu><linear_acceleration><x><noise type='gaussian'>"
+    "<stddev>0.1</stddev></noise></x></linear_acceleration></imu></sensor></gazebo></robot>"
+)
+
+
+def test_sensors_measure_the_same_with_the_same_noise(sim):
+    robot = add_robot(sim, "cartpole", cartpole_urdf().replace("</robot>", IMU))
+    start(robot, CONTROLLERS)
+    sensing = Sensing(sim, seed=3)
+    with sim.lock:
+        readers = SensorReaders(sim, sensing, ["feel"])
+    robot.manager.get("cart").command(0.2)
+    future(sim, 25)
+    with sim.lock:
+        snapshot = sim.save_state()
+
+    def measured():
+        seen = []
+        for _ in range(30):
+            future(sim, 5)
+            (taken,) = readers.read()
+            seen.append((taken.now, {k: v.tolist() for k, v in taken.values.items()}))
+        return seen
+
+    first = measured()
+    assert len({str(values) for _, values in first}) > 10
+    for seed in (5, 6):
+        sim.reseed(seed)
+        sim.reset_simulation()
+        measured()
+        with sim.lock:
+            sim.restore_state(snapshot)
+        assert measured() == first
+
+
+def test_a_sensor_that_is_heard_only_since_measures_at_its_times(sim):
+    schedule, seen, heard = Schedule(sim), [], False
+    model = next(iter(sim.world.models.values()))
+    with sim.lock:
+        schedule.begin(model, 10.0, seen.append, lambda: heard, at_once=False)
+    future(sim, 250)
+    with sim.lock:
+        snapshot = sim.save_state()
+        heard = True
+        schedule.review()
+    future(sim, 300)
+    first = seen.copy()
+    seen.clear()
+    with sim.lock:
+        sim.restore_state(snapshot)
+        heard = True
+        schedule.review()
+    future(sim, 300)
+    assert seen == first == [3 * S // 10, 4 * S // 10, 5 * S // 10]
+
+
+def test_another_world_is_refused_and_stays_as_it_is(sim, new_engine):
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    start(robot, CONTROLLERS)
+    model = robot.model
+    with sim.lock:
+        snapshot = sim.save_state()
+
+    def refused(why):
+        future(sim, 3)
+        before = sim.now, model.joint_states()
+        with sim.lock, pytest.raises(SnapshotError, match=why):
+            sim.restore_state(snapshot)
+        assert (sim.now, model.joint_states()) == before
+
+    changed = JointProperties(damping=0.5)
+    set_joint_properties(model, "cart_pole", changed, sim.world.time_step)
+    refused("cartpole.*stop or damping of a joint")
+    set_joint_properties(model, "cart_pole", JointProperties(damping=0.0), sim.world.time_step)
+    model.set_friction("cart", 1.0)
+    with sim.lock:
+        sim.restore_state(snapshot)  # all is as it was
+    sim.world.set_gravity((0.0, 0.0, -3.0))
+    refused("gravity")
+    sim.world.set_gravity((0.0, 0.0, -9.8))
+    robot.manager.switch([], ["cart"])
+    refused("controllers")
+    robot.manager.switch(["cart"], [])
+    sim.world.spawn("cube", parse_urdf(cube()), Pose((1.0, 0.0, 1.0)))
+    refused("models")
+    other = Simulator(World(new_engine()), lockstep=True)
+    with other.lock, pytest.raises(SnapshotError, match="another simulator"):
+        other.restore_state(snapshot)
+    other.world.close()
+
+
+def test_thousands_of_snapshots_are_freed(sim):
+    sim.world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 0.1)))
+    kept = []
+    for number in range(3000):
+        with sim.lock:
+            snapshot = sim.save_state()
+            if number % 1000 == 0:
+                kept.append((snapshot, future_pose(sim)))
+            sim.advance(1)
+    for snapshot, pose in kept:
+        with sim.lock:
+            sim.restore_state(snapshot)
+        assert future_pose(sim) == pose
+
+
+def future_pose(sim):
+    return np.array(sim.world.models["cube"].state()[0].position).tolist()
