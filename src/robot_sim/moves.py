@@ -61,8 +61,7 @@ class Moves:
 
 def _carry(world: World, moved: Collection[Model]) -> None:
     """Moves what is attached to moved models along; what is fixed, or was moved as well, is detached."""
-    stay = {*moved, *(each for each in world.models.values() if each.description.fixed_base)}
-    waiting = list(moved)
+    stay, waiting = set(moved), list(moved)
     while waiting:
         model = waiting.pop()
         for each in [attachment for attachment in world.attachments if attachment.joins(model)]:
@@ -73,7 +72,7 @@ def _carry(world: World, moved: Collection[Model]) -> None:
             if model is other:
                 wanted, pose = pose.compose(each.pose.inverse()), one.link_state(link)[0]
                 other = one
-            if other in stay:
+            if other in stay or other.description.fixed_base:
                 world.detach(each)
                 continue
             other.place(wanted.compose(other.state()[0].relative_to(pose)))

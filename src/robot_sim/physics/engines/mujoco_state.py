@@ -12,8 +12,8 @@ from robot_sim.physics.engines.mujoco_model import xyzw
 from robot_sim.physics.pose import Pose, Vector, add, scale
 
 FREE = 6  # degrees of freedom of a body without joints
-FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
-TENDON = mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON
+FRICTION = int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF)
+TENDON = int(mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON)
 ROWS = 3  # constraints of a contact: along its normal, and two across it
 OUT = 0.1  # of the fastest separation; what separates more slowly is out
 SLIDING = 0.2  # [m/s] times friction; what slides slower hops by micrometres
@@ -119,9 +119,9 @@ class MujocoState:
         """
         model, data = self.model, self.data
         first = data.ne + data.nf + data.nl
-        friction = data.contact.friction[data.contact.efc_address >= 0, 0]
-        if not self.placed and not self._slides(friction, data.efc_vel[first:].tolist()):
+        if not self.placed and not self._slides(first):
             return
+        friction = self._friction()
         mujoco.mj_fwdActuation(model, data)
         mujoco.mj_fwdAcceleration(model, data)
         aims, missed = data.efc_aref[first::ROWS].copy(), np.empty(data.nefc)
@@ -133,13 +133,17 @@ class MujocoState:
             lift = np.where(along > 0.0, friction * np.hypot(one, other), 0.0)
             data.efc_aref[first::ROWS] = aims - lift
 
-    @staticmethod
-    def _slides(friction: np.ndarray, speeds: Sequence[float]) -> bool:
-        """Returns whether something slides, from the speeds [m/s] along and across contacts."""
+    def _slides(self, first: int) -> bool:
+        """Returns whether something slides; `first` is the first constraint of a contact."""
+        speeds = self.data.efc_vel[first:].tolist()  # along and across each contact [m/s]
         if hypot(*speeds) < SLIDING:
             return False
-        across = zip(friction.tolist(), speeds[1::ROWS], speeds[2::ROWS], strict=True)
+        across = zip(self._friction().tolist(), speeds[1::ROWS], speeds[2::ROWS], strict=True)
         return any(mu * hypot(one, other) > SLIDING for mu, one, other in across)
+
+    def _friction(self) -> np.ndarray:
+        contact = self.data.contact
+        return contact.friction[contact.efc_address >= 0, 0]
 
     def _slow_down(self) -> None:
         """Limits speeds, and integrates the positions again.
@@ -157,15 +161,16 @@ class MujocoState:
     def _drive(self) -> None:
         """Drives motors and gears: dry friction brakes towards speed 0, they move towards another speed."""
         data = self.data
-        for row in np.flatnonzero(data.efc_type == TENDON):
-            tendon = int(data.efc_id[row])
+        kinds, numbers = data.efc_type, data.efc_id
+        aims, pulls = data.efc_aref, data.efc_KBIP[:, 1]
+        for row in np.flatnonzero(kinds == TENDON) if self.gears else ():
+            tendon = int(numbers[row])
             missing = self.gears[tendon] - data.ten_length[tendon]
-            speed = GEAR * missing / self.model.opt.timestep
-            data.efc_aref[row] += data.efc_KBIP[row, 1] * speed
-        for row in np.flatnonzero(data.efc_type == FRICTION):
-            speed = self.speeds.get(int(data.efc_id[row]))
+            aims[row] += pulls[row] * (GEAR * missing / self.model.opt.timestep)
+        for row in np.flatnonzero(kinds == FRICTION) if self.speeds else ():
+            speed = self.speeds.get(int(numbers[row]))
             if speed:
-                data.efc_aref[row] += data.efc_KBIP[row, 1] * speed
+                aims[row] += pulls[row] * speed
 
     def link(self, index: int) -> tuple[Pose, Twist]:
         """Returns pose and twist of the frame of body `index`, in the world."""
