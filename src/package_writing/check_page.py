@@ -54,9 +54,9 @@ def examine(file: RobotFile, parameters: str | None) -> Findings:
         CannotUse: if that file can't be read.
     """
     page, content = Findings(str(file.path)), file.content
-    page.notes += [f"without effect: {each}" for each in content.left_out]
     interfaces: Mapping[str, str] = {}
     if isinstance(content, ModelDescription):
+        page.notes += [f"without effect: {each}" for each in content.left_out]
         page.notes += content.warnings
         page.lines |= _contents(content)
         known = {*content.links, *content.lumped, "world"}

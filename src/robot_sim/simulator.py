@@ -73,6 +73,7 @@ class Simulator:
         self.max_update_rate = max_update_rate
         self.relatch = relatch
         self.now = 0  # [ns] of simulated time
+        world.clock = lambda: self.sim_time
         self.elapsed = 0  # [ns] of simulated time in all; no reset sets it back
         self.robots: list[ControlledRobot] = []
         self._robots_of: dict[Model, list[ControlledRobot]] = {}

@@ -3,6 +3,7 @@
 import math
 import os
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import NamedTuple
@@ -286,6 +287,7 @@ class ModelDescription:
         lumped: links that a fixed joint has made part of another one: that link, and their poses in it.
         initial_pose: where the file puts the model.
         start: how it begins, if not there.
+        script: of an actor: where it is at a time [s], if it was at a pose before it started.
     """
 
     name: str
@@ -304,6 +306,7 @@ class ModelDescription:
     lumped: dict[str, tuple[str, Pose]] = field(default_factory=dict)
     initial_pose: Pose = Pose()
     start: SavedMotion | None = None
+    script: Callable[[float, Pose], Pose] | None = None
     static: bool = False
 
     @property
