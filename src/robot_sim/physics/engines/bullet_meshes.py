@@ -59,6 +59,6 @@ class SharedMeshes:
         return body
 
     def remove(self, body: int) -> int:
-        """Forgets a removed body; returns the size [bytes] of a mesh that it had alone and that PyBullet keeps."""
+        """Forgets a removed body; returns the size of a mesh that only it had, and PyBullet keeps."""
         key = self._users.pop(body, None)
         return 0 if key is None or key in self._users.values() else self._meshes.pop(key)[1]
