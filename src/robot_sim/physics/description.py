@@ -280,6 +280,7 @@ class ModelDescription:
         root: the link that no joint carries.
         root_pose: of the root link in the model.
         world_joints: joints that fix the root link to the world.
+        foot: how many joints come before the one to the world, if `joints` hasn't got it.
         left_out: plugins and the like, which nothing simulates.
         stand_ins: models of Gazebo's database that aren't installed, in whose place simpler ones stand.
         islands: links of a static model that no joint connects with the root, and their poses seen from it.
@@ -296,6 +297,7 @@ class ModelDescription:
     root: str
     root_pose: Pose = Pose()
     world_joints: list[str] = field(default_factory=list)
+    foot: int = 0
     plugins: list[Plugin] = field(default_factory=list)
     sensors: list[Sensor] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)

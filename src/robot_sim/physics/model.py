@@ -68,10 +68,10 @@ class Model:
 
     @property
     def all_joints(self) -> list[str]:
-        """Names of all joints that Gazebo lists, fixed ones included."""
-        anchors = [name for name in self.description.world_joints if name != WORLD]
-        others = [name for name in self.description.joints if name not in anchors]
-        return anchors + others
+        """Names of all joints that Gazebo lists, fixed ones included, in document order."""
+        names, place = list(self.description.joints), self.description.foot
+        names[place:place] = set(self.description.world_joints) - {WORLD, *names}  # one at most
+        return names
 
     def joint_index(self, name: str) -> int:
         """Returns the index of a movable joint in the body."""
