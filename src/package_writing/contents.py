@@ -48,7 +48,7 @@ def render(template: str, **values: Any) -> str:
         attribute=_attribute,
         flow=_flow,
         literal=literal,
-        shell=shlex.quote,
+        quote=shlex.quote,
         short="{:g}".format,
         xacro=lambda text: _attribute(text.replace("$(", "$$(").replace("${", "$${")),
     )

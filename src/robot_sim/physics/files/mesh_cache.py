@@ -17,7 +17,7 @@ MOST_BYTES = 4 << 30  # of the folder; beyond them what wasn't used for longest 
 def cache_folder() -> Path:
     """Returns the folder that keeps it."""
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return Path(cache, "bullet_gazebo", "meshes")
+    return Path(cache, "robot_sim", "meshes")
 
 
 def kept(path: Path, compute: Callable[[], bytes]) -> list[np.ndarray]:

