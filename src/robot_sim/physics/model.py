@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Collection, Mapping, Sequence
-from math import hypot, isfinite
+from math import isfinite
 from typing import Any, NamedTuple
 
 from robot_sim.physics.description import ModelDescription, SavedMotion, Shape
@@ -13,19 +13,11 @@ from robot_sim.physics.lumping import WORLD
 from robot_sim.physics.pose import (
     ZERO,
     Pose,
-    Vector,
-    add,
-    conjugate,
-    cross,
-    rotate,
-    scale,
-    subtract,
 )
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit
 GENTLEST = 0.5  # of the damping that would stop a joint in one step
 SOFTEST = 0.25  # of inertia / step²; a stiffer spring swings faster than steps can follow
-SLOWEST = 0.01  # [m/s, rad/s]; ODE lets no slower velocity decay
 SPINNING = 0.1  # [rad] in a step: no base of a robot turns that fast by itself
 
 logger = logging.getLogger(f"rosout.{__name__}")
@@ -54,10 +46,10 @@ class Model:
         self.placed = pose  # where it was put last: a static model stays there
         self.time_step = 0.0  # [s], the world's
         self._damped: dict[str, float] = {}  # the engine's damping [N m s/rad, N s/m] by joint
-        self._springs: dict[str, float] = {}  # stiffness [N m/rad, N/m] by joint
+        self.springs: dict[str, float] = {}  # stiffness [N m/rad, N/m] by joint
         self.kinematic = description.links[description.root].kinematic
         decaying = [name for name, link in description.links.items() if any(link.decay or ())]
-        self._decaying = [] if description.static else decaying  # links
+        self.decaying = [] if description.static else decaying  # links
         self.damping_added: Mapping[str, float] = {}  # [N m s/rad, N s/m] in addition to the file's
         self._motors: dict[str, tuple[float, float]] = {}  # speed [rad/s, m/s] and effort [N m, N]
         self._grip: dict[str, float] = {}  # factors of the friction of links
@@ -243,7 +235,7 @@ class Model:
                 if stiffness > most:
                     stiffness = stiffness if self.body.implicit_damping else most
                     damping += time_step * stiffness
-                self._springs[name] = stiffness
+                self.springs[name] = stiffness
             self._damped[name] = damping
             self.body.set_damping(self._joints[name], self._damped[name])
 
@@ -251,75 +243,7 @@ class Model:
     def softened(self) -> list[str]:
         """Names of joints whose springs are cut."""
         joints = self.description.joints
-        return [
-            name for name, each in self._springs.items() if each < joints[name].spring_stiffness
-        ]
-
-    @property
-    def special(self) -> bool:
-        """Whether springs or decay act on it, or its root link is kinematic: steps have more to do then."""
-        return bool(self._springs or self._decaying or self.kinematic)
-
-    def apply_passive_forces(self) -> None:
-        """Adds the forces of springs, and those by which velocities decay, to the next step's."""
-        if self._springs:
-            states, joints = self.body.joint_states(), self.description.joints
-            efforts = [0.0] * len(states)
-            for name, stiffness in self._springs.items():
-                index = self._joints[name]
-                efforts[index] = stiffness * (joints[name].spring_reference - states[index][0])
-            self.body.apply_efforts(efforts)
-        wrenches = [(link, self.decay_wrench(link)) for link in self._decaying]
-        for link, wrench in wrenches:
-            self.body.add_wrench(link, *wrench)
-
-    def decay_wrench(self, name: str) -> tuple[Vector, Vector]:
-        """Returns the force [N] at the centre of mass and the torque [N m] by which a link's velocity decays.
-
-        In a step they take a share of the momentum that it has before, as ODE takes it after each step.
-        """
-        inertia = self.description.links[name].inertia
-        if name not in self._decaying or inertia is None:
-            return ZERO, ZERO
-        centre, twist = self._centre(name)
-        linear, angular = self._lost(name, twist)
-        axes, rate = centre.orientation, -1.0 / self.time_step
-        x, y, z = rotate(conjugate(axes), angular)
-        momentum = (
-            inertia.ixx * x + inertia.ixy * y + inertia.ixz * z,
-            inertia.ixy * x + inertia.iyy * y + inertia.iyz * z,
-            inertia.ixz * x + inertia.iyz * y + inertia.izz * z,
-        )
-        return scale(linear, inertia.mass * rate), scale(rotate(axes, momentum), rate)
-
-    def kinematic_twist(self) -> Twist:
-        """Returns the twist that a kinematic root's centre of mass has after a step, whatever it meets."""
-        _, twist = self._centre(self.description.root)
-        lost = self._lost(self.description.root, twist)
-        return subtract(twist[0], lost[0]), subtract(twist[1], lost[1])
-
-    def set_kinematic_twist(self, twist: Twist) -> None:
-        """Gives a kinematic root's centre of mass a twist."""
-        linear, angular = twist
-        centre, _ = self._centre(self.description.root)
-        arm = subtract(centre.position, self.root_state()[0].position)
-        self.body.set_base_twist((subtract(linear, cross(angular, arm)), angular))
-
-    def _centre(self, name: str) -> tuple[Pose, Twist]:
-        """Returns pose and twist of a link's centre of mass, in world axes."""
-        inertia = self.description.links[name].inertia
-        pose, (linear, angular) = self.link_state(name)
-        centre = pose if inertia is None else pose.compose(inertia.com)
-        arm = subtract(centre.position, pose.position)
-        return centre, (add(linear, cross(angular, arm)), angular)
-
-    def _lost(self, name: str, twist: Twist) -> Twist:
-        """Returns what a link's centre loses of its twist in a step."""
-        linear, angular = self.description.links[name].decay or (0.0, 0.0)
-        return (
-            scale(twist[0], linear) if hypot(*twist[0]) > SLOWEST else ZERO,
-            scale(twist[1], angular) if hypot(*twist[1]) > SLOWEST else ZERO,
-        )
+        return [name for name, each in self.springs.items() if each < joints[name].spring_stiffness]
 
     def add_damping(self, added: Mapping[str, float]) -> None:
         """Adds damping [N m s/rad, N s/m] to the file's, replacing what was added before."""

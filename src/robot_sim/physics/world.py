@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from robot_sim.physics import passive_forces
 from robot_sim.physics.description import (
     DescriptionError,
     Inertia,
@@ -13,6 +14,7 @@ from robot_sim.physics.description import (
     Shape,
 )
 from robot_sim.physics.engine import Contact, Engine, Twist
+from robot_sim.physics.entity_names import EntityNames
 from robot_sim.physics.model import AT_REST, Model, ModelState
 from robot_sim.physics.pose import Pose, Vector, conjugate, rotate, subtract
 
@@ -78,18 +80,6 @@ class NameTaken(ValueError):
     """The world already has a model of that name."""
 
 
-class Entity(NamedTuple):
-    """What a name refers to: `kind` is model, link, collision or joint; `name` is plain.
-
-    `link` is the link of a collision.
-    """
-
-    kind: str
-    model: Model
-    name: str
-    link: str = ""
-
-
 class World:
     """All models, and the engine that simulates them. Not thread-safe: its owner serialises access."""
 
@@ -101,8 +91,7 @@ class World:
         self.lights: dict[str, Light] = {}
         self.attachments: list[Attachment] = []
         self.version = 0  # counts what changes the look of the world: models and lights
-        self._entities: dict[str, Entity] = {}
-        self._joints: dict[str, Entity] = {}
+        self._names = EntityNames()
         self._special: list[Model] = []  # with springs, decay or a kinematic link
         self._recalled: Sequence[Contact] | None = None  # until the next step
         self.time_step = time_step
@@ -155,27 +144,27 @@ class World:
         for each in self._of(model):
             self.detach(each)
         self.engine.remove(model.body)
-        self._entities, self._joints = {}, {}
+        self._names = EntityNames()
         self._index(*self.models.values())
 
     def model(self, name: str) -> Model | None:
         """Returns what the name look-up finds, if it is a model (docs/contract/gazebo.md 2.0)."""
-        entity = self._entities.get(name)
+        entity = self._names.entities.get(name)
         return entity.model if entity is not None and entity.kind == "model" else None
 
     def link(self, name: str) -> tuple[Model, str] | None:
         """Returns model and plain name of what the name look-up finds, if it is a link."""
-        entity = self._entities.get(name)
+        entity = self._names.entities.get(name)
         return (entity.model, entity.name) if entity is not None and entity.kind == "link" else None
 
     def joint(self, name: str) -> tuple[Model, str] | None:
         """Returns the first model that has joint `name` (plain or scoped), and the joint's plain name."""
-        entity = self._joints.get(name)
+        entity = self._names.joints.get(name)
         return None if entity is None else (entity.model, entity.name)
 
     def frame(self, name: str) -> tuple[Pose, Twist] | None:
         """Returns pose and twist of the named model, link or collision, or of the world; None if unknown."""
-        entity = self._entities.get(name)
+        entity = self._names.entities.get(name)
         if entity is None or entity.kind == "joint":
             return (Pose(), AT_REST) if entity is None and name in WORLD_FRAMES else None
         if entity.kind == "model":
@@ -187,7 +176,7 @@ class World:
 
     def is_world_frame(self, name: str) -> bool:
         """Returns whether `name` refers to the world itself: an entity of that name takes precedence."""
-        return name in WORLD_FRAMES and name not in self._entities
+        return name in WORLD_FRAMES and name not in self._names.entities
 
     def attach(self, first: tuple[Model, str], second: tuple[Model, str]) -> Attachment:
         """Fixes a link to another one where they are now, until `detach`, a reset, or one's deletion."""
@@ -271,11 +260,15 @@ class World:
             self.engine.step()
             return
         for model in self._special:
-            model.apply_passive_forces()
-        held = [(model, model.kinematic_twist()) for model in self._special if model.kinematic]
+            passive_forces.apply(model)
+        held = [
+            (model, passive_forces.kinematic_twist(model))
+            for model in self._special
+            if model.kinematic
+        ]
         self.engine.step()
         for model, twist in held:
-            model.set_kinematic_twist(twist)
+            passive_forces.set_kinematic_twist(model, twist)
 
     def contacts(self) -> Sequence[Contact]:
         """Returns where bodies touched in the last step; after a restore, in that before the snapshot."""
@@ -364,28 +357,11 @@ class World:
             self._fasten(each)
 
     def _index(self, *models: Model) -> None:
-        """Maps plain and scoped names of new models to what a depth-first search from the world's root finds.
-
-        It finds new models last, so existing entries stay.
-        """
+        """Adds new models to the name look-up."""
         self.version += 1
-        self._special = [model for model in self.models.values() if model.special]
+        self._special = [model for model in self.models.values() if passive_forces.are_on(model)]
         for model in models:
-            self._entities.setdefault(model.name, Entity("model", model, model.name))
-            for link in model.link_names:
-                self._enter(Entity("link", model, link), f"{model.name}::{link}")
-                for name in model.collisions(link):
-                    scoped = f"{model.name}::{link}::{name}"
-                    self._enter(Entity("collision", model, name, link), scoped)
-            for name in model.all_joints:
-                joint, scoped = Entity("joint", model, name), f"{model.name}::{name}"
-                self._enter(joint, scoped)
-                for key in (scoped, name):
-                    self._joints.setdefault(key, joint)
-
-    def _enter(self, entity: Entity, scoped: str) -> None:
-        for key in (scoped, entity.name):
-            self._entities.setdefault(key, entity)
+            self._names.add(model)
 
 
 def seen_from(state: tuple[Pose, Twist], frame: tuple[Pose, Twist]) -> tuple[Pose, Twist]:

@@ -14,6 +14,7 @@ from robot_sim.physics.dynamics import tensor_in
 from robot_sim.physics.loops import in_loops
 from robot_sim.physics.lumping import WORLD
 from robot_sim.physics.model import Model
+from robot_sim.physics.passive_forces import decay_wrench
 from robot_sim.physics.pose import (
     ZERO,
     Vector,
@@ -79,7 +80,7 @@ class LinkForces:
             for link, (_, centre) in inertias.items()
             for wrench in (
                 applied.wrench_on(self._model, link, now),
-                self._model.decay_wrench(link),
+                decay_wrench(self._model, link),
             )
         ]
         momentum = _sum(self._momentum(link, *each) for link, each in inertias.items())

@@ -36,7 +36,7 @@ def variable(ws, name, **environment):
         (["cean"], 2, "did you mean: ws clean?"),
         (["no-such-command"], 127, "no such command: no-such-command"),
         (["python3", "-c", "raise SystemExit(3)"], 3, ""),
-        (["check", "nonsense"], 2, "no check 'nonsense', only lint format types"),
+        (["check", "nonsense"], 2, "no check 'nonsense', only lint format imports types"),
     ],
     ids=str,
 )
