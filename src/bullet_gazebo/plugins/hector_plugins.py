@@ -21,7 +21,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import Empty
 
 from bullet_gazebo.common.dynamic_server import FIRST, DynamicServer, Parameter
-from bullet_gazebo.common.messages import NANOSECONDS, to_time
+from bullet_gazebo.common.messages import to_time
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import (
     ContextPlugin,
@@ -30,6 +30,7 @@ from bullet_gazebo.plugins.sensor_topics import (
     offer_shared,
     topic_in,
 )
+from robot_sim.constants import NANOSECONDS
 from robot_sim.physics.files.elements import numbers, truth
 from robot_sim.physics.pose import conjugate, from_rpy, multiply, rotate
 from robot_sim.sensors.drift import DriftingError

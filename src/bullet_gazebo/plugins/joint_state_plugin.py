@@ -10,9 +10,10 @@ import rospy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from bullet_gazebo.common.messages import NANOSECONDS, to_time
+from bullet_gazebo.common.messages import to_time
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import ContextPlugin, advertised
+from robot_sim.constants import NANOSECONDS
 
 QUEUE = 1000
 RATE = "100.0"  # [Hz]

@@ -30,7 +30,8 @@ from bullet_gazebo.plugins.sensor_topics import (
     subscribe,
     topic_in,
 )
-from robot_sim.drives.odometry import NANOSECONDS, TWIST, DeadReckoning, OdometrySample, Triple
+from robot_sim.constants import NANOSECONDS
+from robot_sim.drives.odometry import TWIST, DeadReckoning, OdometrySample, Triple
 from robot_sim.drives.wheels import side_speeds
 from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.pose import conjugate, rotate, subtract

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple, Self
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.controllers.base import Controller
 from robot_sim.control.controllers.parameters import OneJoint, Parameters, parameter, rate
 from robot_sim.control.errors import ControlError
@@ -11,7 +12,6 @@ from robot_sim.control.hardware import EFFORT, POSITION, RobotHardware
 from robot_sim.control.joint import JointHandle
 from robot_sim.control.limits import clamp
 from robot_sim.control.pid import Loop, Pid
-from robot_sim.control.trajectory import NANOSECONDS
 from robot_sim.control.trajectory_goals import ABORTED, CANCELED, SUCCEEDED, GoalObserver
 
 

@@ -6,6 +6,7 @@ See docs/contract/ros_control.md 3.1.
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.controllers.base import Controller, Output
 from robot_sim.control.controllers.parameters import SLOWEST, are_names, parameter
 from robot_sim.control.controllers.sensor_controllers import PublishRate
@@ -13,7 +14,6 @@ from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import STATE, RobotHardware
 from robot_sim.control.joint import JointHandle
 
-NANOSECONDS = 1_000_000_000
 Extra = tuple[str, tuple[float, ...]]  # a constant joint: name; position, velocity, effort
 EXTRA_FIELDS = ("position", "velocity", "effort")
 

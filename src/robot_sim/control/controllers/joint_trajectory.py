@@ -6,6 +6,7 @@ See docs/contract/ros_control.md 3.5.
 from collections.abc import Mapping
 from typing import NamedTuple, Self
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.controllers.base import Controller, Output
 from robot_sim.control.controllers.parameters import (
     SLOWEST,
@@ -17,7 +18,7 @@ from robot_sim.control.controllers.parameters import (
 )
 from robot_sim.control.hardware import EFFORT, POSITION, VELOCITY, RobotHardware
 from robot_sim.control.pid import Loop, Pid
-from robot_sim.control.trajectory import NANOSECONDS, Axis, State
+from robot_sim.control.trajectory import Axis, State
 from robot_sim.control.trajectory_goals import (
     CANCELED,
     INVALID_GOAL,

@@ -5,6 +5,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.controllers.base import Controller, Input, Output
 from robot_sim.control.controllers.parameters import (
     Parameters,
@@ -16,7 +17,6 @@ from robot_sim.control.controllers.parameters import (
 from robot_sim.control.errors import ControlError
 from robot_sim.control.transmissions import is_number
 from robot_sim.drives.odometry import (
-    NANOSECONDS,
     DeadReckoning,
     OdometrySample,
     Period,
