@@ -147,13 +147,10 @@ class ControllerTopics:
 
     def _subscribe(self, port: Input, namespace: str) -> None:
         topic = rospy.names.ns_join(namespace, port.topic)
-        kind: Any
-        read: Convert
-        kind, read, of_joints = port.kind, _unchanged, False
-        if isinstance(port.kind, str):
-            command_kind = COMMANDS[port.kind]
-            kind, read = command_kind.message_type, command_kind.read
-            of_joints = command_kind.single or command_kind.listed
+        command_kind = COMMANDS[port.kind] if isinstance(port.kind, str) else None
+        read: Convert = command_kind.read if command_kind else _unchanged
+        of_joints = command_kind and (command_kind.single or command_kind.listed)
+        kind: Any = command_kind.message_type if command_kind else port.kind
 
         def receive(message: object) -> None:
             command = read(message)

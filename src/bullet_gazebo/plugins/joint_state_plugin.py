@@ -1,8 +1,4 @@
-"""libgazebo_ros_joint_state_publisher.so: joint states of a model without ros_control.
-
-As in gazebo_plugins, `jointName` lists the joints, `updateRate` is in Hz of simulated time (100 by
-default), and `robotNamespace` holds the topic `joint_states` (docs/contract/gazebo_launch.md 5.2).
-"""
+"""libgazebo_ros_joint_state_publisher.so: joint states of a model (docs/contract/gazebo_launch.md 5.2)."""
 
 import re
 

@@ -1,8 +1,4 @@
-"""libgazebo_ros_kobuki.so: the base of TurtleBot 2 (docs/contract/sensors.md 12.4).
-
-All its elements are required but `wheel_drop_left_sensor_name`, `wheel_drop_right_sensor_name`, without which
-no wheel drops, `velocity_command_timeout` (none), `publish_tf` (false) and `update_rate` (every step).
-"""
+"""libgazebo_ros_kobuki.so: the base of TurtleBot 2 (docs/contract/sensors.md 12.4)."""
 
 import math
 from collections.abc import Callable
