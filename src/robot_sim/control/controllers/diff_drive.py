@@ -1,7 +1,7 @@
 """diff_drive_controller/DiffDriveController (docs/contract/sensors.md 7)."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 from robot_sim.control.controllers.base import Output
 from robot_sim.control.controllers.parameters import parameter, positive, wheel_names
@@ -77,9 +77,7 @@ class DiffDriveController(VehicleController):
         self._wheels = Output("wheel_joint_controller_state", "TrajectorySample")
 
     @classmethod
-    def create(
-        cls, name: str, params: Mapping[str, object], hardware: RobotHardware
-    ) -> "DiffDriveController":
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
         given, robot = DiffDriveParameters.read(params, name), hardware.robot
         sides = [
             [hardware.joint(VELOCITY, each) for each in names]

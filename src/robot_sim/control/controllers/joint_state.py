@@ -4,11 +4,11 @@ See docs/contract/ros_control.md 3.1.
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 from robot_sim.constants import NANOSECONDS
 from robot_sim.control.controllers.base import Controller, Output
-from robot_sim.control.controllers.parameters import SLOWEST, are_names, parameter
+from robot_sim.control.controllers.parameters import SLOWEST, name_list, parameter
 from robot_sim.control.controllers.sensor_controllers import PublishRate
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import STATE, RobotHardware
@@ -28,16 +28,10 @@ class JointStateSample(NamedTuple):
     efforts: tuple[float, ...]
 
 
-def _names(value: Any, key: str) -> list[str]:
-    if not are_names(value):
-        raise ControlError(f"parameter {key} must be a list of joint names: {value!r}")
-    return list(value)
-
-
 class JointStateParameters(PublishRate):
     """Those of joint states."""
 
-    joints: list[str] | None = parameter("those to report; all without it", None, _names)
+    joints: list[str] | None = parameter("those to report; all without it", None, name_list)
     extra_joints: Any = parameter(
         "constant ones: a list of `{name, position, velocity, effort}`", (), lambda value, _: value
     )
@@ -61,9 +55,7 @@ class JointStateController(Controller):
         self.outputs = [self._output]
 
     @classmethod
-    def create(
-        cls, name: str, params: Mapping[str, object], hardware: RobotHardware
-    ) -> "JointStateController":
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
         given = JointStateParameters.read(params, name)
         wanted = list(hardware.joints) if given.joints is None else given.joints
         unknown = [joint for joint in wanted if joint not in hardware.joints]

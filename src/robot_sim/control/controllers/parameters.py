@@ -71,80 +71,21 @@ class Parameters:
         return cls(**found)
 
 
-def number(value: Any, key: str) -> float:
-    """Reads a finite number."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ControlError(f"parameter {key} is missing or is not a finite number: {value!r}")
-    return float(value)
-
-
-def of_type(kind: type) -> Callable[[Any, str], Any]:
-    """Returns a reader of values of one type."""
+def reader(
+    holds: Callable[[Any], bool],
+    fault: str,
+    convert: Callable[[Any], Any] = lambda value: value,
+    before: Callable[[Any, str], Any] | None = None,
+) -> Callable[[Any, str], Any]:
+    """Returns a reader of what `holds`, or else has a `fault`; `before` reads it first."""
 
     def read(value: Any, key: str) -> Any:
-        if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
-            raise ControlError(f"parameter {key} must be of type {kind.__name__}: {value!r}")
-        return value
+        found = before(value, key) if before else value
+        if not holds(found):
+            raise ControlError(f"parameter {key} {fault}: {found!r}")
+        return convert(found)
 
-    return number if kind is float else read
-
-
-def truth(value: Any, key: str) -> bool:
-    """Reads true or false."""
-    if not isinstance(value, bool):
-        raise ControlError(f"parameter {key} must be true or false: {value!r}")
-    return value
-
-
-def positive(value: Any, key: str) -> float:
-    """Reads a length, or its multiplier."""
-    return checked_length(number(value, key), key)
-
-
-def checked_length(found: float, key: str) -> float:
-    """Checks a length that is given, or comes from a description."""
-    if not 0.0 < found < math.inf:
-        raise ControlError(f"parameter {key} must be above 0 and finite: {found}")
-    return found
-
-
-def rate(value: Any, key: str) -> float:
-    """Reads a rate [Hz] that isn't 0."""
-    found = number(value, key)
-    if found <= SLOWEST:
-        raise ControlError(f"parameter {key} must be more than 0 [Hz]")
-    return found
-
-
-def mapping(value: Any, key: str) -> Mapping[str, Any]:
-    """Reads parameters by name."""
-    if not isinstance(value, Mapping):
-        raise ControlError(f"parameter {key} must hold parameters by name: {value!r}")
-    return value
-
-
-def joint_name(value: Any, key: str) -> str:
-    """Reads the name of a joint."""
-    if not isinstance(value, str) or not value:
-        raise ControlError(f"parameter {key} is missing or is not a string: {value!r}")
-    return value
-
-
-def joint_names(value: Any, key: str) -> list[str]:
-    """Reads a list of joints."""
-    if not are_names(value) or not value:
-        raise ControlError(f"parameter {key} must be a list of joint names: {value!r}")
-    if len(set(value)) < len(value):
-        raise ControlError(f"parameter {key} names a joint twice: {value!r}")
-    return list(value)
-
-
-def wheel_names(value: Any, key: str) -> list[str]:
-    """Reads the joint or the joints of wheels."""
-    names = [value] if isinstance(value, str) else value
-    if not are_names(names) or not names:
-        raise ControlError(f"parameter {key} must name a joint, or list some: {value!r}")
-    return list(names)
+    return read
 
 
 def are_names(value: Any) -> bool:
@@ -152,7 +93,40 @@ def are_names(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(each, str) for each in value)
 
 
+def _is_number(value: Any) -> bool:
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return is_number and math.isfinite(value)
+
+
+def of_type(kind: type) -> Callable[[Any, str], Any]:
+    """Returns a reader of values of one type; a float is finite."""
+    if kind is float:
+        return number
+    return reader(
+        lambda value: isinstance(value, kind) and isinstance(value, bool) == (kind is bool),
+        f"must be of type {kind.__name__}",
+    )
+
+
 SLOWEST = 1e-6  # [Hz]; below it, as at 0, nothing is ever published
+number = reader(_is_number, "is missing or is not a finite number", float)
+truth = reader(lambda value: isinstance(value, bool), "must be true or false")
+mapping = reader(lambda value: isinstance(value, Mapping), "must hold parameters by name")
+length = reader(lambda value: 0.0 < value < math.inf, "must be above 0 and finite")
+positive = reader(lambda value: value > 0.0, "must be above 0 and finite", before=number)
+rate = reader(lambda value: value > SLOWEST, "must be more than 0 [Hz]", before=number)
+name_list = reader(are_names, "must be a list of joint names", list)
+joint_name = reader(
+    lambda value: isinstance(value, str) and value != "", "is missing or is not a string"
+)
+joint_names = reader(
+    lambda value: len(set(value)) == len(value), "names a joint twice", list,
+    reader(lambda value: are_names(value) and value, "must be a list of joint names"),
+)  # fmt: skip
+wheel_names = reader(
+    lambda value: are_names(value) and value, "must name a joint, or list some", list,
+    lambda value, _: [value] if isinstance(value, str) else value,
+)  # fmt: skip
 
 
 class OneJoint(Parameters):

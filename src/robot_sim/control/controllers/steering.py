@@ -6,12 +6,17 @@ ackermann_steering_controller and four_wheel_steering_controller.
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple, Self
 
 from robot_sim.control.controllers.base import Input, Output
-from robot_sim.control.controllers.parameters import number, parameter, positive, wheel_names
+from robot_sim.control.controllers.parameters import (
+    number,
+    parameter,
+    positive,
+    reader,
+    wheel_names,
+)
 from robot_sim.control.controllers.vehicle import VehicleController, VehicleParameters
-from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import POSITION, VELOCITY, RobotHardware
 from robot_sim.control.joint import JointHandle
 from robot_sim.control.transmissions import distance, wheel_radius
@@ -30,11 +35,7 @@ class SteeringSample(NamedTuple):
     speed: float
 
 
-def _pair(value: Any, key: str) -> list[str]:
-    names = wheel_names(value, key)
-    if len(names) != 2:
-        raise ControlError(f"parameter {key} must list two joints: {names!r}")
-    return names
+_pair = reader(lambda value: len(value) == 2, "must list two joints", before=wheel_names)
 
 
 class SteeringParameters(VehicleParameters):
@@ -99,9 +100,7 @@ class AckermannSteeringController(SteeringController):
         self._last_turned = 0.0
 
     @classmethod
-    def create(
-        cls, name: str, params: Mapping[str, object], hardware: RobotHardware
-    ) -> "AckermannSteeringController":
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
         given, robot = AckermannParameters.read(params, name), hardware.robot
         wheel = hardware.joint(VELOCITY, given.rear_wheel)
         fork = hardware.joint(POSITION, given.front_steer)
@@ -151,9 +150,7 @@ class FourWheelSteeringController(SteeringController):
         self.inputs.append(steering)
 
     @classmethod
-    def create(
-        cls, name: str, params: Mapping[str, object], hardware: RobotHardware
-    ) -> "FourWheelSteeringController":
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
         given, robot = FourWheelParameters.read(params, name), hardware.robot
         groups = given.front_wheel, given.rear_wheel, given.front_steering, given.rear_steering
         kinds = VELOCITY, VELOCITY, POSITION, POSITION

@@ -9,10 +9,11 @@ from robot_sim.constants import NANOSECONDS
 from robot_sim.control.controllers.base import Controller, Input, Output
 from robot_sim.control.controllers.parameters import (
     Parameters,
-    checked_length,
+    length,
     number,
     of_type,
     parameter,
+    reader,
 )
 from robot_sim.control.errors import ControlError
 from robot_sim.control.transmissions import is_number
@@ -37,10 +38,11 @@ class TwistSample(NamedTuple):
     angular: float
 
 
-def _diagonal(value: Any, key: str) -> tuple[float, ...]:
-    if not isinstance(value, list) or len(value) != AXES or not all(map(is_number, value)):
-        raise ControlError(f"parameter {key} must be a list of {AXES} numbers: {value!r}")
-    return tuple(map(float, value))
+_diagonal = reader(
+    lambda value: isinstance(value, list) and len(value) == AXES and all(map(is_number, value)),
+    f"must be a list of {AXES} numbers",
+    lambda value: tuple(map(float, value)),
+)
 
 
 def _limits(axis: str) -> Callable[[Any, str], SpeedLimits]:
@@ -88,7 +90,7 @@ class VehicleParameters(Parameters):
             ControlError: if there is nothing above 0 to be found.
         """
         given: float | None = getattr(self, key)
-        return checked_length(look_up(), f"{name}/{key}") if given is None else given
+        return length(look_up(), f"{name}/{key}") if given is None else given
 
 
 class VehicleController(Controller):
