@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
 from robot_sim.applied_forces import AppliedForces
+from robot_sim.constants import NANOSECONDS
 from robot_sim.held_state import HeldState
 from robot_sim.moves import Moves
 from robot_sim.physics.engine import Twist
@@ -15,7 +16,6 @@ from robot_sim.physics.world import SnapshotError, World, WorldSnapshot
 from robot_sim.robot import ControlledRobot
 from robot_sim.timing import FairLock, Holds, Pacer
 
-NANOSECONDS = 1_000_000_000
 STALL_CHECK = 100_000_000  # [ns]
 IDLE_POLL = 0.2  # [s]; how soon an idle run() notices stop()
 

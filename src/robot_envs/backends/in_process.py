@@ -30,6 +30,7 @@ from robot_envs.world_state import (
     WorldState,
     link_keys,
 )
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import RobotHardware
 from robot_sim.control.joint import JointHandle
@@ -54,7 +55,7 @@ from robot_sim.physics.world import NameTaken, SnapshotError, World
 from robot_sim.robot import ControlledRobot, control_period_of
 from robot_sim.sensors.sensing import Sensing
 from robot_sim.sensors.sensor_readers import SensorReaders, offer_sensors
-from robot_sim.simulator import NANOSECONDS, Simulator
+from robot_sim.simulator import Simulator
 from robot_sim.state import NOTHING, StateReader, UnknownName, find_link, find_model
 
 

@@ -62,7 +62,7 @@ class CommandLimits:
         return self._bounded(near), exceeded  # last, whatever it starts from
 
     def _numbers(self, command: Command) -> list[float]:
-        return [command] if self._port.single else list(command)  # type: ignore[list-item, arg-type]
+        return self._port.kind.numbers(command)
 
     def stop(self, joints: Mapping[str, JointState]) -> Command:
         """Returns the command that stops the joints: zero velocity or effort, or their present positions.

@@ -12,7 +12,7 @@ import rospy
 from std_msgs.msg import Float64MultiArray
 
 from robot_envs.backends.ros import node
-from robot_envs.backends.ros.bringup import command_message, command_publisher, full_name
+from robot_envs.backends.ros.bringup import command_publisher, full_name
 from robot_envs.backends.ros.running import lockstep_hint
 from robot_envs.backends.ros.sensor_listener import SensorListener
 from robot_envs.controllers import TWIST
@@ -243,7 +243,7 @@ class PolicyNode:
 
     def _publish(self, commands: Mapping[str, Command]) -> None:
         for name, command in commands.items():
-            self._topics[name].publish(command_message(self._ports[name], command))
+            self._topics[name].publish(self._ports[name].kind.write(command))
 
     def _end(self) -> None:
         """Stops the robot, if it has moved."""

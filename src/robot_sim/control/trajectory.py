@@ -7,10 +7,10 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.joint import JointHandle, shortest_distance
 from robot_sim.control.pid import Pid
 
-NANOSECONDS = 1_000_000_000
 Coefficients = tuple[float, float, float, float, float, float]
 
 

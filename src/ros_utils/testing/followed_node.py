@@ -4,12 +4,10 @@ import contextlib
 import queue
 from collections.abc import Sequence
 
-import roslib.message
 import rospy
-from geometry_msgs.msg import Twist
-from std_msgs.msg import Float64, Float64MultiArray
 
 from ros_calls import master
+from ros_calls.commands import COMMANDS
 from ros_calls.waiting import wait_until
 from ros_utils import ros_node
 from ros_utils._internal import nodes
@@ -110,12 +108,9 @@ class FollowedNode:
 
 def _numbers(message: rospy.AnyMsg) -> list[float]:
     """Returns a command's numbers, as a step takes them."""
-    kind = message._connection_header["type"]
-    command = roslib.message.get_message_class(kind)().deserialize(message._buff)
-    if isinstance(command, Twist):
-        return [command.linear.x, command.linear.y, command.angular.z]
-    if isinstance(command, Float64):
-        return [command.data]
-    if isinstance(command, Float64MultiArray):
-        return list(command.data)
-    raise WorldError(f"a command is {kind}: Float64, Float64MultiArray and Twist can be followed")
+    name = message._connection_header["type"]
+    followed = {kind.message: kind for kind in COMMANDS.values() if kind.topic}
+    kind = followed.get(name)
+    if kind is None:
+        raise WorldError(f"a command is {name}: {', '.join(followed)} can be followed")
+    return kind.numbers(kind.read(kind.message_type().deserialize(message._buff)))

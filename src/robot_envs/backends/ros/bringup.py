@@ -8,12 +8,10 @@ from typing import Any
 
 import rospy
 from controller_manager_msgs.srv import ListControllers
-from geometry_msgs.msg import Twist, Vector3
-from std_msgs.msg import Float64, Float64MultiArray
 
 from robot_envs.backends.ros import node, running
 from robot_envs.backends.ros.running import WORLD_SERVICE, SimulatorService, Undo
-from robot_envs.controllers import TWIST, CommandPort
+from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
@@ -62,18 +60,8 @@ def full_name(robot: Robot, name: str) -> str:
 
 def command_publisher(robot: Robot, port: CommandPort) -> rospy.Publisher:
     """Advertises the topic on which a controller takes commands."""
-    kind, topic = (Float64 if port.single else Float64MultiArray), "command"
-    if port.quantity == TWIST:
-        kind, topic = Twist, "cmd_vel"
-    return rospy.Publisher(f"{full_name(robot, port.name)}/{topic}", kind, queue_size=1)
-
-
-def command_message(port: CommandPort, command: Any) -> Float64 | Float64MultiArray | Twist:
-    """Returns the message of a command."""
-    if port.quantity == TWIST:
-        ahead, left, turn = command
-        return Twist(Vector3(ahead, left, 0.0), Vector3(0.0, 0.0, turn))
-    return Float64(command) if port.single else Float64MultiArray(data=list(command))
+    topic = f"{full_name(robot, port.name)}/{port.kind.topic}"
+    return rospy.Publisher(topic, port.kind.message_type, queue_size=1)
 
 
 def ready(scene: Scene) -> Ready:

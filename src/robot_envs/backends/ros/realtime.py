@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState as JointStateMsg
 from std_srvs.srv import Empty
 
 from robot_envs.backends.backend import RobotBackend
-from robot_envs.backends.ros.bringup import command_message, command_publisher, full_name, ready
+from robot_envs.backends.ros.bringup import command_publisher, full_name, ready
 from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.backends.ros.running import (
     JointStateReader,
@@ -140,7 +140,7 @@ class CommandTopic:
 
     def publish(self, value: Any) -> None:
         """Commands the controller."""
-        self._publisher.publish(command_message(self._port, value))
+        self._publisher.publish(self._port.kind.write(value))
 
     def wait(self) -> None:
         """Waits until the controller listens; advertises the topic again halfway.
