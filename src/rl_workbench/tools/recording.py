@@ -68,8 +68,28 @@ class EpisodeFrame(NamedTuple):
         return "   ".join([*parts, "ended"] if self.ended else parts)
 
 
+class Screen:
+    """A picture in the middle of a page, at most WIDTH by HEIGHT."""
+
+    def __init__(self, server: "viser.ViserServer") -> None:
+        self._server = server
+        self._image: viser.ImageHandle | None = None
+
+    def show(self, picture: np.ndarray) -> None:
+        """Shows a picture (H, W, 3) of uint8; all have the same size."""
+        if self._image is not None:
+            self._image.image = picture
+            return
+        high, wide = picture.shape[:2]
+        scale = min(HEIGHT / high, WIDTH / wide)
+        self._image = self._server.scene.add_image(
+            "/picture", picture, wide * scale, high * scale, format="jpeg", jpeg_quality=QUALITY,
+            wxyz=FACING, cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+
+
 class PictureView:
-    """Shows the pictures of `render`, of that size, in the middle of a page, if there is one."""
+    """Takes the pictures of `render`, scaled to a size, and shows them on a page if there is one."""
 
     def __init__(
         self,
@@ -79,8 +99,8 @@ class PictureView:
     ) -> None:
         if env.render_mode != "rgb_array":
             raise WorkbenchError("the environment draws no pictures")
-        self._env, self._server, self._size = env, server, size
-        self._shown: viser.ImageHandle | None = None
+        self._env, self._size = env, size
+        self._screen = Screen(server) if server else None
 
     def take(self) -> bytes:
         """Returns a PNG, because thousands are kept."""
@@ -98,18 +118,9 @@ class PictureView:
         return stream.getvalue()
 
     def show(self, seen: bytes, caption: str = "") -> None:
-        """Shows the picture; the page has captions of its own."""
-        assert self._server is not None
-        picture = np.asarray(Image.open(BytesIO(seen)))
-        if self._shown is not None:
-            self._shown.image = picture
-            return
-        high, wide = picture.shape[:2]
-        scale = min(HEIGHT / high, WIDTH / wide)
-        self._shown = self._server.scene.add_image(
-            "/picture", picture, wide * scale, high * scale, format="jpeg", jpeg_quality=QUALITY,
-            wxyz=FACING, cast_shadow=False, receive_shadow=False,
-        )  # fmt: skip
+        """Shows a picture; the page has captions of its own."""
+        assert self._screen is not None
+        self._screen.show(np.asarray(Image.open(BytesIO(seen))))
 
 
 class SceneView:
