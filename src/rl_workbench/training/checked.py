@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, own_frames
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
 from rl_workbench.training.progress import warn
 
 LARGEST_FLOAT32 = float(
@@ -23,8 +23,6 @@ LONGEST = 10_000  # [steps], of an episode where nothing says how long one lasts
 
 CURVES = "episode_curves"  # in the last info of an episode: the means of its infos' numbers, by tag
 _UNFIT = re.compile(r"[^\w./-]+")  # for a tag
-# Gymnasium's wrappers and this one unpack what reset (2) and step (5) return.
-_OLD_GYM = re.compile(r"unpack \(expected [25]\b|unexpected keyword argument '(seed|options)'")
 
 
 class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -59,10 +57,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         with self._running("reset"):
-            found: Any = self.env.reset(seed=seed, options=options)
-        if not isinstance(found, tuple) or len(found) != 2:
-            raise self._old_gym()
-        observation, info = found
+            observation, info = self.env.reset(seed=seed, options=options)
         self._sums, self._length = {}, 0
         self._check(observation)
         return observation, info
@@ -155,19 +150,11 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         except gymnasium.error.Error as error:  # its text is made for the user
             raise self._error(str(error) or type(error).__name__) from error
         except (Exception, SystemExit) as error:
-            if _OLD_GYM.search(str(error)) and not own_frames(error):
-                raise self._old_gym() from error
             raise self._failure(method, error) from error
 
     def _failure(self, method: str, error: BaseException) -> EnvironmentFailure:
         return EnvironmentFailure(
             f"{self._which}{self._id} failed in {method}(): {error_line(error)}"
-        )
-
-    def _old_gym(self) -> WorkbenchError:
-        return self._error(
-            f"{self._id} is written for the old gym: Gymnasium's reset(seed=None, options=None) returns "
-            "(observation, info), and its step() (observation, reward, terminated, truncated, info)"
         )
 
     def _error(self, text: str) -> WorkbenchError:

@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import os
 import sys
 import time
 from collections.abc import Callable
@@ -12,7 +11,6 @@ from rl_workbench.training.callbacks import Callback, EpisodeResult
 
 LINE_EVERY = 20  # [episodes]
 SILENCE = 60.0  # [s] without a line
-WIDTH = 100  # [columns] of the bar on a terminal that doesn't report its size
 
 
 def tell(text: str, stream: TextIO | None = None) -> None:
@@ -58,11 +56,9 @@ class Progress(Callback):
         if self._stream.isatty():
             from tqdm import tqdm
 
-            # tqdm would draw a bar of no width on a terminal that doesn't report its size.
-            size: dict[str, int] = {"dynamic_ncols": True}
-            if not _has_size(self._stream):
-                size = {"ncols": WIDTH, "nrows": 2}
-            self._bar = tqdm(total=total, initial=done, unit=unit, file=self._stream, **size)
+            self._bar = tqdm(
+                total=total, initial=done, unit=unit, file=self._stream, dynamic_ncols=True
+            )
 
     def on_step(self, training: Any) -> None:
         if self._counts_steps:
@@ -104,10 +100,3 @@ class Progress(Callback):
         """Closes the bar at its present position."""
         if self._bar is not None:
             self._bar.close()
-
-
-def _has_size(stream: TextIO) -> bool:
-    try:
-        return os.get_terminal_size(stream.fileno()).columns > 0
-    except (OSError, ValueError):
-        return False
