@@ -84,7 +84,7 @@ def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:
     """Parses flags and private parameters; flags override parameters.
 
     Raises:
-        SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
+        SystemExit: With code 2 and a usage line, if they are wrong; with 0 after --help.
     """
     parser = argparse.ArgumentParser(
         f"{NODE}.py",
@@ -136,13 +136,13 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
     """Loads the policy of a run folder or an exported file, with its robot and task.
 
     Args:
-        path: the run folder or the exported file.
-        which: the checkpoint of a run folder.
-        options: options of the environment on top of the training's.
+        path: The run folder or the exported file.
+        which: The checkpoint of a run folder.
+        options: Options of the environment on top of the training's.
 
     Raises:
-        WorkbenchError: if there is no such policy or environment.
-        RobotEnvError: if its environment doesn't have exactly one robot.
+        WorkbenchError: If there is no such policy or environment.
+        RobotEnvError: If its environment doesn't have exactly one robot.
     """
     # They import torch, for which --help need not wait.
     from rl_workbench.tools.policies import load_learned

@@ -55,7 +55,7 @@ class LimitedProcess:
         """
         Args:
             program: "module:function" that answers a request, bytes to bytes; what it raises refuses it.
-            limits: of each request.
+            limits: Of each request.
         """
         self._program = program
         self._limits = limits
@@ -67,8 +67,8 @@ class LimitedProcess:
         """Returns the answer to a request.
 
         Raises:
-            RequestRefused: if the program has raised an error.
-            ProcessDied: if it has gone beyond a limit or crashed; the next request starts it again.
+            RequestRefused: If the program has raised an error.
+            ProcessDied: If it has gone beyond a limit or crashed; the next request starts it again.
         """
         with self._lock:
             process = self._running()
@@ -125,8 +125,8 @@ def _receive(process: subprocess.Popen[bytes], size: int, deadline: float) -> by
     """Returns `size` bytes of a process's output.
 
     Raises:
-        EOFError: if the process has ended.
-        ProcessDied: if they don't come in time.
+        EOFError: If the process has ended.
+        ProcessDied: If they don't come in time.
     """
     assert process.stdout is not None
     descriptor = process.stdout.fileno()

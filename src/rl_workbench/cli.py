@@ -62,7 +62,7 @@ def parse(argv: list[str], prog: str = PROG) -> argparse.Namespace:
     """Parses the arguments of a subcommand.
 
     Raises:
-        SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
+        SystemExit: With code 2 and a usage line, if they are wrong; with 0 after --help.
     """
     parser = argparse.ArgumentParser(
         prog,

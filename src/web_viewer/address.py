@@ -39,8 +39,8 @@ class Address:
         """Returns lines that say where the page is and how to reach it from another machine.
 
         Args:
-            what: the page's subject, as "the window".
-            power: what the page lets its visitors do, as "moves the simulation".
+            what: The page's subject, as "the window".
+            power: What the page lets its visitors do, as "moves the simulation".
         """
         lines = [f"{what} is the page {self.url}"]
         if self.token:
@@ -94,11 +94,11 @@ def find_address(host: str, port: int | None) -> Address:
     """Returns an address that can be served.
 
     Args:
-        host: the address to bind to.
-        port: the port; None for the first free one.
+        host: The address to bind to.
+        port: The port; None for the first free one.
 
     Raises:
-        PortInUse: if nothing can be served there.
+        PortInUse: If nothing can be served there.
     """
     ports = [port] if port is not None else range(FIRST_PORT, FIRST_PORT + MAX_TRIES)
     problem = ""

@@ -46,8 +46,8 @@ class Curves:
     """Charts in a tab or a folder of a page.
 
     Args:
-        gui: of the page.
-        container: the tab or folder.
+        gui: Of the page.
+        container: The tab or folder.
     """
 
     def __init__(self, gui: viser.GuiApi, container: Container) -> None:

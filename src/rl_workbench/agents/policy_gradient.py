@@ -81,10 +81,10 @@ class TwoNetworks(ABC):
     """Base class: a policy and a value network, an Adam for each, and a generator for the actions.
 
     Args:
-        policy: maps observations (N, D) to probabilities (N, A).
-        value: maps observations (N, D) to estimated returns (N, 1).
-        rates: learning rates of policy and value.
-        seed: seeds the generator.
+        policy: Maps observations (N, D) to probabilities (N, A).
+        value: Maps observations (N, D) to estimated returns (N, 1).
+        rates: Learning rates of policy and value.
+        seed: Seeds the generator.
     """
 
     def __init__(
@@ -137,7 +137,7 @@ def descend(optimizer: torch.optim.Optimizer, loss: torch.Tensor) -> None:
     """Takes one optimizer step down the loss.
 
     Raises:
-        WorkbenchError: if the gradient isn't finite, which is possible even with a finite loss. The
+        WorkbenchError: If the gradient isn't finite, which is possible even with a finite loss. The
             weights are unchanged.
     """
     optimizer.zero_grad()

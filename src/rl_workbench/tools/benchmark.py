@@ -231,7 +231,7 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
             f"no training has a result; the first one ({planned[0].job.log}): {fault}"
         )
     groups = figures.grouped(results)
-    summary = figures.summary_table(groups, figures.RESULTS_SUMMARY)
+    summary = figures.summary_table(groups, figures.SUMMARY)
     every = figures.table(results, figures.RESULTS)
     costs = figures.summary_table(groups, figures.COSTS_SUMMARY)
     costs += f"\n\n{figures.table(results, figures.COSTS)}"

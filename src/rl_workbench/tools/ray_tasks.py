@@ -52,8 +52,8 @@ def train(
     """Ray's task: one attempt at a training, in a process of its own.
 
     Raises:
-        NodeUnusable: if this node doesn't see the folder, or has other versions of the libraries.
-        TrainingLost: if the process was killed.
+        NodeUnusable: If this node doesn't see the folder, or has other versions of the libraries.
+        TrainingLost: If the process was killed.
     """
     node = socket.gethostname()
     try:

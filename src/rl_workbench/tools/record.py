@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from PIL.Image import Image
 
-    from rl_workbench.tools.policies import LearnedPolicy, RandomPolicy
+    from rl_workbench.tools.policies import Player
     from rl_workbench.tools.recording import EpisodeFrame
     from rl_workbench.tools.runs import Run
 
@@ -110,9 +110,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     tell(f"{out}: {count} frames, {count / films[0].rate:.1f} s")
 
 
-def _policy(
-    arguments: argparse.Namespace, run: "Run", which: str
-) -> "LearnedPolicy | RandomPolicy":
+def _policy(arguments: argparse.Namespace, run: "Run", which: str) -> "Player":
     from rl_workbench.tools.policies import load_any
 
     options = {**env_options(arguments), "render_mode": "rgb_array"}
@@ -222,9 +220,9 @@ def write_video(path: Path, frames: "Sequence[np.ndarray]", rate: float) -> None
     """Writes a video in the format of the file's suffix; replaces an older file atomically.
 
     Args:
-        path: the file.
-        frames: at least one, all of one size, (H, W, 3) uint8.
-        rate: frame rate [Hz].
+        path: The file.
+        frames: At least one, all of one size, (H, W, 3) uint8.
+        rate: Frame rate [Hz].
     """
     from rl_workbench.storage import write_file
 

@@ -175,12 +175,12 @@ def record_episode(
     """Plays one episode; yields its frames.
 
     Args:
-        env: the environment.
-        act: chooses the action for an observation.
-        view: of the environment.
-        seed: of the episode.
-        stride: average number of steps between frames; the last step always has a frame.
-        max_steps: steps after which the episode is cut off; 0 for never.
+        env: The environment.
+        act: Chooses the action for an observation.
+        view: Of the environment.
+        seed: Of the episode.
+        stride: Average number of steps between frames; the last step always has a frame.
+        max_steps: Steps after which the episode is cut off; 0 for never.
     """
     total, due = 0.0, 0.0
     for length, step in enumerate(episode_steps(env, act, seed, max_steps)):
@@ -238,9 +238,9 @@ class EpisodeRecorder:
     """Plays and records episodes of a run; only its thread touches the environment.
 
     Args:
-        folder: the run folder, which may still be empty.
-        server: of the page.
-        env_options: of the environment, on top of the training's own.
+        folder: The run folder, which may still be empty.
+        server: Of the page.
+        env_options: Of the environment, on top of the training's own.
     """
 
     def __init__(
@@ -352,8 +352,8 @@ def check_robot_is_free(run: Run, options: dict[str, Any]) -> None:
     """Checks that an episode won't move the robot of a running training.
 
     Args:
-        run: the run, whose record has the options that name a shared robot.
-        options: of the episode's environment.
+        run: The run, whose record has the options that name a shared robot.
+        options: Of the episode's environment.
     """
     shared = run.config.get("shared_robot")
     if shared is None or not is_held(run.folder):

@@ -52,16 +52,16 @@ def show_run(
     """Serves the page until Ctrl-C, or until the training that started it ends.
 
     Args:
-        folder: the run folder.
-        policies: the choices; the first one is played first.
-        seed: of the first episode.
-        episodes: number of episodes, with consecutive seeds, that are repeated.
-        env_options: options of the environment on top of the training's.
-        host: the address to serve on.
-        port: the port to serve on; None for the first free one.
-        browser: whether to open a browser.
-        interrupt: ends the serving.
-        beside_training: whether a training started this process, which ends when its standard input closes.
+        folder: The run folder.
+        policies: The choices; the first one is played first.
+        seed: Of the first episode.
+        episodes: Number of episodes, with consecutive seeds, that are repeated.
+        env_options: Options of the environment on top of the training's.
+        host: The address to serve on.
+        port: The port to serve on; None for the first free one.
+        browser: Whether to open a browser.
+        interrupt: Ends the serving.
+        beside_training: Whether a training started this process, which ends when its standard input closes.
     """
     import torch
 
@@ -136,11 +136,11 @@ class Playback:
     """The controls of the page. One thread calls `tick`; clicks come in viser's threads.
 
     Args:
-        gui: of the page.
-        recorder: records the episodes.
-        policies: the choices; the first one is played first.
-        seed: of the first episode.
-        episodes: number of consecutive seeds to play before the first one follows again.
+        gui: Of the page.
+        recorder: Records the episodes.
+        policies: The choices; the first one is played first.
+        seed: Of the first episode.
+        episodes: Number of consecutive seeds to play before the first one follows again.
     """
 
     def __init__(

@@ -53,8 +53,7 @@ class Callback:
 
     Callbacks run in the order of the list, after our own. They must not touch the random generators of
     Python, NumPy or torch, or the training ends with other weights. A callback that raises ends the
-    training with one line, which names the step up to which what was learned is saved; the other callbacks
-    still hear of the event.
+    training with one line, which names the step up to which what was learned is saved.
     """
 
     def on_training_start(self, training: Any) -> None:
@@ -117,7 +116,7 @@ def load_callbacks(names: str) -> list[Callback]:
     """Makes callbacks of the user's own.
 
     Args:
-        names: module:Class, several with commas.
+        names: Module:Class, several with commas.
     """
     return [_load(name.strip()) for name in names.split(",") if name.strip()]
 
@@ -145,22 +144,13 @@ class CallbackList:
         self._own, self._users = own, users
 
     def call(self, event: str, training: Any, *arguments: Any) -> None:
-        """Calls the method of an event; all of the user's hear of it, whatever another one raises.
-
-        Of several failures the first one propagates.
-        """
-        failures: list[tuple[str, Exception]] = []
-        try:
-            for own in self._own:
-                getattr(own, event)(training, *arguments)
-        finally:
-            for user in self._users:
-                try:
-                    getattr(user, event)(training, *arguments)
-                except Exception as error:  # noqa: BLE001 - the others hear of it first
-                    name = type(user).__name__
-                    text = f"the callback {name} failed in {event}(): {error_line(error)}"
-                    failures.append((text, error))
-        if failures:
-            text, cause = failures[0]
-            raise EnvironmentFailure(text) from cause
+        """Calls the method of an event."""
+        for own in self._own:
+            getattr(own, event)(training, *arguments)
+        for user in self._users:
+            try:
+                getattr(user, event)(training, *arguments)
+            except Exception as error:
+                name = type(user).__name__
+                text = f"the callback {name} failed in {event}(): {error_line(error)}"
+                raise EnvironmentFailure(text) from error

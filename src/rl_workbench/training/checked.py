@@ -117,11 +117,8 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         """
         with self._running(COMPUTE_REWARD):
             found = self.env.get_wrapper_attr(COMPUTE_REWARD)(achieved, desired, info)
-        name = f"{COMPUTE_REWARD}() of {self._id}"
-        try:
             rewards = np.asarray(found, np.float32)
-        except (TypeError, ValueError) as error:
-            raise self._error(f"{name} gives no numbers: {found!r}") from error
+        name = f"{COMPUTE_REWARD}() of {self._id}"
         if rewards.shape != (len(achieved),):
             raise self._error(
                 f"{name} isn't vectorised: for {len(achieved)} goals at once, {achieved.shape}, it gives "

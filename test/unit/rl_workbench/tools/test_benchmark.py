@@ -30,8 +30,8 @@ from rl_workbench.tools.benchmark import (
     training_flags,
 )
 from rl_workbench.tools.job import Job, command
-from rl_workbench.tools.results import RESULTS_SUMMARY, RunResult, examine, grouped, summary_table
-from rl_workbench.tools.runs import cost_file, open_run
+from rl_workbench.tools.results import SUMMARY, RunResult, examine, grouped, summary_table
+from rl_workbench.tools.runs import open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.train import PROGRAM
 
@@ -215,22 +215,16 @@ def test_figures_that_cannot_be_read_are_faults(tmp_path: Path) -> None:
     assert row.fault.count("isn't the table of a training") == 1 and "no policy" in row.fault
 
 
-def test_pauses_are_no_part_of_the_seconds_to_solve(tmp_path: Path) -> None:
+def test_the_step_to_solve_is_a_confirmed_one_if_there_is_any(tmp_path: Path) -> None:
     one = job(tmp_path)
     workbench_runs.record(one.folder, [20.0] * 30)
-    config = json.loads((one.folder / "config.json").read_text())
-    (one.folder / "config.json").write_text(json.dumps({**config, "began": 1000.0}))
-    with (one.folder / "scalars.csv").open("a") as file:
-        file.write("300,eval/mean_reward,475.0,1200.0\n")
-    assert examined(one).solved_seconds == 200.0
-    before = [700.0, 750.0]  # killed before its first checkpoint, it was begun anew
-    spans = [before, [1000.0, 1050.0], [1150.0, 1300.0], [2000.0, 2100.0]]
-    cost_file(one.folder).write_text(json.dumps({"spans": spans}))
-    row = examined(one)
-    assert (row.solved_step, row.solved_seconds) == (300, 100.0)
-    with (one.folder / "scalars.csv").open("a") as file:
-        file.write("400,eval/confirmed_reward,480.0,1250.0\n")
-    assert examined(one).solved_step == 400
+    for row, solved in (
+        ("300,eval/mean_reward,475.0,0", 300),
+        ("400,eval/confirmed_reward,480.0,0", 400),
+    ):
+        with (one.folder / "scalars.csv").open("a") as file:
+            file.write(f"{row}\n")
+        assert examined(one).solved_step == solved
 
 
 def complete(out: Path) -> list[str]:
@@ -286,7 +280,7 @@ def row(seed: int, score: float | None, step: int | None, fault: str = "") -> Ru
 
 
 def summarised(rows: list[RunResult]) -> str:
-    return summary_table(grouped(rows), RESULTS_SUMMARY).splitlines()[2]
+    return summary_table(grouped(rows), SUMMARY).splitlines()[2]
 
 
 def test_seeds_that_never_solve_count_as_never() -> None:
@@ -299,12 +293,12 @@ def test_a_statistic_tells_how_many_seeds_it_lacks() -> None:
     rows = [row(0, 480.0, 100), row(1, 500.0, 300), row(2, None, None, "the loss is nan")]
     cells = summarised(rows).split(" | ")
     assert cells[1] == "2 of 3, 1 failed" and cells[2] == "490.0 ± 14.1 (2 of 3)"
-    assert all(cell.endswith(" (2 of 3)") for cell in cells[3:6])
+    assert all(cell.endswith(" (2 of 3)") for cell in cells[3:7])
 
 
 def test_a_variant_without_any_run_has_a_line_of_its_own() -> None:
     line = summarised([RunResult("a", 0, "run", fault="no run folder")])
-    assert line == "| a | 0 of 1, 1 failed | - | - | - | - | never | never |"
+    assert line == "| a | 0 of 1, 1 failed | never | never |"
 
 
 def test_the_training_is_told_all_of_its_options(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from rl_workbench import cli
 from rl_workbench.agents.greedy import SeveralChoices, SingleChoice, Switches
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools import torchscript
-from rl_workbench.tools.policies import LearnedPolicy, load_learned
+from rl_workbench.tools.policies import Player, load_learned
 from rl_workbench.tools.runs import Run, open_run
 from rl_workbench.tools.torchscript import open_exported
 from rl_workbench.training.algorithms import ALGORITHMS
@@ -234,9 +234,9 @@ def test_observations_in_parts(algorithm: str, actions: spaces.Space) -> None:
     env = Reach(actions)
     own = getattr(stable_baselines3, ALGORITHMS[algorithm].hyperparameters().library_class)
     model = own("MultiInputPolicy", env, seed=1)
-    policy = LearnedPolicy(
+    policy = Player(
         lambda seen: model.policy.predict(seen, deterministic=True)[0],
-        greedy_network(model, algorithm), env, Path("best.pt"), 10,
+        env, greedy_network(model, algorithm), Path("best.pt"), 10,
     )  # fmt: skip
     run = Run(Path(), algorithm, "a test", "Reach-v0", {}, 0, {})
     content, agreement = torchscript.export(run, policy, seed=3)
@@ -254,7 +254,7 @@ def test_parts_that_are_no_vectors_of_numbers() -> None:
     env = Reach(FAR)
     env.observation_space = spaces.Dict(camera=spaces.Box(0, 255, (9, 9, 3), np.uint8))
     network = torch.nn.Linear(1, 1)
-    policy = LearnedPolicy(lambda _: 0, network, env, Path("best.pt"), 10)
+    policy = Player(lambda _: 0, env, network, Path("best.pt"), 10)
     run = Run(Path(), "ppo", "a test", "Reach-v0", {}, 0, {})
     with pytest.raises(WorkbenchError, match=r"Reach-v0 can't be exported: part camera of its"):
         torchscript.export(run, policy, seed=0)

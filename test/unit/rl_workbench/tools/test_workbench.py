@@ -199,7 +199,7 @@ def test_compare_has_every_run_in_its_table(runs: Path, tmp_path: Path, capsys) 
     }
     both = groups["dqn in CartPole-v1"]
     assert [row["seed"] for row in both["runs"]] == [0, 1] and both["statistics"]["n"] == 2
-    assert "needs two seeds" in told, "one seed alone has no interval"
+    assert told.count("| IQM [95 %] |") == 1
     assert Image.open(out).format == "PNG"
 
 
@@ -210,14 +210,14 @@ def test_a_failed_run_stays_in_the_table(runs: Path, tmp_path: Path, capsys) -> 
     told = capsys.readouterr().out
     row = next(line for line in told.splitlines() if "| 3 |" in line)
     assert "it has no checkpoint yet" in row
-    assert "2 of 3 (see faults)" in told
+    assert "(2 of 3)" in told
 
 
 def test_compare_by_training_needs_no_checkpoint(tmp_path: Path, capsys) -> None:
     for seed, value in enumerate((10.0, 20.0, 30.0, 400.0)):
         workbench_runs.record(tmp_path / f"run_{seed}", [value] * 5, seed=seed)
     assert work("compare", tmp_path, "--episodes", 0) == 0
-    assert "| 115.0 ± 190.2 | 25.0 | 25.0 |" in capsys.readouterr().out
+    assert "| 115.0 ± 190.2 | 25.0 | 25.0 [" in capsys.readouterr().out
 
 
 # Bad input: one line each, and an exit code.
