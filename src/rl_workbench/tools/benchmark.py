@@ -22,7 +22,7 @@ from rl_workbench.tools.jobs import claim, job_pool
 from rl_workbench.tools.runs import SUITE_RECORD, Run, open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm
-from rl_workbench.training.options import default_file, known_options, read_section
+from rl_workbench.training.options import default_file, read_section
 from rl_workbench.training.progress import tell, warn
 from rl_workbench.training.train import choose
 
@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """Trains the incomplete runs, then writes results.md, costs.md, results.json and two pictures."""
     suite = _suite(arguments)
     for variant in suite.variants:
-        check_package(variant)
+        check_options(variant)
     folder = (arguments.out or Path("runs/benchmark") / suite.name).resolve()
     first = arguments.first_seed
     seeds = range(first, first + (arguments.seeds or suite.seeds))
@@ -168,7 +168,7 @@ def _options(value: Any, origin: str) -> dict[str, Any]:
 
 
 def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
-    """Makes a variant, and checks names and types of its options if the algorithm is our own."""
+    """Makes a variant; `check_options` checks its options."""
     if not NAME.fullmatch(name):
         raise WorkbenchError(
             f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}"
@@ -180,16 +180,15 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
     taken = [key for key in rest if key in OWN]
     if taken:
         raise WorkbenchError(f"{origin}: the benchmark sets {taken[0]} itself")
-    if not algorithm(kind).package:  # others are asked in `check_package`
-        known_options(algorithm(kind)).read(_without_special(kind, rest), f"{origin}: {name}")
     return Variant(name, kind, rest)
 
 
-def check_package(variant: Variant) -> None:
-    """Checks that the package of the variant's algorithm is installed and knows the options."""
-    kind = algorithm(variant.algorithm)
-    if kind.package:
-        choose(kind, training_flags(variant, 0)[2:])
+def check_options(variant: Variant) -> None:
+    """Checks that the variant's algorithm knows its options, and that its package is installed."""
+    try:
+        choose(algorithm(variant.algorithm), training_flags(variant, 0)[2:])
+    except WorkbenchError as error:
+        raise WorkbenchError(f"{variant.name}: {error}") from error
 
 
 def _without_special(name: str, options: dict[str, Any]) -> dict[str, Any]:

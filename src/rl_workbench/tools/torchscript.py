@@ -239,19 +239,16 @@ def _observations(policy: Player, seed: int) -> list[Observation]:
 def _compare(
     file: torch.jit.ScriptModule, policy: Player, observations: list[Observation]
 ) -> Agreement:
-    """Compares the file's actions with the policy's, for all observations at once and for single ones.
+    """Compares the file's actions with the policy's.
 
     Raises:
         WorkbenchError: If actions differ by more than rounding can explain.
     """
     wanted = np.stack([np.asarray(policy.act(each)) for each in observations])
     with torch.no_grad():
-        together = file(batch(observations)).numpy()
-        singly = torch.cat([file(batch([each])) for each in observations]).numpy()
+        found = file(batch(observations)).numpy()
     space = policy.env.action_space
-    results = [_differences(found, wanted, space) for found in (together, singly)]
-    equal = np.logical_and(*(same for same, _ in results))
-    distances = np.maximum(*(distance for _, distance in results))
+    equal, distances = _differences(found, wanted, space)
     is_continuous = isinstance(space, spaces.Box)
     wrong = distances > ROUNDING if is_continuous else ~equal
     if wrong.any() and not is_continuous:

@@ -14,15 +14,9 @@ SILENCE = 60.0  # [s] without a line
 
 
 def tell(text: str, stream: TextIO | None = None) -> None:
-    """Prints a line and flushes it. A closed stream or its encoding can't make this fail."""
+    """Prints a line and flushes it. A closed stream can't make this fail."""
     with contextlib.suppress(OSError):
-        print(writable(text, stream or sys.stdout), file=stream, flush=True)
-
-
-def writable(text: str, stream: TextIO | None) -> str:
-    """Returns a text, such as a path, with backslash escapes for what the stream can't encode."""
-    encoding = getattr(stream, "encoding", None) or "utf-8"
-    return text.encode(encoding, "backslashreplace").decode(encoding)
+        print(text, file=stream, flush=True)
 
 
 def warn(text: str) -> None:
@@ -92,7 +86,7 @@ class Progress(Callback):
         """Prints a line above the bar."""
         self._told = self._clock()
         if self._bar is not None:
-            self._bar.write(writable(text, self._stream), file=self._stream)
+            self._bar.write(text, file=self._stream)
         else:
             tell(text, self._stream)
 

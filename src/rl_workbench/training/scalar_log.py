@@ -143,8 +143,7 @@ def _truncated(path: Path, length: int, say: Callable[[str], None]) -> list[Poin
         content = file.read(length)
     points: list[Point] = []
     complete = len(HEADER) if content.startswith(HEADER) else 0
-    rows = content[complete:].splitlines(keepends=True) if complete else []
-    for row in rows:
+    for row in content[complete:].splitlines(keepends=True) if complete else []:
         try:
             step, tag, value, wall_time = row.decode().split(",")
             point = (tag, float(value), int(step), float(wall_time))

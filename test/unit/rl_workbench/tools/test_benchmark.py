@@ -23,7 +23,7 @@ from rl_workbench.tools.benchmark import (
     CONFIG,
     _suite,
     add_flags,
-    check_package,
+    check_options,
     default_file,
     make_variant,
     read_suite,
@@ -58,12 +58,15 @@ def examined(one: Job) -> RunResult:
     return examine(open_run(one.folder), "quick", 2, lambda text: None, also_last=True)
 
 
+@pytest.mark.extras("stable_baselines3")
 def test_every_suite_of_the_package_has_options_that_exist() -> None:
     import yaml
 
     for name in yaml.safe_load(default_file(CONFIG).read_text()):
         suite = read_suite(name)
         assert suite.variants and suite.about
+        for variant in suite.variants:
+            check_options(variant)
 
 
 @pytest.mark.slow
@@ -174,15 +177,16 @@ def test_wrong_input_is_a_line(
         ("{variants: {a: {}}, seeds: 0}", "seeds is a number from 1"),
         ("variants: {../../a: {}}", "a variant's name is"),
         ("variants: {..: {}}", "a variant's name is"),
-        ("variants: {a: {algo: reinforce, value_epoch: 3}}", "s: a: .*did you mean value_epochs"),
-        ("variants: {a: {gamma: high}}", "s: a: gamma must be a number"),
+        ("variants: {a: {algo: reinforce, value_epoch: 3}}", "a: .*did you mean value_epochs"),
+        ("variants: {a: {gamma: high}}", "a: .*gamma must be a number"),
     ],
 )
 def test_a_suite_that_makes_no_sense_is_refused(content: str, words: str, tmp_path: Path) -> None:
     path = tmp_path / "suites.yaml"
     path.write_text(f"s: {content if content[0] == '{' else '{' + content + '}'}")
     with pytest.raises(WorkbenchError, match=words):
-        read_suite("s", path)
+        for variant in read_suite("s", path).variants:
+            check_options(variant)
 
 
 @pytest.mark.extras("stable_baselines3")
@@ -193,7 +197,7 @@ def test_options_that_stable_baselines3_does_not_know_are_refused_before_anythin
     assert cli.main(command) == 1
     assert "did you mean n_steps" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-    check_package(make_variant("t", "a", {"algo": "ppo", "target_kl": None, "n_steps": 64}))
+    check_options(make_variant("t", "a", {"algo": "ppo", "target_kl": None, "n_steps": 64}))
 
 
 def test_a_failed_training_stays_in_the_table(tmp_path: Path) -> None:

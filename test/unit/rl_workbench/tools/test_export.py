@@ -154,22 +154,6 @@ def test_how_far_scores_are_from_another_choice(kind, scores: list, margins: lis
     assert found.tolist() == margins
 
 
-def test_what_rounds_otherwise_is_told_by_its_size(
-    run: Path, tmp_path: Path, capsys, monkeypatch
-) -> None:
-    for numbers in ((1000, 0, 2.4e-7), (1000, 1000, 0.0), (1000, 998, 0.0)):
-        agreement = torchscript.Agreement(*numbers)
-        monkeypatch.setattr(torchscript, "export", lambda *_, found=agreement: (b"", found))
-        monkeypatch.setattr(torchscript, "open_exported", lambda path: None)
-        assert work("export", run, "--out", tmp_path / "policy.pt") == 0
-    first, second, third = capsys.readouterr().out.splitlines()
-    assert first.endswith(
-        "over 1000 observations its actions differ by at most 2e-07 of their range"
-    )
-    assert second.endswith("over 1000 observations its actions are the same")
-    assert third.endswith("its actions are the same, but for 2 where scores tie")
-
-
 @pytest.mark.slow
 def test_torch_alone_runs_it(run: Path, tmp_path: Path) -> None:
     """Without our package, from double precision, and many observations at once."""

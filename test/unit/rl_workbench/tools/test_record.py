@@ -16,7 +16,6 @@ import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli
 from rl_workbench.tools.record import Film, SideBySide, write_video
 from rl_workbench.tools.recording import (
-    EpisodeFrame,
     PictureView,
     draw_without_display,
     record_episode,
@@ -99,21 +98,6 @@ def test_captions_stand_below_the_picture_and_change_with_it():
     lines = [frame[high.shape[0] :] for frame in (first, last)]
     assert all((line < 128).any() for line in lines) and (lines[0] != lines[1]).any()
     assert all((line[:, -1] == 255).all() for line in lines)  # it fits in
-
-
-@pytest.mark.parametrize(
-    ("action", "text"),
-    [(np.int64(1), "1"), (np.array([0.5, -0.25], np.float32), "+0.50 -0.25"),
-     (np.zeros(5), "+0.00 +0.00 +0.00 ..."), (np.array([1, 0]), "1 0")],
-)  # fmt: skip
-def test_actions_of_any_kind_are_told(action, text):
-    class Constant(Counter):
-        action_space = gymnasium.spaces.Discrete(2)
-
-    env = Constant(2)
-    *_, last = record_episode(env, lambda _: action, PictureView(env), 0)
-    assert last.caption("best") == f"best   step 2   return 1.0   action {text}   ended"
-    assert EpisodeFrame(0, b"", 0.0, "").caption() == "step 0   return 0.0"
 
 
 def test_a_gifs_frames_last_as_long_as_they_should_on_average(tmp_path: Path):

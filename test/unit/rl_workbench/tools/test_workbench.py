@@ -89,13 +89,6 @@ def test_eval_of_random_actions_is_a_baseline(runs: Path, capsys) -> None:
     assert "or random actions" in " ".join(capsys.readouterr().out.split())
 
 
-@pytest.mark.parametrize("given", [["max_steps=3"], ["max_steps=3,noise=0.01"],
-                                   ["max_steps=3", "noise=0.01"]])  # fmt: skip
-def test_options_of_the_environment_reach_it(runs: Path, given: list[str], capsys) -> None:
-    work("eval", runs / "robot", "--episodes", 1, "--json", "-", "--env-kwargs", *given)
-    assert json.loads(capsys.readouterr().out)["lengths"] == [3]
-
-
 @pytest.mark.parametrize("name", ["dqn_0", "robot", "reinforce"])
 def test_record_writes_a_gif_without_a_display(runs: Path, tmp_path: Path, name: str) -> None:
     out = tmp_path / "video.gif"
@@ -260,15 +253,6 @@ def test_a_checkpoint_of_another_run_is_refused(runs: Path, own: Path, capsys) -
         assert "best.pt isn't a checkpoint of" in refused(capsys, "eval", own)
 
 
-def test_without_any_good_checkpoint(own: Path, capsys) -> None:
-    for path in own.rglob("*.pt"):
-        path.write_bytes(b"")
-    assert "none of its checkpoints can be read" in refused(capsys, "eval", own)
-    for path in own.rglob("*.pt"):
-        path.unlink()
-    assert "no checkpoint yet" in refused(capsys, "eval", own)
-
-
 def test_no_episodes_yet(tmp_path: Path, capsys) -> None:
     run = workbench_runs.record(tmp_path / "run", [])
     assert "no episode has ended yet" in refused(capsys, "plot", run, "--out", tmp_path / "a.png")
@@ -282,21 +266,6 @@ def test_a_line_that_is_only_half_written_is_left_out(tmp_path: Path) -> None:
     with (run / "scalars.csv").open("a") as file:
         file.write("30,charts/episodic_return,3")
     assert work("plot", run, "--out", tmp_path / "a.png") == 0
-
-
-def test_a_foreign_table(tmp_path: Path, capsys) -> None:
-    run = workbench_runs.record(tmp_path / "run", [1.0])
-    (run / "scalars.csv").write_text("a,b\n1,2\n")
-    line = refused(capsys, "plot", run, "--out", tmp_path / "a.png")
-    assert "isn't the table of a training" in line
-
-
-@pytest.mark.parametrize("name", ["evla", "reccord", "nonsense"])
-def test_an_unknown_command(name: str, capsys) -> None:
-    with pytest.raises(SystemExit) as ended:
-        work(name)
-    assert ended.value.code == 2
-    assert "unknown command" in capsys.readouterr().err
 
 
 def test_a_picture_or_a_video_of_another_format(runs: Path, tmp_path: Path, capsys) -> None:

@@ -27,7 +27,6 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
 from rl_workbench.training.callbacks import ScalarLogger
 from rl_workbench.training.evaluator import Evaluator
-from rl_workbench.training.history import History
 
 ON_A_ROBOT = {"env_id": POLE, "env_kwargs": {"noise": 0.05}}
 LEARNERS = [*EXACT, OTHERS[0]]  # from single actions
@@ -108,25 +107,6 @@ def test_a_folder_that_is_moved_away_is_one_line(whole, times, tmp_path: Path, n
 
 
 # No memory.
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", EXACT)
-def test_memory_that_ends_in_the_training(whole, tmp_path: Path, monkeypatch, name: str) -> None:
-    def learn(self: History) -> dict:
-        if len(list(run.glob("checkpoints/step_*.pt"))) == 3:
-            raise MemoryError("std::bad_alloc")
-        return keep(self)
-
-    run, keep = tmp_path / "run", History.state_dict
-    with monkeypatch.context() as patched:
-        patched.setattr(History, "state_dict", learn)
-        line = failure(lambda: train(run, name, keep_checkpoints=0))
-    assert "there is no memory left; stopped after" in line and "is saved" not in line
-    assert f"--resume {run} continues from the last checkpoint" in line
-    resume(run)
-    assert summary(run)["complete"]
-    assert summary(run)["returns"] == summary(whole(name))["returns"]
 
 
 # Numbers that are none.
@@ -319,19 +299,4 @@ def test_every_environment_is_closed_once(
     else:
         dying(monkeypatch, after)
         failure(lambda: train(tmp_path, name, **ON_A_ROBOT, eval_frequency=0))
-    assert len(closed) == len({id(env) for env in closed}) == 2
-
-
-@pytest.mark.parametrize("name", LEARNERS)
-def test_a_refused_checkpoint_leaves_no_environment_open(
-    tmp_path: Path, monkeypatch, name: str
-) -> None:
-    run = train(tmp_path, name, InterruptAfter(90), **ON_A_ROBOT)
-    content = torch.load(run / "last.pt", weights_only=True)
-    for path in run.rglob("*.pt"):
-        path.unlink()
-    torch.save(content | {"history": "text"}, run / "last.pt")
-    closed: list[Pole] = []
-    monkeypatch.setattr(Pole, "close", lambda env: closed.append(env))  # noqa: PLW0108 - binds
-    assert "the checkpoint holds another history" in failure(lambda: resume(run))
     assert len(closed) == len({id(env) for env in closed}) == 2
