@@ -158,7 +158,7 @@ def _backend(options: TrainingOptions) -> str:
 def session(
     options: TrainingOptions, name: str, argv: list[str], robot: RobotOptions, folder: Path
 ) -> Iterator[None]:
-    """Runs what the robot needs over ROS until the block ends.
+    """Runs the robot's ROS session until the block ends.
 
     Args:
         options: Of the training.

@@ -125,7 +125,7 @@ def answer(data: bytes) -> bytes:
 
 
 def main() -> int:
-    """The program ``xacro`` with its own options; returns its exit code."""
+    """Runs the program ``xacro`` with its own options; returns its exit code."""
     worker = os.fork()
     if not worker:
         _run_program()

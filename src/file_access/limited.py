@@ -49,14 +49,13 @@ class LimitedProcess:
     """Answers requests in a child process, one at a time.
 
     The process starts with the first request, and again after it has died. It ends with its parent.
+
+    Args:
+        program: "module:function" that answers a request, bytes to bytes; what it raises refuses it.
+        limits: Of each request.
     """
 
     def __init__(self, program: str, limits: Limits) -> None:
-        """
-        Args:
-            program: "module:function" that answers a request, bytes to bytes; what it raises refuses it.
-            limits: Of each request.
-        """
         self._program = program
         self._limits = limits
         self._lock = threading.Lock()

@@ -11,7 +11,7 @@ from rl_workbench.training import train as training
 
 PROG = "rl-workbench"
 DESCRIPTION = """\
-Trains agents in Gymnasium's environments, and shows what they learned.
+Trains agents in Gymnasium's environments and shows their policies.
 
 RUN is a run folder, as runs/CartPole-v1__dqn__0__1700000000.
 Exit codes: 0 done, 1 failed, 2 wrong arguments; 130 after Ctrl-C."""

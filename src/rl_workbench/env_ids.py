@@ -1,4 +1,4 @@
-"""Gymnasium's ids of environments: `module:namespace/Name-v0` or `namespace/Name-v0`."""
+"""Environment ids of Gymnasium: `module:namespace/Name-v0` or `namespace/Name-v0`."""
 
 import contextlib
 import re

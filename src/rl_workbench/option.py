@@ -165,7 +165,7 @@ def key_values(texts: list[str], origin: str) -> dict[str, str]:
 
 
 def imported(name: str, flag: str) -> Any:
-    """Returns what a flag names as module:attribute."""
+    """Imports an attribute that a flag names as module:attribute."""
     module, _, attribute = name.partition(":")
     if not module or not attribute:
         raise WorkbenchError(f"{flag} must be module:name, not {name!r}")
@@ -217,7 +217,7 @@ EXPECTED = {bool: "true or false", int: "a whole number", float: "a number"}
 
 
 def _converted(kind: Any, value: Any) -> Any:
-    """Converts a text or a YAML value. The text of a ValueError is what it should have been."""
+    """Converts a text or a YAML value. The text of a ValueError is the expected form."""
     if NoneType in get_args(kind):
         kind = next(each for each in get_args(kind) if each is not NoneType)
     if get_origin(kind) is tuple:
@@ -250,7 +250,7 @@ def mapping(value: Any) -> dict[str, Any]:
     """Reads a mapping, or a text such as `control_period=0.02, variation={mass: 0.2, gain: [0.9, 1.1]}`.
 
     Raises:
-        ValueError: If it is neither. The text is what it should have been.
+        ValueError: If it is neither. The text is the expected form.
     """
     if isinstance(value, str):
         first, *words = _KEY.split(value)

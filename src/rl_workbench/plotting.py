@@ -202,7 +202,7 @@ def evaluation_curves(panels: Sequence[Panel]) -> Figure:
 
 
 def _environments(panels: Sequence[Panel]) -> tuple[Figure, list[Axes]]:
-    """Large axes, one pair for each environment, since their returns don't compare."""
+    """Makes axes, one pair for each environment, since their returns don't compare."""
     if len(panels) == 1:
         figure = new_figure(WIDTH, 5)
         return figure, [figure.subplots()]
@@ -215,7 +215,7 @@ def _environments(panels: Sequence[Panel]) -> tuple[Figure, list[Axes]]:
 
 
 def _styles(panels: Sequence[Panel]) -> dict[str, dict[str, Any]]:
-    """Colour and line of each group, the same in all panels."""
+    """Returns colour and line of each group, the same in all panels."""
     names = dict.fromkeys(name for panel in panels for name in panel.curves)
     count = len(COLOURS)
     return {

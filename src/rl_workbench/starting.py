@@ -1,4 +1,4 @@
-"""How commands start and end: signals, an output without a reader, and how one starts another."""
+"""Start and end of commands: signals, broken pipes, subprocesses."""
 
 import contextlib
 import os
@@ -55,7 +55,7 @@ def search_path() -> str:
 
 @contextlib.contextmanager
 def reader_may_go() -> Iterator[None]:
-    """Ends the block silently once no one reads standard output, as in `train --help | head`."""
+    """Ends the block silently when standard output is closed, as in `train --help | head`."""
     try:
         try:
             yield

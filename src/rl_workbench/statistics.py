@@ -23,7 +23,7 @@ class Statistics(NamedTuple):
 
 
 def iqm(scores: np.ndarray, axis: int = -1) -> np.ndarray:
-    """Returns the mean of the middle half, which no single lucky or failed seed decides."""
+    """Returns the interquartile mean, which a single outlier hardly changes."""
     count = scores.shape[axis]
     cut = int(CUT * count)
     return np.mean(np.sort(scores, axis).take(range(cut, count - cut), axis), axis)

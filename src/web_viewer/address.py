@@ -1,4 +1,4 @@
-"""Where a page is served: a free port, the flags that choose it, and how users reach it."""
+"""Addresses of pages: free ports, flags, tokens, and advice for remote browsers."""
 
 import argparse
 import getpass

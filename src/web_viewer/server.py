@@ -150,7 +150,7 @@ def can_be(props: object, value: Any) -> bool:
 
 
 def _check_fields(server: viser.ViserServer) -> None:
-    """Passes on only what a field can have: programs rely on it, and viser sends it to all other pages."""
+    """Drops values that a field doesn't admit; viser would pass them on to programs and other pages."""
     gui, pages = server.gui, server._websock_server
     pages.unregister_handler(messages.GuiUpdateMessage, gui._handle_gui_updates)
 
@@ -247,7 +247,7 @@ def stop(server: viser.ViserServer) -> None:
 
 @contextlib.contextmanager
 def hidden_page() -> Iterator[viser.ViserServer]:
-    """Serves a page for recordings, which viser can make only from a server; no one has its token."""
+    """Serves a page for recordings, which viser makes only from a server; its token is secret."""
     server = _start(Address(LOOPBACK, 0, secrets.token_urlsafe(TOKEN_BYTES)))
     try:
         yield server

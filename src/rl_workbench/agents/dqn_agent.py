@@ -1,4 +1,4 @@
-"""The DQN agent: acts, stores transitions, learns. It knows neither environments nor files."""
+"""The DQN agent: acting, replay, learning. It knows neither environments nor files."""
 
 import math
 from collections.abc import Callable, Sequence

@@ -109,7 +109,7 @@ class SoftmaxActor:
         return self._outputs(self._prepare(observation)).astype(np.float64)
 
     def probabilities(self, observation: np.ndarray) -> np.ndarray:
-        """Of the actions: (A,), float64."""
+        """Returns the probabilities of the actions, (A,), float64."""
         preferences = self._preferences(observation)
         weights = np.exp(preferences - preferences.max())
         return weights / weights.sum()

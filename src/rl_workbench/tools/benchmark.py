@@ -124,7 +124,7 @@ def _suite(arguments: argparse.Namespace) -> Suite:
     if arguments.suite:
         if arguments.algo or arguments.env_id or arguments.config or arguments.params or steps:
             raise WorkbenchError(
-                "a suite says what is trained: it takes no --algo, --env-id, --config, --total-timesteps "
+                "a suite defines its trainings and takes no --algo, --env-id, --config, --total-timesteps "
                 "or --params"
             )
         return read_suite(arguments.suite, arguments.suites)

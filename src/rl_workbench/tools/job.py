@@ -1,4 +1,4 @@
-"""One training as a job: a process that is started, watched, stopped and resumed.
+"""A training as a job: a process that is started, watched, stopped and resumed.
 
 FOLDER/NAME             the run folder
 FOLDER/NAME.log         the output of its training

@@ -1,4 +1,4 @@
-"""A pool of jobs, their states in FOLDER/jobs.json, and `jobs`, which lists them."""
+"""A pool of jobs, their states in FOLDER/jobs.json, and the command `jobs`."""
 
 import argparse
 import contextlib
@@ -171,7 +171,7 @@ class JobPool:
 
     def _lost(self, job: Job, reason: str) -> None:
         self._set(job, RUNNING, reason)
-        tell(f"{job.name}: lost, and tried again: {reason}")
+        tell(f"{job.name}: lost, retrying: {reason}")
 
     def _ended(self, job: Job, failure: str) -> str:
         self._set(job, FAILED if failure else DONE, failure)
@@ -274,7 +274,7 @@ def _status(folder: Path, entry: JobEntry, is_alive: bool) -> JobStatus:
     if summary.get("complete"):
         step, state, line = summary["steps"], DONE, outcome(summary)
     elif state == DONE:
-        line = "ended early: the rest wasn't needed any more"
+        line = "stopped early: its result is no longer needed"
     elif not is_alive and (state == RUNNING or step and state == WAITING):
         state = STOPPED
         line = outcome(summary) if summary.get("interrupted") else line

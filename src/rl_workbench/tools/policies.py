@@ -1,4 +1,4 @@
-"""Loads learned policies with an environment to act in, and plays their episodes."""
+"""Learned policies with an environment to act in, and their episodes."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack

@@ -1,4 +1,4 @@
-"""Records episodes frame by frame, for the files of `record` and for the page of `view`.
+"""Recording of episodes frame by frame, for the files of `record` and the page of `view`.
 
 For the page a thread records them, because an environment may be slower than real time, and some
 environments have to stay in one thread.

@@ -162,9 +162,7 @@ class Playback:
         self._speed = gui.add_dropdown("Speed", list(SPEEDS), initial_value="1 ×")
         self._which = gui.add_dropdown("Policy", list(policies), initial_value=policies[0])
         self._seed = gui.add_number("Seed", seed, min=0, max=MAX_SEED, step=1)
-        self._follow = gui.add_checkbox(
-            "Newest by itself", True, hint="play a checkpoint as soon as it is written"
-        )
+        self._follow = gui.add_checkbox("Follow newest", True, hint="play each new checkpoint")
         newest = gui.add_button("Play the newest now", icon=viser.Icon.REFRESH)
         self._about = gui.add_html("")  # below the controls, so that its size doesn't move them
         self._button.on_click(lambda _: self.toggle())

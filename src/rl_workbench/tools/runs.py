@@ -1,4 +1,4 @@
-"""Reads run folders: config.json, scalars.csv (also while it grows), summary.json at the end."""
+"""Run folders: config.json, scalars.csv (also while it grows), summary.json at the end."""
 
 import csv
 import glob

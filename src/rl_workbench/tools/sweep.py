@@ -147,7 +147,7 @@ def open_study(sweep: Sweep) -> Any:
 
 
 def _repair(path: Path) -> None:
-    """Removes what a killed search left: its lock, which no one else can hold, and an unfinished line."""
+    """Repairs the journal of a killed search: removes its stale lock and a partial last line."""
     path.with_name(f"{path.name}.lock").unlink(missing_ok=True)
     with contextlib.suppress(FileNotFoundError):
         content = path.read_bytes()

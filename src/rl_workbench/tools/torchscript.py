@@ -1,4 +1,4 @@
-"""Exports a run's policy as a TorchScript file that also holds a description of the policy.
+"""Policies as TorchScript files with a description of the policy.
 
 The file's content is compared with the policy before it is written.
 """
@@ -255,14 +255,14 @@ def _compare(
         wrong &= ~_tied(policy, observations)
     if wrong.any():
         raise WorkbenchError(
-            f"not written: in {wrong.sum()} of {len(wanted)} observations the file acts otherwise than "
+            f"not written: in {wrong.sum()} of {len(wanted)} observations the file's actions differ from "
             "the run's policy"
         )
     return Agreement(len(wanted), int(equal.sum()), float(distances.max()))
 
 
 def _tied(policy: Player, observations: list[Observation]) -> np.ndarray:
-    """Returns where scores choose so narrowly that rounding may choose otherwise, (N,)."""
+    """Returns whether rounding may change the choice, (N,)."""
     network = policy.network
     if not isinstance(network, Choice):
         return np.zeros(len(observations), bool)

@@ -53,26 +53,26 @@ class Callback:
 
     Callbacks run in the order of the list, after our own. They must not touch the random generators of
     Python, NumPy or torch, or the training ends with other weights. A callback that raises ends the
-    training with one line, which names the step up to which what was learned is saved.
+    training with one line, which names the step up to which progress is saved.
     """
 
     def on_training_start(self, training: Any) -> None:
-        """The environments are made. A resumed training has loaded its checkpoint."""
+        """Called once the environments are made; a resumed training has loaded its checkpoint."""
 
     def on_step(self, training: Any) -> None:
-        """The algorithm has learned from its last steps: one of them, or a rollout, or an episode."""
+        """Called after the algorithm has learned from a step, a rollout or an episode."""
 
     def on_episode(self, training: Any, episode: EpisodeResult) -> None:
-        """An episode has ended."""
+        """Called at the end of an episode."""
 
     def on_evaluation(self, training: Any, result: EvaluationResult) -> None:
-        """The policy was evaluated."""
+        """Called after an evaluation."""
 
     def on_checkpoint(self, training: Any, path: "Path") -> None:
-        """A checkpoint was written."""
+        """Called after a checkpoint was written."""
 
     def on_training_end(self, training: Any) -> None:
-        """Everything is saved; the training is complete, interrupted, or has failed."""
+        """Called at the end, when everything is saved, also of an interrupted or failed training."""
 
 
 class ScalarLogger(Callback):

@@ -1,4 +1,4 @@
-"""Checks what an environment returns, before it spoils the weights."""
+"""Checks of observations and rewards before an agent learns from them."""
 
 import math
 import re
@@ -71,7 +71,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
                 if not self._was_cut:
                     self._was_cut = True
                     warn(
-                        f"{self._which}{self._id} doesn't say when an episode ends: it is truncated after "
+                        f"{self._which}{self._id} declares no time limit: episodes are truncated after "
                         f"{LONGEST} steps; its option max_episode_steps=N sets another limit"
                     )
             if info:
@@ -121,11 +121,11 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         name = f"{COMPUTE_REWARD}() of {self._id}"
         if rewards.shape != (len(achieved),):
             raise self._error(
-                f"{name} isn't vectorised: for {len(achieved)} goals at once, {achieved.shape}, it gives "
+                f"{name} isn't vectorised: for {len(achieved)} goals at once, {achieved.shape}, it returns "
                 f"the shape {rewards.shape}, not {(len(achieved),)}; norms take axis=-1"
             )
         if not np.isfinite(rewards).all():
-            raise self._error(f"{name} gives a reward that isn't finite")
+            raise self._error(f"{name} returns a reward that isn't finite")
         return rewards
 
     def render(self) -> Any:

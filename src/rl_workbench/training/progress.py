@@ -1,4 +1,4 @@
-"""What the user sees while training: a bar on a terminal, and a line every 20 episodes."""
+"""Progress output: a bar on a terminal, and a line every 20 episodes."""
 
 import contextlib
 import io

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rl_workbench.statistics import bands, describe, interval, iqm
+from rl_workbench.statistics import describe, interval, iqm
 
 
 def test_the_interquartile_mean_drops_a_quarter_at_either_end() -> None:
@@ -38,10 +38,3 @@ def test_equal_scores_have_an_interval_of_no_width() -> None:
 def test_one_score_has_none() -> None:
     found = describe(np.array([7.0]))
     assert found.iqm_interval is None and found.std == 0.0 and found.iqm == 7.0
-
-
-def test_bands_are_intervals_point_by_point() -> None:
-    table = np.random.default_rng(0).normal(size=(6, 4)) + np.arange(4.0)
-    low, high = bands(table, np.mean)
-    assert low.shape == high.shape == (4,)
-    assert (low < table.mean(axis=0)).all() and (table.mean(axis=0) < high).all()

@@ -257,7 +257,7 @@ def test_a_file_that_acts_otherwise_is_not_written(
 
     monkeypatch.setattr(torchscript, "written", spoilt)
     line = refused(capsys, "export", run, "--out", tmp_path / "policy.pt")
-    assert "of 1000 observations the file acts otherwise" in line
+    assert "of 1000 observations the file's actions differ" in line
     assert not list(tmp_path.iterdir())
 
 

@@ -120,7 +120,7 @@ def test_a_number_that_is_none_ends_it_and_is_not_learned_from(
     options = {"env_id": SPOILT, "env_kwargs": {what: -1e39}, "eval_frequency": 0}
     line = failure(lambda: train(tmp_path, name, **options))
     assert f"the {what} of {SPOILT} isn't finite in float32" in line
-    assert "what was learned is saved in" in line and "--resume" in line
+    assert "progress is saved in" in line and "--resume" in line
     assert all_finite(checkpoint(tmp_path))
     assert summary(tmp_path)["failure"] and not summary(tmp_path)["complete"]
 
@@ -170,7 +170,7 @@ def test_a_simulator_that_dies_costs_nothing_that_was_saved(
         dying(patched, 100)
         line = failure(lambda: train(tmp_path / "run", name, **options))
     assert f"the simulator has ended; stopped after {summary(tmp_path / 'run')['steps']} " in line
-    assert f"what was learned is saved in {tmp_path / 'run'}; --resume" in line
+    assert f"progress is saved in {tmp_path / 'run'}; --resume" in line
     result = summary(tmp_path / "run")
     assert result["failure"] == "the connection broke; the simulator has ended"
     assert checkpoint(tmp_path / "run")["steps"] == result["steps"]
@@ -214,7 +214,7 @@ def test_dqn_saves_its_last_whole_step_wherever_it_fails(
         line = failure(lambda: train(tmp_path / "run", "dqn", **options))
     steps = summary(tmp_path / "run")["steps"]
     assert checkpoint(tmp_path / "run")["steps"] == steps > 0
-    assert f"stopped after {steps} steps" in line and "what was learned is saved in" in line
+    assert f"stopped after {steps} steps" in line and "progress is saved in" in line
     assert_same_run(whole, resume(tmp_path / "run"))
 
 
@@ -226,7 +226,7 @@ def test_a_round_of_learning_that_fails_costs_the_steps_since_the_last_checkpoin
     line = failure(lambda: train(tmp_path, "dqn", loss="mse", checkpoint_frequency=20, **huge))
     steps = checkpoint(tmp_path)["steps"]
     assert 0 < steps < summary(tmp_path)["steps"]
-    assert f"what was learned up to step {steps} is saved in {tmp_path}; --resume" in line
+    assert f"progress up to step {steps} is saved in {tmp_path}; --resume" in line
 
 
 def test_a_round_that_was_learned_from_and_not_recorded_is_played_again(

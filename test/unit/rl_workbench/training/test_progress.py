@@ -1,7 +1,6 @@
 """What the user sees while training: lines in a pipe, a bar on a terminal."""
 
 import io
-import sys
 import time
 from types import SimpleNamespace
 
@@ -61,16 +60,6 @@ def test_or_over_steps_which_ends_where_the_training_has_ended() -> None:
     bar.on_step(SimpleNamespace(steps=100))
     bar.close()
     assert "100/100" in stream.getvalue()
-
-
-def test_without_a_standard_error_it_goes_nowhere(monkeypatch, capsys) -> None:
-    """As 2>&- starts a training."""
-    monkeypatch.setattr(sys, "stderr", None)
-    bar = Progress(100, "step", 0)
-    for count in range(1, 21):
-        show_episode(bar, [1.0] * count, 1)
-    bar.close()
-    assert capsys.readouterr().out == "", "standard output is for results"
 
 
 @pytest.mark.parametrize(
