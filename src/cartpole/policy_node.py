@@ -100,7 +100,7 @@ def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:
     add("--late", type=_positive, metavar="S",
         help="the robot stops when joint states are older [s] (default 5 control periods, "
         "at least 0.1, for a vehicle at most 0.3)")  # fmt: skip
-    add("--max-speed", type=_positive_or_0, default=1.0, metavar="SHARE",
+    add("--max-speed", type=_share, default=1.0, metavar="SHARE",
         help="how fast commanded positions may move, as a share of the joints' velocity limits "
         "(default 1; 0: no limit)")  # fmt: skip
     add("--goal", type=_numbers, metavar="X,Y,...",
@@ -128,7 +128,7 @@ def _positive(text: str) -> float:
     return value
 
 
-def _positive_or_0(text: str) -> float:
+def _share(text: str) -> float:
     return 0.0 if float(text) == 0.0 else _positive(text)
 
 

@@ -77,7 +77,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     add("--params", nargs="+", default=[], metavar="KEY=VALUE", help="options of the training")
     add("--total-timesteps", type=number(1), metavar="N", help="length of each training [steps]")
     add("--seeds", type=number(1), metavar="N", help=f"how many (the suite's, or {SEEDS})")
-    add("--first-seed", type=number(0), default=0, metavar="N", help="default 0")
     add_job_flags(parser)
     add("--episodes", type=number(1), default=100, metavar="N",
         help="greedy episodes on fresh seeds for each policy's score (default 100)")  # fmt: skip
@@ -92,8 +91,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     for variant in suite.variants:
         check_options(variant)
     folder = (arguments.out or Path("runs/benchmark") / suite.name).resolve()
-    first = arguments.first_seed
-    seeds = range(first, first + (arguments.seeds or suite.seeds))
+    seeds = range(arguments.seeds or suite.seeds)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -235,14 +235,11 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of the command."""
     parser.add_argument("folder", type=Path, metavar="FOLDER",
                         help="folder of a benchmark or sweep; it may still be running")  # fmt: skip
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the list as JSON, too")
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """Lists the jobs of a benchmark or a sweep; only reads files."""
     found = read_jobs(arguments.folder)
-    if arguments.json:
-        write_file(arguments.json, as_json([asdict(each) for each in found]))
     width = max((len(each.name) for each in found), default=0)
     for each in found:
         steps = f"{each.step} of {each.steps}" if each.steps else str(each.step)

@@ -70,7 +70,12 @@ def show_run(
     draw_without_display()
     torch.set_num_threads(1)  # networks this small are slower on more
     interrupt.defer()
-    is_over = _end(interrupt, beside_training)
+
+    def is_over() -> bool:
+        # Standard input closes with the training, even if that is killed.
+        has_ended = beside_training and bool(select.select([sys.stdin], [], [], 0)[0])
+        return has_ended or interrupt.requested()
+
     try:
         address = find_address(host, port)
         server = serve(address, folder.name, CAMERA, LOOK_AT)
@@ -95,17 +100,6 @@ def show_run(
         curves = Curves(server.gui, server.gui.add_folder("Training"))
         curves.follow(folder)
         _play(server, playback, curves, is_over)
-
-
-def _end(interrupt: Interrupt, beside_training: bool) -> Callable[[], bool]:
-    """Returns what says whether the serving is over."""
-
-    def is_over() -> bool:
-        # Standard input closes with the training, even if that is killed.
-        has_ended = beside_training and bool(select.select([sys.stdin], [], [], 0)[0])
-        return has_ended or interrupt.requested()
-
-    return is_over
 
 
 def _play(
