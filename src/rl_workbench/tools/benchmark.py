@@ -189,16 +189,10 @@ def check_options(variant: Variant) -> None:
         raise WorkbenchError(f"{variant.name}: {error}") from error
 
 
-def _without_special(name: str, options: dict[str, Any]) -> dict[str, Any]:
-    """Leaves out the flags that choose a section or a file of options."""
-    special = ("config", *(("preset",) if algorithm(name).presets else ()))
-    return {key: value for key, value in options.items() if key not in special}
-
-
 def training_flags(variant: Variant, seed: int) -> list[str]:
     """Returns the flags of `train` for one run, except --run-dir."""
-    rest = _without_special(variant.algorithm, variant.options)
-    special = {key: value for key, value in variant.options.items() if key not in rest}
+    rest = dict(variant.options)
+    special: dict[str, Any] = {key: rest.pop(key) for key in ("config", "preset") if key in rest}
     if "config" in special:  # a cluster node may have another current folder
         special["config"] = Path(special["config"]).resolve()
     own = {"exp_name": variant.name, "seed": seed, **special}

@@ -151,7 +151,6 @@ def test_a_folder_of_other_options_is_refused(
         (["cartpole", "--algo", "dqn"], "a suite defines its trainings"),
         (["--suites", "mine.yaml"], "which suite of mine.yaml"),
         (["--algo", "reinforce", "--params", "gama=0.9"], "did you mean gamma"),
-        (["--algo", "reinforce", "--params", "preset=tutorial"], "unknown option 'preset'"),
         (["--params", "seed=3"], "the benchmark sets seed itself"),
     ],
 )

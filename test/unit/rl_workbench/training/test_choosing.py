@@ -141,7 +141,6 @@ def test_a_preset_may_name_the_environment_and_a_flag_another() -> None:
         (DQN, ["surplus"], "unknown flag 'surplus'"),
         (REINFORCE, ["--episods=5"], "unknown flag '--episods'; did you mean --episodes?"),
         (REINFORCE, ["--episodes", "many"], "must be a whole number, not 'many'"),
-        (REINFORCE, ["--preset=tutorial"], "unknown flag '--preset'"),  # its file has none
         (DOCUMENT, ["--batch-episodes=2"], "unknown flag '--batch-episodes'"),
     ],
 )
