@@ -23,7 +23,7 @@ _LIBRARIES = (
 
 
 class WorkbenchError(RuntimeError):
-    """An error that the user can fix. The text says what is wrong and what to do."""
+    """An error that the user can fix. The text says how."""
 
 
 class EnvironmentFailure(WorkbenchError):
@@ -32,15 +32,11 @@ class EnvironmentFailure(WorkbenchError):
 
 def error_line(error: BaseException) -> str:
     """Returns an error as one line, with the place in the user's own code if it went through that."""
-    place = (own_frames(error) or traceback.extract_tb(error.__traceback__))[-1]
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
+    place = (own or frames)[-1]
     text = " ".join(str(error).split())
     return f"{type(error).__name__}{': ' if text else ''}{text} ({place.filename}:{place.lineno})"
-
-
-def own_frames(error: BaseException) -> list[traceback.FrameSummary]:
-    """Returns where an error went through the user's own code."""
-    frames = traceback.extract_tb(error.__traceback__)
-    return [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
 
 
 def need(module: str, package: str, what: str) -> None:
@@ -68,7 +64,7 @@ class Hints:
 
     def finding_modules(self) -> str:
         """Returns how Python finds a module of the user's own."""
-        return "its folder has to be on PYTHONPATH"
+        return "its folder must be on PYTHONPATH"
 
     def watching(self, folder: Path) -> str:
         """Returns the command that shows a run in TensorBoard."""

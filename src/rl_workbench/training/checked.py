@@ -1,4 +1,4 @@
-"""Checks what an environment returns, before it spoils the weights."""
+"""Checks of observations and rewards before an agent learns from them."""
 
 import math
 import re
@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker
 
-from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, own_frames
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
 from rl_workbench.training.progress import warn
 
 LARGEST_FLOAT32 = float(
@@ -25,8 +25,6 @@ LONGEST = 10_000  # [steps], of an episode where nothing says how long one lasts
 
 CURVES = "episode_curves"  # in the last info of an episode: the means of its infos' numbers, by tag
 _UNFIT = re.compile(r"[^\w./-]+")  # for a tag
-# Gymnasium's wrappers and this one unpack what reset (2) and step (5) return.
-_OLD_GYM = re.compile(r"unpack \(expected [25]\b|unexpected keyword argument '(seed|options)'")
 
 
 class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -81,7 +79,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
                 if not self._was_cut:
                     self._was_cut = True
                     warn(
-                        f"{self._which}{self._id} doesn't say when an episode ends: it is truncated after "
+                        f"{self._which}{self._id} declares no time limit: episodes are truncated after "
                         f"{LONGEST} steps; its option max_episode_steps=N sets another limit"
                     )
             if info:
@@ -129,18 +127,15 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         """
         with self._running(COMPUTE_REWARD):
             found = self.env.get_wrapper_attr(COMPUTE_REWARD)(achieved, desired, info)
-        name = f"{COMPUTE_REWARD}() of {self._id}"
-        try:
             rewards = np.asarray(found, np.float32)
-        except (TypeError, ValueError) as error:
-            raise self._error(f"{name} gives no numbers: {found!r}") from error
+        name = f"{COMPUTE_REWARD}() of {self._id}"
         if rewards.shape != (len(achieved),):
             raise self._error(
-                f"{name} isn't vectorised: for {len(achieved)} goals at once, {achieved.shape}, it gives "
+                f"{name} isn't vectorised: for {len(achieved)} goals at once, {achieved.shape}, it returns "
                 f"the shape {rewards.shape}, not {(len(achieved),)}; norms take axis=-1"
             )
         if not np.isfinite(rewards).all():
-            raise self._error(f"{name} gives a reward that isn't finite")
+            raise self._error(f"{name} returns a reward that isn't finite")
         return rewards
 
     def render(self) -> Any:
@@ -169,12 +164,6 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
             return self._old_gym()
         return EnvironmentFailure(
             f"{self._which}{self._id} failed in {method}(): {error_line(error)}"
-        )
-
-    def _old_gym(self) -> WorkbenchError:
-        return self._error(
-            f"{self._id} is written for the old gym: Gymnasium's reset(seed=None, options=None) returns "
-            "(observation, info), and its step() (observation, reward, terminated, truncated, info)"
         )
 
     def _error(self, text: str) -> WorkbenchError:

@@ -7,7 +7,6 @@ Each holds everything. last.pt and best.pt are further names of numbered files.
 """
 
 import contextlib
-import errno
 import os
 import pickle
 import shutil
@@ -37,24 +36,6 @@ class Checkpoints:
 
     def __init__(self, run: Path, keep: int) -> None:
         self._run, self._keep = run, keep
-        self._place = run.stat()
-
-    def are_in_place(self) -> bool:
-        """Returns whether the run folder is still where it was."""
-        try:
-            return os.path.samestat(self._run.stat(), self._place)
-        except FileNotFoundError:
-            return False
-
-    def check_place(self) -> None:
-        """Checks the run folder: another run may be in its place by now, and must not be overwritten.
-
-        Raises:
-            OSError: If the folder isn't the one in which the training began.
-        """
-        if not self.are_in_place():
-            moved = "the folder was moved or removed"
-            raise FileNotFoundError(errno.ENOENT, moved, str(self._run))
 
     def save(self, step: int, content: dict[str, Any], best: bool = False) -> Path:
         """Writes a checkpoint as the last one, and also as the best one if `best`; returns its path.
@@ -62,7 +43,6 @@ class Checkpoints:
         Raises:
             OSError: If it can't be written. The earlier checkpoints are untouched.
         """
-        self.check_place()
         path = self._run / FOLDER / f"step_{step:09d}.pt"
         path.parent.mkdir(exist_ok=True)
         save_tensors(path, {"format": FORMAT, **content})
@@ -76,7 +56,7 @@ class Checkpoints:
         return path
 
     def remove_leftovers(self) -> None:
-        """Removes what a killed training had begun to write. No one else may be writing."""
+        """Removes the partial files of a killed training. The caller holds the folder's lock."""
         for folder in (self._run, self._run / FOLDER):
             for pattern in LEFTOVERS:
                 for path in folder.glob(pattern):
@@ -151,10 +131,7 @@ def candidates(run: Path, best_first: bool = False) -> list[Path]:
     for path in best + others if best_first else others + best:
         try:
             status = path.stat()
-        except FileNotFoundError:
+        except OSError:
             continue
-        except OSError:  # a link to itself, ...: reading it tells
-            found[path] = path
-        else:
-            found.setdefault((status.st_dev, status.st_ino), path)
+        found.setdefault((status.st_dev, status.st_ino), path)
     return list(found.values())

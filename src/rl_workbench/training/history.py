@@ -97,7 +97,7 @@ def evaluation_of(state: Any) -> tuple[int, float]:
 
 
 class Outcome(NamedTuple):
-    """A training at its end, whatever ended it."""
+    """The outcome of a training."""
 
     options: TrainingOptions
     folder: Path
@@ -106,7 +106,6 @@ class Outcome(NamedTuple):
     is_complete: bool
     is_interrupted: bool
     evaluation: Evaluation | None  # the last one
-    is_in_place: bool  # else the run folder was moved or removed
 
     def write_summary(self, failure: str | None) -> None:
         """Writes summary.json."""
@@ -145,8 +144,6 @@ class Outcome(NamedTuple):
             if evaluation.success_rate is not None:
                 line += f", success {evaluation.success_rate:.0%}"
         tell(line)
-        if not self.is_in_place:
-            return
         tell(f"all results are in {self.folder}")
         if self.is_interrupted:
             tell(f"interrupted{self._how_to_resume()}")
@@ -166,11 +163,11 @@ class Outcome(NamedTuple):
         text += f"{len(self.history.returns)} episodes"
         if saved_at >= 0:
             until = "" if saved_at == self.steps else f" up to step {saved_at}"
-            text += f", what was learned{until} is saved in {self.folder}"
+            text += f", progress{until} is saved in {self.folder}"
         return text + self._how_to_resume()
 
     def _how_to_resume(self) -> str:
-        if not self.is_in_place or not candidates(self.folder):
+        if not candidates(self.folder):
             return ""
         return f"; --resume {shlex.quote(str(self.folder))} continues from the last checkpoint"
 

@@ -1,4 +1,4 @@
-"""The frame of every training: open or resume a folder, learn, evaluate, keep the best, save, report."""
+"""The training loop around an algorithm: open or resume, learn, evaluate, keep the best, save, report."""
 
 import contextlib
 import math
@@ -110,11 +110,6 @@ class Training:
         """Steps of the environment so far."""
         return self._algorithm.steps
 
-    @property
-    def is_in_place(self) -> bool:
-        """Whether the run folder is still where it was."""
-        return self._checkpoints.are_in_place()
-
     def _read_checkpoint(self) -> dict[str, Any] | None:
         """Returns None if the training was killed before its first checkpoint: it starts from scratch."""
         if not candidates(self.folder):
@@ -134,7 +129,7 @@ class Training:
             restore_random_states(content["random"])
 
     def _score_of_a_changed_task(self) -> tuple[int, float] | None:
-        """Returns step and score of the best policy so far, if what it was scored by isn't the same now."""
+        """Returns step and new score of the best policy if the task's code has changed; else None."""
         before, path = read_record(self.folder).get("task"), self.folder / BEST
         if before in (None, self._task) or not path.exists():
             return None
@@ -150,7 +145,7 @@ class Training:
     # --- the course of a training ---------------------------------------------------------------
 
     def run(self) -> None:
-        """Trains and writes everything. When it fails, what was learned until then is saved."""
+        """Trains and writes everything. After a failure it saves the progress."""
         failure: WorkbenchError | None = None
         try:
             self._train()
@@ -182,18 +177,18 @@ class Training:
             self.log.close()
 
     def _begin(self) -> None:
-        """Brings environment and generators to where they begin, or to where they were."""
+        """Starts or restores environment and generators."""
         run, algorithm = self._run, self._algorithm
         if not self._resumed:
             algorithm.start_environment(None, self._progress.say)
             about = f"training {self.options.kind.name} in {run.env_id} with seed {run.seed}"
             tell(f"{about}: {self.folder}")
             self._callbacks.call("on_training_start", self)
-            self._save()  # so that there is something to resume from, whatever happens
+            self._save()  # so that a training can be resumed from its first moment
             return
         others = run_folder.other_versions(read_record(self.folder).get("versions"))
         if others:
-            tell(f"{others}: from here on the bits may differ")
+            tell(f"{others}: the bits may differ from here on")
         with fitting("state of the environment"):
             algorithm.start_environment(self._resumed["environment"], self._progress.say)
         restore_random_states(self._resumed["random"])
@@ -226,7 +221,7 @@ class Training:
                     self._save()
             raise
 
-    # --- what an algorithm calls while it learns ------------------------------------------------
+    # --- called by algorithms ------------------------------------------------------------------
 
     def is_interrupted(self) -> bool:
         """Returns whether the user interrupts."""
@@ -357,23 +352,18 @@ class Training:
         """Writes and reports the outcome; then raises a failure, unless the user had stopped anyway."""
         outcome = Outcome(
             self.options, self.folder, self.history, self._algorithm.steps, self._is_complete(),
-            self._interrupt.requested(), self._evaluation, self.is_in_place,
+            self._interrupt.requested(), self._evaluation,
         )  # fmt: skip
-        failure = self._tried(self._export, failure)
+        failure = self._tried(partial(self._algorithm.export, self.folder), failure)
         failure = self._tried(partial(self._callbacks.call, "on_training_end", self), failure)
-        if outcome.is_in_place:
-            summary = partial(outcome.write_summary, str(failure) if failure else None)
-            failure = self._tried(summary, failure)
+        summary = partial(outcome.write_summary, str(failure) if failure else None)
+        failure = self._tried(summary, failure)
         outcome.report()
         # After Ctrl-C the failure may be its effect, as it may have ended what the environment needs. A
         # failed write is reported all the same.
         if failure and not (self._interrupt.requested() and self._is_written):
             saved = self._saved_at if self._is_written else -1
             raise WorkbenchError(outcome.failure_text(failure, saved)) from failure
-
-    def _export(self) -> None:
-        self._checkpoints.check_place()
-        self._algorithm.export(self.folder)
 
     def _tried(
         self, action: Callable[[], object], failure: WorkbenchError | None
