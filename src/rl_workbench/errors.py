@@ -32,11 +32,15 @@ class EnvironmentFailure(WorkbenchError):
 
 def error_line(error: BaseException) -> str:
     """Returns an error as one line, with the place in the user's own code if it went through that."""
-    frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
-    place = (own or frames)[-1]
+    place = (own_frames(error) or traceback.extract_tb(error.__traceback__))[-1]
     text = " ".join(str(error).split())
     return f"{type(error).__name__}{': ' if text else ''}{text} ({place.filename}:{place.lineno})"
+
+
+def own_frames(error: BaseException) -> list[traceback.FrameSummary]:
+    """Returns where an error went through the user's own code."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
 
 
 def need(module: str, package: str, what: str) -> None:

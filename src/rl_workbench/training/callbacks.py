@@ -102,7 +102,7 @@ class CurvesPicture(Callback):
 
     def on_training_end(self, training: Any) -> None:
         history, run = training.history, training.options.run
-        if not history.returns:
+        if not history.returns or not training.is_in_place:
             return
         # matplotlib is slow to import
         from rl_workbench.plotting import as_png, learning_curve

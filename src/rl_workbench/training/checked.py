@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker
 
-from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, own_frames
 from rl_workbench.training.progress import warn
 
 LARGEST_FLOAT32 = float(
@@ -25,6 +25,8 @@ LONGEST = 10_000  # [steps], of an episode where nothing says how long one lasts
 
 CURVES = "episode_curves"  # in the last info of an episode: the means of its infos' numbers, by tag
 _UNFIT = re.compile(r"[^\w./-]+")  # for a tag
+# Gymnasium's wrappers and this one unpack what reset (2) and step (5) return.
+_OLD_GYM = re.compile(r"unpack \(expected [25]\b|unexpected keyword argument '(seed|options)'")
 
 
 class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -164,6 +166,12 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
             return self._old_gym()
         return EnvironmentFailure(
             f"{self._which}{self._id} failed in {method}(): {error_line(error)}"
+        )
+
+    def _old_gym(self) -> WorkbenchError:
+        return self._error(
+            f"{self._id} is written for the old gym: Gymnasium's reset(seed=None, options=None) returns "
+            "(observation, info), and its step() (observation, reward, terminated, truncated, info)"
         )
 
     def _error(self, text: str) -> WorkbenchError:

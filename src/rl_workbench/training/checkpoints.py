@@ -7,6 +7,7 @@ Each holds everything. last.pt and best.pt are further names of numbered files.
 """
 
 import contextlib
+import errno
 import os
 import pickle
 import shutil
@@ -36,6 +37,24 @@ class Checkpoints:
 
     def __init__(self, run: Path, keep: int) -> None:
         self._run, self._keep = run, keep
+        self._place = run.stat()
+
+    def are_in_place(self) -> bool:
+        """Returns whether the run folder is still where it was."""
+        try:
+            return os.path.samestat(self._run.stat(), self._place)
+        except FileNotFoundError:
+            return False
+
+    def check_place(self) -> None:
+        """Checks the run folder: another run may be in its place by now, and must not be overwritten.
+
+        Raises:
+            OSError: If the folder isn't the one in which the training began.
+        """
+        if not self.are_in_place():
+            moved = "the folder was moved or removed"
+            raise FileNotFoundError(errno.ENOENT, moved, str(self._run))
 
     def save(self, step: int, content: dict[str, Any], best: bool = False) -> Path:
         """Writes a checkpoint as the last one, and also as the best one if `best`; returns its path.
@@ -43,6 +62,7 @@ class Checkpoints:
         Raises:
             OSError: If it can't be written. The earlier checkpoints are untouched.
         """
+        self.check_place()
         path = self._run / FOLDER / f"step_{step:09d}.pt"
         path.parent.mkdir(exist_ok=True)
         save_tensors(path, {"format": FORMAT, **content})

@@ -106,6 +106,7 @@ class Outcome(NamedTuple):
     is_complete: bool
     is_interrupted: bool
     evaluation: Evaluation | None  # the last one
+    is_in_place: bool  # else the run folder was moved or removed
 
     def write_summary(self, failure: str | None) -> None:
         """Writes summary.json."""
@@ -144,6 +145,8 @@ class Outcome(NamedTuple):
             if evaluation.success_rate is not None:
                 line += f", success {evaluation.success_rate:.0%}"
         tell(line)
+        if not self.is_in_place:
+            return
         tell(f"all results are in {self.folder}")
         if self.is_interrupted:
             tell(f"interrupted{self._how_to_resume()}")
@@ -167,7 +170,7 @@ class Outcome(NamedTuple):
         return text + self._how_to_resume()
 
     def _how_to_resume(self) -> str:
-        if not candidates(self.folder):
+        if not self.is_in_place or not candidates(self.folder):
             return ""
         return f"; --resume {shlex.quote(str(self.folder))} continues from the last checkpoint"
 

@@ -32,6 +32,7 @@ from rl_workbench.training.options import (
     section_names,
     until_the_steps,
 )
+from rl_workbench.training.progress import warn
 
 PROGRAM = starting.program("rl_workbench")
 PROG = "rl-workbench train"
@@ -111,6 +112,8 @@ def run_training(
                 folder = holding.enter_context(run_folder.opened(*place))
             begin(folder)
             training = Training(options, folder, interrupt, callbacks)
+            if doubt := options.doubt():
+                warn(doubt)
             interrupt.defer()
             training.run()
     finally:

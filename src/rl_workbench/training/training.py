@@ -110,6 +110,11 @@ class Training:
         """Steps of the environment so far."""
         return self._algorithm.steps
 
+    @property
+    def is_in_place(self) -> bool:
+        """Whether the run folder is still where it was."""
+        return self._checkpoints.are_in_place()
+
     def _read_checkpoint(self) -> dict[str, Any] | None:
         """Returns None if the training was killed before its first checkpoint: it starts from scratch."""
         if not candidates(self.folder):
@@ -352,18 +357,23 @@ class Training:
         """Writes and reports the outcome; then raises a failure, unless the user had stopped anyway."""
         outcome = Outcome(
             self.options, self.folder, self.history, self._algorithm.steps, self._is_complete(),
-            self._interrupt.requested(), self._evaluation,
+            self._interrupt.requested(), self._evaluation, self.is_in_place,
         )  # fmt: skip
-        failure = self._tried(partial(self._algorithm.export, self.folder), failure)
+        failure = self._tried(self._export, failure)
         failure = self._tried(partial(self._callbacks.call, "on_training_end", self), failure)
-        summary = partial(outcome.write_summary, str(failure) if failure else None)
-        failure = self._tried(summary, failure)
+        if outcome.is_in_place:
+            summary = partial(outcome.write_summary, str(failure) if failure else None)
+            failure = self._tried(summary, failure)
         outcome.report()
         # After Ctrl-C the failure may be its effect, as it may have ended what the environment needs. A
         # failed write is reported all the same.
         if failure and not (self._interrupt.requested() and self._is_written):
             saved = self._saved_at if self._is_written else -1
             raise WorkbenchError(outcome.failure_text(failure, saved)) from failure
+
+    def _export(self) -> None:
+        self._checkpoints.check_place()
+        self._algorithm.export(self.folder)
 
     def _tried(
         self, action: Callable[[], object], failure: WorkbenchError | None

@@ -1,5 +1,6 @@
 """Options of a training: where they come from, what wins, what is refused and how."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -167,6 +168,27 @@ def test_wrong_names_elsewhere_name_the_nearest(empty: str) -> None:
 def test_a_training_has_an_end(empty: str) -> None:
     assert "a training needs an end" in refusal(REINFORCE, empty, "--episodes=0")
     assert choose(REINFORCE, [empty, "--episodes=0", "--total-timesteps=9"]).run.episodes == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "flags", "words"),
+    [
+        (DQN, "1000 --learning-starts=5000", "learning starts after 5000 .* training ends after 1000"),
+        (DQN, "3000 --learning-starts=2000 --exploration-fraction=0.1", "end after 300 steps .* 2000"),
+        (DQN, "3000 --learning-starts=300 --exploration-fraction=0.1", ""),
+        (DQN, "3000 --learning-starts=2000 --epsilon-schedule=step", ""),
+        (REINFORCE, "1000", ""),
+        pytest.param(
+            ALGORITHMS["sac"], "100", "after 100 .* ends after 100",
+            marks=pytest.mark.extras("stable_baselines3"),
+        ),
+    ],
+)  # fmt: skip
+def test_options_that_leave_nothing_to_learn_are_doubted(
+    empty: str, kind: AlgorithmKind, flags: str, words: str
+) -> None:
+    doubt = choose(kind, [empty, *f"--total-timesteps={flags}".split()]).doubt()
+    assert bool(doubt) == bool(words) and re.search(words, doubt)
 
 
 @pytest.mark.parametrize("name", ALL)

@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -85,24 +86,44 @@ def test_a_disk_that_fills_up_keeps_the_checkpoint_before(
 class MovedAfter(InterruptAfter):
     """The run folder is moved when the training asks for the n-th time; it isn't interrupted."""
 
-    def __init__(self, asked: int, folder: Path) -> None:
+    def __init__(self, asked: int, folder: Path, comes: Path | None) -> None:
         super().__init__()
-        self._moved_at, self._folder = asked, folder
+        self._moved_at, self._folder, self._comes = asked, folder, comes
 
     def requested(self) -> bool:
         super().requested()
         if self.times == self._moved_at:
             self._folder.rename(self._folder.with_name("moved"))
+            if self._comes:
+                shutil.copytree(self._comes, self._folder)
         return False
 
 
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
 @pytest.mark.slow
+@pytest.mark.parametrize("is_replaced", [True, False])
 @pytest.mark.parametrize("name", EXACT)
-def test_a_folder_that_is_moved_away_is_one_line(whole, times, tmp_path: Path, name: str) -> None:
+def test_a_folder_that_is_moved_away_is_one_line(
+    whole, times, tmp_path: Path, capsys, name: str, is_replaced: bool
+) -> None:
+    """Another run that comes into its place is left alone."""
     (run := tmp_path / "run").mkdir()
-    line = failure(lambda: train(run, name, MovedAfter(round(0.5 * times(name)), run)))
-    assert f"can't write {run}" in line and "No such file" in line and "--resume" not in line
-    assert not run.exists()
+    other, moved_at = whole(name) if is_replaced else None, round(0.5 * times(name))
+    capsys.readouterr()
+    line = failure(lambda: train(run, name, MovedAfter(moved_at, run, other)))
+    assert f"can't write {run}: the folder was moved or removed; stopped" in line
+    assert "--resume" not in line and "all results are in" not in capsys.readouterr().out
+    if other:
+        assert contents(run) == contents(other)
+    else:
+        assert not run.exists()
     assert_same_run(whole(name), resume(tmp_path / "moved"))
 
 

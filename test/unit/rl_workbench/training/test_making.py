@@ -73,6 +73,23 @@ class Endless(gymnasium.Env):
         return np.zeros(2, np.float32), 1.0, False, False, {}
 
 
+class OldGym(Endless):
+    """As one wrote them for gym before 0.26."""
+
+    def reset(self, seed=None, options=None):
+        return np.zeros(2, np.float32)
+
+
+class OldStep(Endless):
+    def step(self, action):
+        return np.zeros(2, np.float32), 1.0, False, {}
+
+
+class Unseeded(Endless):
+    def reset(self):
+        return np.zeros(2, np.float32)
+
+
 def length(env: gymnasium.Env, most: int = 20_000) -> int:
     """Of an episode [steps]."""
     env.reset(seed=0)
@@ -89,6 +106,14 @@ def test_an_episode_without_an_end_is_truncated_and_said_once(monkeypatch, capsy
     monkeypatch.setattr(Endless, "max_steps", 12_000)  # it says so itself
     assert length(make_environment(env_id)) == 20_000
     assert not capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", [OldGym, OldStep, Unseeded])
+@pytest.mark.parametrize("limit", [{}, {"max_episode_steps": 9}])
+def test_what_was_written_for_the_old_gym_is_named(monkeypatch, kind, limit: dict) -> None:
+    env = make_environment(register_with(monkeypatch, kind), limit)
+    with pytest.raises(WorkbenchError, match=r"written for the old gym: Gymnasium's reset\(seed"):
+        length(env)
 
 
 @pytest.mark.extras("Box2D")
