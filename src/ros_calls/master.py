@@ -125,11 +125,7 @@ def call(method: str, *args: Any, timeout: float = TIMEOUT) -> Any:
 
 
 def require(timeout: float = TIMEOUT) -> None:
-    """Returns if the master answers within `timeout` [s].
-
-    Raises:
-        MasterDown: the master doesn't answer; the text says why.
-    """
+    """Raises MasterDown, which says why, unless the master answers within `timeout` [s]."""
     host_and_port()
     try:
         call("getPid", timeout=timeout)
@@ -165,11 +161,10 @@ def is_up_or_startable() -> bool:
 
 def is_up() -> bool:
     """Returns True if the master answers."""
-    try:
+    with contextlib.suppress(MasterDown):
         require()
-    except MasterDown:
-        return False
-    return True
+        return True
+    return False
 
 
 def host_and_port() -> tuple[str, int]:
@@ -218,15 +213,7 @@ def _same_machine(one: str, other: str) -> bool:
 
 
 def living_address(name: str, timeout: float = TIMEOUT) -> str | None:
-    """Returns the XML-RPC address of a node, or None if no such node answers.
-
-    Args:
-        name: the node's full name.
-        timeout: limit for each call [s]. A killed node's port refuses at once.
-
-    Raises:
-        NoAnswer: the master doesn't answer.
-    """
+    """Returns the XML-RPC address of a node, None if it doesn't answer; raises NoAnswer without a master."""
     try:
         address = str(call("lookupNode", name))
     except Refused:

@@ -4,6 +4,7 @@ rospy's proxies have no time limit, keep a dead connection, and ask the process'
 know the address.
 """
 
+import contextlib
 import io
 import math
 import select
@@ -88,7 +89,6 @@ class ServiceClient:
             ServiceHangs: no answer in time.
             ServiceFailed: the service reported a failure, or the request can't be sent.
         """
-        self._refuse_if_begun()
         try:
             self.begin(*request)
             return self.end()
@@ -103,10 +103,13 @@ class ServiceClient:
             ServiceFailed: as for a call.
             RuntimeError: a call was begun and not ended.
         """
-        self._refuse_if_begun()
+        if self._begun:
+            raise RuntimeError(f"{self.name}: begin() once more before end()")
         try:
             message = request_message(self._kind, request)
-            self._connected().send(message, self.timeout)
+            if self._connection is None:
+                self._connection = Connection(self._address(), self.name, self._kind, self.timeout)
+            self._connection.send(message, self.timeout)
             self._begun = True
         except (TimeoutError, CallFailed) as fault:
             raise self._failure(fault) from fault
@@ -134,36 +137,21 @@ class ServiceClient:
             if not kept:
                 self.close()
 
-    def _refuse_if_begun(self) -> None:
-        if self._begun:
-            raise RuntimeError(f"{self.name}: begin() once more before end()")
+    def call_idempotent(self, *request: Any) -> Any:
+        """Calls the service, again if a kept connection's node has ended; for what may be done twice."""
+        if self._connection is not None:
+            with contextlib.suppress(ServiceGone):
+                return self(*request)
+        return self(*request)
 
     def _failure(self, fault: Exception) -> ServiceFailed:
         if isinstance(fault, TimeoutError):
-            limit = "before the shutdown"
-            if self.timeout < math.inf:
-                limit = f"within {self.timeout:g} s"
+            is_bounded = self.timeout < math.inf
+            limit = f"within {self.timeout:g} s" if is_bounded else "before the shutdown"
             return ServiceHangs(f"{self.name}: no answer {limit}")
         if isinstance(fault, ConnectionEnded):
             return ServiceGone(f"{self.name}: the connection broke; its node has ended")
         return ServiceFailed(f"{self.name}: {fault}")
-
-    def call_idempotent(self, *request: Any) -> Any:
-        """Calls the service, a second time if a kept connection's node has ended.
-
-        Only for requests that may be carried out twice.
-        """
-        if self._connection is not None:
-            try:
-                return self(*request)
-            except ServiceGone:
-                pass
-        return self(*request)
-
-    def _connected(self) -> "Connection":
-        if self._connection is None:
-            self._connection = Connection(self._address(), self.name, self._kind, self.timeout)
-        return self._connection
 
     def _address(self) -> str:
         try:
@@ -194,18 +182,17 @@ class ConnectionEnded(CallFailed):
 
 
 class Connection:
-    """A lasting connection to one service. Not thread-safe.
+    """A lasting connection to the service at a ``rosrpc://`` address. Not thread-safe.
 
-    Time limits are wall time [s]; infinity means until the caller's node shuts down.
+    Time limits are wall time [s]; infinity means until the caller's node shuts down. After a TimeoutError the
+    connection can't be used any more.
+
+    Raises:
+        CallFailed: The connection failed, or the service has another type.
+        TimeoutError: No answer in time.
     """
 
     def __init__(self, address: str, name: str, kind: Any, timeout: float) -> None:
-        """Connects to the service at a ``rosrpc://`` address.
-
-        Raises:
-            CallFailed: the connection failed, or the service has another type.
-            TimeoutError: no answer in time.
-        """
         self._kind = kind
         deadline = time.monotonic() + timeout
         try:
@@ -238,12 +225,7 @@ class Connection:
         self._node = answer.get("callerid", "")
 
     def send(self, message: genpy.Message, timeout: float) -> None:
-        """Sends a request; `receive` must take its answer before the next one.
-
-        Raises:
-            CallFailed: the request can't be sent; ConnectionEnded: the connection broke.
-            TimeoutError: sending took too long; the connection can't be used afterwards.
-        """
+        """Sends a request; `receive` must take its answer before the next one."""
         payload = _serialized(message)
         try:
             self._socket.settimeout(_finite(timeout))
@@ -257,10 +239,6 @@ class Connection:
         """Returns the response to the last request; the time limit starts now.
 
         While a simulator in lock-step computes, no limit ends the wait.
-
-        Raises:
-            CallFailed: the service failed; ConnectionEnded: the connection broke.
-            TimeoutError: no answer in time; the connection can't be used afterwards.
         """
         try:
             self._socket.settimeout(_finite(timeout))
@@ -286,7 +264,10 @@ class Connection:
             try:
                 if data or timeout == math.inf:
                     self._await_data(deadline)
-                data += self._part()
+                part = self._socket.recv(CHUNK)
+                if not part:
+                    raise ConnectionError("the connection ended before the answer")
+                data += part
             except TimeoutError as fault:
                 ours = raised_in(fault) == __name__  # not in a signal's handler in the middle of it
                 if timeout == math.inf or not ours or not self._computes():
@@ -307,18 +288,8 @@ class Connection:
         except (NoAnswer, Refused):
             return False
 
-    def _part(self) -> bytes:
-        part = self._socket.recv(CHUNK)
-        if not part:
-            raise ConnectionError("the connection ended before the answer")
-        return part
-
     def _await_data(self, deadline: float) -> None:
-        """Returns once there is data, or the end, to read.
-
-        Raises:
-            TimeoutError: the deadline has passed, or it is infinity and the node has shut down.
-        """
+        """Waits for data; raises TimeoutError at the deadline, without one when the node shuts down."""
         poll = select.poll()
         poll.register(self._socket, select.POLLIN)
         left = deadline - time.monotonic()

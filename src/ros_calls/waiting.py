@@ -21,18 +21,15 @@ Found = TypeVar("Found")
 
 
 def wait_until(look: Callable[[], Found], timeout: float, what: str) -> Found:
-    """Calls `look` until it returns something true, and returns that.
+    """Calls `look` until its result is true, and returns that; false after the timeout.
 
     Args:
-        look: returns something true once the wait is over; called at least once.
-        timeout: limit of the wait [s], or infinity; the last look may exceed it.
-        what: what is awaited, for the text of an interrupt.
-
-    Returns:
-        The last look's result; false after a timeout.
+        look: Called at least once.
+        timeout: Limit of the wait [s], or infinity; the last look may exceed it.
+        what: What is awaited, for the text of an interrupt.
 
     Raises:
-        rospy.ROSInterruptException: the node shut down meanwhile.
+        rospy.ROSInterruptException: The node shut down meanwhile.
     """
     deadline = time.monotonic() + timeout
     while not (found := look()):
@@ -57,18 +54,7 @@ def service_answers(name: str) -> bool:
 
 
 def service_comes_up(name: str, timeout: float) -> bool:
-    """Waits until a service answers, also while there is no master.
-
-    Args:
-        name: the service, global or relative to the node's namespace.
-        timeout: bound of the wait [s], or infinity.
-
-    Returns:
-        False if it doesn't in time.
-
-    Raises:
-        rospy.ROSInterruptException: the node shut down meanwhile.
-    """
+    """Waits until a service answers, also while there is no master; returns False after `timeout` [s]."""
     resolved = str(rospy.resolve_name(name))
     return wait_until(lambda: service_answers(resolved), timeout, f"service {resolved}")
 

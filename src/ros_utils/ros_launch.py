@@ -56,17 +56,9 @@ def ros_launch_from_pkg(
         _log.error(f"ros_launch_from_pkg: {fault}")
         return False
     return ros_launch_from_path(
-        path,
-        args,
-        launch_new_term,
-        timeout=timeout,
-        output=output,
-        wait=wait,
-        log_file=log_file,
-        env=env,
-        master_uri=master_uri,
-        ready=ready,
-    )
+        path, args, launch_new_term, timeout=timeout, output=output, wait=wait, log_file=log_file,
+        env=env, master_uri=master_uri, ready=ready,
+    )  # fmt: skip
 
 
 def ros_launch_from_path(

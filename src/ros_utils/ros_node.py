@@ -14,7 +14,7 @@ from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import packages as _packages
 from ros_utils._internal import programs as _programs
 from ros_utils._internal import roslaunch as _roslaunch
-from ros_utils._internal.programs import CannotStart, Handle, Started, await_start
+from ros_utils._internal.programs import CannotStart, Started, await_start
 from ros_utils.readiness import Ready
 
 
@@ -71,14 +71,9 @@ def ros_node_from_pkg(
             _master.require()
             before = set(_nodes.node_uris().values())
             handle = _programs.start(
-                command,
-                "node",
-                label,
-                window=launch_new_term,
-                screen=output == "screen",
-                log_file=log_file,
-                env=env,
-            )
+                command, "node", label, window=launch_new_term, screen=output == "screen",
+                log_file=log_file, env=env,
+            )  # fmt: skip
         except (_packages.NotFound, CannotStart, _master.MasterDown, ValueError) as fault:
             _log.error(f"{label}: {fault}")
             return False
@@ -86,9 +81,13 @@ def ros_node_from_pkg(
             return Started(handle)
         full_name = rosgraph.names.ns_join(_global(ns), name) if name else None
         absent = f"not registered at {_master.uri()} (for a program that is not a node: wait=False)"
-        return await_start(
-            handle, lambda: _is_registered(handle, full_name, before), absent, timeout, ready
-        )
+
+        def is_registered() -> bool:  # an earlier node of that name doesn't count
+            found = [_nodes.node_uri(full_name)] if full_name else _nodes.node_uris().values()
+            new = [address for address in found if address and address not in before]
+            return any(handle.owns(_nodes.node_pid(address)) for address in new)
+
+        return await_start(handle, is_registered, absent, timeout, ready)
 
 
 def ros_kill_node(node_name: str) -> bool:
@@ -175,10 +174,7 @@ def _executable(package: str, name: str) -> str:
 
 def _arguments(args: str | Sequence[str] | None) -> list[str]:
     """Returns the node's own arguments as a list; raises ValueError if a quote isn't closed."""
-    try:
-        return shlex.split(args) if isinstance(args, str) else [str(arg) for arg in args or []]
-    except ValueError as fault:
-        raise ValueError(f"args {args!r}: {fault}") from fault
+    return shlex.split(args) if isinstance(args, str) else [str(arg) for arg in args or []]
 
 
 def _global(ns: str | None) -> str:
@@ -192,10 +188,3 @@ def _remappings(name: str | None, ns: str | None) -> list[str]:
             f"name {name!r}: a node's name has letters, digits and underscores, and no slash"
         )
     return [*([f"__name:={name}"] if name else []), f"__ns:={_global(ns)}"]
-
-
-def _is_registered(handle: Handle, name: str | None, before: set[str]) -> bool:
-    """Returns True if a node of this process is registered; an earlier one of that name doesn't count."""
-    addresses = [_nodes.node_uri(name)] if name else list(_nodes.node_uris().values())
-    new = [address for address in addresses if address and address not in before]
-    return any(handle.owns(_nodes.node_pid(address)) for address in new)

@@ -12,13 +12,10 @@ from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import packages as _packages
 from ros_utils._internal import programs as _programs
 from ros_utils._internal import roslaunch as _roslaunch
-from ros_utils._internal.programs import CannotStart, Handle, Started, await_start, wait_for_world
+from ros_utils._internal.programs import CannotStart, Started, await_start, wait_for_world
 from ros_utils.readiness import Ready
 
-__all__ = [
-    "close_Gazebo",
-    "launch_Gazebo",
-]
+__all__ = ["close_Gazebo", "launch_Gazebo"]
 
 LABEL = "Gazebo"
 NODES = ("/gazebo", "/gazebo_gui")
@@ -90,28 +87,20 @@ def launch_Gazebo(
         error in the log, if package or world are missing, no master can be used, or the simulator
         ends, doesn't answer or isn't ready in time (it is ended then, if it was started here).
     """
-    switches = {
-        "paused": paused,
-        "use_sim_time": use_sim_time,
-        "gui": gui,
-        "recording": recording,
-        "debug": debug,
-        "verbose": verbose,
-        "output": output,
-        "respawn_gazebo": respawn_gazebo,
+    arguments: dict[str, object] = {
+        "paused": paused, "use_sim_time": use_sim_time, "gui": gui, "recording": recording, "debug": debug,
+        "verbose": verbose, "output": output, "respawn_gazebo": respawn_gazebo,
         "use_clock_frequency": True,  # the rate has no effect without it
-        "pub_clock_frequency": pub_clock_frequency,
-        "server_required": server_required,
+        "pub_clock_frequency": pub_clock_frequency, "server_required": server_required,
         "gui_required": gui_required,
-    }
+    }  # fmt: skip
     # A real gazebo_ros rejects unknown arguments, so only those asked for are passed.
     asked = {
         "lockstep": lockstep or None,
-        "seed": seed,  # 0 is one, too
+        "seed": seed,
         "extra_gazebo_args": extra_gazebo_args or None,
     }
-    switches |= {name: value for name, value in asked.items() if value is not None}
-    world = (custom_world_path, custom_world_pkg, custom_world_name)
+    arguments |= {name: value for name, value in asked.items() if value is not None}
     service = f"{gazebo_ns.rstrip('/')}/{READY}"
     answers = functools.partial(service_answers, service)
     with _master.using(master_uri):
@@ -120,31 +109,20 @@ def launch_Gazebo(
                 f"{LABEL} runs already under {_master.uri()}: using it (ros_kill_all_processes ends it)"
             )
             return wait_for_world(Started(), ready, time.monotonic() + timeout, timeout)
-        handle = _start(switches, world, launch_new_term, log_file, env)
-        return handle is not None and await_start(
+        try:
+            if path := _world(custom_world_path, custom_world_pkg, custom_world_name):
+                arguments["world_name"] = path
+            _packages.file("gazebo_ros", "launch", "empty_world.launch")
+            given = [f"{name}:={value}" for name, value in arguments.items()]
+            command = ["gazebo_ros", "empty_world.launch", *given]
+            screen = output == "screen" and not launch_new_term
+            handle = _roslaunch.start(command, LABEL, launch_new_term, screen, log_file, env)
+        except (_packages.NotFound, CannotStart, _master.MasterDown) as fault:
+            _log.error(f"launch_Gazebo: {fault}")
+            return False
+        return await_start(
             handle, answers, f"service {service} doesn't answer", timeout, ready, may_end=False
         )
-
-
-def _start(
-    switches: Mapping[str, object],
-    world: tuple[str | None, str | None, str | None],
-    window: bool,
-    log_file: str | None,
-    env: Mapping[str, str] | None,
-) -> Handle | None:
-    """Starts roslaunch; returns None, with an error in the log, if it can't be started."""
-    try:
-        path = _world(*world)
-        world_name = {} if path is None else {"world_name": path}
-        _packages.file("gazebo_ros", "launch", "empty_world.launch")
-        arguments = [f"{name}:={value}" for name, value in {**switches, **world_name}.items()]
-        command = ["gazebo_ros", "empty_world.launch", *arguments]
-        screen = switches["output"] == "screen" and not window
-        return _roslaunch.start(command, LABEL, window, screen, log_file, env)
-    except (_packages.NotFound, CannotStart, _master.MasterDown) as fault:
-        _log.error(f"launch_Gazebo: {fault}")
-        return None
 
 
 def close_Gazebo(*, master_uri: str | None = None) -> bool:
