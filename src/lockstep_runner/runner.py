@@ -59,16 +59,15 @@ def _ends_with_the_world(instead: bool | None) -> Callable[[Method], Method]:
 
 
 class ScriptRunner:
-    """One script in lock-step."""
+    """One script in lock-step; nothing is replaced yet.
+
+    Args:
+        period: Simulated time that passes at a trigger [s], in whole physics steps; 0 is one.
+        triggers: Topics and services; None for the commands to controllers.
+        world: The simulator, and the source of time.
+    """
 
     def __init__(self, period: float, triggers: Collection[str] | None, world: ScriptWorld) -> None:
-        """Sets the runner up; nothing is replaced yet.
-
-        Args:
-            period: simulated time that passes at a trigger [s], in whole physics steps; 0 is one.
-            triggers: topics and services; None for the commands to controllers.
-            world: the simulator, and the source of time.
-        """
         self.world = world
         self.topics = Topics(self.world)
         self.clock = Clock(self.world)

@@ -34,10 +34,12 @@ class WorldFailed(Exception):
 
 
 class ScriptWorld:
-    """Finds a simulator and talks to it, one at a time; thread-safe."""
+    """The connection to a simulator, found by `look`, one at a time; thread-safe.
+
+    `seed` seeds the random numbers of each simulator found; None leaves them.
+    """
 
     def __init__(self, seed: int | None = None) -> None:
-        """`seed` seeds the random numbers of each simulator found; None leaves them."""
         self.now = 0  # [ns] simulated
         self.step = 1_000_000  # [ns]
         self.paused = False
@@ -61,7 +63,7 @@ class ScriptWorld:
         """Looks for a simulator, at most once per LOOK; returns whether there is one.
 
         Raises:
-            RunsByItself: the simulator found isn't in lock-step.
+            RunsByItself: The simulator found isn't in lock-step.
         """
         if self._call is not None:
             return True
@@ -105,13 +107,13 @@ class ScriptWorld:
         """Lets time pass, and exchanges messages.
 
         Args:
-            ticks: most physics steps to pass; one call does no more than `longest`.
-            until: topics; the call ends after the first tick with a message on one of them.
-            connect: topics that the script subscribes to, and that it publishes; connected first.
+            ticks: Most physics steps to pass; one call does no more than `longest`.
+            until: Topics; the call ends after the first tick with a message on one of them.
+            connect: Topics that the script subscribes to, and that it publishes; connected first.
 
         Raises:
-            WorldGone: the simulator was ended; there is none until `look` finds another.
-            WorldFailed: the simulator has died, or hangs.
+            WorldGone: The simulator was ended; there is none until `look` finds another.
+            WorldFailed: The simulator has died, or hangs.
         """
         request = AdvanceWorldRequest(
             node=rospy.get_name(), ticks=min(ticks, self.longest), until=list(until)

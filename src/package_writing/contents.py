@@ -59,9 +59,9 @@ def fill(folder: Path, package: str, values: Mapping[str, Any]) -> None:
     """Writes the template's files, except the default robot, and those of the task.
 
     Args:
-        folder: the package's folder.
-        package: the package's name.
-        values: the values to fill in, by their names in the template.
+        folder: The package's folder.
+        package: The package's name.
+        values: The values to fill in, by their names in the template.
     """
     tops = (TEMPLATE, HERE / ("drive" if values["base"] else "reach"))
     for top, source in ((each, file) for each in tops for file in sorted(each.rglob(f"*{FILLED}"))):

@@ -37,15 +37,15 @@ class PackageRequest:
     """The user's request for a package.
 
     Args:
-        name: the package's name.
-        folder: its destination.
-        urdf: the robot's file; None for a two-link arm.
-        arguments: xacro's arguments.
+        name: The package's name.
+        folder: Its destination.
+        urdf: The robot's file; None for a two-link arm.
+        arguments: Xacro's arguments.
         base: "fixed" or "free", for a robot that isn't fixed to the world; None if not given.
-        height: where to spawn it [m]; None for 0, or so that a free base stands on the ground.
-        interface: of joints without transmissions; None for velocity on wheels and effort on others.
-        passive: joints that get no motor, if none has a transmission.
-        standalone: whether its URDF is written expanded, with all meshes.
+        height: Where to spawn it [m]; None for 0, or so that a free base stands on the ground.
+        interface: Of joints without transmissions; None for velocity on wheels and effort on others.
+        passive: Joints that get no motor, if none has a transmission.
+        standalone: Whether its URDF is written expanded, with all meshes.
     """
 
     name: str
@@ -77,7 +77,7 @@ def write(request: PackageRequest, made: Path) -> str:
         The report to print.
 
     Raises:
-        CannotWrite: if the robot can't be read, simulated or moved.
+        CannotWrite: If the robot can't be read, simulated or moved.
     """
     if request.height is not None and not math.isfinite(request.height):
         raise CannotWrite(f"--height is a number of metres, not {request.height}")

@@ -94,14 +94,14 @@ def look_at(
     """Surveys a URDF.
 
     Args:
-        xml: the URDF's text.
-        interface: of the joints, if none has a transmission; None for velocity on wheels, effort on others.
-        resources: finds meshes.
-        free: whether the robot's base stays free.
-        passive: joints that get no motor, if none has a transmission.
+        xml: The URDF's text.
+        interface: Of the joints, if none has a transmission; None for velocity on wheels, effort on others.
+        resources: Finds meshes.
+        free: Whether the robot's base stays free.
+        passive: Joints that get no motor, if none has a transmission.
 
     Raises:
-        CannotWrite: if it can't be read or simulated, or nothing in it can be moved.
+        CannotWrite: If it can't be read or simulated, or nothing in it can be moved.
     """
     try:
         robot, control = parse(xml), read_description(xml)

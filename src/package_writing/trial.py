@@ -36,16 +36,16 @@ def try_out(package: str, env_id: str, made: Path, *, stands: bool) -> dict[str,
     """Takes a step in a package's environment, in a process of its own; not without ROS.
 
     Args:
-        package: the package's name.
-        env_id: of its environment.
-        made: its folder.
-        stands: whether to try if its robot stands, too.
+        package: The package's name.
+        env_id: Id of its environment.
+        made: Its folder.
+        stands: Whether to try if its robot stands, too.
 
     Returns:
         Why the robot doesn't stand, "" if it does, by each engine that is installed.
 
     Raises:
-        CannotWrite: if the step fails.
+        CannotWrite: If the step fails.
     """
     if importlib.util.find_spec("rospkg") is None:  # without ROS nothing finds it by its name
         return {}

@@ -25,10 +25,10 @@ class Copied:
     """A copied file.
 
     Args:
-        place: its path in the package's folder `urdf`.
-        xml: the copy, expanded.
-        packages: the packages that it names.
-        outside: the files that it includes from outside of any package.
+        place: Its path in the package's folder `urdf`.
+        xml: The copy, expanded.
+        packages: The packages that it names.
+        outside: The files that it includes from outside of any package.
     """
 
     place: str
@@ -43,14 +43,14 @@ def copy_urdf(
     """Copies a file and those that it includes by relative paths; the paths stay the same.
 
     Args:
-        path: the URDF or xacro file.
-        arguments: xacro's arguments.
-        package: the package's name.
-        folder: the package's folder.
-        standalone: whether to write the file expanded, and to copy all meshes; it takes no arguments then.
+        path: The URDF or xacro file.
+        arguments: Xacro's arguments.
+        package: The package's name.
+        folder: The package's folder.
+        standalone: Whether to write the file expanded, and to copy all meshes; it takes no arguments then.
 
     Raises:
-        CannotWrite: if one of them can't be read or copied.
+        CannotWrite: If one of them can't be read or copied.
     """
     path = Path(os.path.abspath(path.expanduser()))  # without .., which git can't keep empty
     try:

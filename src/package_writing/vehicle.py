@@ -33,16 +33,16 @@ class Base:
     """What a diff_drive_controller drives.
 
     Args:
-        left: joints of the wheels on the left.
-        right: on the right, as many.
-        radius: of the wheels [m].
-        separation: of the left ones from the right ones [m].
-        speed: the highest ahead [m/s].
-        frame: the root link.
-        laser: one that sees its surroundings alone; None: there is none.
-        touch: range of the laser at which the base touches what it sees [m].
-        clearance: free space about the middle of the base where it starts [m].
-        note: why there is no laser, although the file has one; or "".
+        left: Joints of the wheels on the left.
+        right: On the right, as many.
+        radius: Radius of the wheels [m].
+        separation: Separation of the left ones from the right ones [m].
+        speed: The highest ahead [m/s].
+        frame: The root link.
+        laser: One that sees its surroundings alone; None: there is none.
+        touch: Range of the laser at which the base touches what it sees [m].
+        clearance: Free space about the middle of the base where it starts [m].
+        note: Why there is no laser, although the file has one; or "".
     """
 
     left: tuple[str, ...]
@@ -167,9 +167,9 @@ def scan_topic(laser: Sensor, namespace: str, name: str) -> str:
     """Returns the topic of a laser (docs/contract/sensors.md 0.2).
 
     Args:
-        laser: the sensor.
-        namespace: in which the robot is spawned.
-        name: of the model.
+        laser: The sensor.
+        namespace: In which the robot is spawned.
+        name: Name of the model.
     """
     element = next((each.element for each in laser.plugins), laser.element)
     own = element.findtext("robotNamespace")

@@ -68,35 +68,35 @@ class RobotEnv(DrawnEnv):
     `GoalTask` "goal".
 
     Args:
-        robot: the robot, or several that share a world.
-        task: what is to be learned.
+        robot: The robot, or several that share a world.
+        task: What is to be learned.
         backend: "bullet" or "mujoco": in this process; "ros": over ROS in lock-step, bit-identical to
             "bullet"; "ros-own": the same in a simulator that is started for this environment alone, and
             replaced if it fails; "ros-realtime": over ROS, by Gazebo's own services; None: in this process,
             with the robot's engine. Or a backend, which the environment closes.
-        control_period: simulated time of an action [s]; None: the robot's. In real time 0 takes the
+        control_period: Simulated time of an action [s]; None: the robot's. In real time 0 takes the
             newest joint state without waiting.
-        deadline: wall time that a simulator over ROS in lock-step may take for an answer, on top of 10 ms for
+        deadline: Wall time that a simulator over ROS in lock-step may take for an answer, on top of 10 ms for
             each physics step [s]; None: 5 s, and 30 s for "ros-own", of which there may be many.
-        max_steps: after how many steps an episode is truncated; None: the task's.
-        sensor_noise: standard deviation of noise on what joints and sensors measure; see `Sensor`.
-        sensor_delay: age of an observation [control steps].
-        encoder_step: resolution of position sensors [rad, m]; see `Sensor`.
-        action_delay: how many control steps pass before a command arrives.
-        actuator_limit: of commands; see `Actuator`.
-        actuator_lag: time constant with which commands are followed [s]; see `Actuator`.
-        randomisation: what differs from episode to episode: options of `UniformRandomisation` by name, or a
+        max_steps: After how many steps an episode is truncated; None: the task's.
+        sensor_noise: Standard deviation of noise on what joints and sensors measure; see `Sensor`.
+        sensor_delay: Age of an observation [control steps].
+        encoder_step: Resolution of position sensors [rad, m]; see `Sensor`.
+        action_delay: How many control steps pass before a command arrives.
+        actuator_limit: Limit of commands; see `Actuator`.
+        actuator_lag: Time constant with which commands are followed [s]; see `Actuator`.
+        randomisation: What differs from episode to episode: options of `UniformRandomisation` by name, or a
             `Randomisation`. The reset's `info["variation"]` reports what was drawn.
-        camera: of pictures, or only some fields of a `Camera`, as in {"yaw": 90.0}; None: one that sees the
+        camera: Of pictures, or only some fields of a `Camera`, as in {"yaw": 90.0}; None: one that sees the
             robots.
-        width: of pictures [pixels].
-        height: of pictures [pixels].
+        width: Width of pictures [pixels].
+        height: Height of pictures [pixels].
         render_mode: "rgb_array": pictures; "human": a page in the browser, whose address is printed once, at
             about the pace of real time; None: neither.
 
     Raises:
-        RobotEnvError: if the robot's description is wrong, or it can't be brought up.
-        ValueError: for an option that makes no sense.
+        RobotEnvError: If the robot's description is wrong, or it can't be brought up.
+        ValueError: For an option that makes no sense.
     """
 
     side_by_side = staticmethod(side_by_side)
@@ -228,13 +228,13 @@ class RobotEnv(DrawnEnv):
         """Starts an episode.
 
         Args:
-            seed: restarts the stream of random numbers; None continues it.
+            seed: Restarts the stream of random numbers; None continues it.
             options: "initial_state", and for a `GoalTask` "goal"; see the class.
 
         Raises:
-            gymnasium.error.ClosedEnvironmentError: after `close()`.
-            ValueError: for an unknown option, or an impossible initial state or goal.
-            SimulatorError: if the backend doesn't answer.
+            gymnasium.error.ClosedEnvironmentError: After `close()`.
+            ValueError: For an unknown option, or an impossible initial state or goal.
+            SimulatorError: If the backend doesn't answer.
         """
         self._check_open()
         options = checks.reset_options(self.task, options or {})
@@ -282,9 +282,7 @@ class RobotEnv(DrawnEnv):
         """Sends a step's commands and returns at once, so that several simulators move at the same time.
 
         `step` with the same action takes the result; a reset or close drops it. Calling it is optional.
-
-        Raises:
-            Exception: as `step`; and a ValueError if a step is under way.
+        Raises as `step`, and ValueError if a step is under way.
         """
         if self._begun is not None:
             raise ValueError("begin_step() was called twice; step() with its action comes next")
@@ -321,11 +319,11 @@ class RobotEnv(DrawnEnv):
         """Carries out one action.
 
         Raises:
-            gymnasium.error.ResetNeeded: if no episode is under way.
-            gymnasium.error.ClosedEnvironmentError: after `close()`.
-            ValueError: if the action isn't in the action space, or isn't the one that was begun, or a method
+            gymnasium.error.ResetNeeded: If no episode is under way.
+            gymnasium.error.ClosedEnvironmentError: After `close()`.
+            ValueError: If the action isn't in the action space, or isn't the one that was begun, or a method
                 of the task returns something impossible.
-            SimulatorError: if the backend doesn't answer.
+            SimulatorError: If the backend doesn't answer.
         """
         task, judge = self.task, self._judge
         number, action, arriving, sent = self._taken(action)
@@ -349,8 +347,8 @@ class RobotEnv(DrawnEnv):
         """Returns all that decides the future: of world, episode, task and generators.
 
         Raises:
-            gymnasium.error.ResetNeeded: before the first episode.
-            SimulatorError: if the task holds something unreadable, or the world runs in real time.
+            gymnasium.error.ResetNeeded: Before the first episode.
+            SimulatorError: If the task holds something unreadable, or the world runs in real time.
         """
         self._check_open()
         if self._state is None or self._begun is not None:
@@ -367,8 +365,8 @@ class RobotEnv(DrawnEnv):
         """Returns to a snapshot of this environment: the same actions lead to the same bits.
 
         Raises:
-            ValueError: if it is of another environment.
-            SimulatorError: if the world isn't that of the snapshot any more; a reset comes next.
+            ValueError: If it is of another environment.
+            SimulatorError: If the world isn't that of the snapshot any more; a reset comes next.
         """
         self._check_open()
         if getattr(snapshot, "of", None) is not self:

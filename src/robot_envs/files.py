@@ -25,15 +25,7 @@ SHARE = Path(__file__).resolve().parent / "share"  # in a wheel (setup.py)
 def own_file(package: str, place: str) -> Path:
     """Finds a file of this package, or of one of its companions, without a running ROS.
 
-    It is in the source tree around this module; in a wheel next to this module; or in a catkin workspace,
-    where rospkg finds the package.
-
-    Args:
-        package: the package's name.
-        place: the file's path in it.
-
-    Raises:
-        RobotEnvError: if it is in none of these.
+    It is in the source tree, in a wheel next to this module, or in a catkin workspace, where rospkg finds it.
     """
     source = TREE if package == "cartpole" else TREE / "companions" / package
     for folder in (source, SHARE / package):
@@ -66,11 +58,7 @@ def is_text(source: Source) -> bool:
 
 
 def locate(source: Source) -> Path:
-    """Returns the path of a file, which need not exist.
-
-    Raises:
-        RobotEnvError: if its package isn't found, or it names no file.
-    """
+    """Returns the path of a file, which need not exist; raises RobotEnvError if its package isn't found."""
     if not isinstance(source, (str, Path)) or not str(source).strip():
         raise RobotEnvError(
             f'a file is a path or "package://PACKAGE/PLACE", or its text; not {source!r}'
@@ -119,15 +107,7 @@ def need_file(path: Path) -> None:
 
 
 def read_urdf(source: Source, arguments: Mapping[str, str]) -> str:
-    """Returns the URDF in a file, which is expanded if it is xacro, or the text itself.
-
-    Args:
-        source: the file or the text, which isn't expanded.
-        arguments: of xacro.
-
-    Raises:
-        RobotEnvError: if it can't be read or expanded.
-    """
+    """Returns the URDF in a file, expanded by xacro's arguments, or the text itself; raises RobotEnvError."""
     if is_text(source):
         return str(source)
     path = locate(source)

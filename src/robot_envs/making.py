@@ -27,17 +27,10 @@ def rendering(make: Maker) -> Maker:
 
 @rendering
 def make_environment(robot: str, task: str, backend: str | None = None, **options: Any) -> RobotEnv:
-    """Makes an environment.
+    """Makes an environment of a robot and a task; see `register`.
 
-    Args:
-        robot: see `register`.
-        task: see `register`.
-        backend: see `RobotEnv`.
-        options: of `RobotEnv`; all others are the task's.
-
-    Raises:
-        RobotEnvError: if robot or task aren't found, or an option is unknown.
-        ValueError: if an option makes no sense.
+    `options` are `RobotEnv`'s; all others are the task's. Raises RobotEnvError for an unknown one or a name
+    that isn't found, ValueError for an option that makes no sense.
     """
     make_task = named(task)
     is_class = isinstance(make_task, type)
@@ -56,12 +49,7 @@ def make_environment(robot: str, task: str, backend: str | None = None, **option
 
 
 def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
-    """Makes a vector of environments; see `make_environment`.
-
-    Raises:
-        RobotEnvError: if robot or task aren't found, or an option is unknown.
-        ValueError: if an option makes no sense.
-    """
+    """Makes a vector of environments; see `make_environment`."""
     return RobotVectorEnv(num_envs, make_environment, **options)
 
 
@@ -89,15 +77,7 @@ def _takes_nothing(found: Any) -> bool:
 
 
 def check_options(given: Iterable[str], known: Iterable[str] = ()) -> None:
-    """Checks that options are known.
-
-    Args:
-        given: their names.
-        known: names besides `RobotEnv`'s.
-
-    Raises:
-        RobotEnvError: if one isn't.
-    """
+    """Raises RobotEnvError for an option that neither `RobotEnv` nor `known` has."""
     names = [*option_names(RobotEnv), *known]
     for name in given:
         if name not in names:
@@ -124,11 +104,7 @@ def option_names(make: Callable[..., Any]) -> list[str]:
 
 
 def named(name: str) -> Any:
-    """Imports "module:attribute".
-
-    Raises:
-        RobotEnvError: if there is no such module, or it has no such attribute.
-    """
+    """Imports "module:attribute"; raises RobotEnvError if there is no such module or attribute."""
     module, colon, attribute = name.partition(":")
     if not colon:
         raise RobotEnvError(f"'{name}' must be written as module:attribute")

@@ -26,11 +26,11 @@ class Scene:
     """What is in a world besides the models of its file.
 
     Args:
-        robots: one or several; the first one defines world, engine, physics_step and control period.
-        objects: of the task.
+        robots: One or several; the first one defines world, engine, physics_step and control period.
+        objects: Objects of the task.
 
     Raises:
-        RobotEnvError: if something in a robot's description is wrong, or a name is used twice.
+        RobotEnvError: If something in a robot's description is wrong, or a name is used twice.
     """
 
     def __init__(self, robots: Sequence[Robot], objects: Sequence[Object] = ()) -> None:
@@ -94,11 +94,7 @@ class Scene:
         return found
 
     def commands(self, given: Commands) -> dict[str, float | tuple[float, ...]]:
-        """Converts commands to plain numbers.
-
-        Raises:
-            TaskError: for an unknown controller, the wrong count of numbers, or one that isn't finite.
-        """
+        """Converts commands to plain numbers; raises TaskError for an unknown controller or wrong numbers."""
         found: dict[str, float | tuple[float, ...]] = {}
         try:
             items = given.items()

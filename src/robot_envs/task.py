@@ -21,9 +21,9 @@ class Object:
     """An obstacle or a thing to handle, which a task needs besides its robots.
 
     Args:
-        name: of the model in the world.
-        file: its SDF or URDF: a path, "package://PACKAGE/PLACE", or the text itself.
-        pose: where it is spawned; an `InitialState` may put it somewhere else for an episode.
+        name: Name of the model in the world.
+        file: Its SDF or URDF: a path, "package://PACKAGE/PLACE", or the text itself.
+        pose: Where it is spawned; an `InitialState` may put it somewhere else for an episode.
     """
 
     name: str
@@ -73,8 +73,8 @@ class Task(ABC):
         """Converts an action to commands.
 
         Args:
-            action: in the action space.
-            state: before the action; `state.commands` is what the controllers hold.
+            action: In the action space.
+            state: Before the action; `state.commands` is what the controllers hold.
 
         Returns:
             Commands by controller; controllers that aren't named keep theirs.

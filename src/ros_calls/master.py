@@ -61,17 +61,17 @@ def call_plain(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> A
     """Calls an XML-RPC method that answers in ROS's form, ``[code, text, value]``.
 
     Args:
-        uri: its ``http://`` address.
-        method: the method's name.
-        args: all of its arguments.
-        timeout: limit for connecting, for sending and for each part of the answer [s of wall time].
+        uri: Its ``http://`` address.
+        method: The method's name.
+        args: All of its arguments.
+        timeout: Limit for connecting, for sending and for each part of the answer [s of wall time].
 
     Returns:
         The value.
 
     Raises:
-        NoAnswer: nothing usable came back.
-        Refused: the answer's code is not 1.
+        NoAnswer: Nothing usable came back.
+        Refused: The answer's code is not 1.
     """
     try:
         with xmlrpc.client.ServerProxy(uri, transport=_Transport(timeout)) as proxy:
@@ -142,7 +142,7 @@ def is_up_or_startable() -> bool:
     """Returns True if the master answers, False if none does but one can be started there.
 
     Raises:
-        MasterDown: another machine doesn't answer, or another program holds the port. (roslaunch
+        MasterDown: Another machine doesn't answer, or another program holds the port. (roslaunch
             itself would wait for minutes.)
     """
     try:

@@ -28,7 +28,7 @@ def require(modules: tuple[str, ...]) -> None:
     """Ends the program if modules are missing, with one line that says how to install them.
 
     Raises:
-        SystemExit: a module is missing.
+        SystemExit: A module is missing.
     """
     text = lack(modules)
     if text:

@@ -59,10 +59,10 @@ class ServiceClient:
     to a node that has ended. This client does neither: after a failure the next call reconnects.
 
     Args:
-        name: the service's name, global or relative to the node's namespace.
-        kind: the service's generated class.
-        persistent: keep the connection between calls, which is several times as fast.
-        timeout: limit for connecting and for an answer [s of wall time]; with infinity a call waits
+        name: The service's name, global or relative to the node's namespace.
+        kind: The service's generated class.
+        persistent: Keep the connection between calls, which is several times as fast.
+        timeout: Limit for connecting and for an answer [s of wall time]; with infinity a call waits
             until the caller's node shuts down. The attribute may be changed.
     """
 
@@ -84,10 +84,10 @@ class ServiceClient:
         """Calls the service with a request, or with its fields in order, and returns the response.
 
         Raises:
-            ServiceGone: no node offers the service, or the connection broke; the call may or may not
+            ServiceGone: No node offers the service, or the connection broke; the call may or may not
                 have been carried out.
-            ServiceHangs: no answer in time.
-            ServiceFailed: the service reported a failure, or the request can't be sent.
+            ServiceHangs: No answer in time.
+            ServiceFailed: The service reported a failure, or the request can't be sent.
         """
         try:
             self.begin(*request)
@@ -100,8 +100,8 @@ class ServiceClient:
         """Sends a request and returns at once; `end` takes the response, and must come next.
 
         Raises:
-            ServiceFailed: as for a call.
-            RuntimeError: a call was begun and not ended.
+            ServiceFailed: As for a call.
+            RuntimeError: A call was begun and not ended.
         """
         if self._begun:
             raise RuntimeError(f"{self.name}: begin() once more before end()")
@@ -121,8 +121,8 @@ class ServiceClient:
         """Waits for the response to `begin` and returns it; the time limit starts again.
 
         Raises:
-            ServiceFailed: as for a call.
-            RuntimeError: no call was begun, or `close` was called since.
+            ServiceFailed: As for a call.
+            RuntimeError: No call was begun, or `close` was called since.
         """
         if not self._begun or self._connection is None:
             raise RuntimeError(f"{self.name}: end() without begin()")

@@ -63,15 +63,15 @@ def wait_for_service(name: str, timeout: float = TIMEOUT) -> str:
     """Waits until a service can be called; fails at once without a master.
 
     Args:
-        name: the service, global or relative to the node's namespace; doubled slashes are harmless.
-        timeout: limit of the wait [s].
+        name: The service, global or relative to the node's namespace; doubled slashes are harmless.
+        timeout: Limit of the wait [s].
 
     Returns:
         The resolved name.
 
     Raises:
-        ServiceMissing: no master, or the service doesn't come up in time.
-        rospy.ROSInterruptException: the node shut down meanwhile.
+        ServiceMissing: No master, or the service doesn't come up in time.
+        rospy.ROSInterruptException: The node shut down meanwhile.
     """
     resolved = str(rospy.resolve_name(name))
 
@@ -96,14 +96,14 @@ def wait_and_call(name: str, kind: Any, *request: Any, timeout: float = TIMEOUT)
     """Waits for a service, calls it, and returns the response.
 
     Args:
-        name: the service.
-        kind: the service's generated class.
-        request: the request, or its fields in order.
-        timeout: limit of the wait for the service, and again of the call [s].
+        name: The service.
+        kind: The service's generated class.
+        request: The request, or its fields in order.
+        timeout: Limit of the wait for the service, and again of the call [s].
 
     Raises:
-        ServiceFailed: the service isn't up in time (ServiceMissing), or fails. See `ServiceClient`.
-        rospy.ROSInterruptException: the node shut down meanwhile.
+        ServiceFailed: The service isn't up in time (ServiceMissing), or fails. See `ServiceClient`.
+        rospy.ROSInterruptException: The node shut down meanwhile.
     """
     resolved = wait_for_service(name, timeout)
     try:

@@ -33,12 +33,12 @@ class Ready:
     """A requirement: a world that answers, with its models and running controllers.
 
     Args:
-        models: names of models that must be in the world.
-        controllers: names of controllers that must run; a name with a leading slash includes its
+        models: Names of models that must be in the world.
+        controllers: Names of controllers that must run; a name with a leading slash includes its
             namespace.
-        ns: the namespace of the other controllers' manager.
-        gazebo_ns: the simulator's node, the prefix of its services' names.
-        lockstep: the world must run in lock-step.
+        ns: The namespace of the other controllers' manager.
+        gazebo_ns: The simulator's node, the prefix of its services' names.
+        lockstep: The world must run in lock-step.
     """
 
     models: Sequence[str] = ()
@@ -56,7 +56,7 @@ class Ready:
         """Returns the first missing thing and the command that fixes it; empty if nothing is missing.
 
         Args:
-            timeout: limit of each call [s].
+            timeout: Limit of each call [s].
         """
         try:
             _master.require(timeout)
@@ -70,11 +70,11 @@ class Ready:
         """Waits until nothing is missing.
 
         Args:
-            timeout: limit of the wait [s].
+            timeout: Limit of the wait [s].
 
         Raises:
-            NotReady: something is still missing after that.
-            rospy.ROSInterruptException: the caller's node was shut down meanwhile.
+            NotReady: Something is still missing after that.
+            rospy.ROSInterruptException: The caller's node was shut down meanwhile.
         """
         missing = still_missing(self, timeout)
         if missing:
@@ -125,12 +125,12 @@ def controller_faults(namespace: str, names: Sequence[str], timeout: float) -> I
     """Yields a line for each controller of a manager that isn't loaded or doesn't run, with the remedy.
 
     Args:
-        namespace: of the manager, without a slash at its end.
-        names: of the controllers.
-        timeout: limit of the call [s].
+        namespace: Namespace of the manager, without a slash at its end.
+        names: Names of the controllers.
+        timeout: Limit of the call [s].
 
     Raises:
-        ServiceFailed: if the manager doesn't answer.
+        ServiceFailed: If the manager doesn't answer.
     """
     service = f"{namespace}/controller_manager/list_controllers"
     answer = ServiceClient(service, ListControllers, timeout=timeout)()

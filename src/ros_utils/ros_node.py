@@ -40,21 +40,21 @@ def ros_node_from_pkg(
 
     Args:
         pkg_name: ROS package.
-        node_name: its executable.
-        launch_master: start a master first if none runs.
-        launch_master_term: the master in an xterm of its own, if there is a display and xterm.
-        launch_new_term: the node in an xterm, if there is a display and xterm; otherwise see
+        node_name: Its executable.
+        launch_master: Start a master first if none runs.
+        launch_master_term: The master in an xterm of its own, if there is a display and xterm.
+        launch_new_term: The node in an xterm, if there is a display and xterm; otherwise see
             `output`.
-        name: the node's name; None for its own default.
+        name: The node's name; None for its own default.
         ns: namespace.
         output: "log" for a log file, "screen" for this terminal.
-        args: the node's arguments: a string, split as in a shell, or a list.
-        timeout: limit of the wait for the registration [s].
+        args: The node's arguments: a string, split as in a shell, or a list.
+        timeout: Limit of the wait for the registration [s].
         wait: False for a program that isn't a ROS node, or to return at once.
-        log_file: the file for the output; None for one of its own in ROS's log folder.
-        env: variables in addition to this process's.
-        master_uri: the master to register at; None for this process's.
-        ready: see `ros_launch.ros_launch_from_pkg`.
+        log_file: The file for the output; None for one of its own in ROS's log folder.
+        env: Variables in addition to this process's.
+        master_uri: The master to register at; None for this process's.
+        ready: See `ros_launch.ros_launch_from_pkg`.
 
     Returns:
         A true handle once the node is registered, or has ended with exit code 0, and everything in

@@ -92,15 +92,14 @@ class _Node:
 
 
 class Followers(Others):
-    """All nodes that follow the clock."""
+    """All nodes that follow the clock, which connect to a socket.
+
+    Args:
+        address: Path of the socket.
+        runner: The script's.
+    """
 
     def __init__(self, address: str, runner: ScriptRunner) -> None:
-        """Listens for nodes.
-
-        Args:
-            address: path of the socket.
-            runner: the script's.
-        """
         self._clock, self._world = runner.clock, runner.world
         self.starting = StartedProcesses()
         self._guard = originals.Condition()

@@ -14,8 +14,8 @@ def install(args: argparse.Namespace, world: ScriptWorld | None = None) -> Scrip
     """Replaces the functions that docs/lockstep.md lists.
 
     Args:
-        args: the launcher's parsed options.
-        world: the world of a node that follows the script's clock; None in the script's own process.
+        args: The launcher's parsed options.
+        world: The world of a node that follows the script's clock; None in the script's own process.
 
     Returns:
         The runner that the replacements share.

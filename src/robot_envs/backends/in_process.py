@@ -72,14 +72,14 @@ class InProcessWorld(RobotBackend):
     No other thread knows this world, so its lock is never taken.
 
     Args:
-        scene: the robots and objects.
-        control_period: simulated time [s] of one action.
+        scene: The robots and objects.
+        control_period: Simulated time [s] of one action.
         engine: "bullet", or "mujoco"; see `robot_sim.physics.engines`.
 
     Raises:
-        ValueError: if the period isn't a whole number of physics steps, or the engine is unknown or not
+        ValueError: If the period isn't a whole number of physics steps, or the engine is unknown or not
             installed.
-        RobotEnvError: if a file isn't found, or something in it is wrong.
+        RobotEnvError: If a file isn't found, or something in it is wrong.
     """
 
     deterministic, complete, shared = True, True, False

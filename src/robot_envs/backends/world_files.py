@@ -24,14 +24,9 @@ logger = logging.getLogger(f"rosout.{__name__}")
 
 
 def fill(sim: Simulator, source: Source | None) -> None:
-    """Loads a world file into an empty world: models, gravity and physics step, as gzserver does.
+    """Loads a world file into an empty world, as gzserver does: models, gravity and physics step.
 
-    Args:
-        sim: of the world.
-        source: the file; `EMPTY`: a ground plane; None: nothing.
-
-    Raises:
-        RobotEnvError: if the file can't be read or simulated.
+    `EMPTY` is a ground plane, None nothing. Raises RobotEnvError if the file can't be read or simulated.
     """
     if source is None:
         return
@@ -63,15 +58,7 @@ def world_models(source: Source | None) -> dict[str, ModelDescription]:
 
 
 def loose_joints(source: Source | None, objects: Sequence[Object]) -> list[tuple[str, str]]:
-    """Returns model and name of all movable joints besides the robots', which a reset puts at 0, at rest.
-
-    Args:
-        source: the world file.
-        objects: of the task.
-
-    Raises:
-        RobotEnvError: if one of them can't be read.
-    """
+    """Returns model and name of the world's and the objects' movable joints, which a reset puts at 0."""
     models = {**world_models(source), **{each.name: object_model(each) for each in objects}}
     return [(name, each.name) for name, model in models.items() for each in model.movable_joints]
 

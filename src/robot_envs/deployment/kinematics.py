@@ -21,11 +21,11 @@ class LinkView:
     Poses are the engine's, by forward kinematics; twists are their derivatives.
 
     Args:
-        robot: the robot.
-        query: of a task.
+        robot: The robot.
+        query: Query of a task.
 
     Raises:
-        RobotEnvError: if the query asks for what the joints don't determine.
+        RobotEnvError: If the query asks for what the joints don't determine.
     """
 
     def __init__(self, robot: Robot, query: StateQuery) -> None:
@@ -92,11 +92,7 @@ def _check(robot: Robot, query: StateQuery) -> None:
 
 
 def _of_link(robot: Robot, name: str) -> tuple[str, Pose]:
-    """Returns the link that joints move, and the pose in it of the link of that name, which it may include.
-
-    Raises:
-        RobotEnvError: if there is none, or it depends on a joint whose position isn't known.
-    """
+    """Returns the link that joints move, and the pose in it of the one named, which may be lumped into it."""
     model, _, plain = name.rpartition(SCOPE)
     links = robot.links
     if model not in ("", robot.model) or not (plain in links.links or plain in links.lumped):

@@ -36,11 +36,11 @@ class CommandLimits:
     | speeds of a vehicle | the controller's own limits |
 
     Args:
-        robot: with these limits.
-        port: of the controller.
-        way: largest move of a position from one command to the next, as a share of what the joint's velocity
+        robot: With these limits.
+        port: Port of the controller.
+        way: Largest move of a position from one command to the next, as a share of what the joint's velocity
             limit allows; infinity: no limit.
-        period: from one command to the next [s].
+        period: From one command to the next [s].
     """
 
     def __init__(self, robot: Robot, port: CommandPort, way: float, period: float) -> None:
@@ -65,10 +65,7 @@ class CommandLimits:
         return [command] if self._port.single else list(command)  # type: ignore[list-item, arg-type]
 
     def stop(self, joints: Mapping[str, JointState]) -> Command:
-        """Returns the command that stops the joints: zero velocity or effort, or their present positions.
-
-        A joint beyond a stop is commanded to the stop.
-        """
+        """Returns the command that stops the joints, within their stops: zero, or their present positions."""
         command = self._port.at_start({name: each.position for name, each in joints.items()})
         return self._bounded(self._numbers(command))
 
@@ -122,18 +119,18 @@ class Pilot:
     aren't moved to the task's initial state.
 
     Args:
-        robot: the robot.
-        task: what the policy has learned.
-        act: the policy: the action for an observation.
-        period: from one step to the next [s].
-        seed: of what the task draws, such as a goal.
-        goal: of a task that has goals; None: it draws one.
-        way: see `CommandLimits`.
-        say: reports commands beyond their limits, once for each controller.
+        robot: The robot.
+        task: What the policy has learned.
+        act: The policy: the action for an observation.
+        period: From one step to the next [s].
+        seed: Seed of what the task draws, such as a goal.
+        goal: Goal of a task that has goals; None: it draws one.
+        way: See `CommandLimits`.
+        say: Reports commands beyond their limits, once for each controller.
 
     Raises:
-        RobotEnvError: if the robot's description is wrong, or the task asks for what joints don't determine.
-        ValueError: if the goal isn't one of the task's.
+        RobotEnvError: If the robot's description is wrong, or the task asks for what joints don't determine.
+        ValueError: If the goal isn't one of the task's.
     """
 
     def __init__(
@@ -199,18 +196,9 @@ class Pilot:
     def step(
         self, time: float, joints: Joints, sensors: Sensors = NO_SENSORS
     ) -> dict[str, Command] | None:
-        """One step.
+        """Returns commands for a time since the beginning [s]; None if the task's episode would end.
 
-        Args:
-            time: since the beginning [s].
-            joints: their states.
-            sensors: readings of those that the task's query names.
-
-        Returns:
-            Commands to send, by controller; None if the task's episode would have ended.
-
-        Raises:
-            ValueError: if the policy or the task returns something impossible.
+        Raises ValueError if the policy or the task returns something impossible.
         """
         task, state = self._task, self._state(time, joints, sensors)
         over = self._judge.is_terminal(state)

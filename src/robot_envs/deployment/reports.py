@@ -27,11 +27,11 @@ class JointListener:
     future or long past, is a fault until the joint's next good state.
 
     Args:
-        topic: of the joint states.
-        model: of the robot: joints may be named model::joint.
-        joints: their plain names.
-        limits: of the joints that have any.
-        late: how old a stamp may be [s], at least 1 s.
+        topic: Topic of the joint states.
+        model: Model of the robot: joints may be named model::joint.
+        joints: Their plain names.
+        limits: Limits of the joints that have any.
+        late: How old a stamp may be [s], at least 1 s.
     """
 
     def __init__(
@@ -119,8 +119,8 @@ class ControllerWatch:
     A real robot may have no controller manager; then nothing is known of them.
 
     Args:
-        robot: whose controllers take the commands.
-        over: ends the thread.
+        robot: Whose controllers take the commands.
+        over: Ends the thread.
     """
 
     def __init__(self, robot: Robot, over: threading.Event) -> None:

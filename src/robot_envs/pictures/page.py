@@ -40,15 +40,15 @@ class RobotOnPage:
     a viewer has turned them, and so does a recording's.
 
     Args:
-        server: of the page.
-        placement: of the robot.
-        positions: returns its joints' positions [rad, m], by name.
-        camera: of its pictures.
-        size: of its pictures [pixels].
-        beside: how many robots of its kind are on the page already.
+        server: Server of the page.
+        placement: Placement of the robot.
+        positions: Returns its joints' positions [rad, m], by name.
+        camera: Camera of its pictures.
+        size: Size of its pictures [pixels].
+        beside: How many robots of its kind are on the page already.
 
     Raises:
-        SimulatorError: here and later, if the backend has to be asked where the robot is, and doesn't answer.
+        SimulatorError: Here and later, if the backend has to be asked where the robot is, and doesn't answer.
     """
 
     def __init__(
@@ -91,11 +91,7 @@ class RobotOnPage:
         self()
 
     def __call__(self, caption: str = "") -> None:
-        """Moves it to where it is now.
-
-        Args:
-            caption: a line of text below it; empty: the present one stays.
-        """
+        """Moves it to where it is now; a caption appears below it, "" keeps the present one."""
         self.show(self.look(), caption)
 
     def look(self) -> Placed:
@@ -143,9 +139,9 @@ class LivePage:
     Prints its address once.
 
     Args:
-        title: of the page.
-        draw_on: see `RobotEnv.draw_on`.
-        period: wall time for which each state is shown [s].
+        title: Title of the page.
+        draw_on: See `RobotEnv.draw_on`.
+        period: Wall time for which each state is shown [s].
     """
 
     def __init__(

@@ -30,9 +30,9 @@ class Surroundings:
     doesn't have.
 
     Args:
-        scene: the robots and objects.
-        ask: returns the poses of link frames in the world, each link named model::link.
-        goal: the task's `goal_mark`.
+        scene: The robots and objects.
+        ask: Returns the poses of link frames in the world, each link named model::link.
+        goal: The task's `goal_mark`.
     """
 
     def __init__(
@@ -101,9 +101,9 @@ class Placement:
     """A robot on a ground at z = 0, or above it.
 
     Args:
-        robot: the robot.
-        base: returns the pose of its root link; None: where it is spawned.
-        beside: what else is in its world; None: nothing.
+        robot: The robot.
+        base: Returns the pose of its root link; None: where it is spawned.
+        beside: What else is in its world; None: nothing.
     """
 
     def __init__(
@@ -127,12 +127,7 @@ class Placement:
         return {self.name: self.shapes, **(self._beside.shapes if self._beside else {})}
 
     def poses(self, positions: Mapping[str, float], base: Pose) -> dict[str, dict[str, Pose]]:
-        """Returns the frame of every link in the world, by model.
-
-        Args:
-            positions: of the robot's joints [rad, m].
-            base: the pose of its root link.
-        """
+        """Returns the frame of every link in the world, by model; positions are in [rad, m]."""
         others = self._beside.poses() if self._beside else {}
         own = {} if self.name in others else link_poses(self.description, base, positions)
         return {self.name: own, **others}
@@ -154,13 +149,10 @@ class Placement:
         return np.concatenate([np.zeros((0, 3)), *corners])
 
     def camera(self, camera: CameraLike, aspect: float) -> Camera:
-        """`camera`, or one that sees all that joints can reach, or in which a robot that drives is a third.
+        """Returns `camera`, or one that sees all that joints reach, or a vehicle as a third of the picture.
 
-        A task's goal on the floor is seen from above, with more around the robot.
-
-        Args:
-            camera: for the robot as it is spawned, or some of its fields.
-            aspect: of the pictures, width to height.
+        A task's goal on the floor is seen from above, with more around the robot. `aspect` is width to
+        height.
         """
         if isinstance(camera, Camera):
             return camera

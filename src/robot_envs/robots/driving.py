@@ -62,14 +62,14 @@ class DriveToGoal(Task):
     `distance`: of the goal [m]. `is_success`: whether it is there. `touched`.
 
     Args:
-        robot: the vehicle, with one controller that takes cmd_vel.
-        laser: its sensor; None: it has none, and nothing is touched.
-        ranges: sectors of the laser, up to the number of its rays.
-        world: a world file in place of the robot's.
-        touch: range of the laser at which the vehicle touches something [m].
-        clearance: of starts and goals, from the vehicle's middle [m].
-        nearest: of goals from the start [m].
-        furthest: of goals from the start [m].
+        robot: The vehicle, with one controller that takes cmd_vel.
+        laser: Its sensor; None: it has none, and nothing is touched.
+        ranges: Sectors of the laser, up to the number of its rays.
+        world: A world file in place of the robot's.
+        touch: Range of the laser at which the vehicle touches something [m].
+        clearance: Clearance of starts and goals, from the vehicle's middle [m].
+        nearest: Least distance of goals from the start [m].
+        furthest: Largest distance of goals from the start [m].
     """
 
     max_steps = 150
@@ -212,8 +212,8 @@ class Floor:
     """What stands on the floor of a world, seen from above.
 
     Args:
-        models: of the world. Planes and meshes don't count.
-        size: how far points may be from things that span less, or from the origin [m].
+        models: Models of the world. Planes and meshes don't count.
+        size: How far points may be from things that span less, or from the origin [m].
     """
 
     def __init__(self, models: Mapping[str, ModelDescription], size: float) -> None:
@@ -240,17 +240,7 @@ class Floor:
         start: tuple[float, float] | None = None,
         away: tuple[float, float] = (0.0, math.inf),
     ) -> tuple[float, float]:
-        """Draws a free point (x, y) [m].
-
-        Args:
-            rng: draws it.
-            clearance: from all things [m].
-            start: another point.
-            away: least and largest distance from that [m].
-
-        Raises:
-            TaskError: if none is found.
-        """
+        """Draws a free point (x, y) [m], `away` from `start` [m]; raises TaskError if none is found."""
         for _ in range(TRIES):
             points = rng.uniform(self.low, self.high, (AT_ONCE, 2))
             fit = self.clearance(points) >= clearance

@@ -41,13 +41,7 @@ class Subject:
 
 
 def expect_error(call: Callable[[], Any], what: str, *kinds: type[Exception]) -> None:
-    """Raises AssertionError unless a call raises an error of some kinds.
-
-    Args:
-        call: what should be refused.
-        what: describes the call, for the error.
-        kinds: the errors that may be raised.
-    """
+    """Raises AssertionError, which says `what`, unless a call raises an error of some kinds."""
     wanted = " or ".join(kind.__name__ for kind in kinds)
     try:
         call()
@@ -71,13 +65,9 @@ PARTS = {
 
 
 def rollout(env: gymnasium.Env[Any, Any], steps: int, seed: int, two_phases: bool = False) -> Given:
-    """Returns the results of an environment for seeded random actions; episodes follow one another.
+    """Returns the results of seeded random actions; episodes follow one another.
 
-    Args:
-        env: the environment.
-        steps: number of actions.
-        seed: of the first episode, and of the actions.
-        two_phases: call `begin_step` before each step.
+    With `two_phases` it calls `begin_step` before each step.
     """
     env.action_space.seed(seed)
     given: Given = [env.reset(seed=seed)]

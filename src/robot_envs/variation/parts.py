@@ -39,7 +39,7 @@ class Parts:
     | `controllers` | controllers that run |
 
     Raises:
-        RobotEnvError: if something in a robot's description is wrong.
+        RobotEnvError: If something in a robot's description is wrong.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -91,15 +91,7 @@ def gains_of(controller: RobotPart) -> dict[str, Gains]:
 
 
 def check_tunable(pids: Mapping[str, Mapping[str, Gains]], factors: Mapping[str, float]) -> None:
-    """Checks that gains can be changed over ROS: dynamic_reconfigure silently clips large ones.
-
-    Args:
-        pids: gains by controller, and place below it.
-        factors: the largest, by controller.
-
-    Raises:
-        ValueError: if gains are too large for dynamic_reconfigure.
-    """
+    """Raises ValueError for gains, times their largest factors, that dynamic_reconfigure would clip."""
     for controller, factor in factors.items():
         for place, gains in pids[controller].items():
             for name, most in MOST_GAINS.items():

@@ -105,9 +105,8 @@ def families(tokens: Sequence[str]) -> list[dict[int, psutil.Process]]:
 def started(own: Sequence[Start]) -> list[Start]:
     """Returns what any process of this user started under this master and still runs.
 
-    Args:
-        own: of the calling process; one whose main thread has ended, but not the others, has no
-            environment any more.
+    `own` are the caller's: a process whose main thread has ended, but not the others, has no environment any
+    more.
     """
     found = {start.token: start for start in own}
     for process in psutil.process_iter():
@@ -120,17 +119,10 @@ def started(own: Sequence[Start]) -> list[Start]:
 
 
 def end(starts: Sequence[Start], reap: Callable[[set[str]], bool]) -> bool:
-    """Ends starts with their descendants, nodes first and the master last.
+    """Ends starts with their descendants, nodes first and the master last; returns whether nothing is left.
 
-    Skips a start that the calling process itself descends from.
-
-    Args:
-        starts: what to end.
-        reap: collects exit codes of ended children; given tokens, waits for theirs and returns whether
-            all have come.
-
-    Returns:
-        Whether nothing else of them is left.
+    Skips a start that the calling process itself descends from. `reap` collects exit codes of ended children;
+    given tokens, it waits for theirs and returns whether all have come.
     """
     own_line = {process.pid for process in (psutil.Process(), *psutil.Process().parents())}
     gone = True
@@ -148,11 +140,8 @@ def end(starts: Sequence[Start], reap: Callable[[set[str]], bool]) -> bool:
 def end_orphans(reap: Callable[[set[str]], bool]) -> bool:
     """Waits until launches and masters with a killed caller are gone: the kernel has signalled them.
 
-    That takes some seconds, in which their master still answers. Those that don't end by themselves are
-    ended.
-
-    Returns:
-        Whether none is left.
+    In these seconds their master still answers. Ends those that don't end by themselves; returns whether none
+    is left.
     """
     orphans = [each for each in started(()) if each.kind != "node" and each.is_orphan]
     deadline = time.monotonic() + max((END_PATIENCE[each.kind] for each in orphans), default=0.0)

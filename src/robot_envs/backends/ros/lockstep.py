@@ -72,10 +72,10 @@ class LockstepWorld(RobotBackend):
     `begin` sends the request, `act` takes the answer; so several simulators move at the same time.
 
     Args:
-        scene: the robots and objects; they are there, and the controllers run.
-        ticks: physics steps of one action.
-        world: shared with the other environments of this process.
-        timeout: wall time [s] that an answer may take, on top of 10 ms for each tick.
+        scene: The robots and objects; they are there, and the controllers run.
+        ticks: Physics steps of one action.
+        world: Shared with the other environments of this process.
+        timeout: Wall time [s] that an answer may take, on top of 10 ms for each tick.
     """
 
     deterministic = complete = shared = True

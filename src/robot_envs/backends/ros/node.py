@@ -24,12 +24,7 @@ def full_name(argv: list[str], default: str) -> str:
 
 
 def master_is_up() -> bool:
-    """Returns whether the ROS master answers.
-
-    Raises:
-        RobotEnvError: if it doesn't answer and can't be started here: it is another machine's, or something
-            else uses its port.
-    """
+    """Returns whether the master answers; raises RobotEnvError if none could be started at its address."""
     try:
         return master.is_up_or_startable()
     except master.MasterDown as error:

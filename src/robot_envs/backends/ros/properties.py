@@ -43,8 +43,8 @@ class RosVariation:
     """Varies the robots of a simulator, and restores them as they were found; see `Changeable`.
 
     Args:
-        scene: the robots.
-        timeout: of a call [s].
+        scene: The robots.
+        timeout: Timeout of a call [s].
     """
 
     def __init__(self, scene: Scene, timeout: float = TIMEOUT) -> None:

@@ -92,15 +92,9 @@ class JointStates:
         return all(abs(joint.position - positions[name]) < _SAME for name, joint in found.items())
 
     def wait_until(self, due: float | None) -> tuple[float, dict[str, JointState]]:
-        """Waits for the joint state of a simulated time [s]; None: takes any.
+        """Waits for the joint state of a time, or any for None; returns its time [s], and the joints.
 
-        There is no bound on a long control period as long as joint states come.
-
-        Returns:
-            Its simulated time [s], and the joints.
-
-        Raises:
-            SimulatorError: if they stop coming.
+        There is no bound on a long control period; raises SimulatorError if joint states stop coming.
         """
         with self._arrived:
             while True:
@@ -129,9 +123,9 @@ class CommandTopic:
     """The topic on which a controller listens for commands.
 
     Args:
-        scene: the robots.
-        robot: whose controller it is.
-        port: how that is commanded.
+        scene: The robots.
+        robot: Whose controller it is.
+        port: How that is commanded.
     """
 
     def __init__(self, scene: Scene, robot: Robot, port: CommandPort) -> None:
@@ -145,11 +139,8 @@ class CommandTopic:
     def wait(self) -> None:
         """Waits until the controller listens; advertises the topic again halfway.
 
-        rospy turns a subscriber away that connects after one environment's end and before the next one's
-        beginning in the same process, and doesn't try again.
-
-        Raises:
-            SimulatorError: if the controller doesn't listen in time.
+        rospy turns a subscriber away that connects between one environment's end and the next one's beginning
+        in the same process, and doesn't try again. Raises SimulatorError after STATE_TIMEOUT.
         """
         topic = self._publisher.resolved_name
         if wait_until(self._publisher.get_num_connections, STATE_TIMEOUT / 2, topic):
@@ -171,13 +162,13 @@ class RealtimeWorld(RobotBackend):
     time passes depends on the machine.
 
     Args:
-        scene: the robot, which is there, with its controllers running.
-        control_period: simulated time from one joint state to the next one that is taken [s]; 0 takes the
+        scene: The robot, which is there, with its controllers running.
+        control_period: Simulated time from one joint state to the next one that is taken [s]; 0 takes the
             newest one without waiting.
-        world: shared with the other environments of this process.
+        world: Shared with the other environments of this process.
 
     Raises:
-        RobotEnvError: for several robots.
+        RobotEnvError: For several robots.
     """
 
     deterministic, complete, shared = False, False, True
@@ -210,8 +201,8 @@ class RealtimeWorld(RobotBackend):
     def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         """See `RobotBackend.reset`; leaves the world paused, and joints at rest.
 
-        Waits for the joint state that the reset publishes. If the simulator publishes none while it is
-        paused, the joints are taken to be where they were put.
+        A simulator that publishes no joint state while paused is taken to have the joints where they were
+        put.
         """
         positions = {name: at for name, (at, _) in self.scene.placed_joints(initial).items()}
         with self._simulator:

@@ -65,14 +65,14 @@ class SensorListener:
     """Keeps the newest reading of each sensor, and when it has come.
 
     Args:
-        robot: whose plugins, or `sensor_topics`, name the topics.
-        names: of its sensors.
-        clock: tells the time of arrival [s].
-        off: how far stamps may be off that clock [s]; then, too, a reading counts only if its stamp is newer
+        robot: Whose plugins, or `sensor_topics`, name the topics.
+        names: Names of its sensors.
+        clock: Tells the time of arrival [s].
+        off: How far stamps may be off that clock [s]; then, too, a reading counts only if its stamp is newer
             than the one before. None: the clock isn't that of the stamps.
 
     Raises:
-        RobotEnvError: if the robot has no such sensor, or none whose topic is known.
+        RobotEnvError: If the robot has no such sensor, or none whose topic is known.
     """
 
     def __init__(
@@ -140,10 +140,7 @@ class SensorListener:
             )
 
     def trouble(self, late: float) -> str:
-        """Returns what can't be read, or is older than `late` [s] and three periods; empty if all is well.
-
-        Time counts from the last `resume` at the earliest.
-        """
+        """Returns which sensor is unreadable, or silent for `late` [s] and three periods since `resume`."""
         now = self._clock()
         with self._arrived:
             for name, heard in self._heard.items():

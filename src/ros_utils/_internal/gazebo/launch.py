@@ -56,31 +56,31 @@ def launch_Gazebo(
     process exits.
 
     Args:
-        paused: start with the simulation paused.
-        use_sim_time: let nodes use simulated time.
-        gui: with a window; without a display the simulation continues without one.
-        recording: record the state log.
-        debug: run the server in a debugger.
-        verbose: more messages from the server.
-        output: where the simulator's output goes, "screen" or "log".
-        custom_world_path: world file; wins over the package's.
-        custom_world_pkg, custom_world_name: world file ``<pkg>/worlds/<name>``.
-        respawn_gazebo: start the server again if it dies.
-        pub_clock_frequency: messages on /clock per second of simulated time [Hz]; 0 for one each
+        paused: Start with the simulation paused.
+        use_sim_time: Let nodes use simulated time.
+        gui: With a window; without a display the simulation continues without one.
+        recording: Record the state log.
+        debug: Run the server in a debugger.
+        verbose: More messages from the server.
+        output: Where the simulator's output goes, "screen" or "log".
+        custom_world_path: World file; wins over the package's.
+        custom_world_pkg, custom_world_name: World file ``<pkg>/worlds/<name>``.
+        respawn_gazebo: Start the server again if it dies.
+        pub_clock_frequency: Messages on /clock per second of simulated time [Hz]; 0 for one each
             step. At 1 kHz each rospy node spends a tenth of its time on them.
-        server_required: end the launch when the server ends.
-        gui_required: end the launch when the window ends.
-        launch_new_term: in an xterm, if there is a display and xterm; otherwise the output goes to
+        server_required: End the launch when the server ends.
+        gui_required: End the launch when the window ends.
+        launch_new_term: In an xterm, if there is a display and xterm; otherwise the output goes to
             a log file.
-        lockstep: time moves only on request (the stand-in's own argument; Gazebo has none).
-        seed: seed of the simulator (the stand-in's own argument).
-        timeout: limit of the wait [s].
-        extra_gazebo_args: further arguments for the server.
-        gazebo_ns: namespace of its services.
-        log_file: the file for its output; None for the terminal or one of its own.
-        env: variables in addition to this process's.
-        master_uri: the master to run under; None for this process's.
-        ready: for a world with models of its own; see `ros_launch.ros_launch_from_pkg`.
+        lockstep: Time moves only on request (the stand-in's own argument; Gazebo has none).
+        seed: Seed of the simulator (the stand-in's own argument).
+        timeout: Limit of the wait [s].
+        extra_gazebo_args: Further arguments for the server.
+        gazebo_ns: Namespace of its services.
+        log_file: The file for its output; None for the terminal or one of its own.
+        env: Variables in addition to this process's.
+        master_uri: The master to run under; None for this process's.
+        ready: For a world with models of its own; see `ros_launch.ros_launch_from_pkg`.
 
     Returns:
         A true handle once the simulator answers and everything in `ready` is there. False, with an
@@ -131,7 +131,7 @@ def close_Gazebo(*, master_uri: str | None = None) -> bool:
     A master that the launch brought up ends with it.
 
     Args:
-        master_uri: the simulator's master; None for this process's.
+        master_uri: The simulator's master; None for this process's.
 
     Returns:
         True if nothing of it is left.

@@ -52,7 +52,7 @@ def gazebo_reset_sim(
 
     Args:
         retries: attempts.
-        timeout, gazebo_ns: see `ros_gazebo`.
+        timeout, gazebo_ns: See `ros_gazebo`.
 
     Returns:
         True if the simulator did it.
@@ -87,9 +87,9 @@ def gazebo_step_physics(
     """Pauses the simulation and advances it by `steps` physics steps, as ``gz world -m`` does.
 
     Args:
-        steps: number of steps, at least 1.
-        timeout: limit for each 1000 steps [s].
-        gazebo_ns: the simulator's node.
+        steps: Number of steps, at least 1.
+        timeout: Limit for each 1000 steps [s].
+        gazebo_ns: The simulator's node.
 
     Returns:
         True once the steps are done.
@@ -145,11 +145,11 @@ def gazebo_set_physics_properties(
     """Changes the given properties; the others stay unchanged.
 
     Args:
-        time_step: of one physics step [s], above 0.
-        max_update_rate: steps per second of wall time [Hz]; 0 is as fast as possible.
-        gravity: x, y, z [m/s²].
-        ode_config: the solver's settings.
-        timeout, gazebo_ns: see `ros_gazebo`.
+        time_step: Time step of one physics step [s], above 0.
+        max_update_rate: Steps per second of wall time [Hz]; 0 is as fast as possible.
+        gravity: X, y, z [m/s²].
+        ode_config: The solver's settings.
+        timeout, gazebo_ns: See `ros_gazebo`.
 
     Returns:
         True if the simulator did it.
@@ -181,9 +181,9 @@ def gazebo_set_max_update_rate(
     """Sets how fast simulated time passes.
 
     Args:
-        max_update_rate: a FACTOR of real time, 1 for real time; 0 is as fast as possible. (The
+        max_update_rate: A FACTOR of real time, 1 for real time; 0 is as fast as possible. (The
             getter answers in Hz; `gazebo_set_physics_properties` takes Hz.)
-        timeout, gazebo_ns: see `ros_gazebo`.
+        timeout, gazebo_ns: See `ros_gazebo`.
 
     Returns:
         True if the simulator did it.

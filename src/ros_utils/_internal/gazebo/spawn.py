@@ -81,9 +81,9 @@ def gazebo_delete_model(
     """Deletes a model.
 
     Args:
-        model_name: the model's name.
-        timeout, gazebo_ns: see `ros_gazebo`.
-        verify: return only once the model is no longer in the world's list.
+        model_name: The model's name.
+        timeout, gazebo_ns: See `ros_gazebo`.
+        verify: Return only once the model is no longer in the world's list.
 
     Returns:
         True if the model existed and is gone.
@@ -154,14 +154,14 @@ def gazebo_spawn_urdf_string(
     """Spawns a model from URDF text.
 
     Args:
-        model_string: the URDF, with xacro already expanded.
-        model_name: name of the new model.
-        robot_namespace: namespace of its plugins, e.g. of its controller manager.
-        reference_frame: model or link that the pose refers to; "world" for the origin.
-        pos_x, pos_y, pos_z: position [m].
-        ori_x, ori_y, ori_z, ori_w: orientation, a quaternion.
-        timeout, gazebo_ns: see `ros_gazebo`.
-        verify: return only once the model is in the world's list.
+        model_string: The URDF, with xacro already expanded.
+        model_name: Name of the new model.
+        robot_namespace: Namespace of its plugins, e.g. of its controller manager.
+        reference_frame: Model or link that the pose refers to; "world" for the origin.
+        pos_x, pos_y, pos_z: Position [m].
+        ori_x, ori_y, ori_z, ori_w: Orientation, a quaternion.
+        timeout, gazebo_ns: See `ros_gazebo`.
+        verify: Return only once the model is in the world's list.
 
     Returns:
         Whether it was spawned, and the simulator's text or an earlier error: a pair that is false

@@ -84,14 +84,14 @@ def gazebo_set_model_state(
     """Moves a model and keeps its joint positions. A zero twist also stops its joints.
 
     Args:
-        model_name: the model's name.
-        ref_frame: model or link that pose and twist refer to.
-        pos_x, pos_y, pos_z: position [m].
-        ori_x, ori_y, ori_z, ori_w: orientation, a quaternion; all zeros means no rotation.
+        model_name: The model's name.
+        ref_frame: Model or link that pose and twist refer to.
+        pos_x, pos_y, pos_z: Position [m].
+        ori_x, ori_y, ori_z, ori_w: Orientation, a quaternion; all zeros means no rotation.
         lin_vel_x, lin_vel_y, lin_vel_z: [m/s].
         ang_vel_x, ang_vel_y, ang_vel_z: [rad/s].
-        sleep_time: pause afterwards [s of wall time].
-        timeout, gazebo_ns: see `ros_gazebo`.
+        sleep_time: Pause afterwards [s of wall time].
+        timeout, gazebo_ns: See `ros_gazebo`.
 
     Returns:
         True if the simulator did it.
@@ -154,11 +154,11 @@ def gazebo_set_model_configuration(
     """Moves a model's joints to positions [rad, m] at once.
 
     Args:
-        model_name: the model's name.
-        joint_names: the joints to move.
-        joint_positions: one for each joint [rad, m].
-        urdf_param_name: parameter with its URDF; Gazebo doesn't use it.
-        timeout, gazebo_ns: see `ros_gazebo`.
+        model_name: The model's name.
+        joint_names: The joints to move.
+        joint_positions: One for each joint [rad, m].
+        urdf_param_name: Parameter with its URDF; Gazebo doesn't use it.
+        timeout, gazebo_ns: See `ros_gazebo`.
 
     Returns:
         True if the simulator did it.
