@@ -25,12 +25,8 @@ Placed = dict[str, tuple[float, float]]
 class Scene:
     """What is in a world besides the models of its file.
 
-    Args:
-        robots: One or several; the first one defines world, engine, physics_step and control period.
-        objects: Objects of the task.
-
-    Raises:
-        RobotEnvError: If something in a robot's description is wrong, or a name is used twice.
+    The first robot defines world, engine, physics_step and control period. Raises RobotEnvError if something
+    in a robot's description is wrong, or a name is used twice.
     """
 
     def __init__(self, robots: Sequence[Robot], objects: Sequence[Object] = ()) -> None:

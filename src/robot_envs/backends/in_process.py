@@ -69,17 +69,8 @@ def _refusals() -> Iterator[None]:
 class InProcessWorld(RobotBackend):
     """A scene's robots and their controllers, in a world of their own.
 
-    No other thread knows this world, so its lock is never taken.
-
-    Args:
-        scene: The robots and objects.
-        control_period: Simulated time [s] of one action.
-        engine: "bullet", or "mujoco"; see `robot_sim.physics.engines`.
-
-    Raises:
-        ValueError: If the period isn't a whole number of physics steps, or the engine is unknown or not
-            installed.
-        RobotEnvError: If a file isn't found, or something in it is wrong.
+    No other thread knows this world, so its lock is never taken. Raises ValueError for a control period [s]
+    of a fraction of physics steps or a missing engine, RobotEnvError for a wrong file.
     """
 
     deterministic, complete, shared = True, True, False

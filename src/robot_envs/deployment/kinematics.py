@@ -18,14 +18,8 @@ _WORLD = ("", "world")
 class LinkView:
     """Computes the links of a query, for a robot that is fixed to the world where its description says.
 
-    Poses are the engine's, by forward kinematics; twists are their derivatives.
-
-    Args:
-        robot: The robot.
-        query: Query of a task.
-
-    Raises:
-        RobotEnvError: If the query asks for what the joints don't determine.
+    Poses are the engine's, by forward kinematics; twists are their derivatives. Raises RobotEnvError if the
+    query asks for what the joints don't determine.
     """
 
     def __init__(self, robot: Robot, query: StateQuery) -> None:

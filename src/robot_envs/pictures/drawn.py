@@ -31,17 +31,8 @@ RENDER_MODES = ("human", "rgb_array")
 class RobotPicture:
     """Draws a robot and a ground, without a display; loads what it needs with the first picture.
 
-    Args:
-        robot: The robot.
-        width: Width of the pictures [pixels].
-        height: Height of the pictures [pixels].
-        camera: For the robot as it is spawned; see `Placement.camera`.
-        base: Returns the pose of its root link, which the camera follows; None: where it is spawned.
-        beside: What else is in its world; None: nothing.
-
-    Raises:
-        ValueError: For an impossible size or camera.
-        RobotEnvError: Later, if the robot's file can't be read.
+    `base` returns the pose of its root link, which the camera follows; None: where it is spawned. Raises
+    ValueError for an impossible size or camera, and later RobotEnvError if the robot's file can't be read.
     """
 
     def __init__(

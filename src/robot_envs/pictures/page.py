@@ -36,19 +36,9 @@ class Placed(NamedTuple):
 class RobotOnPage:
     """A robot on a page; the first one brings ground, lights, initial camera and a switch to follow it.
 
-    A followed robot stays in place on the page, and the world moves instead. So all cameras follow, however
-    a viewer has turned them, and so does a recording's.
-
-    Args:
-        server: Server of the page.
-        placement: Placement of the robot.
-        positions: Returns its joints' positions [rad, m], by name.
-        camera: Camera of its pictures.
-        size: Size of its pictures [pixels].
-        beside: How many robots of its kind are on the page already.
-
-    Raises:
-        SimulatorError: Here and later, if the backend has to be asked where the robot is, and doesn't answer.
+    A followed robot stays in place on the page, and the world moves instead. So all cameras follow, however a
+    viewer has turned them, and so does a recording's. `beside` is the number of robots already there. Raises
+    SimulatorError, here and later, if the backend has to be asked where the robot is, and doesn't answer.
     """
 
     def __init__(
@@ -134,15 +124,7 @@ class RobotOnPage:
 
 
 class LivePage:
-    """A page of this machine that shows a robot's states at about the pace of real time.
-
-    Prints its address once.
-
-    Args:
-        title: Title of the page.
-        draw_on: See `RobotEnv.draw_on`.
-        period: Wall time for which each state is shown [s].
-    """
+    """A page of this machine that shows each state for a period [s of wall time]; prints its address."""
 
     def __init__(
         self, title: str, draw_on: Callable[[viser.ViserServer], RobotOnPage], period: float

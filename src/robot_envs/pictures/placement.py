@@ -26,13 +26,8 @@ Shapes = list[tuple[str, Shape]]  # each with its link
 class Surroundings:
     """What is visible besides the first robot: other robots, a task's objects and goal, the world's models.
 
-    A backend is asked where they are, and also for the first robot's links if it has joints that a state
-    doesn't have.
-
-    Args:
-        scene: The robots and objects.
-        ask: Returns the poses of link frames in the world, each link named model::link.
-        goal: The task's `goal_mark`.
+    `ask` returns the poses of link frames, named model::link: of these, and of the first robot's links if it
+    has joints that a state doesn't have. `goal` is the task's `goal_mark`.
     """
 
     def __init__(
@@ -98,12 +93,9 @@ QUARTERS = (0.0, pi / 2.0, pi, -pi / 2.0)  # [rad] of a joint without stops
 
 
 class Placement:
-    """A robot on a ground at z = 0, or above it.
+    """A robot on a ground at z = 0, or above it, with its surroundings.
 
-    Args:
-        robot: The robot.
-        base: Returns the pose of its root link; None: where it is spawned.
-        beside: What else is in its world; None: nothing.
+    `base` returns the pose of its root link; None: where it is spawned.
     """
 
     def __init__(

@@ -209,11 +209,9 @@ def heading(pose: Pose) -> Vector:
 
 
 class Floor:
-    """What stands on the floor of a world, seen from above.
+    """What stands on the floor of a world, seen from above; planes and meshes don't count.
 
-    Args:
-        models: Models of the world. Planes and meshes don't count.
-        size: How far points may be from things that span less, or from the origin [m].
+    Points are up to `size` [m] from things that span less, or from the origin.
     """
 
     def __init__(self, models: Mapping[str, ModelDescription], size: float) -> None:

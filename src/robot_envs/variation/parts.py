@@ -37,9 +37,6 @@ class Parts:
     | `lumped` | links that a fixed joint merges into another one: that one's name |
     | `joints` | joints that move |
     | `controllers` | controllers that run |
-
-    Raises:
-        RobotEnvError: If something in a robot's description is wrong.
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -69,13 +69,8 @@ class KeptSnapshot:
 class LockstepWorld(RobotBackend):
     """One service call for each action: command, advance, read; time stands still between.
 
-    `begin` sends the request, `act` takes the answer; so several simulators move at the same time.
-
-    Args:
-        scene: The robots and objects; they are there, and the controllers run.
-        ticks: Physics steps of one action.
-        world: Shared with the other environments of this process.
-        timeout: Wall time [s] that an answer may take, on top of 10 ms for each tick.
+    `begin` sends the request, `act` takes the answer; so several simulators move at the same time. `timeout`
+    is the wall time [s] that an answer may take, on top of 10 ms for each tick.
     """
 
     deterministic = complete = shared = True

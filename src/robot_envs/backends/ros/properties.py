@@ -40,12 +40,7 @@ TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 class RosVariation:
-    """Varies the robots of a simulator, and restores them as they were found; see `Changeable`.
-
-    Args:
-        scene: The robots.
-        timeout: Timeout of a call [s].
-    """
+    """Varies the robots of a simulator, and restores them as they were found; see `Changeable`."""
 
     def __init__(self, scene: Scene, timeout: float = TIMEOUT) -> None:
         self._timeout = timeout

@@ -120,13 +120,7 @@ class JointStates:
 
 
 class CommandTopic:
-    """The topic on which a controller listens for commands.
-
-    Args:
-        scene: The robots.
-        robot: Whose controller it is.
-        port: How that is commanded.
-    """
+    """The topic on which a robot's controller listens for commands."""
 
     def __init__(self, scene: Scene, robot: Robot, port: CommandPort) -> None:
         self._scene, self._robot, self._port = scene, robot, port
@@ -156,19 +150,10 @@ class CommandTopic:
 
 
 class RealtimeWorld(RobotBackend):
-    """Moves a robot as the existing script does, with nothing but Gazebo's services and topics.
+    """Moves one robot as the existing script does, with nothing but Gazebo's services and topics.
 
-    An action unpauses the world, publishes the commands, and takes the newest joint state. How much simulated
-    time passes depends on the machine.
-
-    Args:
-        scene: The robot, which is there, with its controllers running.
-        control_period: Simulated time from one joint state to the next one that is taken [s]; 0 takes the
-            newest one without waiting.
-        world: Shared with the other environments of this process.
-
-    Raises:
-        RobotEnvError: For several robots.
+    An action unpauses the world, publishes the commands, and takes the joint state one control period [s]
+    later, or the newest for 0. How much simulated time passes depends on the machine.
     """
 
     deterministic, complete, shared = False, False, True

@@ -62,17 +62,11 @@ class _Heard(NamedTuple):
 
 
 class SensorListener:
-    """Keeps the newest reading of each sensor, and when it has come.
+    """The newest reading of each sensor, and when it came, by `clock` [s].
 
-    Args:
-        robot: Whose plugins, or `sensor_topics`, name the topics.
-        names: Names of its sensors.
-        clock: Tells the time of arrival [s].
-        off: How far stamps may be off that clock [s]; then, too, a reading counts only if its stamp is newer
-            than the one before. None: the clock isn't that of the stamps.
-
-    Raises:
-        RobotEnvError: If the robot has no such sensor, or none whose topic is known.
+    Stamps may differ from that clock by `off` [s]; then, too, a reading counts only if its stamp is newer
+    than the one before. None: the clock isn't that of the stamps. Raises RobotEnvError for an unknown sensor
+    or topic.
     """
 
     def __init__(

@@ -92,9 +92,6 @@ def gazebo_set_model_state(
         ang_vel_x, ang_vel_y, ang_vel_z: [rad/s].
         sleep_time: Pause afterwards [s of wall time].
         timeout, gazebo_ns: See `ros_gazebo`.
-
-    Returns:
-        True if the simulator did it.
     """
     pose = make_pose(pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     linear, angular = (lin_vel_x, lin_vel_y, lin_vel_z), (ang_vel_x, ang_vel_y, ang_vel_z)
@@ -159,9 +156,6 @@ def gazebo_set_model_configuration(
         joint_positions: One for each joint [rad, m].
         urdf_param_name: Parameter with its URDF; Gazebo doesn't use it.
         timeout, gazebo_ns: See `ros_gazebo`.
-
-    Returns:
-        True if the simulator did it.
     """
     request = (model_name, urdf_param_name, list(joint_names), list(joint_positions))
     service = "set_model_configuration"
@@ -196,9 +190,6 @@ def gazebo_apply_joint_effort(
     """Applies an effort [N m, N] to a joint, from `start_time` or now on [s of simulated time].
 
     It lasts for `duration` [s of simulated time]; a negative one is forever.
-
-    Returns:
-        True if the simulator does it.
     """
     if fault := not_finite(f"effort on {joint_name}", effort, duration, start_time):
         _log.error(fault)
