@@ -1,4 +1,4 @@
-"""The state that the replaced functions share: world, clock, and when time passes without a wait."""
+"""The state that the replaced functions share: world, clock, and triggers."""
 
 import contextlib
 import functools
@@ -85,12 +85,12 @@ class ScriptRunner:
             self._end()
         if self.world.there:
             return True
-        found = self.world.look()
-        if found:
+        is_there = self.world.look()
+        if is_there:
             self.topics.changed()
             self.clock.exchange()
             self._round_period()
-        return found
+        return is_there
 
     def fail(self, fault: Exception) -> NoReturn:
         """Ends the script with one line on stderr, even if it catches SystemExit."""

@@ -156,11 +156,7 @@ class Topics:
         return not self._changed and self._seen == self._world.topics_changed
 
     def settle(self) -> Sequence[TopicMessage]:
-        """Waits until new topics of the script are connected to the simulator.
-
-        Returns:
-            Messages that arrived meanwhile.
-        """
+        """Waits until new topics are connected to the simulator; returns messages that came meanwhile."""
         if self.are_settled:
             return ()
         self._changed = False

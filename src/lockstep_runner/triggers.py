@@ -1,4 +1,4 @@
-"""Decides when time passes without a wait: once per round of commands, or at topics the user names."""
+"""Triggers of time for scripts that don't wait: rounds of commands, or topics that the user names."""
 
 from collections import Counter
 from collections.abc import Collection

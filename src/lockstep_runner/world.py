@@ -60,11 +60,7 @@ class ScriptWorld:
         return self._call is not None
 
     def look(self) -> bool:
-        """Looks for a simulator, at most once per LOOK; returns whether there is one.
-
-        Raises:
-            RunsByItself: The simulator found isn't in lock-step.
-        """
+        """Looks for a simulator, at most once per LOOK; raises RunsByItself for one in real time."""
         if self._call is not None:
             return True
         if self._left or not rospy.core.is_initialized():
@@ -104,16 +100,11 @@ class ScriptWorld:
         until: Sequence[str] = (),
         connect: tuple[Sequence[str], Sequence[str]] | None = None,
     ) -> AdvanceWorldResponse:
-        """Lets time pass, and exchanges messages.
+        """Lets at most `ticks` pass, `longest` in one call, and exchanges messages.
 
-        Args:
-            ticks: Most physics steps to pass; one call does no more than `longest`.
-            until: Topics; the call ends after the first tick with a message on one of them.
-            connect: Topics that the script subscribes to, and that it publishes; connected first.
-
-        Raises:
-            WorldGone: The simulator was ended; there is none until `look` finds another.
-            WorldFailed: The simulator has died, or hangs.
+        The call ends after the first tick with a message on one of the topics `until`. `connect` are topics
+        that the script subscribes to, and that it publishes; connected first. Raises WorldGone if the
+        simulator was ended, until `look` finds another, and WorldFailed if it has died, or hangs.
         """
         request = AdvanceWorldRequest(
             node=rospy.get_name(), ticks=min(ticks, self.longest), until=list(until)

@@ -1,4 +1,4 @@
-"""Trials of a robot in an engine: whether it stands with its joints held, and which of them commands move."""
+"""Trials of a robot in an engine: standing with its joints held, and motion by commands."""
 
 import math
 from collections.abc import Iterable, Mapping

@@ -1,4 +1,4 @@
-"""The page of `check_robot.py` on a file: what is read and served, whether it stands, and what moves."""
+"""The page of `check_robot.py` on a file: contents, what is served, standing and motion."""
 
 import importlib.util
 import math

@@ -1,4 +1,4 @@
-"""A base on wheels: which of them drive it, and what its drive controller and its task need to know."""
+"""Bases on wheels: drive wheels, dimensions, speeds and laser."""
 
 import math
 import re
@@ -70,13 +70,12 @@ class Base:
 def find_base(survey: Survey) -> Base | None:
     """Returns the base that wheels on its left and right drive, which turn about its y.
 
-    Returns:
-        The base; None if its wheels are others, or their motors take no velocity.
+    None if its wheels are others, or their motors take no velocity.
     """
     wheels = survey.wheels
-    found = [_wheel(survey, motor) for motor in wheels]
-    rims = [each for each in found if each is not None]
-    if not rims or len(rims) < len(found):
+    measured = [_wheel(survey, motor) for motor in wheels]
+    rims = [each for each in measured if each is not None]
+    if not rims or len(rims) < len(measured):
         return None
     left, right = (
         tuple(each.joint for each, (_, y) in zip(wheels, rims, strict=True) if sign * y > MIDDLE)
@@ -148,11 +147,11 @@ def _outline(survey: Survey, laser: Sensor | None) -> tuple[float, float]:
     ]
 
     def widest(centre: Pose, angles: np.ndarray) -> float:
-        found = [0.0]
+        reaches = [0.0]
         for angle in angles.tolist():
             way = rotate(centre.orientation, (math.cos(angle), math.sin(angle), 0.0))
-            found += [reach(*each, way) - float(np.dot(centre.position, way)) for each in shapes]
-        return max(found)
+            reaches += [reach(*each, way) - float(np.dot(centre.position, way)) for each in shapes]
+        return max(reaches)
 
     middle = widest(Pose(), np.linspace(-math.pi, math.pi, WAYS))
     if laser is None:
@@ -164,17 +163,11 @@ def _outline(survey: Survey, laser: Sensor | None) -> tuple[float, float]:
 
 
 def scan_topic(laser: Sensor, namespace: str, name: str) -> str:
-    """Returns the topic of a laser (docs/contract/sensors.md 0.2).
-
-    Args:
-        laser: The sensor.
-        namespace: In which the robot is spawned.
-        name: Name of the model.
-    """
+    """Returns the topic of a laser (docs/contract/sensors.md 0.2) of a model spawned in a namespace."""
     element = next((each.element for each in laser.plugins), laser.element)
     own = element.findtext("robotNamespace")
     given = namespace if own is None else own.strip() or name
     topic = (element.findtext("topicName") or "scan").strip()
     parts = (topic if topic[:1] == "/" else f"{given}/{topic}").split("/")
-    found = "/" + "/".join(filter(None, parts))
-    return found if re.fullmatch(r"[\w/]+", found) else "/scan"  # it stands in launch files
+    resolved = "/" + "/".join(filter(None, parts))
+    return resolved if re.fullmatch(r"[\w/]+", resolved) else "/scan"  # it stands in launch files

@@ -1,4 +1,4 @@
-"""Checks of what a task defines and returns; each error names the method and what it should return."""
+"""Validation of a task's definitions and results; each error names the method and the expected value."""
 
 import math
 import operator
@@ -171,12 +171,12 @@ def checked(task: Task, method: str, given: Any, kind: type | tuple[type, ...]) 
 def checked_number(task: Task, method: str, given: Any) -> float:
     """Returns the finite number that a method has returned; raises TaskError for anything else."""
     try:
-        found = float(given)
+        number = float(given)
     except (TypeError, ValueError):
-        found = math.nan
-    if not math.isfinite(found):
+        number = math.nan
+    if not math.isfinite(number):
         raise _wrong(task, method, given, "a finite number")
-    return found
+    return number
 
 
 def short(given: Any) -> str:

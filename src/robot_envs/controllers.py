@@ -1,4 +1,4 @@
-"""Controllers as a robot's parameters describe them: checked, loaded, and commanded."""
+"""A robot's controllers: validation, loading, and the ports that take commands."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The Gymnasium environment: it passes commands to robots, and lets the task judge the state."""
+"""The Gymnasium environment: commands to robots, and the task's evaluation of the state."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,7 +16,7 @@ from robot_envs.errors import SimulatorError
 from robot_envs.pictures.drawn import HEIGHT, WIDTH, DrawnEnv
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.task import GoalTask, Task, Unjudged
+from robot_envs.task import GoalTask, Task, Unrewarded
 from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Noise, Sensor
 from robot_envs.variation.randomisation import UniformRandomisation
@@ -130,7 +130,7 @@ class RobotEnv(DrawnEnv):
             robots[:1] = [replace(each, world=task.world) for each in robots[:1]]
         self.scene = scene = Scene(robots, task.objects)
         self.max_steps = checks.checked_steps(task.max_steps if max_steps is None else max_steps)
-        self._adopt(task)
+        self._set_task(task)
         usual = scene.robots[0].control_period  # [s]
         self.control_period = period = usual if control_period is None else control_period
         nominal = period if period > 0.0 else usual
@@ -155,13 +155,13 @@ class RobotEnv(DrawnEnv):
         self.backend: RobotBackend = backend
         self._closed = False
         try:
-            self._judge = self._judge_in(backend)
+            self._evaluator = self._register_queries(backend)
         except BaseException:
             self.close()
             raise
 
-    def _judge_in(self, backend: RobotBackend) -> Task | Unjudged:
-        """Lets the backend tell what the task sees; returns what judges its states."""
+    def _register_queries(self, backend: RobotBackend) -> Task | Unrewarded:
+        """Registers the task's queries; returns the evaluator of its states."""
         task = self.task
         if not self._hides or backend.complete:
             backend.look(both(task.query, task.reward_query))
@@ -169,10 +169,10 @@ class RobotEnv(DrawnEnv):
         backend.look(task.query)
         text = "are 0, and nothing terminates: this world can't tell its reward_query"
         gymnasium.logger.warn(f"rewards of {type(task).__name__} {text}")
-        return Unjudged()
+        return Unrewarded()
 
-    def _adopt(self, task: Task) -> None:
-        """Takes the task's spaces, and what checks actions and observations against them."""
+    def _set_task(self, task: Task) -> None:
+        """Sets the task, its spaces, and the functions that check actions and observations."""
         self.task = task
         self._hides = task.reward_query != StateQuery()  # from `apply` and `observe`
         self._has_sensors = bool(task.query.sensors or task.reward_query.sensors)
@@ -264,7 +264,7 @@ class RobotEnv(DrawnEnv):
         self._steps = 0
         self._show()
         return observation, {
-            **checks.checked(self.task, "info", self._judge.info(state), dict),
+            **checks.checked(self.task, "info", self._evaluator.info(state), dict),
             **info,
         }
 
@@ -326,22 +326,22 @@ class RobotEnv(DrawnEnv):
                 of the task returns something impossible.
             SimulatorError: If the backend doesn't answer.
         """
-        task, judge = self.task, self._judge
+        task, evaluator = self.task, self._evaluator
         number, action, arriving, sent = self._taken(action)
         state = self.backend.act(arriving)
         if sent is not None:
             state = state._replace(commands=sent)
         self._state, self._steps = state, number
-        ended = checks.checked(task, "is_terminal", judge.is_terminal(state), checks.FLAGS)
+        ended = checks.checked(task, "is_terminal", evaluator.is_terminal(state), checks.FLAGS)
         terminated = bool(ended)
         truncated = not terminated and number == self.max_steps
         if terminated or truncated:
             self._steps = None
         measured = state if self._sensor is None else self._sensor.measure(state, self.np_random)
         self._show()
-        reward = checks.checked_number(task, "reward", judge.reward(state, action))
+        reward = checks.checked_number(task, "reward", evaluator.reward(state, action))
         observation = self._observe(measured)
-        info = checks.checked(task, "info", judge.info(state), dict)
+        info = checks.checked(task, "info", evaluator.info(state), dict)
         return observation, reward, terminated, truncated, info
 
     def save_state(self) -> EnvSnapshot:

@@ -1,4 +1,4 @@
-"""A robot's files: finding them, and reading URDF (expanding xacro) and YAML."""
+"""A robot's files: lookup, URDF (xacro is expanded) and YAML."""
 
 import contextlib
 import importlib.util
@@ -31,23 +31,23 @@ def own_file(package: str, place: str) -> Path:
     for folder in (source, SHARE / package):
         if (folder / place).is_file():
             return folder / place
-    found = _rospkg_path(package)
-    if found is None:
+    path = _rospkg_path(package)
+    if path is None:
         raise RobotEnvError(
             f"package '{package}' is neither next to {TREE} nor on ROS_PACKAGE_PATH; "
             "source the workspace that it is installed in"
         )
-    return found / place
+    return path / place
 
 
 def resources() -> Resources:
     """Finds the meshes and models that a file names by package://."""
 
     def package(name: str) -> str:
-        found = _rospkg_path(name)
-        if found is None:
+        path = _rospkg_path(name)
+        if path is None:
             raise LookupError(name)
-        return str(found)
+        return str(path)
 
     return Resources(package=package)
 
@@ -67,9 +67,9 @@ def locate(source: Source) -> Path:
     if not text.startswith(PACKAGE):
         return Path(text).expanduser()
     package, _, place = text.removeprefix(PACKAGE).partition("/")
-    found = _rospkg_path(package)
-    if found is not None:
-        return found / place
+    path = _rospkg_path(package)
+    if path is not None:
+        return path / place
     with contextlib.suppress(RobotEnvError):
         return own_file(package, place)
     raise RobotEnvError(

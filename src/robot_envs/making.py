@@ -1,4 +1,4 @@
-"""Makes environments from the names of a robot and a task: Gymnasium's entry points."""
+"""Gymnasium's entry points: environments from the names of a robot and a task."""
 
 import importlib
 import inspect
@@ -54,8 +54,10 @@ def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
 
 
 def _robots(name: str) -> Any:
-    found = named(name)
-    robots = found() if _takes_nothing(found) and not isinstance(found, type) else found
+    attribute = named(name)
+    robots = (
+        attribute() if _takes_nothing(attribute) and not isinstance(attribute, type) else attribute
+    )
     listed = [robots] if isinstance(robots, Robot) else robots
     if not isinstance(listed, (list, tuple)) or not all(isinstance(each, Robot) for each in listed):
         raise RobotEnvError(
@@ -90,17 +92,17 @@ def option_names(make: Callable[..., Any]) -> list[str]:
 
     What a class takes as `**options` are those of its base that have defaults.
     """
-    found: dict[str, None] = {}
+    names: dict[str, None] = {}
     for maker in inspect.getmro(make) if isinstance(make, type) else [make]:
         parameters = inspect.signature(maker).parameters.values()
         more = [each for each in parameters if each.kind == each.VAR_KEYWORD]
         for each in parameters:
             given = maker is not make and each.default is each.empty
             if each not in more and each.name not in NAMED and not given:
-                found[each.name] = None
+                names[each.name] = None
         if not more:
             break
-    return list(found)
+    return list(names)
 
 
 def named(name: str) -> Any:
@@ -109,15 +111,15 @@ def named(name: str) -> Any:
     if not colon:
         raise RobotEnvError(f"'{name}' must be written as module:attribute")
     try:
-        found = importlib.import_module(module)
+        imported = importlib.import_module(module)
     except ModuleNotFoundError as error:
         if error.name is None or not f"{module}.".startswith(f"{error.name}."):
             raise  # the module exists, and imports one that doesn't
         raise RobotEnvError(
             f"there is no module '{module}' (of '{name}'); ./ws --with FOLDER ... finds those in FOLDER"
         ) from error
-    if not hasattr(found, attribute):
+    if not hasattr(imported, attribute):
         raise RobotEnvError(
-            f"{module} ({found.__file__}) has no '{attribute}'{did_you_mean(attribute, dir(found))}"
+            f"{module} ({imported.__file__}) has no '{attribute}'{did_you_mean(attribute, dir(imported))}"
         )
-    return getattr(found, attribute)
+    return getattr(imported, attribute)

@@ -1,4 +1,4 @@
-"""Registers environments of robots with Gymnasium; imports neither robots nor physics."""
+"""Registration of environments with Gymnasium; imports neither robots nor physics."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What a robot is made of: its files, the controllers that run, and how it is spawned."""
+"""The description of a robot: its files, running controllers, and spawn pose."""
 
 import logging
 import math
@@ -129,8 +129,8 @@ class Robot:
     def pid_gains(self) -> Mapping[str, Any]:
         """The parameters `gazebo_ros_control/pid_gains`, by joint."""
         described = self.parameters.get("gazebo_ros_control")
-        found = described.get("pid_gains") if isinstance(described, Mapping) else None
-        return found if isinstance(found, Mapping) else {}
+        gains = described.get("pid_gains") if isinstance(described, Mapping) else None
+        return gains if isinstance(gains, Mapping) else {}
 
     def hardware(self) -> RobotHardware:
         """Makes the joints as controllers see them; raises ControlError if something about them is wrong."""

@@ -1,4 +1,4 @@
-"""What is to be learned: actions, observations, reward, and how an episode begins and ends.
+"""Tasks: actions, observations, rewards, and the beginning and end of episodes.
 
 A task knows neither ROS nor a simulator nor a learner; every backend runs the same tasks.
 """
@@ -108,8 +108,8 @@ class Task(ABC):
         return {}
 
 
-class Unjudged:
-    """In the place of a task whose `reward_query` the world can't answer."""
+class Unrewarded:
+    """Evaluator for a task whose `reward_query` the world can't answer: no reward, and no end."""
 
     def is_terminal(self, state: WorldState) -> bool:
         return False

@@ -1,4 +1,4 @@
-"""Vectors of robots: what `gymnasium.make_vec` makes of every environment of this library."""
+"""Vector environments: what `gymnasium.make_vec` makes of every environment of this library."""
 
 import contextlib
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What a task sees: joints, links, models and contacts by name; and how an episode begins."""
+"""States of a world: joints, links, models and contacts by name; and initial states."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields

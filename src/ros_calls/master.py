@@ -58,20 +58,10 @@ def call_node(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> An
 
 
 def call_plain(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> Any:
-    """Calls an XML-RPC method that answers in ROS's form, ``[code, text, value]``.
+    """Calls an XML-RPC method that answers in ROS's form, ``[code, text, value]``; returns the value.
 
-    Args:
-        uri: Its ``http://`` address.
-        method: The method's name.
-        args: All of its arguments.
-        timeout: Limit for connecting, for sending and for each part of the answer [s of wall time].
-
-    Returns:
-        The value.
-
-    Raises:
-        NoAnswer: Nothing usable came back.
-        Refused: The answer's code is not 1.
+    `timeout` limits connecting, sending and each part of the answer [s of wall time]. Raises NoAnswer if
+    nothing usable came back, Refused if the answer's code is not 1.
     """
     try:
         with xmlrpc.client.ServerProxy(uri, transport=_Transport(timeout)) as proxy:
@@ -141,9 +131,8 @@ def require(timeout: float = TIMEOUT) -> None:
 def is_up_or_startable() -> bool:
     """Returns True if the master answers, False if none does but one can be started there.
 
-    Raises:
-        MasterDown: Another machine doesn't answer, or another program holds the port. (roslaunch
-            itself would wait for minutes.)
+    Raises MasterDown if another machine doesn't answer, or another program holds the port: roslaunch would
+    wait for minutes.
     """
     try:
         require()

@@ -1,4 +1,4 @@
-"""Checks for the packages of requirements/base.txt, and names the command that installs missing ones.
+"""Check for the packages of requirements/base.txt, with the command that installs missing ones.
 
 Programs call it before any other import: in a user's own catkin workspace, rosdep and `catkin_make` don't
 install packages that only pip has.

@@ -32,13 +32,13 @@ def wait_until(look: Callable[[], Found], timeout: float, what: str) -> Found:
         rospy.ROSInterruptException: The node shut down meanwhile.
     """
     deadline = time.monotonic() + timeout
-    while not (found := look()):
+    while not (result := look()):
         if rospy.is_shutdown():
             raise rospy.ROSInterruptException(f"shut down while waiting for {what}")
         if time.monotonic() > deadline:
             break
         time.sleep(POLL)
-    return found
+    return result
 
 
 def service_answers(name: str) -> bool:
@@ -60,18 +60,10 @@ def service_comes_up(name: str, timeout: float) -> bool:
 
 
 def wait_for_service(name: str, timeout: float = TIMEOUT) -> str:
-    """Waits until a service can be called; fails at once without a master.
+    """Waits until a service can be called, and returns its resolved name; doubled slashes are harmless.
 
-    Args:
-        name: The service, global or relative to the node's namespace; doubled slashes are harmless.
-        timeout: Limit of the wait [s].
-
-    Returns:
-        The resolved name.
-
-    Raises:
-        ServiceMissing: No master, or the service doesn't come up in time.
-        rospy.ROSInterruptException: The node shut down meanwhile.
+    Raises ServiceMissing after `timeout` [s], and at once without a master; rospy.ROSInterruptException if
+    the node shut down meanwhile.
     """
     resolved = str(rospy.resolve_name(name))
 
@@ -82,10 +74,10 @@ def wait_for_service(name: str, timeout: float = TIMEOUT) -> str:
         return False
 
     try:
-        found = wait_until(look, timeout, f"service {resolved}")
+        is_up = wait_until(look, timeout, f"service {resolved}")
     except master.MasterDown as fault:
         raise ServiceMissing(f"service {resolved}: {fault}") from fault
-    if not found:
+    if not is_up:
         raise ServiceMissing(
             f"service {resolved} didn't come up within {timeout:g} s: {why_not_up(resolved)}"
         )
@@ -93,17 +85,11 @@ def wait_for_service(name: str, timeout: float = TIMEOUT) -> str:
 
 
 def wait_and_call(name: str, kind: Any, *request: Any, timeout: float = TIMEOUT) -> Any:
-    """Waits for a service, calls it, and returns the response.
+    """Waits for a service, calls it with a request, or its fields in order, and returns the response.
 
-    Args:
-        name: The service.
-        kind: The service's generated class.
-        request: The request, or its fields in order.
-        timeout: Limit of the wait for the service, and again of the call [s].
-
-    Raises:
-        ServiceFailed: The service isn't up in time (ServiceMissing), or fails. See `ServiceClient`.
-        rospy.ROSInterruptException: The node shut down meanwhile.
+    `timeout` limits the wait for the service, and again the call [s]. Raises ServiceFailed (see
+    `ServiceClient`), ServiceMissing if it isn't up in time, rospy.ROSInterruptException if the node shut down
+    meanwhile.
     """
     resolved = wait_for_service(name, timeout)
     try:

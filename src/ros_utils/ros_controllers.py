@@ -1,4 +1,4 @@
-"""Loads, starts, stops and unloads controllers through a controller manager's services.
+"""Controllers: loading, start, stop and unloading through a controller manager's services.
 
 `ns` is always the controller manager's namespace: its services are ``<ns>/controller_manager/…``;
 None is the root. `strictness` is BEST_EFFORT (1: skip what can't be done) or STRICT (2: all or

@@ -1,4 +1,4 @@
-"""Starts and ends launch files."""
+"""Launch files: start and end."""
 
 import os
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Starts and ends nodes and the master."""
+"""Nodes and the master: start and end."""
 
 import shlex
 from collections.abc import Mapping, Sequence
@@ -83,8 +83,8 @@ def ros_node_from_pkg(
         absent = f"not registered at {_master.uri()} (for a program that is not a node: wait=False)"
 
         def is_registered() -> bool:  # an earlier node of that name doesn't count
-            found = [_nodes.node_uri(full_name)] if full_name else _nodes.node_uris().values()
-            new = [address for address in found if address and address not in before]
+            addresses = [_nodes.node_uri(full_name)] if full_name else _nodes.node_uris().values()
+            new = [address for address in addresses if address and address not in before]
             return any(handle.owns(_nodes.node_pid(address)) for address in new)
 
         return await_start(handle, is_registered, absent, timeout, ready)
@@ -162,14 +162,14 @@ def _executable(package: str, name: str) -> str:
     """Returns the path of a package's executable, found as by rosrun."""
     _packages.folder(package)
     try:
-        found = roslib.packages.find_node(package, name, rospack=rospkg.RosPack())
+        paths = roslib.packages.find_node(package, name, rospack=rospkg.RosPack())
     except rospkg.ResourceNotFound as fault:
         raise _packages.NotFound(f"package '{fault}' not found") from fault
-    if not found:
+    if not paths:
         raise _packages.NotFound(
             f"package '{package}' has no executable '{name}': is its workspace built and sourced?"
         )
-    return str(found[0])
+    return str(paths[0])
 
 
 def _arguments(args: str | Sequence[str] | None) -> list[str]:

@@ -1,4 +1,4 @@
-"""Loads YAML files into the parameter server."""
+"""YAML files on the parameter server."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Brings a robot into the simulation in one call: description, state publisher, model, controllers."""
+"""A robot in one call: description, state publisher, model, controllers."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Expands robot descriptions (xacro) and puts them on the parameter server."""
+"""Robot descriptions (xacro), expanded and put on the parameter server."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Steps a world in lock-step from Python, through the services of bullet_gazebo_msgs.
+"""Client for a world in lock-step, through the services of bullet_gazebo_msgs.
 
 client = StepClient()
 client.reset({"cart_pole": 0.1}, {"cart_pole": -0.5})
@@ -101,15 +101,15 @@ class PreparedSteps:
         Raises:
             ServiceFailed: StepRefused for a wrong name; otherwise see `ServiceClient`.
         """
-        found = self._prepared.get(names)
-        if found is None:
-            found = self._prepare(*names)
-            if not found.success:
-                raise StepRefused(found.status_message)
+        prepared = self._prepared.get(names)
+        if prepared is None:
+            prepared = self._prepare(*names)
+            if not prepared.success:
+                raise StepRefused(prepared.status_message)
             if len(self._prepared) >= MOST_PREPARED:
                 self._prepared.clear()
-            self._prepared[names] = found
-        return found
+            self._prepared[names] = prepared
+        return prepared
 
     def begin(self, names: StepNames, ticks: int, commands: Sequence[float]) -> None:
         """Sends a step; `end` takes its answer and must come next.

@@ -1,4 +1,4 @@
-"""Observes processes and threads through /proc: whether they compute or wait."""
+"""Activity of processes and threads, observed in /proc."""
 
 from pathlib import Path
 

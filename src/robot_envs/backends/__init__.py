@@ -1,4 +1,4 @@
-"""What moves a robot: this process's own physics, or a simulator over ROS, in lock-step or in real time.
+"""Backends: physics in this process, or a simulator over ROS, in lock-step or in real time.
 
 Importing this is cheap: a backend's modules are imported when one is made. Only `ros/` needs ROS.
 """

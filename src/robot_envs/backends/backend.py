@@ -1,4 +1,4 @@
-"""What an environment needs of a world, be it simulated here, over ROS, or real."""
+"""The interface of backends, and simulators that start side by side."""
 
 import contextlib
 from collections.abc import Callable, Iterator, Sequence

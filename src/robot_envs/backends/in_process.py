@@ -1,4 +1,4 @@
-"""Robots in a physics world of this process: no ROS, and bit-identical to a simulator in lock-step."""
+"""Backend in this process: no ROS, and bit-identical to a simulator in lock-step."""
 
 import contextlib
 import math
@@ -234,8 +234,8 @@ class InProcessWorld(RobotBackend):
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         with _refusals():
-            found = [find_link(self._sim.world, name) for name in links]
-        return [model.link_state(link)[0] for model, link in found]
+            pairs = [find_link(self._sim.world, name) for name in links]
+        return [model.link_state(link)[0] for model, link in pairs]
 
     def close(self) -> None:
         """Frees the world; may be called twice."""

@@ -1,4 +1,4 @@
-"""Models of a world in this process besides its robots: those of a world file, and a task's objects."""
+"""Models of world files and of a task's objects, for a world in this process."""
 
 import logging
 from collections.abc import Sequence
@@ -30,13 +30,13 @@ def fill(sim: Simulator, source: Source | None) -> None:
     """
     if source is None:
         return
-    found = empty_world() if source == EMPTY else _read(source)
-    for warning in found.warnings:
+    world = empty_world() if source == EMPTY else _read(source)
+    for warning in world.warnings:
         logger.warning("world %s: %s", _shown(source), warning)
-    sim.set_time_step(found.time_step)
-    sim.world.set_gravity(found.gravity)
-    sim.world.set_solver(found.solver)
-    for name, error in fill_world(sim.world, found.models):
+    sim.set_time_step(world.time_step)
+    sim.world.set_gravity(world.gravity)
+    sim.world.set_solver(world.solver)
+    for name, error in fill_world(sim.world, world.models):
         if error is not None:
             raise RobotEnvError(f"world {_shown(source)}: model '{name}': {error}") from error
 

@@ -1,4 +1,4 @@
-"""Where a robot's links are and how they move, computed from its joints alone."""
+"""Forward kinematics of a robot's links, with velocities, from its joints alone."""
 
 from collections.abc import Mapping
 
@@ -47,10 +47,10 @@ class LinkView:
             poses = [each[link].compose(offset) for each in (now, before, after)]
             return Motion(poses[0], _twist(poses[1], poses[2]))
 
-        found = {}
+        motions = {}
         for key, place, frame in self._wanted:
-            found[key] = motion(place).seen_from(AT_REST if frame is None else motion(frame))
-        return found
+            motions[key] = motion(place).seen_from(AT_REST if frame is None else motion(frame))
+        return motions
 
     def _poses(self, joints: Mapping[str, JointState], time: float) -> dict[str, Pose]:
         """Returns the poses of all links at a time from now [s]."""

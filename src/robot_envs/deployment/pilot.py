@@ -1,4 +1,4 @@
-"""A task and a policy in control of a robot, step by step, within its limits; without ROS or a clock."""
+"""The control loop of task and policy, step by step, within limits; without ROS or a clock."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from robot_envs.deployment.kinematics import LinkView
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.task import GoalTask, Task, Unjudged
+from robot_envs.task import GoalTask, Task, Unrewarded
 from robot_envs.world_state import (
     ODOMETRY,
     Command,
@@ -72,8 +72,8 @@ class CommandLimits:
     def _bounded(self, numbers: list[float]) -> Command:
         """Returns the nearest command within the bounds."""
         bounds = zip(numbers, self._bounds, strict=True)
-        found = tuple(min(max(value, lower), upper) for value, (lower, upper) in bounds)
-        return found[0] if self._port.single else found
+        bounded = tuple(min(max(value, lower), upper) for value, (lower, upper) in bounds)
+        return bounded[0] if self._port.single else bounded
 
 
 def _bounds(limits: JointLimits, quantity: str) -> tuple[float, float]:
@@ -147,7 +147,7 @@ class Pilot:
         self._scene, self._task, self._act, self._say = Scene([robot]), task, act, say
         if not robot.ports:
             raise RobotEnvError(f"the robot '{robot.model}' has no controller that takes commands")
-        self._judge = task if task.reward_query == StateQuery() else Unjudged()
+        self._evaluator = task if task.reward_query == StateQuery() else Unrewarded()
         self._links, self._model = LinkView(robot, task.query), robot.model
         self._limits = {port.name: CommandLimits(robot, port, way, period) for port in robot.ports}
         self._read_action = checks.action_reader(checks.made_space(task, "action_space"))
@@ -201,9 +201,9 @@ class Pilot:
         Raises ValueError if the policy or the task returns something impossible.
         """
         task, state = self._task, self._state(time, joints, sensors)
-        over = self._judge.is_terminal(state)
+        over = self._evaluator.is_terminal(state)
         if self._action is not None:
-            self._judge.reward(state, self._action)
+            self._evaluator.reward(state, self._action)
         if over:
             self._action = None
             return None
@@ -211,7 +211,7 @@ class Pilot:
         return self._limited(self._scene.commands(task.apply(self._action, state)))
 
     def _limited(self, commands: Mapping[str, Command]) -> dict[str, Command]:
-        found = {}
+        limited = {}
         for name, wanted in commands.items():
             command, exceeded = self._limits[name](wanted, self._held[name])
             if exceeded and name not in self._reported:
@@ -219,8 +219,8 @@ class Pilot:
                 self._say(
                     f"{name} is commanded beyond the limits of {', '.join(exceeded)}: it is kept within"
                 )
-            found[name] = self._held[name] = command
-        return found
+            limited[name] = self._held[name] = command
+        return limited
 
     def _observation(self, state: WorldState) -> Any:
         seen, task = self._read(self._task.observe(state)), self._task

@@ -1,4 +1,4 @@
-"""A policy that moves a robot over ROS, simulated or real: joint states and sensors in, commands out."""
+"""The ROS node of a policy: joint states and sensors in, commands out."""
 
 import math
 import os

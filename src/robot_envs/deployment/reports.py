@@ -1,4 +1,4 @@
-"""What a robot reports to its policy: the newest states of its joints, and whether its controllers run."""
+"""Joint states and controller states that a robot publishes."""
 
 import math
 import threading

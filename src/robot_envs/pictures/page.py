@@ -1,4 +1,4 @@
-"""A robot on a viser page, as the simulator's window shows it, without a simulator."""
+"""A robot on a viser page, without a simulator's window."""
 
 import logging
 import time
@@ -87,8 +87,8 @@ class RobotOnPage:
     def look(self) -> Placed:
         """Where it is now, to be shown later; doesn't change the page."""
         positions, base = self._positions(), self._placement.base()
-        found = self._placement.poses(positions, base)
-        poses = [found[model.name][link.name] for model in self._seen for link in model.links]
+        by_model = self._placement.poses(positions, base)
+        poses = [by_model[model.name][link.name] for model in self._seen for link in model.links]
         rows = [[*pose.position, *pose.orientation] for pose in poses]
         return Placed(np.array(rows), np.array(self._placement.travelled(positions, base)))
 

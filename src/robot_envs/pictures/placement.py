@@ -1,4 +1,4 @@
-"""Where a robot's links are in a state, what surrounds it, and a camera that sees all of it."""
+"""Link poses of a state, surroundings, and a camera that sees all of it."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
@@ -58,14 +58,14 @@ class Surroundings:
     def poses(self) -> dict[str, dict[str, Pose]]:
         """Returns the poses of links, by model."""
         asked = self._asked
-        found: dict[str, dict[str, Pose]] = {model: {} for model, _ in asked}
+        poses: dict[str, dict[str, Pose]] = {model: {} for model, _ in asked}
         if asked:
             names = [f"{model}::{link}" for model, link in asked]
             for (model, link), pose in zip(asked, self._ask(names), strict=True):
-                found[model][link] = pose
+                poses[model][link] = pose
         if (mark := self._goal()) is not None:
-            found[GOAL] = {GOAL: Pose(mark[0])}
-        return found
+            poses[GOAL] = {GOAL: Pose(mark[0])}
+        return poses
 
     @cached_property
     def _asked(self) -> list[tuple[str, str]]:

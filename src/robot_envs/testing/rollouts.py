@@ -1,4 +1,4 @@
-"""Rollouts of an environment under test, and where two of them differ."""
+"""Rollouts of an environment under test, and their differences."""
 
 import contextlib
 import math
@@ -119,8 +119,8 @@ def outside(space: gymnasium.Space[Any], value: Any) -> str:
     if isinstance(space, gymnasium.spaces.Dict) and isinstance(value, Mapping):
         if value.keys() != space.keys():
             return f"it has {', '.join(value)}, and the space {', '.join(space.keys())}"
-        found = ((key, outside(part, value[key])) for key, part in space.items())
-        return next(f"{key}: {why}" for key, why in found if why)
+        reasons = ((key, outside(part, value[key])) for key, part in space.items())
+        return next(f"{key}: {why}" for key, why in reasons if why)
     if not isinstance(space, gymnasium.spaces.Box) or not isinstance(value, np.ndarray):
         return f"{value!r} isn't of {space}"
     if value.shape != space.shape or not np.can_cast(value.dtype, space.dtype):

@@ -1,4 +1,4 @@
-"""Applies variations to robots, in one order on all backends, and restores the robots afterwards."""
+"""Application of variations to robots, in one order on all backends, and their reversal."""
 
 from collections.abc import Mapping
 from dataclasses import replace

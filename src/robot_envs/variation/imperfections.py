@@ -110,10 +110,10 @@ class Sensor:
             self._sensors = {name: _by_part(noise[name]) for name in noise if name in sensors}
             noise = {name: each for name, each in noise.items() if name not in sensors}
         self._readings: dict[str, tuple[float, Reading]] = {}  # noisy ones, with their times [s]
-        found = by_name("sensor_noise", noise, joints, "joint")
-        sizes = {name: _pair("sensor_noise", size) for name, size in found.items()}
-        found = by_name("encoder_step", encoder_step, joints, "joint")
-        notches = {name: at_least_zero("encoder_step", size) for name, size in found.items()}
+        by_joint = by_name("sensor_noise", noise, joints, "joint")
+        sizes = {name: _pair("sensor_noise", size) for name, size in by_joint.items()}
+        by_joint = by_name("encoder_step", encoder_step, joints, "joint")
+        notches = {name: at_least_zero("encoder_step", size) for name, size in by_joint.items()}
         for size in notches.values():
             if 0.0 < size < LEAST_STEP:
                 raise ValueError(f"encoder_step must be 0 or at least {LEAST_STEP:g}, not {size!r}")
@@ -173,10 +173,10 @@ class Sensor:
         values = dict(reading.values)
         for part in [each for each in values if each in sizes]:
             exact = values[part]
-            found = exact + rng.normal(0.0, sizes[part], exact.shape)
+            noised = exact + rng.normal(0.0, sizes[part], exact.shape)
             if exact.dtype == np.uint8:
-                found = np.rint(np.clip(found, 0.0, 255.0))
-            values[part] = found.astype(exact.dtype)
+                noised = np.rint(np.clip(noised, 0.0, 255.0))
+            values[part] = noised.astype(exact.dtype)
         noisy = Reading(reading.time, values)
         self._readings[name] = (reading.time, noisy)
         return noisy
@@ -293,11 +293,11 @@ def _lag(share: float, wanted: float, before: float) -> float:
 
 def _ruled(rules: Rules, wanted: Commands, before: Commands) -> Commands:
     """Applies each controller's rule, number by number."""
-    found = dict(wanted)
+    ruled = dict(wanted)
     for name, (rule, size) in rules.items():
         to, at = wanted[name], before[name]
         if isinstance(to, tuple):
-            found[name] = tuple(rule(size, *each) for each in zip(to, at, strict=True))
+            ruled[name] = tuple(rule(size, *each) for each in zip(to, at, strict=True))
         else:
-            found[name] = rule(size, to, at)
-    return found
+            ruled[name] = rule(size, to, at)
+    return ruled

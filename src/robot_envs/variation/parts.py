@@ -62,19 +62,19 @@ class Parts:
 
     def pids(self) -> dict[str, dict[str, Gains]]:
         """The gains of all PIDs, by controller and place below it; only controllers that have PIDs."""
-        found = {name: gains_of(part) for name, part in self.controllers.items()}
-        return {name: gains for name, gains in found.items() if gains}
+        gains_by_controller = {name: gains_of(part) for name, part in self.controllers.items()}
+        return {name: gains for name, gains in gains_by_controller.items() if gains}
 
 
 def varied(parts: Mapping[str, RobotPart], kind: str, names: Iterable[str]) -> dict[str, RobotPart]:
     """Returns the parts with these names; raises SimulatorError, which tells their kind, if there is none."""
-    found = {}
+    chosen = {}
     for name in names:
         if name not in parts:
             hint = nearest_or_all(name, parts)
             raise SimulatorError(f"there is no {kind} '{name}' to vary{hint}")
-        found[name] = parts[name]
-    return found
+        chosen[name] = parts[name]
+    return chosen
 
 
 def gains_of(controller: RobotPart) -> dict[str, Gains]:

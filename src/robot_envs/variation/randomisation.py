@@ -85,9 +85,9 @@ def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, Unifor
         return dict.fromkeys(names, _range(option, given, option.name))
     if option.of == WORLD:
         raise ValueError(f"randomisation of {option.name} is one for the world, not {dict(given)}")
-    found = by_name(f"randomisation of {option.name}", given, names, *option.of)
+    values = by_name(f"randomisation of {option.name}", given, names, *option.of)
     return {
-        name: _range(option, value, f"{option.name} of '{name}'") for name, value in found.items()
+        name: _range(option, value, f"{option.name} of '{name}'") for name, value in values.items()
     }
 
 

@@ -1,4 +1,4 @@
-"""What may differ from a robot as it was made, and what becomes of a link's inertia."""
+"""Variations of a robot, and their effect on a link's inertia."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace

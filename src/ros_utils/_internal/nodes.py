@@ -1,4 +1,4 @@
-"""Queries and shuts down the nodes of a ROS master; every call has a time limit."""
+"""Nodes of a ROS master: queries and shutdown; every call has a time limit."""
 
 import contextlib
 import time
@@ -33,8 +33,8 @@ def node_uri(name: str) -> str | None:
 
 def node_uris() -> dict[str, str]:
     """Returns the XML-RPC addresses of all registered nodes, by name."""
-    found = {name: node_uri(name) for name in node_names()}
-    return {name: address for name, address in found.items() if address}
+    uris = {name: node_uri(name) for name in node_names()}
+    return {name: address for name, address in uris.items() if address}
 
 
 def node_pid(address: str) -> int | None:

@@ -1,4 +1,4 @@
-"""Reads and sets parameters of the current master (`ros_calls.master.using`), with a time limit.
+"""Parameters of the current master (`ros_calls.master.using`), with a time limit.
 
 rospy's own functions know one master per process.
 """

@@ -1,4 +1,4 @@
-"""Finds the programs that this toolkit started, from any process of the user, and ends them.
+"""Programs that this toolkit started, found from any process of the user, and their end.
 
 All descendants of a start carry its description in an environment variable. So they are found even if their
 parent was killed, and there is no list that could be out of date.
@@ -95,10 +95,10 @@ def families(tokens: Sequence[str]) -> list[dict[int, psutil.Process]]:
             marks[process.pid] = process.environ().get(MARK, "")
     result = []
     for token in tokens:
-        found = {pid for pid, mark in marks.items() if token in mark}
-        while grown := {pid for pid, parent in parents.items() if parent in found} - found:
-            found |= grown
-        result.append({pid: everything[pid] for pid in found if _lives(pid)})
+        pids = {pid for pid, mark in marks.items() if token in mark}
+        while grown := {pid for pid, parent in parents.items() if parent in pids} - pids:
+            pids |= grown
+        result.append({pid: everything[pid] for pid in pids if _lives(pid)})
     return result
 
 
@@ -108,13 +108,13 @@ def started(own: Sequence[Start]) -> list[Start]:
     `own` are the caller's: a process whose main thread has ended, but not the others, has no environment any
     more.
     """
-    found = {start.token: start for start in own}
+    starts = {start.token: start for start in own}
     for process in psutil.process_iter():
         with contextlib.suppress(psutil.Error):
             for start in _starts(process.environ().get(MARK, "")):
-                found[start.token] = start
+                starts[start.token] = start
     with contextlib.suppress(_master.MasterDown):
-        return [start for start in found.values() if _master.is_at(start.master)]
+        return [start for start in starts.values() if _master.is_at(start.master)]
     return []
 
 
@@ -202,12 +202,12 @@ def _end_with(
 
 def _children(members: dict[int, psutil.Process]) -> set[int]:
     """Returns the ids of members whose parent is one, too."""
-    found = set()
+    children = set()
     for pid, process in members.items():
         with contextlib.suppress(psutil.Error):
             if process.ppid() in members:
-                found.add(pid)
-    return found
+                children.add(pid)
+    return children
 
 
 def _group(pid: int) -> int:

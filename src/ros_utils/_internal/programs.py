@@ -1,4 +1,4 @@
-"""Starts programs, waits until they are ready, and ends them when this process exits.
+"""Programs: start, readiness, and their end when this process exits.
 
 Every program gets its own session: Ctrl-C in the terminal reaches only the caller, whose exit then ends the
 programs in order. If the caller is killed outright, the kernel sends them SIGTERM (needs setpriv of
@@ -319,11 +319,11 @@ def await_start(
         ended = handle.exit_code() is not None
         return "there" if is_there() else "ended" if ended else ""
 
-    found = wait_until(look, timeout, handle.start.label)
+    result = wait_until(look, timeout, handle.start.label)
     fault, code = "", handle.exit_code()
-    if not found:
+    if not result:
         fault = f"{absent} after {timeout:g} s; ended it"
-    elif code or (found == "ended" and not may_end):
+    elif code or (result == "ended" and not may_end):
         fault = f"ended with exit code {code}"
     if fault:
         reason = handle.reason()  # before it is told to end, and reports that

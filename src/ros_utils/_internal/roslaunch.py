@@ -1,4 +1,4 @@
-"""Starts roslaunch, and asks it about its processes. Part of `ros_launch` and `ros_gazebo`."""
+"""roslaunch and its processes. Part of `ros_launch` and `ros_gazebo`."""
 
 import time
 from collections.abc import Mapping, Sequence

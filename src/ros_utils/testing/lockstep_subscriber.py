@@ -1,4 +1,4 @@
-"""What the simulator publishes, whole and in order: its messages come with calls, not over connections."""
+"""A subscriber in lock-step: messages come whole and in order, with calls."""
 
 import socket
 

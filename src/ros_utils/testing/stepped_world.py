@@ -173,13 +173,13 @@ class SteppedWorld:
     def contacts(self, link: str) -> list[str]:
         """Returns the collisions that a link, or model::link, touches, as model::link::collision."""
         self._look(self._touched, link)
-        found: dict[str, None] = {}
+        touched: dict[str, None] = {}
         for each in self._state.contacts:
             pair = each.collision1_name, each.collision2_name
             for mine, other in (pair, pair[::-1]):
                 if f"::{link}::" in f"::{mine}":
-                    found[other] = None
-        return list(found)
+                    touched[other] = None
+        return list(touched)
 
     def sensor(self, name: str) -> dict[str, np.ndarray]:
         """Returns the last measurement of a sensor, or model::sensor; empty before the first.

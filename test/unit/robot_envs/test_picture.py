@@ -119,9 +119,3 @@ def test_a_camera_is_changed_by_its_fields():
         each.close()
     with pytest.raises(ValueError, match="a camera has no 'jaw'"):
         gymnasium.make("cartpole/Balance-v0", camera={"jaw": 3})
-
-
-@pytest.mark.parametrize("size", [(0, 10), (10, 5000), (10.5, 10), (-1, 10)])
-def test_sizes_that_no_picture_has_are_refused_at_once(size):
-    with pytest.raises(ValueError, match="width and height lie in"):
-        RobotPicture(PENDULUM, *size)

@@ -4,7 +4,6 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import data_equivalence as same
-from gymnasium.vector import AutoresetMode
 from support.training.environment_conformance import IDS, RICH
 
 import cartpole  # noqa: F401 - registers the environments
@@ -72,13 +71,6 @@ def test_only_the_masked_are_reset_where_episodes_end_apart(many):
         vector.step(np.ones(COUNT, int))
     vector.reset(options={"reset_mask": ended})
     vector.step(np.ones(COUNT, int))
-
-
-def test_pictures_of_all_and_how_it_resets(many):
-    vector = many(IDS[-1], render_mode="rgb_array", width=64, height=32)
-    vector.reset(seed=1)
-    assert [picture.shape for picture in vector.render()] == [(32, 64, 3)] * 2
-    assert vector.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
 
 
 @pytest.mark.parametrize(

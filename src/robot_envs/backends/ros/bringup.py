@@ -1,4 +1,4 @@
-"""Brings robots up in a running simulator: models, parameters and controllers."""
+"""Bring-up of robots in a running simulator: models, parameters and controllers."""
 
 import contextlib
 import os

@@ -1,4 +1,4 @@
-"""Robots in a simulator over ROS that moves in lock-step."""
+"""Backend for a simulator over ROS that moves in lock-step."""
 
 import contextlib
 import secrets

@@ -1,4 +1,4 @@
-"""Changes a robot's physical properties by Gazebo's services and ros_control's dynamic_reconfigure."""
+"""Physical properties over Gazebo's services, and gains over ros_control's dynamic_reconfigure."""
 
 import contextlib
 from collections.abc import Mapping

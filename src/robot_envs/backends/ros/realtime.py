@@ -1,4 +1,4 @@
-"""A robot in a simulator that runs in real time, by Gazebo's own services and topics alone."""
+"""Backend for a simulator in real time, by Gazebo's own services and topics alone."""
 
 import contextlib
 import threading
@@ -88,8 +88,8 @@ class JointStates:
     def _is_at(self, positions: Mapping[str, float]) -> bool:
         if self._newest is None:
             return False
-        found = self._read(self._newest[0])
-        return all(abs(joint.position - positions[name]) < _SAME for name, joint in found.items())
+        joints = self._read(self._newest[0])
+        return all(abs(joint.position - positions[name]) < _SAME for name, joint in joints.items())
 
     def wait_until(self, due: float | None) -> tuple[float, dict[str, JointState]]:
         """Waits for the joint state of a time, or any for None; returns its time [s], and the joints.
@@ -283,15 +283,15 @@ class RealtimeWorld(RobotBackend):
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         """See `RobotBackend.poses`; makes a call for each."""
-        found = []
+        poses = []
         with self._simulator:
             for link in links:
                 answer = self._get_link(link, "world")
                 check_success(answer, f"the pose of '{link}' isn't known")
                 at = answer.link_state.pose
                 place, turn = at.position, at.orientation
-                found.append(Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)))
-        return found
+                poses.append(Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)))
+        return poses
 
     def close(self) -> None:
         """Leaves the topics, and restores robot and objects; the world stays paused or running."""

@@ -1,4 +1,4 @@
-"""The running simulator: calls to it, what is in its world, what it reports, and who has it."""
+"""The running simulator: its services, models, joint states, and the environment that holds it."""
 
 import contextlib
 import math

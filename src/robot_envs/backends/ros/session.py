@@ -1,4 +1,4 @@
-"""What a process's environments over ROS share: master, simulator and robots, started if they don't run."""
+"""The master, simulator and robots that a process's environments over ROS share."""
 
 import atexit
 import contextlib

@@ -1,4 +1,4 @@
-"""The simulator's window, a page in the browser, and RViz: opened along with a session."""
+"""Windows of a session: the simulator's page in the browser, and RViz."""
 
 import contextlib
 import os

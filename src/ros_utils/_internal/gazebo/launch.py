@@ -1,4 +1,4 @@
-"""Starts and ends the simulator. Part of `ros_gazebo`."""
+"""Start and end of the simulator. Part of `ros_gazebo`."""
 
 import functools
 import os

@@ -1,4 +1,4 @@
-"""Reads and sets physics properties; pauses, steps and resets. Part of `ros_gazebo`."""
+"""Physics properties; pause, steps and resets. Part of `ros_gazebo`."""
 
 import math
 from collections.abc import Sequence

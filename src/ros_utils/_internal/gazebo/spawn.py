@@ -1,4 +1,4 @@
-"""Spawns models from URDF and SDF, and deletes them. Part of `ros_gazebo`."""
+"""Spawning of models from URDF and SDF, and their deletion. Part of `ros_gazebo`."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Reads and sets the states of models, links and joints. Part of `ros_gazebo`."""
+"""States of models, links and joints. Part of `ros_gazebo`."""
 
 import time
 from collections.abc import Sequence

@@ -10,7 +10,7 @@ import pytest
 
 import robot_envs.robots  # noqa: F401 - registers the environments
 from robot_envs.robots import gripper_arm, six_joint_arm
-from robot_envs.world_state import InitialState, WorldState
+from robot_envs.world_state import WorldState
 
 Policy = Callable[[WorldState], np.ndarray]
 
@@ -90,14 +90,6 @@ class TestSixJointArm:
 
         return act
 
-    def test_the_tip_is_where_the_angles_say(self) -> None:
-        env: Any = gymnasium.make("robot_envs/SixJointReach-v0").unwrapped
-        angles = (0.5, -0.4, 0.9, -1.1, 0.7, 2.0)
-        joints = dict(zip(six_joint_arm.JOINTS, angles, strict=True))
-        env.reset(seed=0, options={"initial_state": InitialState(joints=joints)})
-        found = env._state.links["tip"].pose.position
-        assert found == pytest.approx(self.tip(np.array(angles)), abs=1e-6)
-
     @pytest.mark.slow
     def test_every_target_is_reached_and_held(self) -> None:
         env = gymnasium.make("robot_envs/SixJointReach-v0")
@@ -142,16 +134,6 @@ class TestGripperArm:
             return np.append(moves / max(1.0, np.abs(moves).max()), 1.0 if closed else -1.0)
 
         return act
-
-    def test_the_tip_is_where_the_angles_say(self) -> None:
-        env: Any = gymnasium.make("robot_envs/PickCube-v0").unwrapped
-        tip, cube = np.array([0.3, -0.1, 0.2]), np.array([0.4, 0.1, 0.02])
-        env.reset(options={"initial_state": gripper_arm.placed(tip, cube, 0.5)})
-        assert gripper_arm.aim(env.state) == pytest.approx(tip, abs=1e-9)
-        assert np.array(gripper_arm.places(env.state)) == pytest.approx(
-            np.array([tip, cube]), abs=1e-6
-        )
-        env.close()
 
     @pytest.mark.parametrize(
         "backend", ["bullet", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
