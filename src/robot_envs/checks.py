@@ -1,4 +1,4 @@
-"""Checks of what a task defines and returns; each error names the method and what it should return."""
+"""Validation of a task's definitions and results; each error names the method and the expected value."""
 
 import math
 import operator
@@ -11,7 +11,6 @@ import numpy as np
 
 from file_access.text import did_you_mean
 from robot_envs.errors import TaskError
-from robot_envs.robot import Robot
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
@@ -24,14 +23,6 @@ WANTED: dict[Any, str] = {
     gymnasium.spaces.Box: "a gymnasium.spaces.Box",
 }
 FEW = 64  # numbers; fewer are checked faster one by one than by NumPy
-
-
-def checked_period(robot: Robot, given: Any) -> float:
-    """Returns a control period [s], by default the robot's; raises ValueError for anything but a number."""
-    period = robot.control_period if given is None else given
-    if not isinstance(period, (int, float)):
-        raise ValueError(f"control_period is a number [s], not {period!r}")
-    return period
 
 
 def reset_options(task: Task, options: dict[str, Any]) -> dict[str, Any]:
@@ -97,10 +88,6 @@ def observation_reader(space: gymnasium.Space[Any], task: str) -> Callable[[Any]
     """Returns a function that converts what a task observes; it raises TaskError for the wrong shape or type.
 
     Numbers beyond the space's bounds pass, as in Gymnasium.
-
-    Args:
-        space: of the observations.
-        task: the name of its class, for the error.
     """
     if isinstance(space, gymnasium.spaces.Box):
         return _array_reader(space, task)
@@ -184,12 +171,12 @@ def checked(task: Task, method: str, given: Any, kind: type | tuple[type, ...]) 
 def checked_number(task: Task, method: str, given: Any) -> float:
     """Returns the finite number that a method has returned; raises TaskError for anything else."""
     try:
-        found = float(given)
+        number = float(given)
     except (TypeError, ValueError):
-        found = math.nan
-    if not math.isfinite(found):
+        number = math.nan
+    if not math.isfinite(number):
         raise _wrong(task, method, given, "a finite number")
-    return found
+    return number
 
 
 def short(given: Any) -> str:
@@ -212,16 +199,9 @@ def goal_space(task: GoalTask, observations: gymnasium.Space[Any]) -> gymnasium.
 
 
 def set_goal(task: GoalTask, state: WorldState, rng: np.random.Generator, goal: Any = None) -> None:
-    """Gives a task the goal of an episode.
+    """Gives a task an episode's goal: `goal`, or the one that it draws; raises TaskError for a wrong one.
 
-    Args:
-        task: the task.
-        state: in which the episode begins.
-        rng: of the environment. A goal is always drawn, so that later draws don't depend on `goal`.
-        goal: replaces the one that the task draws; None: keeps that one.
-
-    Raises:
-        TaskError: if the goal isn't in the task's space of goals.
+    A goal is always drawn, so that later draws don't depend on `goal`.
     """
     drawn = task.goal(rng, state)
     task.desired = checked_goal(task, drawn if goal is None else goal)
@@ -237,16 +217,7 @@ def checked_goal(task: GoalTask, given: Any) -> np.ndarray:
 
 
 def with_goals(task: GoalTask, observation: Any, state: WorldState) -> dict[str, Any]:
-    """Returns the observation of a goal environment.
-
-    Args:
-        task: with the episode's goal.
-        observation: what `observe` returned, in the form of its space.
-        state: that was observed.
-
-    Raises:
-        TaskError: if `achieved` returns another shape than the goal's, or numbers that aren't finite.
-    """
+    """Returns a goal environment's observation; raises TaskError for `achieved` of a wrong shape or NaN."""
     given, desired = task.achieved(state), task.desired
     achieved = _array(given, desired.dtype)
     if achieved.shape != desired.shape or not math.isfinite(achieved.sum()):

@@ -1,4 +1,4 @@
-"""Controllers as a robot's parameters describe them: checked, loaded, and commanded."""
+"""A robot's controllers: validation, loading, and the ports that take commands."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -72,15 +72,9 @@ def _load_one(manager: ControllerManager, name: str, parameters: Mapping[str, An
 def ports(
     commanded: Sequence[str] | None, parameters: Mapping[str, Any], loaded: Loaded
 ) -> list[CommandPort]:
-    """Returns the ports of the controllers that a task commands.
+    """Returns the ports of the controllers that a task commands; None: all that take numbers.
 
-    Args:
-        commanded: their names, in order; None: all that take numbers.
-        parameters: of all controllers.
-        loaded: the running controllers.
-
-    Raises:
-        ControlError: if one doesn't run, or takes no numbers.
+    Raises ControlError if one doesn't run, or takes no numbers.
     """
     if commanded is None:
         return [_port(each, parameters) for each in loaded.values() if _takes_numbers(each)]
@@ -126,14 +120,14 @@ def faults(
     hardware: RobotHardware,
     movable: Sequence[str],
 ) -> Iterator[str]:
-    """Lines that say what is wrong with a robot's controllers.
+    """Yields what is wrong with a robot's controllers.
 
     Args:
-        run: names of those that should run.
-        commanded: names of those that a task should command; None: all that take numbers.
-        parameters: of all controllers.
-        hardware: of the robot.
-        movable: its movable joints, also those without a transmission.
+        run: Names of those that should run.
+        commanded: Names of those that a task should command; None: all that take numbers.
+        parameters: Parameters of all controllers.
+        hardware: Hardware of the robot.
+        movable: Its movable joints, also those without a transmission.
     """
     manager = ControllerManager(hardware)
     loaded: Loaded = {}

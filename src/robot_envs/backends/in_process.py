@@ -1,4 +1,4 @@
-"""Robots in a physics world of this process: no ROS, and bit-identical to a simulator in lock-step."""
+"""Backend in this process: no ROS, and bit-identical to a simulator in lock-step."""
 
 import contextlib
 import math
@@ -70,17 +70,8 @@ def _refusals() -> Iterator[None]:
 class InProcessWorld(RobotBackend):
     """A scene's robots and their controllers, in a world of their own.
 
-    No other thread knows this world, so its lock is never taken.
-
-    Args:
-        scene: the robots and objects.
-        control_period: simulated time [s] of one action.
-        engine: "bullet", or "mujoco"; see `robot_sim.physics.engines`.
-
-    Raises:
-        ValueError: if the period isn't a whole number of physics steps, or the engine is unknown or not
-            installed.
-        RobotEnvError: if a file isn't found, or something in it is wrong.
+    No other thread knows this world, so its lock is never taken. Raises ValueError for a control period [s]
+    of a fraction of physics steps or a missing engine, RobotEnvError for a wrong file.
     """
 
     deterministic, complete, shared = True, True, False
@@ -244,8 +235,8 @@ class InProcessWorld(RobotBackend):
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         with _refusals():
-            found = [find_link(self._sim.world, name) for name in links]
-        return [model.link_state(link)[0] for model, link in found]
+            pairs = [find_link(self._sim.world, name) for name in links]
+        return [model.link_state(link)[0] for model, link in pairs]
 
     def close(self) -> None:
         """Frees the world; may be called twice."""

@@ -28,6 +28,14 @@ class FollowedNode:
     The simulator reports to this process what it sends to the node, and ends a step after that. The commands
     come to this process, which gives them to the simulator with the next step. So it doesn't matter when a
     message arrives anywhere.
+
+    Args:
+        name, package, executable, args: Of the node.
+        hears: The topic that it answers.
+        commands: The topic of its answers, on which it commands a controller.
+
+    Raises:
+        WorldError: It doesn't start or connect, or the simulator doesn't publish `hears`.
     """
 
     def __init__(
@@ -39,16 +47,6 @@ class FollowedNode:
         hears: str,
         commands: str,
     ) -> None:
-        """Starts it.
-
-        Args:
-            name, package, executable, args: of the node.
-            hears: the topic that it answers.
-            commands: the topic of its answers, on which it commands a controller.
-
-        Raises:
-            WorldError: it doesn't start or connect, or the simulator doesn't publish `hears`.
-        """
         self.controller = commands.rpartition("/")[0] or commands
         self.name, self._hears, self._waiting = f"/{name}", hears, 0
         self._answers: queue.SimpleQueue[rospy.AnyMsg] = queue.SimpleQueue()

@@ -1,4 +1,4 @@
-"""Brings robots up in a running simulator: models, parameters and controllers."""
+"""Bring-up of robots in a running simulator: models, parameters and controllers."""
 
 import contextlib
 import os
@@ -29,17 +29,10 @@ Say = Callable[[str], None]
 
 
 def bring_up(scene: Scene, say: Say) -> list[Undo]:
-    """Spawns robots and starts their controllers, where they are missing.
+    """Spawns robots and starts their controllers, where they are missing; `say` reports each step.
 
-    Args:
-        scene: the robots; `SharedWorld` spawns its objects.
-        say: called with a line for each thing that is done.
-
-    Returns:
-        What undoes the changes, in the order in which they were made.
-
-    Raises:
-        RobotEnvError: if something can't be loaded, spawned or started.
+    Returns the functions that undo the changes, in the order of these; raises RobotEnvError if something
+    fails.
     """
     changes = [
         undo
@@ -135,11 +128,7 @@ def _controller_states(robot: Robot) -> dict[str, str]:
 
 
 def spawn_command(robot: Robot, argv: list[str]) -> int:
-    """Runs the command spawn_robot.py: waits for a simulator, brings the robot up, ends.
-
-    Returns:
-        The exit code; a failure is one line.
-    """
+    """Runs the command spawn_robot.py; returns the exit code."""
     try:
         name = node.full_name(argv, "spawn_robot")
         rospy.init_node(os.path.basename(name), argv=["", *argv], disable_signals=True)
