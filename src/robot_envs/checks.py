@@ -11,6 +11,7 @@ import numpy as np
 
 from file_access.text import did_you_mean
 from robot_envs.errors import TaskError
+from robot_envs.robot import Robot
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
@@ -23,6 +24,14 @@ WANTED: dict[Any, str] = {
     gymnasium.spaces.Box: "a gymnasium.spaces.Box",
 }
 FEW = 64  # numbers; fewer are checked faster one by one than by NumPy
+
+
+def checked_period(robot: Robot, given: Any) -> float:
+    """Returns a control period [s], by default the robot's; raises ValueError for anything but a number."""
+    period = robot.control_period if given is None else given
+    if not isinstance(period, (int, float)):
+        raise ValueError(f"control_period is a number [s], not {period!r}")
+    return period
 
 
 def reset_options(task: Task, options: dict[str, Any]) -> dict[str, Any]:

@@ -131,9 +131,8 @@ class RobotEnv(DrawnEnv):
         self.scene = scene = Scene(robots, task.objects)
         self.max_steps = checks.checked_steps(task.max_steps if max_steps is None else max_steps)
         self._set_task(task)
-        usual = scene.robots[0].control_period  # [s]
-        self.control_period = period = usual if control_period is None else control_period
-        nominal = period if period > 0.0 else usual
+        self.control_period = period = checks.checked_period(scene.robots[0], control_period)
+        nominal = period if period > 0.0 else scene.robots[0].control_period  # [s]
         names = task.query.sensors
         sensor = Sensor(scene.joints, nominal, sensor_noise, sensor_delay, encoder_step, names)
         self._sensor = None if sensor.is_exact else sensor

@@ -3,12 +3,12 @@
 import logging
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from typing import Any, Self
 
-from file_access.text import did_you_mean
+from file_access.text import did_you_mean, nearest_or_all
 from robot_envs import controllers, files
 from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError
@@ -78,6 +78,14 @@ class Robot:
     rviz: tuple[str, str] | None = None
     odometry: str | None = None
     sensor_topics: Mapping[str, str] = field(default_factory=dict)
+
+    def __new__(cls, *_: Any, **options: Any) -> Self:
+        """Refuses an unknown option with the nearest name."""
+        known = [each.name for each in fields(cls)]
+        for name in options:
+            if name not in known:
+                raise TypeError(f"a Robot has no option '{name}'{nearest_or_all(name, known)}")
+        return super().__new__(cls)
 
     @cached_property
     def xml(self) -> str:

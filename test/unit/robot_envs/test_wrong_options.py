@@ -14,6 +14,8 @@ OPTIONS = {
     "a backend that doesn't exist": ({"backend": "rose"}, "there is no backend 'rose'; did you mean 'ros'"),
     "a period that is no multiple": ({"control_period": 0.0085},
         "control period 0.0085 s is not a multiple of"),
+    "a period that is no number": ({"control_period": "slow"},
+        r"control_period is a number \[s\], not 'slow'"),
     "a render mode that doesn't exist": ({"render_mode": "rgb"},
         'render_mode is "human" or "rgb_array", not \'rgb\''),
     "pictures of no size": ({"width": 0}, "width and height lie in"),

@@ -37,6 +37,7 @@ ROBOTS = {
     "a world that isn't there": ({"world": "/nowhere/a.world"}, "its world: there is no file"),
     "another namespace than the URDF's": ({"namespace": "left", "urdf": SOLO.xml.replace("</robot>", DRIVES)},
         r"into the namespace '/right' \(<robotNamespace>\), the description into '/left'"),
+    "a text for a time": ({"control_period": "40 ms"}, r"must be a time above 0 \[s\], not '40 ms'"),
     "a negative control period": ({"urdf": with_period("-0.1")},
         "<controlPeriod> -0.1 is not within 0 and 3600 s"),
     "a control period of more than an hour, for a library with its folder": (
@@ -168,6 +169,11 @@ def test_a_description_may_be_files_texts_and_mappings(tmp_path):
     for urdf in (tmp_path / "arm.urdf", str(tmp_path / "arm.urdf"), lambda: tmp_path / "arm.urdf"):
         for controllers in (tmp_path / "arm.yaml", str(tmp_path / "arm.yaml"), text):
             episode(replace(SOLO, urdf=urdf, controllers=controllers))
+
+
+def test_a_misspelt_option_is_told_with_the_nearest():
+    with pytest.raises(TypeError, match="no option 'controler'; did you mean 'controllers'"):
+        Robot(urdf=SOLO.xml, controler={})
 
 
 def test_a_start_beyond_a_stop_is_told_once(caplog):
