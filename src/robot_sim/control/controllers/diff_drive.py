@@ -19,8 +19,6 @@ SEPARATION = "wheel_separation_multiplier"
 
 
 class DiffDriveParameters(VehicleParameters):
-    """Those of wheels on two sides."""
-
     left_wheel: list[str] = parameter("a joint, or a list", read=wheel_names)
     right_wheel: list[str] = parameter("a joint, or a list", read=wheel_names)
     wheel_separation: float | None = parameter("[m]; else the description's", None, positive)

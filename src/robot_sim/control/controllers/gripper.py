@@ -33,8 +33,6 @@ class GripperOutcome(NamedTuple):
 
 
 class GripperParameters(OneJoint):
-    """Those of a gripper with any interface."""
-
     goal_tolerance: float = parameter("how near a goal is reached [rad, m]", 0.01)
     max_effort: float = parameter("the most before the first goal, and after a stop [N m, N]", 0.0)
     stall_velocity_threshold: float = parameter("below it the joint stands [rad/s, m/s]", 0.001)
@@ -43,8 +41,6 @@ class GripperParameters(OneJoint):
 
 
 class GripperGains(Parameters):
-    """That of an effort joint."""
-
     pid: Pid = parameter(
         "gains of its [PID](#pid); for effort joints", read=Pid.from_params, key="gains/<joint>"
     )

@@ -29,8 +29,6 @@ class JointStateSample(NamedTuple):
 
 
 class JointStateParameters(PublishRate):
-    """Those of joint states."""
-
     joints: list[str] | None = parameter("those to report; all without it", None, name_list)
     extra_joints: Any = parameter(
         "constant ones: a list of `{name, position, velocity, effort}`", (), lambda value, _: value

@@ -42,8 +42,6 @@ FOR_EVER = 1e12  # [s]; longer durations are cut
 
 
 class TrajectoryParameters(SomeJoints):
-    """Those of a trajectory controller with any interface."""
-
     goal_time: float = parameter(
         "how late a goal may be reached [s]; 0: at any time", 0.0, key="constraints/goal_time"
     )
@@ -58,8 +56,6 @@ class TrajectoryParameters(SomeJoints):
 
 
 class JointTolerances(Parameters):
-    """Those of each joint."""
-
     trajectory: float = parameter(
         "largest error on the way [rad, m]; 0: any", 0.0, key="constraints/<joint>/trajectory"
     )
@@ -69,8 +65,6 @@ class JointTolerances(Parameters):
 
 
 class JointGains(Parameters):
-    """Those of each joint with an effort or a velocity interface."""
-
     pid: Pid = parameter(
         "gains of its [PID](#pid); not of positions", read=Pid.from_params, key="gains/<joint>"
     )

@@ -130,12 +130,8 @@ wheel_names = reader(
 
 
 class OneJoint(Parameters):
-    """Those of a controller of one joint."""
-
     joint: str = parameter("name of the joint", read=joint_name)
 
 
 class SomeJoints(Parameters):
-    """Those of a controller of several joints."""
-
     joints: list[str] = parameter("names of the joints, in the order of commands", read=joint_names)

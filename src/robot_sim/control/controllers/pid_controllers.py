@@ -39,14 +39,10 @@ class JointControllerSample(NamedTuple):
 
 
 class JointPid(OneJoint):
-    """Those of a controller of one joint by a PID."""
-
     pid: Pid = parameter("gains of its [PID](#pid)", read=Pid.from_params)
 
 
 class OwnPid(Parameters):
-    """That of a joint in a group."""
-
     pid: Pid = parameter("gains of its [PID](#pid)", read=Pid.from_params, key="<joint>/pid")
 
 

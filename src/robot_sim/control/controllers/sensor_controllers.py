@@ -23,8 +23,6 @@ class SensorSample(NamedTuple):
 
 
 class PublishRate(Parameters):
-    """That of what only reports."""
-
     publish_rate: float = parameter("[Hz of simulated time]; 0 publishes nothing")
 
 

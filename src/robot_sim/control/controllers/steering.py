@@ -39,14 +39,10 @@ _pair = reader(lambda value: len(value) == 2, "must list two joints", before=whe
 
 
 class SteeringParameters(VehicleParameters):
-    """Those of vehicles that steer."""
-
     wheel_radius: float | None = parameter("[m]; else the description's", None, positive)
 
 
 class AckermannParameters(SteeringParameters):
-    """Those of a bicycle."""
-
     rear_wheel: str = parameter("joint of the driven wheel", "rear_wheel_joint")
     front_steer: str = parameter("joint of the fork", "front_steer_joint")
     wheel_separation_h: float | None = parameter("[m]; else the description's", None, positive)
@@ -56,8 +52,6 @@ class AckermannParameters(SteeringParameters):
 
 
 class FourWheelParameters(SteeringParameters):
-    """Those of four wheels on forks."""
-
     front_wheel: list[str] = parameter("two joints, the left one first", read=_pair)
     rear_wheel: list[str] = parameter("two joints, the left one first", read=_pair)
     front_steering: list[str] = parameter("two joints, the left one first", read=_pair)

@@ -67,8 +67,6 @@ LIMITS = "`{}/`: `has_velocity_limits`, `max_velocity`, `min_velocity` (minus th
 
 
 class VehicleParameters(Parameters):
-    """Those of all vehicles."""
-
     pose_covariance_diagonal: tuple[float, ...] = parameter("six numbers", read=_diagonal)
     twist_covariance_diagonal: tuple[float, ...] = parameter("six numbers", read=_diagonal)
     publish_rate: float = parameter("of odometry [Hz]", 50.0)
