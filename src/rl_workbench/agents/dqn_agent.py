@@ -196,7 +196,7 @@ class DQNAgent:
         if not (math.isfinite(loss) and math.isfinite(norm)):
             raise WorkbenchError(
                 f"the loss is {loss} and the gradient's norm {norm} at step {self.steps}; the "
-                "networks were left unchanged; try a smaller learning_rate or reward_scale"
+                "networks are unchanged; try a smaller learning_rate or reward_scale"
             )
         if 0 < self.settings.max_grad_norm < norm:
             self._flat.gradient.mul_(self.settings.max_grad_norm / norm)

@@ -130,7 +130,7 @@ def test_a_round_that_nothing_can_be_learned_from_is_given_up_whole(
         raise WorkbenchError("the policy loss is nan")
 
     monkeypatch.setattr(ReinforceAgent, "_update", failing)
-    with pytest.raises(WorkbenchError, match="the policy loss is nan; .* 3 episodes, what was"):
+    with pytest.raises(WorkbenchError, match="the policy loss is nan; .* 3 episodes, progress"):
         train(broken, "reinforce", **MANY)
     assert_same_run(whole, resume(broken))
 
