@@ -11,6 +11,7 @@ from robot_sim.control.hardware import EFFORT
 from robot_sim.physics.description import Joint, ModelDescription
 from robot_sim.physics.engines import make_engine
 from robot_sim.physics.files.world_file import WorldDescription
+from robot_sim.physics.loops import in_loops
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose, conjugate, rotate
 from robot_sim.physics.world import World, ground_plane
@@ -110,8 +111,11 @@ def _why_still(sim: Simulator, model: Model, joint: Joint, interface: str) -> st
     for what, limit in (("range", room), ("velocity", speed), ("effort", strength)):
         if limit == 0.0:
             return f"the {what} of its <limit> is 0"
+    loops = in_loops(model.description)
     for way in (speed, -speed):
         sim.restore_state(begin)
+        for name in loops if joint.name in loops else ():  # one alone can't move
+            model.set_motor(name, 0.0, model.description.joints[name].friction)
         model.set_motor(joint.name, way, strength)
         sim.advance(round(PUSH / sim.world.time_step))
         ends.append(model.joint_state(joint.name)[0])
