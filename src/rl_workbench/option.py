@@ -194,7 +194,7 @@ def plain_value(value: Any) -> Any:
     if not isinstance(value, str):
         return value
     try:
-        return yaml.load(value, _Loader)
+        return _Loader(value).get_single_data()
     except yaml.YAMLError:
         raise ValueError("a YAML value") from None
 
