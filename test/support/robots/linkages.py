@@ -58,3 +58,28 @@ def four_bar(closing: str = "", order: int = 1, static: bool = False, rooted: bo
         )
     return f"""<sdf version="1.6"><model name="four_bar"><static>{int(static)}</static>
       {"".join(links + joints)}</model></sdf>"""
+
+
+CUBE = 0.2  # [m]
+
+
+def cube(name: str, x: float, y: float, size: float = CUBE, mass: float = 1.0) -> str:
+    """SDF of a link that is a cube on the ground."""
+    moment = mass * size**2 / 6.0
+    return f"""<link name="{name}"><pose>{x} {y} {size / 2.0} 0 0 0</pose><inertial><mass>{mass}</mass>
+      <inertia><ixx>{moment}</ixx><iyy>{moment}</iyy><izz>{moment}</izz></inertia></inertial>
+      <collision name="c"><geometry><box><size>{size} {size} {size}</size></box></geometry></collision>
+    </link>"""
+
+
+def weld(name: str, parent: str, child: str) -> str:
+    """SDF of a fixed joint."""
+    return (
+        f'<joint name="{name}" type="fixed"><parent>{parent}</parent><child>{child}</child></joint>'
+    )
+
+
+def sdf(*parts: str, static: int = 0) -> str:
+    """A file with one model."""
+    text = "".join(parts)
+    return f'<sdf version="1.6"><model name="m"><static>{static}</static>{text}</model></sdf>'
