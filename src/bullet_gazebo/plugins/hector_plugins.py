@@ -36,6 +36,7 @@ from robot_sim.sensors.drift import DriftingError
 from robot_sim.sensors.imu import Imu, LinkMotion, motion_of
 from robot_sim.sensors.laser import LaserSensor, nearest
 from robot_sim.sensors.noise import checked_deviation
+from robot_sim.state_dict import Stateful
 
 MOST = 1e6  # that dynamic_reconfigure sets
 EQUATOR = 6378137.0  # [m], radius of WGS84
@@ -53,7 +54,7 @@ MODEL = [
 ]
 
 
-class HectorTimer:
+class HectorTimer(Stateful):
     """What they have in common: a clock that is always heard.
 
     Args:
@@ -62,6 +63,8 @@ class HectorTimer:
         errors: whose drift begins again when time does, and with a new seed.
         send: publishes the measurement at a time [ns], some time [s] after the last one.
     """
+
+    non_persistent = ("_send", "_errors")
 
     def __init__(
         self,

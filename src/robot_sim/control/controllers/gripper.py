@@ -47,7 +47,7 @@ class GripperActionController(Controller):
     Its time is uptime [ns], the sum of its periods since it was started: the clock may jump.
     """
 
-    of_the_present = ("_goal",)  # its client knows nothing of snapshots
+    non_persistent = ("_goal", "_settings")  # a goal's client knows nothing of snapshots
 
     def __init__(
         self, name: str, joint: JointHandle, settings: GripperSettings, pid: Pid | None = None

@@ -18,6 +18,7 @@ from robot_sim.control.controllers.forward import check_length
 from robot_sim.control.hardware import EFFORT, VELOCITY, RobotHardware
 from robot_sim.control.joint import JointHandle
 from robot_sim.control.pid import Loop, Pid
+from robot_sim.state_dict import Stateful
 
 REPORT_EVERY = 10  # updates
 
@@ -39,10 +40,11 @@ class JointControllerSample(NamedTuple):
     antiwindup: bool
 
 
-class PositionLoop:
+class PositionLoop(Stateful):
     """A PID that holds a joint at its set-point [rad, m] (docs/contract/ros_control.md 3.2)."""
 
     __slots__ = ("joint", "pid", "set_point", "target")
+    non_persistent = ("pid",)  # its controller saves it
 
     def __init__(self, joint: JointHandle, pid: Pid) -> None:
         self.joint = joint
@@ -72,6 +74,7 @@ class PidJoint(Controller):
     The state is published on every tenth update since the controller's load.
     """
 
+    non_persistent = ("_pid",)  # one of its `pids`
     of_velocity: ClassVar[bool] = False  # whether the error is one of velocity
 
     def __init__(self, name: str, joint: JointHandle, pid: Pid) -> None:
