@@ -38,7 +38,6 @@ setup(
             "template/**/*",
             "template/.gitignore.in",
         ],
-        "rl_workbench.tools": ["page.html"],
     },
     cmdclass={"build_py": BuildWithData},
 )

@@ -1,14 +1,19 @@
 """A stand-in for Gazebo classic: Gazebo's and ros_control's ROS interfaces on `robot_sim`."""
 
-from typing import NoReturn
+import sys
+import warnings
+from typing import Any
+
+import robot_sim
+from bullet_gazebo.moved import Moved
 
 __wall_time__ = True  # of its waits, also in a script whose time is simulated
 
-MOVED = ("ControlError", "Controller", "Input", "Model", "Output", "joint_param", "number_param")
-"""Names that were here until 0.3."""
+sys.meta_path.insert(0, Moved())
 
 
-def __getattr__(name: str) -> NoReturn:
-    if name in MOVED:
-        raise AttributeError(f"{name} is in robot_sim: from robot_sim import {name}")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+def __getattr__(name: str) -> Any:
+    if name.startswith("_") or name not in robot_sim.__all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn(f"{__name__}.{name} is robot_sim.{name} now", FutureWarning, stacklevel=2)
+    return getattr(robot_sim, name)

@@ -87,15 +87,15 @@ class CartPoleEnv(RobotEnv):
     | `width`, `height` | 640, 320  | of the pictures [pixels]                                  |
 
     Args:
-        task: what is to be learned.
-        backend: see above, or a backend, which the environment closes.
-        sensor_noise: see above.
-        camera: of pictures, or some of its fields.
-        options: the others of the table, as `RobotEnv` has them.
+        task: What is to be learned.
+        backend: See above, or a backend, which the environment closes.
+        sensor_noise: See above.
+        camera: Of pictures, or some of its fields.
+        options: The others of the table, as `RobotEnv` has them.
 
     Raises:
-        RobotEnvError: if the robot can't be brought up.
-        ValueError: for an option that makes no sense.
+        RobotEnvError: If the robot can't be brought up.
+        ValueError: For an option that makes no sense.
     """
 
     def __init__(
@@ -148,13 +148,13 @@ class CartPoleRandomisation:
     """The ranges from which a `CartPoleVariation` is drawn for each episode, uniformly.
 
     Args:
-        mass: half-width of the factor on each mass, e.g. 0.2 for 0.8 to 1.2.
-        length: half-width of the factor on the pole's length.
-        cart_friction: largest viscous friction between cart and rail [N s/m].
-        pole_friction: largest viscous friction in the hinge [N m s/rad].
+        mass: Half-width of the factor on each mass, e.g. 0.2 for 0.8 to 1.2.
+        length: Half-width of the factor on the pole's length.
+        cart_friction: Largest viscous friction between cart and rail [N s/m].
+        pole_friction: Largest viscous friction in the hinge [N m s/rad].
 
     Raises:
-        ValueError: if one of them is negative or too large.
+        ValueError: If one of them is negative or too large.
     """
 
     mass: float = 0.0
@@ -201,8 +201,8 @@ def make_environment(
     """Makes an environment for Gymnasium; `CartPoleEnv` explains the options.
 
     Raises:
-        ValueError: if an option makes no sense.
-        RobotEnvError: if the robot can't be brought up.
+        ValueError: If an option makes no sense.
+        RobotEnvError: If the robot can't be brought up.
     """
     check_options(options, ("noise",))
     varied: CartPoleRandomisation | Mapping[str, Any] | None = randomisation
@@ -216,8 +216,8 @@ def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
     """Makes a vector of environments for Gymnasium; see `RobotVectorEnv`.
 
     Raises:
-        ValueError: if an option makes no sense.
-        RobotEnvError: if a robot can't be brought up.
+        ValueError: If an option makes no sense.
+        RobotEnvError: If a robot can't be brought up.
     """
     return RobotVectorEnv(num_envs, make_environment, **options)
 
@@ -226,7 +226,7 @@ def make_task(name: str, noise: float | None = None) -> CartPoleTask:
     """Makes a task; None stands for its default noise.
 
     Raises:
-        ValueError: if there is no such task, or the noise makes no sense.
+        ValueError: If there is no such task, or the noise makes no sense.
     """
     if name not in TASKS:
         raise ValueError(f"there is no task {name!r}; there are {', '.join(TASKS)}")

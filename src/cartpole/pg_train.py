@@ -93,7 +93,7 @@ def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOption
     """Reads the options of training and robot from flags and private parameters.
 
     Raises:
-        SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
+        SystemExit: With code 2 and a usage line, if they are wrong; with 0 after --help.
     """
     parser = argparse.ArgumentParser(
         PROG,
@@ -158,17 +158,17 @@ def _backend(options: TrainingOptions) -> str:
 def session(
     options: TrainingOptions, name: str, argv: list[str], robot: RobotOptions, folder: Path
 ) -> Iterator[None]:
-    """Runs what the robot needs over ROS until the block ends.
+    """Runs the robot's ROS session until the block ends.
 
     Args:
-        options: of the training.
-        name: this node's full name.
-        argv: the process's arguments, with roslaunch's remappings.
-        robot: the robot's options, among them whether to open RViz.
-        folder: the run folder, whose curves the simulator's window shows.
+        options: Of the training.
+        name: This node's full name.
+        argv: The process's arguments, with roslaunch's remappings.
+        robot: The robot's options, among them whether to open RViz.
+        folder: The run folder, whose curves the simulator's window shows.
 
     Raises:
-        RobotEnvError: if something can't be started, or an already running part doesn't fit.
+        RobotEnvError: If something can't be started, or an already running part doesn't fit.
     """
     backend = _backend(options)
     need_ros(f"the backend {backend}")

@@ -84,7 +84,7 @@ def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:
     """Parses flags and private parameters; flags override parameters.
 
     Raises:
-        SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
+        SystemExit: With code 2 and a usage line, if they are wrong; with 0 after --help.
     """
     parser = argparse.ArgumentParser(
         f"{NODE}.py",
@@ -100,7 +100,7 @@ def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:
     add("--late", type=_positive, metavar="S",
         help="the robot stops when joint states are older [s] (default 5 control periods, "
         "at least 0.1, for a vehicle at most 0.3)")  # fmt: skip
-    add("--max-speed", type=_positive_or_0, default=1.0, metavar="SHARE",
+    add("--max-speed", type=_share, default=1.0, metavar="SHARE",
         help="how fast commanded positions may move, as a share of the joints' velocity limits "
         "(default 1; 0: no limit)")  # fmt: skip
     add("--goal", type=_numbers, metavar="X,Y,...",
@@ -128,7 +128,7 @@ def _positive(text: str) -> float:
     return value
 
 
-def _positive_or_0(text: str) -> float:
+def _share(text: str) -> float:
     return 0.0 if float(text) == 0.0 else _positive(text)
 
 
@@ -136,13 +136,13 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
     """Loads the policy of a run folder or an exported file, with its robot and task.
 
     Args:
-        path: the run folder or the exported file.
-        which: the checkpoint of a run folder.
-        options: options of the environment on top of the training's.
+        path: The run folder or the exported file.
+        which: The checkpoint of a run folder.
+        options: Options of the environment on top of the training's.
 
     Raises:
-        WorkbenchError: if there is no such policy or environment.
-        RobotEnvError: if its environment doesn't have exactly one robot.
+        WorkbenchError: If there is no such policy or environment.
+        RobotEnvError: If its environment doesn't have exactly one robot.
     """
     # They import torch, for which --help need not wait.
     from rl_workbench.tools.policies import load_learned

@@ -46,10 +46,10 @@ class CartPoleTask(Task):
     episode, starting where the cart stands.
 
     Args:
-        noise: half-width of the uniform noise on the initial state; with 0 all episodes start alike.
+        noise: Half-width of the uniform noise on the initial state; with 0 all episodes start alike.
 
     Raises:
-        ValueError: for an impossible noise.
+        ValueError: For an impossible noise.
     """
 
     start: ClassVar[CartPoleState] = CartPoleState(0.0, 0.0, 0.0, 0.0)  # without noise

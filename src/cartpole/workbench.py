@@ -25,7 +25,7 @@ class WorkspaceHints(errors.Hints):
     """The commands that texts recommend, by way of `ws`.
 
     Args:
-        workspace: the path of `ws`.
+        workspace: The path of `ws`.
     """
 
     def __init__(self, workspace: str) -> None:
@@ -76,15 +76,15 @@ def ros_options(argv: list[str], default_name: str) -> tuple[list[str], dict[str
     passes `__name:=`.
 
     Args:
-        argv: the arguments, without the command itself.
-        default_name: of the node, if ROS gives it no other one.
+        argv: The arguments, without the command itself.
+        default_name: Of the node, if ROS gives it no other one.
 
     Returns:
         The command's own flags; its private parameters, where those of the command line override those of the
         master; the node's full name.
 
     Raises:
-        RobotEnvError: if ROS isn't installed, a private parameter isn't YAML, or the master doesn't answer a
+        RobotEnvError: If ROS isn't installed, a private parameter isn't YAML, or the master doesn't answer a
             node that roslaunch started.
     """
     if not any(REMAPPING in argument for argument in argv):

@@ -36,8 +36,8 @@ def open_file(path: Path) -> BinaryIO:
     Opening a pipe or a device could block forever, so they are refused first.
 
     Raises:
-        NotAFile: if it isn't a regular file.
-        OSError: if it can't be opened.
+        NotAFile: If it isn't a regular file.
+        OSError: If it can't be opened.
     """
     if not stat.S_ISREG(path.stat().st_mode):
         raise NotAFile(path)
@@ -54,12 +54,12 @@ def read_file(path: Path, most: int = MAX_BYTES) -> bytes:
     """Returns the content of a regular file.
 
     Args:
-        path: the file.
-        most: the largest size that is accepted [bytes].
+        path: The file.
+        most: The largest size that is accepted [bytes].
 
     Raises:
-        FileError: if it can't be read or isn't a regular file.
-        TooLarge: if it is larger.
+        FileError: If it can't be read or isn't a regular file.
+        TooLarge: If it is larger.
     """
     try:
         with open_file(path) as file:

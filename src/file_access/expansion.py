@@ -50,15 +50,15 @@ def expand(
     """Expands a URDF or xacro file.
 
     Args:
-        path: the file, which may be plain XML.
-        mappings: xacro arguments, name and value.
-        limits: what it may take.
+        path: The file, which may be plain XML.
+        mappings: Xacro arguments, name and value.
+        limits: What it may take.
 
     Returns:
         The XML text.
 
     Raises:
-        CannotExpand: if the file is broken or goes beyond a limit.
+        CannotExpand: If the file is broken or goes beyond a limit.
     """
     return _ask("xml", os.fspath(path), mappings, limits)
 
@@ -69,7 +69,7 @@ def included_files(
     """Returns the files that a xacro file includes, or takes numbers from, with these arguments.
 
     Raises:
-        CannotExpand: if the file is broken or goes beyond a limit.
+        CannotExpand: If the file is broken or goes beyond a limit.
     """
     return _ask("files", os.fspath(path), mappings, LIMITS).splitlines()
 
@@ -125,7 +125,7 @@ def answer(data: bytes) -> bytes:
 
 
 def main() -> int:
-    """The program ``xacro`` with its own options; returns its exit code."""
+    """Runs the program ``xacro`` with its own options; returns its exit code."""
     worker = os.fork()
     if not worker:
         _run_program()

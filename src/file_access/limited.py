@@ -49,14 +49,13 @@ class LimitedProcess:
     """Answers requests in a child process, one at a time.
 
     The process starts with the first request, and again after it has died. It ends with its parent.
+
+    Args:
+        program: "module:function" that answers a request, bytes to bytes; what it raises refuses it.
+        limits: Of each request.
     """
 
     def __init__(self, program: str, limits: Limits) -> None:
-        """
-        Args:
-            program: "module:function" that answers a request, bytes to bytes; what it raises refuses it.
-            limits: of each request.
-        """
         self._program = program
         self._limits = limits
         self._lock = threading.Lock()
@@ -67,8 +66,8 @@ class LimitedProcess:
         """Returns the answer to a request.
 
         Raises:
-            RequestRefused: if the program has raised an error.
-            ProcessDied: if it has gone beyond a limit or crashed; the next request starts it again.
+            RequestRefused: If the program has raised an error.
+            ProcessDied: If it has gone beyond a limit or crashed; the next request starts it again.
         """
         with self._lock:
             process = self._running()
@@ -125,8 +124,8 @@ def _receive(process: subprocess.Popen[bytes], size: int, deadline: float) -> by
     """Returns `size` bytes of a process's output.
 
     Raises:
-        EOFError: if the process has ended.
-        ProcessDied: if they don't come in time.
+        EOFError: If the process has ended.
+        ProcessDied: If they don't come in time.
     """
     assert process.stdout is not None
     descriptor = process.stdout.fileno()

@@ -20,9 +20,9 @@ def locked_folder(folder: Path) -> Iterator[None]:
     """Holds the lock of an existing folder for the block.
 
     Raises:
-        BlockingIOError: if another holder has it, even in this process.
-        FileNotFoundError: if there is no such folder, also if its last holder has just removed it.
-        OSError: if it can't be opened, or its file system has no locks.
+        BlockingIOError: If another holder has it, even in this process.
+        FileNotFoundError: If there is no such folder, also if its last holder has just removed it.
+        OSError: If it can't be opened, or its file system has no locks.
     """
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
@@ -57,10 +57,10 @@ def scratch_folder(parent: str | None = None) -> Iterator[Path]:
     """Makes a temporary folder for the block; a process's first one also removes those of killed processes.
 
     Args:
-        parent: where it is made; None for the system's folder of temporary files.
+        parent: Where it is made; None for the system's folder of temporary files.
 
     Raises:
-        OSError: if it can't be made.
+        OSError: If it can't be made.
     """
     place = Path(parent or tempfile.gettempdir())
     _sweep(place)

@@ -29,8 +29,8 @@ def load_documents(data: bytes | str) -> list[Any]:
     """Returns the documents of a YAML text in UTF-8 or UTF-16; ``deg(90)`` and ``rad(pi/2)`` are radians.
 
     Raises:
-        FileError: if it isn't YAML, with the place, or if a value contains itself.
-        TooLarge: if it exceeds a bound, also with its anchors expanded.
+        FileError: If it isn't YAML, with the place, or if a value contains itself.
+        TooLarge: If it exceeds a bound, also with its anchors expanded.
     """
     if len(data) > MAX_BYTES:
         raise TooLarge(f"it has more than {MAX_BYTES} bytes (MAX_BYTES)")
@@ -56,8 +56,8 @@ def load_parameters(data: bytes | str) -> list[dict[str, Any]]:
     """Returns the documents of a YAML text that are mappings of parameters; empty ones are left out.
 
     Raises:
-        FileError: as `load_documents`, or if a value can't be a parameter.
-        TooLarge: as `load_documents`.
+        FileError: As `load_documents`, or if a value can't be a parameter.
+        TooLarge: As `load_documents`.
     """
     documents = [document for document in load_documents(data) if document is not None]
     for document in documents:
@@ -113,9 +113,9 @@ def _count(value: Any, known: dict[int, int | None], depth: int) -> int:
     """Returns the number of values in `value` with anchors expanded, without expanding them.
 
     Args:
-        value: a parsed value.
-        known: counts by id; None for a value that is being counted: if it comes up, it contains itself.
-        depth: of `value`.
+        value: A parsed value.
+        known: Counts by id; None for a value that is being counted: if it comes up, it contains itself.
+        depth: Of `value`.
     """
     if not isinstance(value, (list, dict, tuple, set)):
         return 1

@@ -1,4 +1,4 @@
-"""Runs a ROS script, unchanged, in a process whose time is the simulation's (docs/lockstep.md).
+"""Unchanged ROS scripts in a process whose time is the simulation's (docs/lockstep.md).
 
 The command is `launcher.main`; everything else is private.
 """

@@ -104,10 +104,10 @@ class Clock:
         """Blocks the calling thread in simulated time.
 
         Args:
-            seconds: longest wait [s of simulated time]; may be infinity.
-            until: ends the wait once true; checked after messages, callbacks and other threads' turns.
-            topics: topics whose messages may make it true.
-            in_pause: longest wait of a thread other than the main one in a paused world [s of wall time].
+            seconds: Longest wait [s of simulated time]; may be infinity.
+            until: Ends the wait once true; checked after messages, callbacks and other threads' turns.
+            topics: Topics whose messages may make it true.
+            in_pause: Longest wait of a thread other than the main one in a paused world [s of wall time].
 
         Returns:
             Whether `until` became true.

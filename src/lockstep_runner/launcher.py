@@ -1,4 +1,4 @@
-"""Command line: runs a script in lock-step (docs/lockstep.md)."""
+"""The command lockstep.py (docs/lockstep.md)."""
 
 import argparse
 import contextlib

@@ -1,4 +1,4 @@
-"""Threads and other processes: what simulates them is loaded once the script uses them."""
+"""Deferred replacement of threads and processes, until the script uses them."""
 
 import atexit
 import builtins

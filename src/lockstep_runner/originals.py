@@ -1,4 +1,4 @@
-"""Python's own versions of the functions that are replaced for the script; this package calls these."""
+"""Python's own versions of the functions that are replaced for the script, for use in this package."""
 
 import threading
 import time

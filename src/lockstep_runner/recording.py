@@ -1,4 +1,4 @@
-"""The bag of `lockstep.py --record`, which the simulator writes: made room for, and complete at the end."""
+"""The bag of `lockstep.py --record`: its name is freed before, and it is completed after a run."""
 
 import contextlib
 import itertools

@@ -1,4 +1,4 @@
-"""The state that the replaced functions share: world, clock, and when time passes without a wait."""
+"""The state that the replaced functions share: world, clock, and triggers."""
 
 import contextlib
 import functools
@@ -59,16 +59,15 @@ def _ends_with_the_world(instead: bool | None) -> Callable[[Method], Method]:
 
 
 class ScriptRunner:
-    """One script in lock-step."""
+    """One script in lock-step; nothing is replaced yet.
+
+    Args:
+        period: Simulated time that passes at a trigger [s], in whole physics steps; 0 is one.
+        triggers: Topics and services; None for the commands to controllers.
+        world: The simulator, and the source of time.
+    """
 
     def __init__(self, period: float, triggers: Collection[str] | None, world: ScriptWorld) -> None:
-        """Sets the runner up; nothing is replaced yet.
-
-        Args:
-            period: simulated time that passes at a trigger [s], in whole physics steps; 0 is one.
-            triggers: topics and services; None for the commands to controllers.
-            world: the simulator, and the source of time.
-        """
         self.world = world
         self.topics = Topics(self.world)
         self.clock = Clock(self.world)
@@ -86,12 +85,12 @@ class ScriptRunner:
             self._end()
         if self.world.there:
             return True
-        found = self.world.look()
-        if found:
+        is_there = self.world.look()
+        if is_there:
             self.topics.changed()
             self.clock.exchange()
             self._round_period()
-        return found
+        return is_there
 
     def fail(self, fault: Exception) -> NoReturn:
         """Ends the script with one line on stderr, even if it catches SystemExit."""

@@ -1,4 +1,4 @@
-"""Compiles and runs the script as if started directly, seeds it, and tells its code from libraries'."""
+"""The script: compilation, execution as `__main__`, seeds, and the frames that are its own."""
 
 import ast
 import builtins

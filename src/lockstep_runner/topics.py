@@ -23,14 +23,13 @@ Told = Callable[[threading.Thread], None]
 
 
 class Callbacks:
-    """Runs callbacks one at a time.
+    """Runs callbacks one at a time; `began` and `ended` get each worker when it starts and stops.
 
     While a callback waits for simulated time, another worker handles the messages of other topics; those of
     its own topic wait for it, as with rospy.
     """
 
     def __init__(self, began: Told, ended: Told) -> None:
-        """`began` and `ended` get each worker when it starts and stops running callbacks."""
         self._began = began
         self._ended = ended
         self._guard = threading.Lock()
@@ -157,11 +156,7 @@ class Topics:
         return not self._changed and self._seen == self._world.topics_changed
 
     def settle(self) -> Sequence[TopicMessage]:
-        """Waits until new topics of the script are connected to the simulator.
-
-        Returns:
-            Messages that arrived meanwhile.
-        """
+        """Waits until new topics are connected to the simulator; returns messages that came meanwhile."""
         if self.are_settled:
             return ()
         self._changed = False

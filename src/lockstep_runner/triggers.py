@@ -1,4 +1,4 @@
-"""Decides when time passes without a wait: once per round of commands, or at topics the user names."""
+"""Triggers of time for scripts that don't wait: rounds of commands, or topics that the user names."""
 
 from collections import Counter
 from collections.abc import Collection
@@ -12,11 +12,11 @@ class Triggers:
     Without names, each round of commands to the simulator triggers once: a script for several joints
     publishes several in a row. A repeated topic begins the next round. If no time has passed by then, the
     script doesn't wait by itself: time passes at once, and from then on after the last topic of each round.
-    A script that waits after its commands gets no triggers.
+    A script that waits after its commands gets no triggers. `names` are topics and services; empty for no
+    triggers, None for all commands.
     """
 
     def __init__(self, names: Collection[str] | None) -> None:
-        """`names` are topics and services; empty for no triggers, None for all commands."""
         self._names = None if names is None else frozenset(names)
         self.seen: dict[str, None] = {}  # topics and services in order of first use
         self._round: list[str] = []  # topics published since the round began

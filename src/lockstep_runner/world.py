@@ -34,10 +34,12 @@ class WorldFailed(Exception):
 
 
 class ScriptWorld:
-    """Finds a simulator and talks to it, one at a time; thread-safe."""
+    """The connection to a simulator, found by `look`, one at a time; thread-safe.
+
+    `seed` seeds the random numbers of each simulator found; None leaves them.
+    """
 
     def __init__(self, seed: int | None = None) -> None:
-        """`seed` seeds the random numbers of each simulator found; None leaves them."""
         self.now = 0  # [ns] simulated
         self.step = 1_000_000  # [ns]
         self.paused = False
@@ -58,11 +60,7 @@ class ScriptWorld:
         return self._call is not None
 
     def look(self) -> bool:
-        """Looks for a simulator, at most once per LOOK; returns whether there is one.
-
-        Raises:
-            RunsByItself: the simulator found isn't in lock-step.
-        """
+        """Looks for a simulator, at most once per LOOK; raises RunsByItself for one in real time."""
         if self._call is not None:
             return True
         if self._left or not rospy.core.is_initialized():
@@ -102,16 +100,11 @@ class ScriptWorld:
         until: Sequence[str] = (),
         connect: tuple[Sequence[str], Sequence[str]] | None = None,
     ) -> AdvanceWorldResponse:
-        """Lets time pass, and exchanges messages.
+        """Lets at most `ticks` pass, `longest` in one call, and exchanges messages.
 
-        Args:
-            ticks: most physics steps to pass; one call does no more than `longest`.
-            until: topics; the call ends after the first tick with a message on one of them.
-            connect: topics that the script subscribes to, and that it publishes; connected first.
-
-        Raises:
-            WorldGone: the simulator was ended; there is none until `look` finds another.
-            WorldFailed: the simulator has died, or hangs.
+        The call ends after the first tick with a message on one of the topics `until`. `connect` are topics
+        that the script subscribes to, and that it publishes; connected first. Raises WorldGone if the
+        simulator was ended, until `look` finds another, and WorldFailed if it has died, or hangs.
         """
         request = AdvanceWorldRequest(
             node=rospy.get_name(), ticks=min(ticks, self.longest), until=list(until)

@@ -3,73 +3,24 @@
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 
-from package_writing import CannotWrite
-from package_writing.check_files import CannotUse, find, read
+from package_writing import CannotUse, CannotWrite
+from package_writing.check_files import find, read
 from package_writing.check_page import Findings, examine
 from package_writing.package import read_arguments
+from robot_envs import RobotEnvError, files
 
 WRONG, UNUSABLE, INTERRUPTED = 1, 2, 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line; returns the exit code."""
-    args = _parser().parse_intermixed_args(argv)
-    pages: list[Findings] = []
-    code = 0
-    try:
-        arguments = read_arguments([each for each in args.files if ":=" in each])
-        for given in args.files:
-            if ":=" not in given:
-                code = max(code, _check(given, arguments, args, pages))
-    except CannotWrite as error:
-        code = _refuse(error)
-    except KeyboardInterrupt:
-        print("check_robot: interrupted", file=sys.stderr)
-        return INTERRUPTED
-    if args.json:
-        print(json.dumps([asdict(page) for page in pages], indent=2, ensure_ascii=False))
-    return code
-
-
-def _check(
-    given: str, arguments: dict[str, str], args: argparse.Namespace, pages: list[Findings]
-) -> int:
-    """Checks what an argument names, and adds its pages; returns the worst exit code."""
-    code, count = 0, len(pages)
-    try:
-        paths = find(given)
-        for path in paths:
-            try:
-                file = read(path, arguments)
-            except CannotUse as error:
-                part = len(paths) > 1 and path.suffix == ".xacro"  # others include most of these
-                code = max(code, _refuse(f"passed over: {error}" if part else error) * (not part))
-                continue
-            page = examine(file, args.controllers)
-            pages.append(page)
-            code = max(code, WRONG if page.wrong else 0)
-            if not args.json:
-                print(page, end="\n\n", flush=True)
-        if len(pages) == count and not code:
-            raise CannotUse(f"{given}: none of its {len(paths)} files is a robot by itself")
-    except CannotUse as error:
-        code = _refuse(error)
-    return code
-
-
-def _refuse(error: object) -> int:
-    print(f"check_robot: {error}", file=sys.stderr)
-    return UNUSABLE
-
-
-def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="check_robot.py",
-        description="Says on a page what is read of a robot's file, which plugins, sensors and controllers "
-        "are served, whether it stands, and which joints commands move. Exit codes: 0 fine, 1 something is "
+        description="Reports what is read of a robot's file, which plugins, sensors and controllers are "
+        "served, whether it stands, and which joints commands move. Exit codes: 0 fine, 1 something is "
         "wrong with the robot, 2 the file can't be used.",
     )
     parser.add_argument(
@@ -78,4 +29,50 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument("--controllers", metavar="FILE", help="YAML file of its controllers")
     parser.add_argument("--json", action="store_true", help="print JSON")
-    return parser
+    args = parser.parse_intermixed_args(argv)
+    pages, code = [], 0
+    try:
+        arguments = read_arguments([each for each in args.files if ":=" in each])
+        if args.controllers:
+            files.read_parameters(args.controllers)  # an unreadable file is reported once
+        for given in (each for each in args.files if ":=" not in each):
+            for page in _examined(given, arguments, args.controllers):
+                if isinstance(page, Findings):
+                    pages.append(page)
+                    code = max(code, WRONG if page.wrong else 0)
+                    print("" if args.json else f"{page}\n\n", end="", flush=True)
+                else:
+                    code = UNUSABLE
+                    print(f"check_robot: {page}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("check_robot: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except (CannotWrite, RobotEnvError) as error:
+        print(f"check_robot: {error}", file=sys.stderr)
+        return UNUSABLE
+    if args.json:
+        print(json.dumps([asdict(page) for page in pages], indent=2, ensure_ascii=False))
+    return code
+
+
+def _examined(
+    given: str, arguments: Mapping[str, str], parameters: str | None
+) -> Iterator[Findings | CannotUse]:
+    """Yields the pages of what an argument names, and why a file can't be used."""
+    try:
+        paths = find(given)
+    except CannotUse as error:
+        yield error
+        return
+    parts = 0  # of robots: other xacro files include them
+    for path in paths:
+        try:
+            yield examine(read(path, arguments), parameters)
+        except CannotUse as error:
+            if len(paths) == 1 or path.suffix != ".xacro":
+                yield error
+                continue
+            parts += 1
+            print(f"check_robot: passed over: {error}", file=sys.stderr)
+    if parts == len(paths):
+        yield CannotUse(f"{given}: none of its {len(paths)} files is a robot by itself")

@@ -8,16 +8,13 @@ from xml.etree.ElementTree import Element
 
 from file_access.content import FileError, read_file
 from file_access.xml_text import decode, parse
+from package_writing import CannotUse
 from robot_envs import RobotEnvError, files
 from robot_sim.physics.description import DescriptionError, Light, ModelDescription
 from robot_sim.physics.files.reading import Reading, Resources
 from robot_sim.physics.files.world_file import WorldDescription, parse_world, read_entity
 
 SUFFIXES = (".urdf", ".xacro", ".sdf", ".world")
-
-
-class CannotUse(Exception):
-    """A file can't be used. The text is one line with what is wrong."""
 
 
 class RobotFile(NamedTuple):
@@ -32,13 +29,11 @@ class RobotFile(NamedTuple):
 def find(given: str) -> list[Path]:
     """Returns the file that an argument names, or those of a folder or a package.
 
-    Packages around it are found from now on, as if its checkout lay in a workspace.
+    From then on, packages in the same checkout are found, as if it lay in a workspace.
     """
-    path = Path(given).expanduser()
     try:
-        if given.startswith(files.PACKAGE):
-            path = files.locate(given)
-        elif not path.exists() and not path.suffix:
+        path = files.locate(given)
+        if not path.exists() and not path.suffix:
             path = files.locate(f"{files.PACKAGE}{given}/package.xml").parent
         path = path.resolve(strict=True)
     except (RobotEnvError, OSError) as error:

@@ -1,4 +1,4 @@
-"""Trials of a robot in an engine: whether it stands with its joints held, and which of them commands move."""
+"""Trials of a robot in an engine: standing with its joints held, and motion by commands."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -11,6 +11,7 @@ from robot_sim.control.hardware import EFFORT
 from robot_sim.physics.description import Joint, ModelDescription
 from robot_sim.physics.engines import make_engine
 from robot_sim.physics.files.world_file import WorldDescription
+from robot_sim.physics.loops import in_loops
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose, conjugate, rotate
 from robot_sim.physics.world import World, ground_plane
@@ -27,27 +28,25 @@ FASTEST, QUICKEST = 100.0, 1000.0  # [m/s] of a base, [rad/s, m/s] of a joint
 
 
 class Trial(NamedTuple):
-    """What an engine makes of a robot or a world."""
+    """The behaviour of a robot or a world in an engine."""
 
+    text: str
     fault: str = ""  # why it doesn't stand
-    sank: float = 0.0  # [m]
-    tilt: float = 0.0  # [degrees]
-    moved: int = 0  # joints
     still: tuple[str, ...] = ()  # a line for each joint that commands don't move
 
 
 def observe(
     content: ModelDescription | WorldDescription, interfaces: Mapping[str, str], engine: str
 ) -> Trial:
-    """Lets a world run, or a robot stand, whose joints are commanded then, each alone.
+    """Lets a world run, or a robot stand, and then commands its joints, each alone.
 
     Args:
-        content: of a file.
-        interfaces: hardware interfaces by joint; joints without one take efforts.
+        content: Content of a file.
+        interfaces: Hardware interfaces by joint; joints without one take efforts.
         engine: "bullet" or "mujoco".
 
     Raises:
-        DescriptionError: if the engine can't take it.
+        DescriptionError: If the engine can't take it.
     """
     sim = Simulator(World(make_engine(engine)), lockstep=True)
     try:
@@ -57,9 +56,13 @@ def observe(
         sim.world.set_gravity(content.gravity)
         for name, each in content.models.items():
             sim.world.spawn(name, deepcopy(each), each.initial_pose)
-        return Trial(_run(sim, sim.world.models.values()))
+        return _still(_run(sim, sim.world.models.values()))
     finally:
         sim.world.close()
+
+
+def _still(fault: str) -> Trial:
+    return Trial(fault or f"nothing blows up within {SECONDS:g} s", fault)
 
 
 def _of_robot(sim: Simulator, robot: ModelDescription, interfaces: Mapping[str, str]) -> Trial:
@@ -69,8 +72,9 @@ def _of_robot(sim: Simulator, robot: ModelDescription, interfaces: Mapping[str, 
         height = standing_height(robot, starts) or 0.0
     model = sim.world.spawn(robot.name, deepcopy(robot), Pose((0.0, 0.0, height)))
     sim.set_joint_states(model, starts, {})
-    joints = [] if robot.static else robot.movable_joints
-    driven = [each for each in joints if each.name not in robot.mimics]
+    driven = [each for each in robot.movable_joints if each.name not in robot.mimics]
+    if robot.static:
+        return _still(_run(sim, [model]))
     for joint in driven:
         model.set_motor(joint.name, 0.0, _strength(joint, ""))
     begin, (first, _) = sim.save_state(), model.root_state()
@@ -89,9 +93,14 @@ def _of_robot(sim: Simulator, robot: ModelDescription, interfaces: Mapping[str, 
         sim.restore_state(begin)
         why = _why_still(sim, model, joint, interfaces.get(joint.name, EFFORT))
         still += [f"commands don't move '{joint.name}': {why}"] if why else []
-    return Trial(
-        fault, sank, math.degrees(math.acos(level)), len(driven) - len(still), tuple(still)
-    )
+    text = fault or ("held by its fixed base" if robot.fixed_base else "stands")
+    if not robot.fixed_base:
+        text += (
+            f", {1000.0 * sank:.1f} mm lower and tilted by {math.degrees(math.acos(level)):.1f}°"
+        )
+        text += f" after {SECONDS:g} s, joints held"
+    moved = f"; commands move {len(driven) - len(still)} of {len(driven)} joints"
+    return Trial(text + (moved if driven else ""), fault, tuple(still))
 
 
 def _why_still(sim: Simulator, model: Model, joint: Joint, interface: str) -> str:
@@ -99,11 +108,14 @@ def _why_still(sim: Simulator, model: Model, joint: Joint, interface: str) -> st
     speed = min(joint.velocity, SPEED) if joint.velocity >= 0.0 else SPEED
     room = joint.upper - joint.lower if joint.bounded else math.inf
     strength, begin, ends = _strength(joint, interface), sim.save_state(), []
-    limits = {"range": room, "velocity": speed, "effort": strength}
-    for what in (what for what, limit in limits.items() if limit == 0.0):
-        return f"the {what} of its <limit> is 0"
+    for what, limit in (("range", room), ("velocity", speed), ("effort", strength)):
+        if limit == 0.0:
+            return f"the {what} of its <limit> is 0"
+    loops = in_loops(model.description)
     for way in (speed, -speed):
         sim.restore_state(begin)
+        for name in loops if joint.name in loops else ():  # one alone can't move
+            model.set_motor(name, 0.0, model.description.joints[name].friction)
         model.set_motor(joint.name, way, strength)
         sim.advance(round(PUSH / sim.world.time_step))
         ends.append(model.joint_state(joint.name)[0])

@@ -1,4 +1,4 @@
-"""A package's files: the templates filled with what is known of the robot."""
+"""The templates of a package's files, and the values that fill them."""
 
 import json
 import shlex
@@ -56,13 +56,7 @@ def render(template: str, **values: Any) -> str:
 
 
 def fill(folder: Path, package: str, values: Mapping[str, Any]) -> None:
-    """Writes the template's files, except the default robot, and those of the task.
-
-    Args:
-        folder: the package's folder.
-        package: the package's name.
-        values: the values to fill in, by their names in the template.
-    """
+    """Writes the template's files, except the default robot, and those of the task."""
     tops = (TEMPLATE, HERE / ("drive" if values["base"] else "reach"))
     for top, source in ((each, file) for each in tops for file in sorted(each.rglob(f"*{FILLED}"))):
         place = source.relative_to(top).with_suffix("")
@@ -101,9 +95,9 @@ def goals(survey: Survey, starts: Mapping[str, float]) -> dict[str, tuple[float,
     """
     least = SAG / 2.0 if 0 < len(feet(survey.model)) < TRIPOD else 0.0
     share = 0.25 if survey.model.fixed_base else 0.0
-    found = {}
+    goals = {}
     for motor in (each for each in survey.motors if not each.wheel):
         start = starts.get(motor.joint, 0.0)
         near = max(0.025 * (motor.high - motor.low), least)
-        found[motor.joint] = (start + share * (motor.high - start), near)
-    return found
+        goals[motor.joint] = (start + share * (motor.high - start), near)
+    return goals

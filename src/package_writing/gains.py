@@ -1,4 +1,4 @@
-"""Initial gains of controllers, from the inertias that they move."""
+"""Initial controller gains, from the inertias that they move."""
 
 import math
 from collections.abc import Mapping
@@ -37,7 +37,7 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
     below = _masses(model)
     stances = _stances(model, below)
     balancing = stances if len(feet(model)) < TRIPOD else {}
-    found = {}
+    gains = {}
     for name, inertia in carried.items():
         ratio = min(inertia / own[name], MOST) if own[name] > 0.0 else 1.0
         moved = own[name] * ratio or inertia
@@ -56,8 +56,8 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
             weight = max(weight, load)
             stable = p * d / standing if standing else math.inf
         i = 0.0 if name in balancing else min(2.0 * p, stable / 2.0)
-        found[name] = _rounded({"p": p, "i": i, "d": d, "i_clamp": weight})
-    return found
+        gains[name] = _rounded({"p": p, "i": i, "d": d, "i_clamp": weight})
+    return gains
 
 
 def _stances(
@@ -71,24 +71,24 @@ def _stances(
     poses, on = poses_at_zero(model), feet(model)
     top = centre_of_mass(model, poses)[2] if on else 0.0
     total = sum(each.inertia.mass for each in model.links.values() if each.inertia is not None)
-    found = {}
+    stances = {}
     for foot in on:
         for joint in (each for each in model.carriers(foot) if each.movable):
             frame = poses[joint.child].compose(joint.anchor)
             x, y, z = rotate(frame.orientation, joint.axis)
             mass = (total - below[joint.name]) / max(1, len(on) // 2)
             if joint.kind == "prismatic":
-                found[joint.name] = (GRAVITY * mass * abs(z), mass, 0.0)
+                stances[joint.name] = (GRAVITY * mass * abs(z), mass, 0.0)
             else:
                 soles = [poses[foot].compose(each.pose) for each in model.links[foot].collisions]
                 arm = max(math.dist(frame.position, each.position) for each in soles)
                 height, level = max(0.0, float(top) - frame.position[2]), math.hypot(x, y)
-                found[joint.name] = (
+                stances[joint.name] = (
                     GRAVITY * mass * arm * level,
                     mass * max(arm, height) ** 2,
                     GRAVITY * mass * height * level,
                 )
-    return found
+    return stances
 
 
 def wheel_gains(model: ModelDescription) -> dict[str, Gains]:
@@ -96,23 +96,23 @@ def wheel_gains(model: ModelDescription) -> dict[str, Gains]:
 
     p is as stiff as steps of 1 ms allow with the wheel in the air; i compensates slopes and friction.
     """
-    found = {}
+    gains = {}
     for name, inertia in effective_inertias(model, poses_at_zero(model)).items():
         p = HIGHEST * inertia
-        found[name] = _rounded({"p": p, "i": VELOCITY * p, "d": 0.0, "i_clamp": CLAMP * p})
-    return found
+        gains[name] = _rounded({"p": p, "i": VELOCITY * p, "d": 0.0, "i_clamp": CLAMP * p})
+    return gains
 
 
 def _masses(model: ModelDescription) -> dict[str, float]:
     """Returns the mass that each movable joint carries [kg]."""
-    found = {}
+    masses = {}
     for joint in model.movable_joints:
         links = [joint.child]
         for name in links:
             links += [each.child for each in model.joints.values() if each.parent == name]
         inertias = [model.links[name].inertia for name in links]
-        found[joint.name] = sum(each.mass for each in inertias if each is not None)
-    return found
+        masses[joint.name] = sum(each.mass for each in inertias if each is not None)
+    return masses
 
 
 def _rounded(gains: Gains) -> Gains:

@@ -1,4 +1,4 @@
-"""Writes one package, and reports its contents."""
+"""The package for a robot, and the report on it."""
 
 import math
 import os
@@ -37,15 +37,15 @@ class PackageRequest:
     """The user's request for a package.
 
     Args:
-        name: the package's name.
-        folder: its destination.
-        urdf: the robot's file; None for a two-link arm.
-        arguments: xacro's arguments.
+        name: The package's name.
+        folder: Its destination.
+        urdf: The robot's file; None for a two-link arm.
+        arguments: Xacro's arguments.
         base: "fixed" or "free", for a robot that isn't fixed to the world; None if not given.
-        height: where to spawn it [m]; None for 0, or so that a free base stands on the ground.
-        interface: of joints without transmissions; None for velocity on wheels and effort on others.
-        passive: joints that get no motor, if none has a transmission.
-        standalone: whether its URDF is written expanded, with all meshes.
+        height: Where to spawn it [m]; None for 0, or so that a free base stands on the ground.
+        interface: Of joints without transmissions; None for velocity on wheels and effort on others.
+        passive: Joints that get no motor, if none has a transmission.
+        standalone: Whether its URDF is written expanded, with all meshes.
     """
 
     name: str
@@ -61,23 +61,19 @@ class PackageRequest:
 
 def read_arguments(texts: Sequence[str]) -> dict[str, str]:
     """Parses xacro's arguments; raises CannotWrite if one isn't NAME:=VALUE."""
-    found = {}
+    arguments = {}
     for text in texts:
         name, sign, value = text.partition(":=")
         if not sign or not re.fullmatch(r"\w+", name):
             raise CannotWrite(f"'{text}' is not an argument of xacro (NAME:=VALUE)")
-        found[name] = value
-    return found
+        arguments[name] = value
+    return arguments
 
 
 def write(request: PackageRequest, made: Path) -> str:
-    """Writes the package into an empty folder.
+    """Writes the package into an empty folder; returns the report to print.
 
-    Returns:
-        The report to print.
-
-    Raises:
-        CannotWrite: if the robot can't be read, simulated or moved.
+    Raises CannotWrite if the robot can't be read, simulated or moved.
     """
     if request.height is not None and not math.isfinite(request.height):
         raise CannotWrite(f"--height is a number of metres, not {request.height}")
@@ -131,8 +127,7 @@ def _completed(
 ) -> tuple[str, str, Survey]:
     """Surveys the robot, and writes a file that adds what its own lacks.
 
-    Returns:
-        The file to use, in the folder urdf; its XML; and the survey.
+    Returns the file to use, in the folder urdf; its XML; and the survey.
     """
     others = files.resources()
     resources = Resources(

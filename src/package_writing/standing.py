@@ -1,4 +1,4 @@
-"""A legged robot's feet, and the posture and height in which it stands on them."""
+"""Feet, stance and standing height of a legged robot."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Surveys a URDF: its motors, passive joints and plugin."""
+"""Survey of a URDF: motors, passive joints and plugin."""
 
 import math
 import re
@@ -91,17 +91,11 @@ def look_at(
     free: bool = False,
     passive: Sequence[str] = (),
 ) -> Survey:
-    """Surveys a URDF.
+    """Surveys a URDF, whose base stays free if `free`.
 
-    Args:
-        xml: the URDF's text.
-        interface: of the joints, if none has a transmission; None for velocity on wheels, effort on others.
-        resources: finds meshes.
-        free: whether the robot's base stays free.
-        passive: joints that get no motor, if none has a transmission.
-
-    Raises:
-        CannotWrite: if it can't be read or simulated, or nothing in it can be moved.
+    `interface` is that of joints, None for velocity on wheels and effort on others; `passive` joints get no
+    motor: both only if no joint has a transmission. Raises CannotWrite if it can't be read or simulated, or
+    nothing moves.
     """
     try:
         robot, control = parse(xml), read_description(xml)
@@ -191,14 +185,14 @@ def _casters(model: ModelDescription) -> set[str]:
     """Returns the continuous joints of casters: what swivels on the ground, and what that carries."""
     lows, poses = lows_of(model, {}), link_poses(model, Pose(), {})
     ground = min(lows.values(), default=0.0)
-    found = set()
+    casters = set()
     for foot in (name for name, low in lows.items() if low <= (1.0 - FOOT) * ground):
         above = [each for each in model.carriers(foot) if each.kind == "continuous"]
         for place, joint in enumerate(above):
             frame = poses[joint.child].compose(joint.anchor)
             if abs(rotate(frame.orientation, joint.axis)[2]) > UPRIGHT:
-                found |= {each.name for each in above[place:]}
-    return found
+                casters |= {each.name for each in above[place:]}
+    return casters
 
 
 def _speeds(joint: JointHandle) -> tuple[float, float]:

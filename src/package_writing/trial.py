@@ -1,4 +1,4 @@
-"""Trials of a package that was just written: a step of its environment, and whether its robot stands."""
+"""Trials of a new package: a step of its environment, and whether its robot stands."""
 
 import importlib.util
 import json
@@ -35,17 +35,8 @@ ENGINES = {"pybullet": "bullet", "mujoco": "mujoco"}  # by the module that each 
 def try_out(package: str, env_id: str, made: Path, *, stands: bool) -> dict[str, str]:
     """Takes a step in a package's environment, in a process of its own; not without ROS.
 
-    Args:
-        package: the package's name.
-        env_id: of its environment.
-        made: its folder.
-        stands: whether to try if its robot stands, too.
-
-    Returns:
-        Why the robot doesn't stand, "" if it does, by each engine that is installed.
-
-    Raises:
-        CannotWrite: if the step fails.
+    With `stands` it also tries if the robot stands; returns why it doesn't, "" if it does, by each engine
+    that is installed. Raises CannotWrite if the step fails.
     """
     if importlib.util.find_spec("rospkg") is None:  # without ROS nothing finds it by its name
         return {}

@@ -1,4 +1,4 @@
-"""Copies a URDF or xacro file with the files it includes, and meshes with relative paths."""
+"""Copies of a URDF or xacro file, the files it includes, and meshes with relative paths."""
 
 import glob
 import itertools
@@ -22,14 +22,7 @@ MATERIALS = re.compile(r"^mtllib[ \t]+([^/\\\n]*\S)[ \t\r]*$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Copied:
-    """A copied file.
-
-    Args:
-        place: its path in the package's folder `urdf`.
-        xml: the copy, expanded.
-        packages: the packages that it names.
-        outside: the files that it includes from outside of any package.
-    """
+    """A copied file, by its path in `urdf`, and expanded; with the packages and files that it needs."""
 
     place: str
     xml: str
@@ -42,15 +35,8 @@ def copy_urdf(
 ) -> Copied:
     """Copies a file and those that it includes by relative paths; the paths stay the same.
 
-    Args:
-        path: the URDF or xacro file.
-        arguments: xacro's arguments.
-        package: the package's name.
-        folder: the package's folder.
-        standalone: whether to write the file expanded, and to copy all meshes; it takes no arguments then.
-
-    Raises:
-        CannotWrite: if one of them can't be read or copied.
+    With `standalone` the file is written expanded, with all meshes, and takes no arguments then. Raises
+    CannotWrite if one of them can't be read or copied.
     """
     path = Path(os.path.abspath(path.expanduser()))  # without .., which git can't keep empty
     try:
@@ -74,7 +60,7 @@ def copy_urdf(
     text = "".join(texts.values())
     # What only a false <xacro:if> asks for need not be there.
     there = {
-        found[1] for found in FOUND.finditer(text) if _is_found(f"{PACKAGE}{found[1]}/package.xml")
+        match[1] for match in FOUND.finditer(text) if _is_found(f"{PACKAGE}{match[1]}/package.xml")
     }
     packages = there | set(NAMED.findall(xml))
     outside = [
@@ -112,10 +98,12 @@ def expanded(path: Path, arguments: Mapping[str, str]) -> str:
 def _own(texts: Mapping[Path, str]) -> list[Path]:
     """Returns the files to copy: those included by relative paths. Others are found where they are."""
     files = list(texts)
-    found = {Path(each[2]).name for text in texts.values() for each in FOUND.finditer(text)}
+    elsewhere = {Path(each[2]).name for text in texts.values() for each in FOUND.finditer(text)}
     near = files[0].resolve().parent.parent  # the package's folder, if the file lies in its `urdf`
     own = [
-        each for each in files[1:] if each.name not in found and each.resolve().is_relative_to(near)
+        each
+        for each in files[1:]
+        if each.name not in elsewhere and each.resolve().is_relative_to(near)
     ]
     return [files[0], *own]
 
@@ -159,14 +147,14 @@ def _mesh(source: Path, name: str, every: bool) -> Path | None:
     if every and _is_found(name.removeprefix("file://")):
         return locate(name.removeprefix("file://"))
     if not name.startswith(PACKAGE):
-        found = [] if ":" in name else [source.parent / name]
+        candidates = [] if ":" in name else [source.parent / name]
     elif _is_found(name):
-        found = []
+        candidates = []
     else:  # downloaded without its package.xml
         package, _, place = name.removeprefix(PACKAGE).partition("/")
-        found = [parent / package / place for parent in source.parents]
-        found += [parent / place for parent in source.parents if parent.name == package]
-    return next((each for each in found if each.is_file()), None)
+        candidates = [parent / package / place for parent in source.parents]
+        candidates += [parent / place for parent in source.parents if parent.name == package]
+    return next((each for each in candidates if each.is_file()), None)
 
 
 def _is_found(name: str) -> bool:

@@ -1,4 +1,4 @@
-"""A base on wheels: which of them drive it, and what its drive controller and its task need to know."""
+"""Bases on wheels: drive wheels, dimensions, speeds and laser."""
 
 import math
 import re
@@ -33,16 +33,16 @@ class Base:
     """What a diff_drive_controller drives.
 
     Args:
-        left: joints of the wheels on the left.
-        right: on the right, as many.
-        radius: of the wheels [m].
-        separation: of the left ones from the right ones [m].
-        speed: the highest ahead [m/s].
-        frame: the root link.
-        laser: one that sees its surroundings alone; None: there is none.
-        touch: range of the laser at which the base touches what it sees [m].
-        clearance: free space about the middle of the base where it starts [m].
-        note: why there is no laser, although the file has one; or "".
+        left: Joints of the wheels on the left.
+        right: On the right, as many.
+        radius: Radius of the wheels [m].
+        separation: Separation of the left ones from the right ones [m].
+        speed: The highest ahead [m/s].
+        frame: The root link.
+        laser: One that sees its surroundings alone; None: there is none.
+        touch: Range of the laser at which the base touches what it sees [m].
+        clearance: Free space about the middle of the base where it starts [m].
+        note: Why there is no laser, although the file has one; or "".
     """
 
     left: tuple[str, ...]
@@ -70,13 +70,12 @@ class Base:
 def find_base(survey: Survey) -> Base | None:
     """Returns the base that wheels on its left and right drive, which turn about its y.
 
-    Returns:
-        The base; None if its wheels are others, or their motors take no velocity.
+    None if its wheels are others, or their motors take no velocity.
     """
     wheels = survey.wheels
-    found = [_wheel(survey, motor) for motor in wheels]
-    rims = [each for each in found if each is not None]
-    if not rims or len(rims) < len(found):
+    measured = [_wheel(survey, motor) for motor in wheels]
+    rims = [each for each in measured if each is not None]
+    if not rims or len(rims) < len(measured):
         return None
     left, right = (
         tuple(each.joint for each, (_, y) in zip(wheels, rims, strict=True) if sign * y > MIDDLE)
@@ -148,11 +147,11 @@ def _outline(survey: Survey, laser: Sensor | None) -> tuple[float, float]:
     ]
 
     def widest(centre: Pose, angles: np.ndarray) -> float:
-        found = [0.0]
+        reaches = [0.0]
         for angle in angles.tolist():
             way = rotate(centre.orientation, (math.cos(angle), math.sin(angle), 0.0))
-            found += [reach(*each, way) - float(np.dot(centre.position, way)) for each in shapes]
-        return max(found)
+            reaches += [reach(*each, way) - float(np.dot(centre.position, way)) for each in shapes]
+        return max(reaches)
 
     middle = widest(Pose(), np.linspace(-math.pi, math.pi, WAYS))
     if laser is None:
@@ -164,17 +163,11 @@ def _outline(survey: Survey, laser: Sensor | None) -> tuple[float, float]:
 
 
 def scan_topic(laser: Sensor, namespace: str, name: str) -> str:
-    """Returns the topic of a laser (docs/contract/sensors.md 0.2).
-
-    Args:
-        laser: the sensor.
-        namespace: in which the robot is spawned.
-        name: of the model.
-    """
+    """Returns the topic of a laser (docs/contract/sensors.md 0.2) of a model spawned in a namespace."""
     element = next((each.element for each in laser.plugins), laser.element)
     own = element.findtext("robotNamespace")
     given = namespace if own is None else own.strip() or name
     topic = (element.findtext("topicName") or "scan").strip()
     parts = (topic if topic[:1] == "/" else f"{given}/{topic}").split("/")
-    found = "/" + "/".join(filter(None, parts))
-    return found if re.fullmatch(r"[\w/]+", found) else "/scan"  # it stands in launch files
+    resolved = "/" + "/".join(filter(None, parts))
+    return resolved if re.fullmatch(r"[\w/]+", resolved) else "/scan"  # it stands in launch files

@@ -1,4 +1,4 @@
-"""Trains agents in Gymnasium's environments, and shows what they learned.
+"""Trainings of agents in Gymnasium's environments, and tools for their runs.
 
 Public names: `train` and `Callback`, to train from Python, and `WorkbenchError`, the error of both.
 The command line is `python3 -m rl_workbench`; the installed command, `rl-workbench`, has this project's

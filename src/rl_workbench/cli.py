@@ -11,7 +11,7 @@ from rl_workbench.training import train as training
 
 PROG = "rl-workbench"
 DESCRIPTION = """\
-Trains agents in Gymnasium's environments, and shows what they learned.
+Trains agents in Gymnasium's environments and shows their policies.
 
 RUN is a run folder, as runs/CartPole-v1__dqn__0__1700000000.
 Exit codes: 0 done, 1 failed, 2 wrong arguments; 130 after Ctrl-C."""
@@ -62,7 +62,7 @@ def parse(argv: list[str], prog: str = PROG) -> argparse.Namespace:
     """Parses the arguments of a subcommand.
 
     Raises:
-        SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
+        SystemExit: With code 2 and a usage line, if they are wrong; with 0 after --help.
     """
     parser = argparse.ArgumentParser(
         prog,

@@ -1,14 +1,15 @@
-"""Gymnasium's ids of environments: `module:namespace/Name-v0` or `namespace/Name-v0`."""
+"""Environment ids of Gymnasium: `module:namespace/Name-v0` or `namespace/Name-v0`."""
 
 import contextlib
 import re
 from importlib import import_module
-
-import gymnasium
-from gymnasium.envs.registration import EnvSpec
+from typing import TYPE_CHECKING
 
 from rl_workbench import errors
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
+
+if TYPE_CHECKING:
+    from gymnasium.envs.registration import EnvSpec
 
 
 def without_module(env_id: str) -> str:
@@ -45,8 +46,10 @@ def import_module_of(env_id: str) -> None:
         raise EnvironmentFailure(f"can't make {env_id}: {error_line(error)}") from error
 
 
-def spec_of(env_id: str) -> EnvSpec | None:
-    """Returns what is registered under an id, once its module is imported."""
+def spec_of(env_id: str) -> "EnvSpec | None":
+    """Returns the registration of an id, once its module is imported."""
+    import gymnasium  # --help needs none of it
+
     if without_module(env_id) not in gymnasium.registry:
         import_module_of(env_id)
     return gymnasium.registry.get(without_module(env_id))

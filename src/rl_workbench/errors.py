@@ -23,7 +23,7 @@ _LIBRARIES = (
 
 
 class WorkbenchError(RuntimeError):
-    """An error that the user can fix. The text says what is wrong and what to do."""
+    """An error that the user can fix. The text says how."""
 
 
 class EnvironmentFailure(WorkbenchError):
@@ -68,7 +68,7 @@ class Hints:
 
     def finding_modules(self) -> str:
         """Returns how Python finds a module of the user's own."""
-        return "its folder has to be on PYTHONPATH"
+        return "its folder must be on PYTHONPATH"
 
     def watching(self, folder: Path) -> str:
         """Returns the command that shows a run in TensorBoard."""

@@ -5,9 +5,10 @@ fields of several dataclasses. Whatever the source, the same conversions and che
 """
 
 import argparse
+import json
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import MISSING, Field, field, fields
 from difflib import get_close_matches
 from functools import partial
@@ -20,7 +21,7 @@ import yaml
 from rl_workbench import errors
 from rl_workbench.errors import WorkbenchError
 
-_TOKEN = re.compile(r"(?P<open>[\[{])|(?P<close>[\]}])|(?P<between>[\s,]+)|.", re.DOTALL)
+_KEY = re.compile(r"(?:^|[\s,]+)([A-Za-z_]\w*)=")
 
 
 def option(
@@ -119,8 +120,8 @@ class Options:
         for name, each in self._fields.items():
             flag = f"--{name.replace('_', '-')}"
             default = (defaults or {}).get(name, None if each.default is MISSING else each.default)
-            shown = "no default" if default is None or default == "" else f"default {default}"
-            text = f"{each.metadata['help']} ({shown})".replace("%", "%%")
+            shown = "" if default in (None, "", {}, ()) else f" (default {default})"
+            text = f"{each.metadata['help']}{shown}".replace("%", "%%")
             if self._types[name] is bool:
                 action = argparse.BooleanOptionalAction
                 parser.add_argument(flag, action=action, default=argparse.SUPPRESS, help=text)
@@ -164,7 +165,7 @@ def key_values(texts: list[str], origin: str) -> dict[str, str]:
 
 
 def imported(name: str, flag: str) -> Any:
-    """Returns what a flag names as module:attribute."""
+    """Imports an attribute that a flag names as module:attribute."""
     module, _, attribute = name.partition(":")
     if not module or not attribute:
         raise WorkbenchError(f"{flag} must be module:name, not {name!r}")
@@ -178,17 +179,14 @@ def imported(name: str, flag: str) -> Any:
 
 def is_plain(value: Any) -> bool:
     """Returns whether JSON can represent a value exactly."""
-    if isinstance(value, dict):
-        return all(isinstance(key, str) and is_plain(each) for key, each in value.items())
-    if isinstance(value, list):
-        return all(is_plain(each) for each in value)
-    if isinstance(value, float):
-        return math.isfinite(value)
-    return value is None or isinstance(value, bool | int | str)
+    try:
+        return bool(json.loads(json.dumps(value, allow_nan=False)) == value)
+    except (TypeError, ValueError):
+        return False
 
 
 def plain_value(value: Any) -> Any:
-    """Reads a text as YAML. Unlike YAML it takes 1e-3 for a number, not only 1.0e-3.
+    """Reads a text as YAML, and 1e-3 and 5e4 as numbers, which YAML 1.1 doesn't.
 
     Raises:
         ValueError: If it isn't YAML.
@@ -196,58 +194,53 @@ def plain_value(value: Any) -> Any:
     if not isinstance(value, str):
         return value
     try:
-        return _number_too(yaml.safe_load(value))
+        return yaml.load(value, _Loader)
     except yaml.YAMLError:
         raise ValueError("a YAML value") from None
 
 
+class _Loader(yaml.SafeLoader):
+    """Reads numbers with an exponent and no point, too."""
+
+
+def _exponent(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float:
+    number = float(str(node.value))
+    return int(number) if number.is_integer() and abs(number) >= 1 else number
+
+
+_Loader.add_constructor("!exponent", _exponent)
+_Loader.add_implicit_resolver(
+    "!exponent", re.compile(r"[-+]?\d[\d_]*(\.\d*)?[eE][-+]?\d+$"), list("-+0123456789")
+)
+
+EXPECTED = {bool: "true or false", int: "a whole number", float: "a number"}
+
+
 def _converted(kind: Any, value: Any) -> Any:
-    """Converts a text or a YAML value. The text of a ValueError is what it should have been."""
+    """Converts a text or a YAML value. The text of a ValueError is the expected form."""
     if NoneType in get_args(kind):
         kind = next(each for each in get_args(kind) if each is not NoneType)
     if get_origin(kind) is tuple:
         return _numbers(value, get_args(kind)[0])
-    readers: dict[Any, Callable[[Any], Any]]
-    readers = {bool: _switch, int: _whole, float: _number, str: str, Any: plain_value}
-    return readers.get(kind, mapping)(value)
-
-
-def _switch(value: Any) -> bool:
-    words = {"true": True, "false": False}
-    text = str(value).lower()
-    if text not in words:
-        raise ValueError("true or false")
-    return words[text]
-
-
-def _number(value: Any) -> float:
-    try:
-        if isinstance(value, bool):
-            raise TypeError
-        return float(value)
-    except (ValueError, TypeError):
-        raise ValueError("a number") from None
-
-
-def _whole(value: Any) -> int:
-    """Also reads 5e4 and 50_000, the way people write large numbers."""
-    try:
-        if isinstance(value, str) and value.strip().lstrip("+-").replace("_", "").isdigit():
-            return int(value)  # exact, however large
-        number = _number(value)
-        if not number.is_integer():
-            raise ValueError
-        return value if isinstance(value, int) else int(number)
-    except ValueError:
-        raise ValueError("a whole number") from None
+    if kind is str:
+        return str(value)
+    if kind is not Any and kind not in EXPECTED:
+        return mapping(value)
+    read = plain_value(value)
+    if kind is float and type(read) is int:
+        return float(read)
+    if kind is int and type(read) is float and read.is_integer():
+        return int(read)
+    if kind is not Any and type(read) is not kind:
+        raise ValueError(EXPECTED[kind])
+    return read
 
 
 def _numbers(value: Any, kind: type) -> tuple[Any, ...]:
     items = value.strip("[]() ").split(",") if isinstance(value, str) else value
-    if not isinstance(items, list | tuple):
-        items = [items]
+    items = items if isinstance(items, list | tuple) else [items]
     try:
-        return tuple((_whole if kind is int else _number)(item) for item in items)
+        return tuple(_converted(kind, item) for item in items)
     except ValueError:
         example = "whole numbers, as in 128,128" if kind is int else "numbers, as in 0.5,2"
         raise ValueError(example) from None
@@ -257,43 +250,15 @@ def mapping(value: Any) -> dict[str, Any]:
     """Reads a mapping, or a text such as `control_period=0.02, variation={mass: 0.2, gain: [0.9, 1.1]}`.
 
     Raises:
-        ValueError: if it is neither; the text is what it should have been.
+        ValueError: If it is neither. The text is the expected form.
     """
     if isinstance(value, str):
-        pairs = [pair.partition("=") for pair in _split(value)]
+        first, *words = _KEY.split(value)
         try:
-            value = {name: _number_too(yaml.safe_load(text)) for name, _, text in pairs}
-        except yaml.YAMLError:
-            value = None
-        if not all(sign for _, sign, _ in pairs):  # a word without =
+            pairs = zip(words[::2], words[1::2], strict=True)
+            value = None if first else {name: plain_value(text) for name, text in pairs}
+        except ValueError:
             value = None
     if not isinstance(value, dict):
         raise ValueError("KEY=VALUE, several with commas")
     return value
-
-
-def _split(text: str) -> list[str]:
-    """Splits at commas and spaces outside of brackets."""
-    pieces, depth = [""], 0
-    for found in _TOKEN.finditer(text):
-        depth += bool(found["open"]) - bool(found["close"])
-        if found["between"] and depth <= 0:
-            pieces.append("")
-        else:
-            pieces[-1] += found[0]
-    return [piece for piece in pieces if piece]
-
-
-def _number_too(value: Any) -> Any:
-    """Takes 1e-3 for a number everywhere inside a YAML value."""
-    if isinstance(value, dict):
-        return {name: _number_too(each) for name, each in value.items()}
-    if isinstance(value, list):
-        return [_number_too(each) for each in value]
-    if not isinstance(value, str) or not value[-1:].isdigit():
-        return value
-    try:
-        number = float(value)
-    except ValueError:
-        return value
-    return int(number) if number.is_integer() and abs(number) >= 1 else number

@@ -94,10 +94,10 @@ def learning_curve(
     """Draws one training: length and return of every episode, with their moving averages.
 
     Args:
-        lengths: of the episodes [steps].
-        returns: of the episodes.
-        title: above the curves.
-        successes: of the episodes, for a third curve; empty to leave it out.
+        lengths: Of the episodes [steps].
+        returns: Of the episodes.
+        title: Above the curves.
+        successes: Of the episodes, for a third curve; empty to leave it out.
     """
     parts: list[tuple[Sequence[float], str, str]] = [
         (lengths, "episode length [steps]", "tab:blue"),
@@ -124,8 +124,8 @@ def training_curves(panels: Sequence[Panel], across: str) -> Figure:
     """Draws every run by itself: the return of each episode and the moving average.
 
     Args:
-        panels: one for each environment; their groups are single runs.
-        across: label of the positions.
+        panels: One for each environment; their groups are single runs.
+        across: Label of the positions.
     """
     figure, grid = _environments(panels)
     returns = [panel for panel in panels if not panel.shows_success]
@@ -147,7 +147,7 @@ def seed_curves(panels: Sequence[Panel]) -> Figure:
     """Draws groups of seeds: the moving averages over the steps.
 
     Args:
-        panels: one for each environment, with the return of each episode over the steps.
+        panels: One for each environment, with the return of each episode over the steps.
     """
     figure, grid = _environments(panels)
     styles = _styles(panels)
@@ -167,7 +167,7 @@ def evaluation_curves(panels: Sequence[Panel]) -> Figure:
     """Draws a small panel for each variant, with the first variant's mean in grey behind it.
 
     Args:
-        panels: one for each variant, with the mean returns of its evaluations over the steps.
+        panels: One for each variant, with the mean returns of its evaluations over the steps.
     """
     first, environments = panels[0], {panel.environment for panel in panels}
     columns = min(COLUMNS, len(panels))
@@ -202,7 +202,7 @@ def evaluation_curves(panels: Sequence[Panel]) -> Figure:
 
 
 def _environments(panels: Sequence[Panel]) -> tuple[Figure, list[Axes]]:
-    """Large axes, one pair for each environment, since their returns don't compare."""
+    """Makes axes, one pair for each environment, since their returns don't compare."""
     if len(panels) == 1:
         figure = new_figure(WIDTH, 5)
         return figure, [figure.subplots()]
@@ -215,7 +215,7 @@ def _environments(panels: Sequence[Panel]) -> tuple[Figure, list[Axes]]:
 
 
 def _styles(panels: Sequence[Panel]) -> dict[str, dict[str, Any]]:
-    """Colour and line of each group, the same in all panels."""
+    """Returns colour and line of each group, the same in all panels."""
     names = dict.fromkeys(name for panel in panels for name in panel.curves)
     count = len(COLOURS)
     return {

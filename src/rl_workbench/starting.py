@@ -1,8 +1,7 @@
-"""How commands start and end: signals, an output without a reader, and how one starts another."""
+"""Start and end of commands: signals, broken pipes, subprocesses."""
 
 import contextlib
 import os
-import select
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -56,29 +55,16 @@ def search_path() -> str:
 
 @contextlib.contextmanager
 def reader_may_go() -> Iterator[None]:
-    """Ends what runs inside silently once no one reads standard output, as in `train --help | head`."""
+    """Ends the block silently when standard output is closed, as in `train --help | head`."""
     try:
-        yield
-        if sys.stdout is not None:  # it may have been closed by >&-
-            sys.stdout.flush()
+        try:
+            yield
+        finally:
+            if sys.stdout is not None:  # it may have been closed by >&-
+                sys.stdout.flush()
     except BrokenPipeError:
-        if not _nobody_reads():  # it was another pipe
-            raise
-    finally:
-        if _nobody_reads():
-            with open(os.devnull, "wb") as nowhere:  # Python flushes it once more
-                os.dup2(nowhere.fileno(), sys.stdout.fileno())
-
-
-def _nobody_reads() -> bool:
-    """Returns whether standard output is a pipe without a reader."""
-    try:
-        descriptor = sys.stdout.fileno()
-    except (AttributeError, OSError, ValueError):  # closed, or a test's
-        return False
-    looking = select.poll()
-    looking.register(descriptor, 0)
-    return any(events & select.POLLERR for _, events in looking.poll(0))
+        with open(os.devnull, "wb") as nowhere:  # Python flushes it once more
+            os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)

@@ -1,4 +1,4 @@
-"""States of random generators and optimizers, for checkpoints, and how draws are taken back.
+"""States of random generators and optimizers for checkpoints, and undoing draws.
 
 Environments of other people may use the generators of the process: Python's, NumPy's and torch's.
 """
@@ -19,12 +19,12 @@ def seed_all(seed: int) -> None:
 
 
 def mark_random_states() -> Any:
-    """Returns the same as `random_states`, quickly, for `rewind_random_states` in this process."""
+    """Returns the states for `rewind_random_states`, faster than `random_states`."""
     return random.getstate(), np.random.get_state(legacy=False), torch.get_rng_state()
 
 
 def rewind_random_states(mark: Any) -> None:
-    """Takes back what was drawn since `mark_random_states`."""
+    """Undoes the draws since `mark_random_states`."""
     python, numpy, tensor = mark
     random.setstate(python)
     np.random.set_state(numpy)

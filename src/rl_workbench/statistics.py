@@ -12,19 +12,18 @@ Statistic = Callable[..., np.ndarray]  # of an array along `axis`
 
 
 class Statistics(NamedTuple):
-    """Statistics of n scores; the intervals are None for a single score."""
+    """Statistics of n scores."""
 
     n: int
     mean: float
     std: float  # with n - 1 degrees of freedom
     median: float
     iqm: float
-    mean_interval: tuple[float, float] | None
-    iqm_interval: tuple[float, float] | None
+    iqm_interval: tuple[float, float] | None  # None for a single score
 
 
 def iqm(scores: np.ndarray, axis: int = -1) -> np.ndarray:
-    """Returns the mean of the middle half, which no single lucky or failed seed decides."""
+    """Returns the interquartile mean, which a single outlier hardly changes."""
     count = scores.shape[axis]
     cut = int(CUT * count)
     return np.mean(np.sort(scores, axis).take(range(cut, count - cut), axis), axis)
@@ -39,7 +38,6 @@ def describe(scores: np.ndarray) -> Statistics:
         float(np.std(scores, ddof=1)) if several else 0.0,
         float(np.median(scores)),
         float(iqm(scores)),
-        interval(scores, np.mean) if several else None,
         interval(scores, iqm) if several else None,
     )
 

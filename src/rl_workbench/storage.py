@@ -1,4 +1,4 @@
-"""Writes files atomically, so that each is either complete or unchanged, and reads config.json."""
+"""Atomic writing of files, and reading of config.json."""
 
 import io
 import json
@@ -37,25 +37,25 @@ def write_atomically(path: Path, write: Writer) -> None:
         os.close(folder)
 
 
-def write_file(path: Path, write: Writer, told: Path | None = None) -> None:
+def write_file(path: Path, write: Writer, shown: Path | None = None) -> None:
     """Writes a file that the user asked for, atomically; also makes its folder.
 
     Args:
         path: The file.
         write: Fills it.
-        told: Its name for the error, if the user gave another one.
+        shown: Its name for the error, if the user gave another one.
 
     Raises:
         WorkbenchError: If it can't be written. An older file of that name is untouched.
     """
-    told = told or path
+    shown = shown or path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, write)
     except FileExistsError as error:
-        raise WorkbenchError(f"can't write {told}: {told.parent} is not a folder") from error
+        raise WorkbenchError(f"can't write {shown}: {shown.parent} is not a folder") from error
     except OSError as error:
-        raise WorkbenchError(f"can't write {told}: {error.strerror or error}") from error
+        raise WorkbenchError(f"can't write {shown}: {error.strerror or error}") from error
 
 
 def check_writable(path: Path) -> None:

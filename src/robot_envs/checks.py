@@ -1,4 +1,4 @@
-"""Checks of what a task defines and returns; each error names the method and what it should return."""
+"""Validation of a task's definitions and results; each error names the method and the expected value."""
 
 import math
 import operator
@@ -97,10 +97,6 @@ def observation_reader(space: gymnasium.Space[Any], task: str) -> Callable[[Any]
     """Returns a function that converts what a task observes; it raises TaskError for the wrong shape or type.
 
     Numbers beyond the space's bounds pass, as in Gymnasium.
-
-    Args:
-        space: of the observations.
-        task: the name of its class, for the error.
     """
     if isinstance(space, gymnasium.spaces.Box):
         return _array_reader(space, task)
@@ -184,12 +180,12 @@ def checked(task: Task, method: str, given: Any, kind: type | tuple[type, ...]) 
 def checked_number(task: Task, method: str, given: Any) -> float:
     """Returns the finite number that a method has returned; raises TaskError for anything else."""
     try:
-        found = float(given)
+        number = float(given)
     except (TypeError, ValueError):
-        found = math.nan
-    if not math.isfinite(found):
+        number = math.nan
+    if not math.isfinite(number):
         raise _wrong(task, method, given, "a finite number")
-    return found
+    return number
 
 
 def short(given: Any) -> str:
@@ -212,16 +208,9 @@ def goal_space(task: GoalTask, observations: gymnasium.Space[Any]) -> gymnasium.
 
 
 def set_goal(task: GoalTask, state: WorldState, rng: np.random.Generator, goal: Any = None) -> None:
-    """Gives a task the goal of an episode.
+    """Gives a task an episode's goal: `goal`, or the one that it draws; raises TaskError for a wrong one.
 
-    Args:
-        task: the task.
-        state: in which the episode begins.
-        rng: of the environment. A goal is always drawn, so that later draws don't depend on `goal`.
-        goal: replaces the one that the task draws; None: keeps that one.
-
-    Raises:
-        TaskError: if the goal isn't in the task's space of goals.
+    A goal is always drawn, so that later draws don't depend on `goal`.
     """
     drawn = task.goal(rng, state)
     task.desired = checked_goal(task, drawn if goal is None else goal)
@@ -237,16 +226,7 @@ def checked_goal(task: GoalTask, given: Any) -> np.ndarray:
 
 
 def with_goals(task: GoalTask, observation: Any, state: WorldState) -> dict[str, Any]:
-    """Returns the observation of a goal environment.
-
-    Args:
-        task: with the episode's goal.
-        observation: what `observe` returned, in the form of its space.
-        state: that was observed.
-
-    Raises:
-        TaskError: if `achieved` returns another shape than the goal's, or numbers that aren't finite.
-    """
+    """Returns a goal environment's observation; raises TaskError for `achieved` of a wrong shape or NaN."""
     given, desired = task.achieved(state), task.desired
     achieved = _array(given, desired.dtype)
     if achieved.shape != desired.shape or not math.isfinite(achieved.sum()):

@@ -1,4 +1,4 @@
-"""Controllers as a robot's parameters describe them: checked, loaded, and commanded."""
+"""A robot's controllers: validation, loading, and the ports that take commands."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,11 +11,10 @@ from robot_sim.control.controllers.vehicle import VehicleController
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import RobotHardware
 from robot_sim.control.manager import STRICT, ControllerManager
+from ros_calls.commands import COMMANDS, CommandKind
 
-KINDS = ("Float64", "Float64MultiArray", "Twist")  # of command topics that take numbers
 QUANTITIES = ("position", "velocity", "effort")  # that they command
 TWIST = "twist"  # the quantity of a vehicle's command
-AXES = ("linear.x", "linear.y", "angular.z")  # of a Twist that count
 Loaded = dict[str, Controller]
 
 
@@ -23,10 +22,15 @@ class CommandPort(NamedTuple):
     """How a controller is commanded."""
 
     name: str  # of the controller
-    joints: tuple[str, ...]  # one number for each, in this order; of a vehicle `AXES`
-    single: bool  # whether it takes one number instead of a list
+    joints: tuple[str, ...]  # one number for each, in this order; of a vehicle fields of a Twist
+    kind: CommandKind
     quantity: str  # what the numbers are: "position", "velocity", "effort"; of a vehicle "twist"
     bounds: tuple[tuple[float, float], ...] = ()  # of a vehicle's command, by axis [m/s, rad/s]
+
+    @property
+    def single(self) -> bool:
+        """Whether it takes one number instead of a list."""
+        return self.kind.single
 
     @property
     def holds(self) -> bool:
@@ -68,15 +72,9 @@ def _load_one(manager: ControllerManager, name: str, parameters: Mapping[str, An
 def ports(
     commanded: Sequence[str] | None, parameters: Mapping[str, Any], loaded: Loaded
 ) -> list[CommandPort]:
-    """Returns the ports of the controllers that a task commands.
+    """Returns the ports of the controllers that a task commands; None: all that take numbers.
 
-    Args:
-        commanded: their names, in order; None: all that take numbers.
-        parameters: of all controllers.
-        loaded: the running controllers.
-
-    Raises:
-        ControlError: if one doesn't run, or takes no numbers.
+    Raises ControlError if one doesn't run, or takes no numbers.
     """
     if commanded is None:
         return [_port(each, parameters) for each in loaded.values() if _takes_numbers(each)]
@@ -94,15 +92,17 @@ def ports(
 
 
 def _takes_numbers(controller: Controller) -> bool:
-    return [each.kind in KINDS for each in controller.inputs] == [True]
+    kinds = [COMMANDS.get(str(each.kind)) for each in controller.inputs]
+    return len(kinds) == 1 and kinds[0] is not None and bool(kinds[0].topic)
 
 
 def _port(controller: Controller, parameters: Mapping[str, Any]) -> CommandPort:
+    kind = COMMANDS[str(controller.inputs[0].kind)]
     if isinstance(controller, VehicleController):
         options = controller.options
         ranges = (options.linear.velocity, (0.0, 0.0), options.angular.velocity)
         bounds = tuple(each or (-math.inf, math.inf) for each in ranges)
-        return CommandPort(controller.name, AXES, False, TWIST, bounds)
+        return CommandPort(controller.name, kind.fields, kind, TWIST, bounds)
     described = parameters[controller.name]
     listed = described.get("joints") or [described.get("joint")]
     joints = tuple(listed) if set(listed) == set(controller.claimed) else controller.claimed
@@ -110,7 +110,7 @@ def _port(controller: Controller, parameters: Mapping[str, Any]) -> CommandPort:
     known = [each for name in names for each in QUANTITIES if each.capitalize() in name]
     # A user's type whose name has no quantity takes that of its interface.
     quantity = "position" if "position" in known else (known or QUANTITIES[2:])[0]
-    return CommandPort(controller.name, joints, controller.inputs[0].kind == KINDS[0], quantity)
+    return CommandPort(controller.name, joints, kind, quantity)
 
 
 def faults(
@@ -120,14 +120,14 @@ def faults(
     hardware: RobotHardware,
     movable: Sequence[str],
 ) -> Iterator[str]:
-    """Lines that say what is wrong with a robot's controllers.
+    """Yields what is wrong with a robot's controllers.
 
     Args:
-        run: names of those that should run.
-        commanded: names of those that a task should command; None: all that take numbers.
-        parameters: of all controllers.
-        hardware: of the robot.
-        movable: its movable joints, also those without a transmission.
+        run: Names of those that should run.
+        commanded: Names of those that a task should command; None: all that take numbers.
+        parameters: Parameters of all controllers.
+        hardware: Hardware of the robot.
+        movable: Its movable joints, also those without a transmission.
     """
     manager = ControllerManager(hardware)
     loaded: Loaded = {}

@@ -1,4 +1,4 @@
-"""The Gymnasium environment: it passes commands to robots, and lets the task judge the state."""
+"""The Gymnasium environment: commands to robots, and the task's evaluation of the state."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,7 +16,7 @@ from robot_envs.pictures.drawn import HEIGHT, WIDTH, DrawnEnv
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.snapshot import EnvSnapshot
-from robot_envs.task import GoalTask, Task, Unjudged
+from robot_envs.task import GoalTask, Task, Unrewarded
 from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Noise, Sensor
 from robot_envs.variation.randomisation import UniformRandomisation
@@ -55,35 +55,35 @@ class RobotEnv(DrawnEnv):
     `GoalTask` "goal".
 
     Args:
-        robot: the robot, or several that share a world.
-        task: what is to be learned.
+        robot: The robot, or several that share a world.
+        task: What is to be learned.
         backend: "bullet" or "mujoco": in this process; "ros": over ROS in lock-step, bit-identical to
             "bullet"; "ros-own": the same in a simulator that is started for this environment alone, and
             replaced if it fails; "ros-realtime": over ROS, by Gazebo's own services; None: in this process,
             with the robot's engine. Or a backend, which the environment closes.
-        control_period: simulated time of an action [s]; None: the robot's. In real time 0 takes the
+        control_period: Simulated time of an action [s]; None: the robot's. In real time 0 takes the
             newest joint state without waiting.
-        deadline: wall time that a simulator over ROS in lock-step may take for an answer, on top of 10 ms for
+        deadline: Wall time that a simulator over ROS in lock-step may take for an answer, on top of 10 ms for
             each physics step [s]; None: 5 s, and 30 s for "ros-own", of which there may be many.
-        max_steps: after how many steps an episode is truncated; None: the task's.
-        sensor_noise: standard deviation of noise on what joints and sensors measure; see `Sensor`.
-        sensor_delay: age of an observation [control steps].
-        encoder_step: resolution of position sensors [rad, m]; see `Sensor`.
-        action_delay: how many control steps pass before a command arrives.
-        actuator_limit: of commands; see `Actuator`.
-        actuator_lag: time constant with which commands are followed [s]; see `Actuator`.
-        randomisation: what differs from episode to episode: options of `UniformRandomisation` by name, or a
+        max_steps: After how many steps an episode is truncated; None: the task's.
+        sensor_noise: Standard deviation of noise on what joints and sensors measure; see `Sensor`.
+        sensor_delay: Age of an observation [control steps].
+        encoder_step: Resolution of position sensors [rad, m]; see `Sensor`.
+        action_delay: How many control steps pass before a command arrives.
+        actuator_limit: Limit of commands; see `Actuator`.
+        actuator_lag: Time constant with which commands are followed [s]; see `Actuator`.
+        randomisation: What differs from episode to episode: options of `UniformRandomisation` by name, or a
             `Randomisation`. The reset's `info["variation"]` reports what was drawn.
-        camera: of pictures, or only some fields of a `Camera`, as in {"yaw": 90.0}; None: one that sees the
+        camera: Of pictures, or only some fields of a `Camera`, as in {"yaw": 90.0}; None: one that sees the
             robots.
-        width: of pictures [pixels].
-        height: of pictures [pixels].
+        width: Width of pictures [pixels].
+        height: Height of pictures [pixels].
         render_mode: "rgb_array": pictures; "human": a page in the browser, whose address is printed once, at
             about the pace of real time; None: neither.
 
     Raises:
-        RobotEnvError: if the robot's description is wrong, or it can't be brought up.
-        ValueError: for an option that makes no sense.
+        RobotEnvError: If the robot's description is wrong, or it can't be brought up.
+        ValueError: For an option that makes no sense.
     """
 
     side_by_side = staticmethod(side_by_side)
@@ -117,7 +117,7 @@ class RobotEnv(DrawnEnv):
             robots[:1] = [replace(each, world=task.world) for each in robots[:1]]
         self.scene = scene = Scene(robots, task.objects)
         self.max_steps = checks.checked_steps(task.max_steps if max_steps is None else max_steps)
-        self._adopt(task)
+        self._set_task(task)
         self.control_period = period = checks.checked_period(scene.robots[0], control_period)
         nominal = period if period > 0.0 else scene.robots[0].control_period  # [s]
         names = task.query.sensors
@@ -141,13 +141,13 @@ class RobotEnv(DrawnEnv):
         self.backend: RobotBackend = backend
         self._closed = False
         try:
-            self._judge = self._judge_in(backend)
+            self._evaluator = self._register_queries(backend)
         except BaseException:
             self.close()
             raise
 
-    def _judge_in(self, backend: RobotBackend) -> Task | Unjudged:
-        """Lets the backend tell what the task sees; returns what judges its states."""
+    def _register_queries(self, backend: RobotBackend) -> Task | Unrewarded:
+        """Registers the task's queries; returns the evaluator of its states."""
         task = self.task
         if not self._hides or backend.complete:
             backend.look(both(task.query, task.reward_query))
@@ -155,10 +155,10 @@ class RobotEnv(DrawnEnv):
         backend.look(task.query)
         text = "are 0, and nothing terminates: this world can't tell its reward_query"
         gymnasium.logger.warn(f"rewards of {type(task).__name__} {text}")
-        return Unjudged()
+        return Unrewarded()
 
-    def _adopt(self, task: Task) -> None:
-        """Takes the task's spaces, and what checks actions and observations against them."""
+    def _set_task(self, task: Task) -> None:
+        """Sets the task, its spaces, and the functions that check actions and observations."""
         self.task = task
         self._hides = task.reward_query != StateQuery()  # from `apply` and `observe`
         self._has_sensors = bool(task.query.sensors or task.reward_query.sensors)
@@ -215,13 +215,13 @@ class RobotEnv(DrawnEnv):
         """Starts an episode.
 
         Args:
-            seed: restarts the stream of random numbers; None continues it.
+            seed: Restarts the stream of random numbers; None continues it.
             options: "initial_state", and for a `GoalTask` "goal"; see the class.
 
         Raises:
-            gymnasium.error.ClosedEnvironmentError: after `close()`.
-            ValueError: for an unknown option, or an impossible initial state or goal.
-            SimulatorError: if the backend doesn't answer.
+            gymnasium.error.ClosedEnvironmentError: After `close()`.
+            ValueError: For an unknown option, or an impossible initial state or goal.
+            SimulatorError: If the backend doesn't answer.
         """
         self._check_open()
         options = checks.reset_options(self.task, options or {})
@@ -250,7 +250,7 @@ class RobotEnv(DrawnEnv):
         self._steps = 0
         self._show()
         return observation, {
-            **checks.checked(self.task, "info", self._judge.info(state), dict),
+            **checks.checked(self.task, "info", self._evaluator.info(state), dict),
             **info,
         }
 
@@ -269,9 +269,7 @@ class RobotEnv(DrawnEnv):
         """Sends a step's commands and returns at once, so that several simulators move at the same time.
 
         `step` with the same action takes the result; a reset or close drops it. Calling it is optional.
-
-        Raises:
-            Exception: as `step`; and a ValueError if a step is under way.
+        Raises as `step`, and ValueError if a step is under way.
         """
         if self._begun is not None:
             raise ValueError("begin_step() was called twice; step() with its action comes next")
@@ -308,36 +306,36 @@ class RobotEnv(DrawnEnv):
         """Carries out one action.
 
         Raises:
-            gymnasium.error.ResetNeeded: if no episode is under way.
-            gymnasium.error.ClosedEnvironmentError: after `close()`.
-            ValueError: if the action isn't in the action space, or isn't the one that was begun, or a method
+            gymnasium.error.ResetNeeded: If no episode is under way.
+            gymnasium.error.ClosedEnvironmentError: After `close()`.
+            ValueError: If the action isn't in the action space, or isn't the one that was begun, or a method
                 of the task returns something impossible.
-            SimulatorError: if the backend doesn't answer.
+            SimulatorError: If the backend doesn't answer.
         """
-        task, judge = self.task, self._judge
+        task, evaluator = self.task, self._evaluator
         number, action, arriving, sent = self._taken(action)
         state = self.backend.act(arriving)
         if sent is not None:
             state = state._replace(commands=sent)
         self._state, self._steps = state, number
-        ended = checks.checked(task, "is_terminal", judge.is_terminal(state), checks.FLAGS)
+        ended = checks.checked(task, "is_terminal", evaluator.is_terminal(state), checks.FLAGS)
         terminated = bool(ended)
         truncated = not terminated and number == self.max_steps
         if terminated or truncated:
             self._steps = None
         measured = state if self._sensor is None else self._sensor.measure(state, self.np_random)
         self._show()
-        reward = checks.checked_number(task, "reward", judge.reward(state, action))
+        reward = checks.checked_number(task, "reward", evaluator.reward(state, action))
         observation = self._observe(measured)
-        info = checks.checked(task, "info", judge.info(state), dict)
+        info = checks.checked(task, "info", evaluator.info(state), dict)
         return observation, reward, terminated, truncated, info
 
     def save_state(self) -> EnvSnapshot:
         """Returns all that decides the future: of world, episode, task and generators.
 
         Raises:
-            gymnasium.error.ResetNeeded: before the first episode.
-            SimulatorError: if the task holds something unreadable, or the world runs in real time.
+            gymnasium.error.ResetNeeded: Before the first episode.
+            SimulatorError: If the task holds something unreadable, or the world runs in real time.
         """
         self._check_open()
         if self._state is None or self._begun is not None:
@@ -355,8 +353,8 @@ class RobotEnv(DrawnEnv):
         """Returns to a snapshot of this environment: the same actions lead to the same bits.
 
         Raises:
-            ValueError: if it is of another environment.
-            SimulatorError: if the world isn't that of the snapshot any more; a reset comes next.
+            ValueError: If it is of another environment.
+            SimulatorError: If the world isn't that of the snapshot any more; a reset comes next.
         """
         self._check_open()
         if getattr(snapshot, "of", None) is not self:

@@ -1,4 +1,4 @@
-"""A robot's files: finding them, and reading URDF (expanding xacro) and YAML."""
+"""A robot's files: lookup, URDF (xacro is expanded) and YAML."""
 
 import contextlib
 import importlib.util
@@ -25,37 +25,29 @@ SHARE = Path(__file__).resolve().parent / "share"  # in a wheel (setup.py)
 def own_file(package: str, place: str) -> Path:
     """Finds a file of this package, or of one of its companions, without a running ROS.
 
-    It is in the source tree around this module; in a wheel next to this module; or in a catkin workspace,
-    where rospkg finds the package.
-
-    Args:
-        package: the package's name.
-        place: the file's path in it.
-
-    Raises:
-        RobotEnvError: if it is in none of these.
+    It is in the source tree, in a wheel next to this module, or in a catkin workspace, where rospkg finds it.
     """
     source = TREE if package == "cartpole" else TREE / "companions" / package
     for folder in (source, SHARE / package):
         if (folder / place).is_file():
             return folder / place
-    found = _rospkg_path(package)
-    if found is None:
+    path = _rospkg_path(package)
+    if path is None:
         raise RobotEnvError(
             f"package '{package}' is neither next to {TREE} nor on ROS_PACKAGE_PATH; "
             "source the workspace that it is installed in"
         )
-    return found / place
+    return path / place
 
 
 def resources() -> Resources:
     """Finds the meshes and models that a file names by package://."""
 
     def package(name: str) -> str:
-        found = _rospkg_path(name)
-        if found is None:
+        path = _rospkg_path(name)
+        if path is None:
             raise LookupError(name)
-        return str(found)
+        return str(path)
 
     return Resources(package=package)
 
@@ -66,11 +58,7 @@ def is_text(source: Source) -> bool:
 
 
 def locate(source: Source) -> Path:
-    """Returns the path of a file, which need not exist.
-
-    Raises:
-        RobotEnvError: if its package isn't found, or it names no file.
-    """
+    """Returns the path of a file, which need not exist; raises RobotEnvError if its package isn't found."""
     if not isinstance(source, (str, Path)) or not str(source).strip():
         raise RobotEnvError(
             f'a file is a path or "package://PACKAGE/PLACE", or its text; not {source!r}'
@@ -79,9 +67,9 @@ def locate(source: Source) -> Path:
     if not text.startswith(PACKAGE):
         return Path(text).expanduser()
     package, _, place = text.removeprefix(PACKAGE).partition("/")
-    found = _rospkg_path(package)
-    if found is not None:
-        return found / place
+    path = _rospkg_path(package)
+    if path is not None:
+        return path / place
     with contextlib.suppress(RobotEnvError):
         return own_file(package, place)
     raise RobotEnvError(
@@ -119,15 +107,7 @@ def need_file(path: Path) -> None:
 
 
 def read_urdf(source: Source, arguments: Mapping[str, str]) -> str:
-    """Returns the URDF in a file, which is expanded if it is xacro, or the text itself.
-
-    Args:
-        source: the file or the text, which isn't expanded.
-        arguments: of xacro.
-
-    Raises:
-        RobotEnvError: if it can't be read or expanded.
-    """
+    """Returns the URDF in a file, expanded by xacro's arguments, or the text itself; raises RobotEnvError."""
     if is_text(source):
         return str(source)
     path = locate(source)

@@ -1,4 +1,4 @@
-"""Makes environments from the names of a robot and a task: Gymnasium's entry points."""
+"""Gymnasium's entry points: environments from the names of a robot and a task."""
 
 import importlib
 import inspect
@@ -27,17 +27,10 @@ def rendering(make: Maker) -> Maker:
 
 @rendering
 def make_environment(robot: str, task: str, backend: str | None = None, **options: Any) -> RobotEnv:
-    """Makes an environment.
+    """Makes an environment of a robot and a task; see `register`.
 
-    Args:
-        robot: see `register`.
-        task: see `register`.
-        backend: see `RobotEnv`.
-        options: of `RobotEnv`; all others are the task's.
-
-    Raises:
-        RobotEnvError: if robot or task aren't found, or an option is unknown.
-        ValueError: if an option makes no sense.
+    `options` are `RobotEnv`'s; all others are the task's. Raises RobotEnvError for an unknown one or a name
+    that isn't found, ValueError for an option that makes no sense.
     """
     make_task = named(task)
     is_class = isinstance(make_task, type)
@@ -56,18 +49,15 @@ def make_environment(robot: str, task: str, backend: str | None = None, **option
 
 
 def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
-    """Makes a vector of environments; see `make_environment`.
-
-    Raises:
-        RobotEnvError: if robot or task aren't found, or an option is unknown.
-        ValueError: if an option makes no sense.
-    """
+    """Makes a vector of environments; see `make_environment`."""
     return RobotVectorEnv(num_envs, make_environment, **options)
 
 
 def _robots(name: str) -> Any:
-    found = named(name)
-    robots = found() if _takes_nothing(found) and not isinstance(found, type) else found
+    attribute = named(name)
+    robots = (
+        attribute() if _takes_nothing(attribute) and not isinstance(attribute, type) else attribute
+    )
     listed = [robots] if isinstance(robots, Robot) else robots
     if not isinstance(listed, (list, tuple)) or not all(isinstance(each, Robot) for each in listed):
         raise RobotEnvError(
@@ -89,15 +79,7 @@ def _takes_nothing(found: Any) -> bool:
 
 
 def check_options(given: Iterable[str], known: Iterable[str] = ()) -> None:
-    """Checks that options are known.
-
-    Args:
-        given: their names.
-        known: names besides `RobotEnv`'s.
-
-    Raises:
-        RobotEnvError: if one isn't.
-    """
+    """Raises RobotEnvError for an option that neither `RobotEnv` nor `known` has."""
     names = [*option_names(RobotEnv), *known]
     for name in given:
         if name not in names:
@@ -110,38 +92,34 @@ def option_names(make: Callable[..., Any]) -> list[str]:
 
     What a class takes as `**options` are those of its base that have defaults.
     """
-    found: dict[str, None] = {}
+    names: dict[str, None] = {}
     for maker in inspect.getmro(make) if isinstance(make, type) else [make]:
         parameters = inspect.signature(maker).parameters.values()
         more = [each for each in parameters if each.kind == each.VAR_KEYWORD]
         for each in parameters:
             given = maker is not make and each.default is each.empty
             if each not in more and each.name not in NAMED and not given:
-                found[each.name] = None
+                names[each.name] = None
         if not more:
             break
-    return list(found)
+    return list(names)
 
 
 def named(name: str) -> Any:
-    """Imports "module:attribute".
-
-    Raises:
-        RobotEnvError: if there is no such module, or it has no such attribute.
-    """
+    """Imports "module:attribute"; raises RobotEnvError if there is no such module or attribute."""
     module, colon, attribute = name.partition(":")
     if not colon:
         raise RobotEnvError(f"'{name}' must be written as module:attribute")
     try:
-        found = importlib.import_module(module)
+        imported = importlib.import_module(module)
     except ModuleNotFoundError as error:
         if error.name is None or not f"{module}.".startswith(f"{error.name}."):
             raise  # the module exists, and imports one that doesn't
         raise RobotEnvError(
             f"there is no module '{module}' (of '{name}'); ./ws --with FOLDER ... finds those in FOLDER"
         ) from error
-    if not hasattr(found, attribute):
+    if not hasattr(imported, attribute):
         raise RobotEnvError(
-            f"{module} ({found.__file__}) has no '{attribute}'{did_you_mean(attribute, dir(found))}"
+            f"{module} ({imported.__file__}) has no '{attribute}'{did_you_mean(attribute, dir(imported))}"
         )
-    return getattr(found, attribute)
+    return getattr(imported, attribute)

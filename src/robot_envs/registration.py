@@ -1,4 +1,4 @@
-"""Registers environments of robots with Gymnasium; imports neither robots nor physics."""
+"""Registration of environments with Gymnasium; imports neither robots nor physics."""
 
 from typing import Any
 
@@ -23,8 +23,8 @@ def register(
         identifier: Gymnasium's id: "namespace/Name-v0".
         robot: "module:attribute" of a `Robot`, a list of them, or a function that returns one.
         task: "module:attribute" of a class of `Task`, or a function that returns one.
-        reward_threshold: the return from which on the task counts as solved.
-        options: of `RobotEnv` or of the task; `gymnasium.make` may override them.
+        reward_threshold: The return from which on the task counts as solved.
+        options: Options of `RobotEnv` or of the task; `gymnasium.make` may override them.
     """
     kwargs = {"robot": robot, "task": task, **options}
     known = gymnasium.registry.get(identifier)

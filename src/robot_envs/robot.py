@@ -1,4 +1,4 @@
-"""What a robot is made of: its files, the controllers that run, and how it is spawned."""
+"""The description of a robot: its files, running controllers, and spawn pose."""
 
 import logging
 import math
@@ -37,28 +37,28 @@ class Robot:
     Creating one reads no file; `check`, which environments call, reads all.
 
     Args:
-        urdf: a URDF or xacro file: a path, "package://PACKAGE/PLACE", a function that finds it, or the
+        urdf: A URDF or xacro file: a path, "package://PACKAGE/PLACE", a function that finds it, or the
             text of a URDF.
-        controllers: the controllers' parameters as ros_control has them: a YAML file, likewise, or a
+        controllers: The controllers' parameters as ros_control has them: a YAML file, likewise, or a
             mapping. `gazebo_ros_control/pid_gains` and `joint_limits` may be among them.
-        run: the controllers to run, in the order in which they are started.
-        commanded: the ones that tasks command; None: all that take numbers.
-        name: of the model in the world; None: the URDF's own.
-        arguments: of xacro, by name.
-        pose: where it is spawned, in the world.
-        world: a world file: a path, or "package://..."; `EMPTY`: a ground plane; None: nothing else, in
+        run: The controllers to run, in the order in which they are started.
+        commanded: The ones that tasks command; None: all that take numbers.
+        name: Name of the model in the world; None: the URDF's own.
+        arguments: Arguments of xacro, by name.
+        pose: Where it is spawned, in the world.
+        world: A world file: a path, or "package://..."; `EMPTY`: a ground plane; None: nothing else, in
             this process, and over ROS gzserver's default.
-        engine: of the physics in this process: "bullet", or "mujoco".
-        control_period: simulated time of one action [s]; whole physics steps.
-        physics_step: of the world [s]: a longer one computes faster and less exactly; None: that of the world
+        engine: Engine of the physics in this process: "bullet", or "mujoco".
+        control_period: Simulated time of one action [s]; whole physics steps.
+        physics_step: Of the world [s]: a longer one computes faster and less exactly; None: that of the world
             file, or 0.001.
-        namespace: of its topics, services and controllers over ROS; each robot of a world with several
+        namespace: Of its topics, services and controllers over ROS; each robot of a world with several
             needs its own.
-        description: the parameter that holds the URDF over ROS, in the namespace.
-        publisher: the controller that publishes its joint states over ROS.
-        rviz: package and name of a launch file that shows it in RViz; None: there is none.
-        odometry: topic of a vehicle's odometry, which tells its pose and speed where it is deployed.
-        sensor_topics: topics of sensors in real time, by the sensor's name, where plugins name others.
+        description: The parameter that holds the URDF over ROS, in the namespace.
+        publisher: The controller that publishes its joint states over ROS.
+        rviz: Package and name of a launch file that shows it in RViz; None: there is none.
+        odometry: Topic of a vehicle's odometry, which tells its pose and speed where it is deployed.
+        sensor_topics: Topics of sensors in real time, by the sensor's name, where plugins name others.
     """
 
     urdf: Source | Callable[[], Source]
@@ -137,8 +137,8 @@ class Robot:
     def pid_gains(self) -> Mapping[str, Any]:
         """The parameters `gazebo_ros_control/pid_gains`, by joint."""
         described = self.parameters.get("gazebo_ros_control")
-        found = described.get("pid_gains") if isinstance(described, Mapping) else None
-        return found if isinstance(found, Mapping) else {}
+        gains = described.get("pid_gains") if isinstance(described, Mapping) else None
+        return gains if isinstance(gains, Mapping) else {}
 
     def hardware(self) -> RobotHardware:
         """Makes the joints as controllers see them; raises ControlError if something about them is wrong."""
@@ -150,11 +150,7 @@ class Robot:
         return f" '{self.name}'" if self.name else ""
 
     def check(self) -> None:
-        """Reads and checks everything; later calls cost nothing.
-
-        Raises:
-            RobotEnvError: if something is wrong; lists all faults, with the nearest names for unknown ones.
-        """
+        """Reads and checks everything, once; raises RobotEnvError that lists all faults."""
         _ = self._sound
 
     @cached_property

@@ -25,12 +25,8 @@ Placed = dict[str, tuple[float, float]]
 class Scene:
     """What is in a world besides the models of its file.
 
-    Args:
-        robots: one or several; the first one defines world, engine, physics_step and control period.
-        objects: of the task.
-
-    Raises:
-        RobotEnvError: if something in a robot's description is wrong, or a name is used twice.
+    The first robot defines world, engine, physics_step and control period. Raises RobotEnvError if something
+    in a robot's description is wrong, or a name is used twice.
     """
 
     def __init__(self, robots: Sequence[Robot], objects: Sequence[Object] = ()) -> None:
@@ -87,19 +83,17 @@ class Scene:
     def starting_commands(self, joints: Mapping[str, JointState]) -> dict[str, Any]:
         """Returns what the controllers hold when an episode starts with these joints."""
         positions = {name: state.position for name, state in joints.items()}
-        found = {}
+        commands = {}
         for name, (robot, port) in self.ports.items():
             held = port.joints if port.holds else ()
-            found[name] = port.at_start({each: positions[self.joint(robot, each)] for each in held})
-        return found
+            commands[name] = port.at_start(
+                {each: positions[self.joint(robot, each)] for each in held}
+            )
+        return commands
 
     def commands(self, given: Commands) -> dict[str, float | tuple[float, ...]]:
-        """Converts commands to plain numbers.
-
-        Raises:
-            TaskError: for an unknown controller, the wrong count of numbers, or one that isn't finite.
-        """
-        found: dict[str, float | tuple[float, ...]] = {}
+        """Converts commands to plain numbers; raises TaskError for an unknown controller or wrong numbers."""
+        commands: dict[str, float | tuple[float, ...]] = {}
         try:
             items = given.items()
         except AttributeError:
@@ -107,8 +101,8 @@ class Scene:
                 f"commands are given by controller, {{{next(iter(self.ports), '')!r}: ...}}, not {given!r}"
             ) from None
         for name, value in items:
-            found[name] = _command(self._port(name), name, value)
-        return found
+            commands[name] = _command(self._port(name), name, value)
+        return commands
 
     def _port(self, name: str) -> CommandPort:
         if name not in self.ports:
@@ -120,14 +114,14 @@ class Scene:
         """Returns all movable joints' position and velocity; raises TaskError for an unknown or wrong one."""
         if not isinstance(initial, InitialState):
             raise TaskError(f"an episode begins with an InitialState(...), not {initial!r}")
-        found: Placed = dict.fromkeys(self.moved, (0.0, 0.0))
+        placed: Placed = dict.fromkeys(self.moved, (0.0, 0.0))
         for name, given in initial.joints.items():
-            if name not in found:
-                near = nearest_or_all(name, found)
+            if name not in placed:
+                near = nearest_or_all(name, placed)
                 raise TaskError(f"there is no joint '{name}' to place{near}")
-            found[name] = _place(name, given)
+            placed[name] = _place(name, given)
             robot, own = self.moved[name]
-            joint, position = robot.links.joints[own], found[name][0]
+            joint, position = robot.links.joints[own], placed[name][0]
             stop = min(max(position, joint.lower), joint.upper)
             # The backend moves it to the nearer stop; once for each joint that is worth a line.
             if joint.bounded and abs(position - stop) > BEYOND and name not in self._warned:
@@ -136,30 +130,30 @@ class Scene:
                 logger.warning("%s: it starts at %g", text, stop)
         for robot in self.robots:
             if robot.links.loops:
-                self._close_loops(robot, found, initial)
-        return found
+                self._close_loops(robot, placed, initial)
+        return placed
 
-    def _close_loops(self, robot: Robot, found: Placed, initial: InitialState) -> None:
+    def _close_loops(self, robot: Robot, placed: Placed, initial: InitialState) -> None:
         """Puts the joints of closed loops that an episode doesn't place where these close."""
         joints = {self.joint(robot, each.name): each for each in robot.links.movable_joints}
         goals = {
-            j.name: j.clamped(found[at][0]) for at, j in joints.items() if at in initial.joints
+            j.name: j.clamped(placed[at][0]) for at, j in joints.items() if at in initial.joints
         }
-        rest = {joint.name: (0.0, found[at][1]) for at, joint in joints.items()}
+        rest = {joint.name: (0.0, placed[at][1]) for at, joint in joints.items()}
         states = closed(robot.links, rest, goals)
         if states is None:
             raise TaskError(f"an episode puts {sorted(goals)} where its robot's loops don't close")
-        found |= {at: states[joint.name] for at, joint in joints.items()}
+        placed |= {at: states[joint.name] for at, joint in joints.items()}
 
     def placed_models(self, initial: InitialState) -> dict[str, Motion]:
         """Returns the models to place; raises TaskError for an impossible pose."""
-        found = {}
+        motions = {}
         for name, at in initial.models.items():
-            placed = found[name] = at if isinstance(at, Motion) else Motion(at)
+            placed = motions[name] = at if isinstance(at, Motion) else Motion(at)
             wrong = unfit_pose(placed.pose)
             if wrong:
                 raise TaskError(f"where an episode puts the model '{name}' {wrong}")
-        return found
+        return motions
 
     def stand(self, initial: InitialState, robot: Robot) -> Pose:
         """Returns the pose of a robot's model when an episode begins."""

@@ -1,4 +1,4 @@
-"""What is to be learned: actions, observations, reward, and how an episode begins and ends.
+"""Tasks: actions, observations, rewards, and the beginning and end of episodes.
 
 A task knows neither ROS nor a simulator nor a learner; every backend runs the same tasks.
 """
@@ -22,9 +22,9 @@ class Object:
     """An obstacle or a thing to handle, which a task needs besides its robots.
 
     Args:
-        name: of the model in the world.
-        file: its SDF or URDF: a path, "package://PACKAGE/PLACE", or the text itself.
-        pose: where it is spawned; an `InitialState` may put it somewhere else for an episode.
+        name: Name of the model in the world.
+        file: Its SDF or URDF: a path, "package://PACKAGE/PLACE", or the text itself.
+        pose: Where it is spawned; an `InitialState` may put it somewhere else for an episode.
     """
 
     name: str
@@ -75,8 +75,8 @@ class Task(Stateful, ABC):
         """Converts an action to commands.
 
         Args:
-            action: in the action space.
-            state: before the action; `state.commands` is what the controllers hold.
+            action: In the action space.
+            state: Before the action; `state.commands` is what the controllers hold.
 
         Returns:
             Commands by controller; controllers that aren't named keep theirs.
@@ -110,8 +110,8 @@ class Task(Stateful, ABC):
         return {}
 
 
-class Unjudged:
-    """In the place of a task whose `reward_query` the world can't answer."""
+class Unrewarded:
+    """Evaluator for a task whose `reward_query` the world can't answer: no reward, and no end."""
 
     def is_terminal(self, state: WorldState) -> bool:
         return False

@@ -1,4 +1,4 @@
-"""Vectors of robots: what `gymnasium.make_vec` makes of every environment of this library."""
+"""Vector environments: what `gymnasium.make_vec` makes of every environment of this library."""
 
 import contextlib
 from collections.abc import Callable
@@ -36,15 +36,15 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
     action is refused before anything moves. After an error in the middle of a step all have to be reset.
 
     Args:
-        num_envs: number of environments.
-        make: makes one environment, from `backend` and `options`.
-        backend: of all; "ros" and "ros-own" are the same here.
+        num_envs: Number of environments.
+        make: Makes one environment, from `backend` and `options`.
+        backend: The backend of all; "ros" and "ros-own" are the same here.
         autoreset_mode: Gymnasium's: "NextStep", "SameStep" or "Disabled".
-        options: keyword arguments of `make`.
+        options: Keyword arguments of `make`.
 
     Raises:
-        ValueError: if an option makes no sense.
-        RobotEnvError: if a robot can't be brought up.
+        ValueError: If an option makes no sense.
+        RobotEnvError: If a robot can't be brought up.
     """
 
     def __init__(
@@ -88,13 +88,7 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Starts an episode in each, or in those that `options["reset_mask"]` names; see `SyncVectorEnv`.
-
-        Raises:
-            ValueError: if there are not as many seeds or flags as environments.
-            gymnasium.error.ClosedEnvironmentError: after `close()`.
-            SimulatorError: if a simulator can't continue.
-        """
+        """Starts an episode in each, or in those that `options["reset_mask"]` names; see `SyncVectorEnv`."""
         of_all = options is None or "reset_mask" not in options
         given = super().reset(seed=seed, options=None if options is None else dict(options))
         if of_all:
@@ -104,12 +98,8 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
     def step(self, actions: Any) -> Results:
         """Carries out one action in each; see `SyncVectorEnv`.
 
-        Raises:
-            ValueError: if there are not as many actions as environments, or one is wrong; nothing has moved.
-            gymnasium.error.ResetNeeded: if an ended episode isn't reset automatically, or an error
-                interrupted a step.
-            gymnasium.error.ClosedEnvironmentError: after `close()`.
-            SimulatorError: if a simulator can't continue.
+        Raises as `RobotEnv.step`; a ValueError for a wrong action or a wrong number of them, and nothing has
+        moved.
         """
         self._check_ready()
         read = [self._read(action) for action in iterate(self.action_space, actions)]
@@ -127,23 +117,13 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
         return given
 
     def save_state(self) -> VectorSnapshot:
-        """Returns all that decides the future of each; see `RobotEnv.save_state`.
-
-        Raises:
-            gymnasium.error.ResetNeeded: before the first episode.
-            SimulatorError: if something's state can't be saved.
-        """
+        """Returns all that decides the future of each; see `RobotEnv.save_state`."""
         self._check_ready()
         states = [robot.save_state() for robot in self._robots]
         return VectorSnapshot(states, self._autoreset_envs.copy())
 
     def restore_state(self, snapshot: VectorSnapshot) -> None:
-        """Returns to a snapshot of this vector: the same actions lead to the same bits.
-
-        Raises:
-            ValueError: if it is of another one.
-            SimulatorError: if a world isn't that of the snapshot any more; a reset comes next.
-        """
+        """Returns to a snapshot of this vector; see `RobotEnv.restore_state`."""
         if not isinstance(snapshot, VectorSnapshot) or len(snapshot.states) != self.num_envs:
             raise ValueError("the snapshot is of another vector; only that one can restore it")
         for robot, state in zip(self._robots, snapshot.states, strict=True):

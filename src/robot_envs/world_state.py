@@ -1,4 +1,4 @@
-"""What a task sees: joints, links, models and contacts by name; and how an episode begins."""
+"""States of a world: joints, links, models and contacts by name; and initial states."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -143,10 +143,10 @@ class InitialState:
     """The state in which an episode begins; whatever isn't named is as it was spawned.
 
     Args:
-        joints: positions [rad, m], or positions and velocities [rad/s, m/s], by the joint's name; others are
+        joints: Positions [rad, m], or positions and velocities [rad/s, m/s], by the joint's name; others are
             at 0. A position beyond a stop means at the stop.
-        models: poses or motions of models in the world, by name; others are where they were spawned.
-        commands: what controllers hold until the first action, by name; by default position controllers hold
+        models: Poses or motions of models in the world, by name; others are where they were spawned.
+        commands: What controllers hold until the first action, by name; by default position controllers hold
             their joints' positions, and others 0.
     """
 

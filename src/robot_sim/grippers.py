@@ -76,7 +76,7 @@ class Suction(Stateful):
         self._near = False
         own = self._model.link_state(self._link)
         for model in list(self._world.models.values()):
-            if model is self._model or model.description.static:
+            if model is self._model or model.description.static or model.description.script:
                 continue
             for link in model.link_names:
                 if not any(each.second == (model, link) for each in self._held):

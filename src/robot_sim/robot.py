@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from math import ceil, isfinite
 from typing import Any
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import RobotHardware
 from robot_sim.control.manager import ControllerManager
@@ -15,7 +16,6 @@ from robot_sim.physics.model import Model
 from robot_sim.stability import Log, StabilityWatch
 
 JointStates = Sequence[Sequence[float]]
-NANOSECONDS = 1_000_000_000
 FAST = 0.999 * FURTHEST  # [rad, m] in a step: only what has blown up moves like that
 
 SLOWEST = 3600.0  # [s]; the longest control period

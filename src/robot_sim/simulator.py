@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
 
 from robot_sim.applied_forces import AppliedForces
+from robot_sim.constants import NANOSECONDS
 from robot_sim.moves import Moves
 from robot_sim.physics.engine import Twist
 from robot_sim.physics.model import Model
@@ -15,7 +16,6 @@ from robot_sim.robot import ControlledRobot
 from robot_sim.state_dict import Shared, StateError, load, state_of
 from robot_sim.timing import FairLock, Holds, Pacer
 
-NANOSECONDS = 1_000_000_000
 STALL_CHECK = 100_000_000  # [ns]
 IDLE_POLL = 0.2  # [s]; how soon an idle run() notices stop()
 
@@ -70,6 +70,7 @@ class Simulator(Shared):
         self.max_update_rate = max_update_rate
         self.relatch = relatch
         self.now = 0  # [ns] of simulated time
+        world.clock = lambda: self.sim_time
         self.elapsed = 0  # [ns] of simulated time in all; no reset sets it back
         self.robots: list[ControlledRobot] = []
         self._robots_of: dict[Model, list[ControlledRobot]] = {}

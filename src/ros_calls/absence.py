@@ -1,4 +1,4 @@
-"""Explains why no node offers a service, and names what to start."""
+"""Diagnosis of missing services: why no node offers one, and what to start."""
 
 from ros_calls import master
 from ros_calls.master import NoAnswer, Refused
@@ -14,11 +14,7 @@ SPAWNS = "gazeboSpawns"  # XML-RPC method of the simulator's node: see `spawns`
 
 
 def is_offered(service: str) -> bool:
-    """Returns whether a node, dead or alive, is registered for the service of that full name.
-
-    Raises:
-        NoAnswer: the master doesn't answer.
-    """
+    """Returns whether a node, dead or alive, is registered for a service, given by its full name."""
     try:
         master.call("lookupService", service)
     except Refused:
@@ -27,14 +23,7 @@ def is_offered(service: str) -> bool:
 
 
 def why_absent(service: str) -> str:
-    """Returns what is missing, and the command that fixes it.
-
-    Args:
-        service: the full name of a service that no node offers.
-
-    Raises:
-        NoAnswer: the master doesn't answer.
-    """
+    """Returns why no node offers a service, given by its full name, and the command that starts one."""
     parent, _, name = service.rpartition("/")
     above, _, last = parent.rpartition("/")
     if name in LOCKSTEP and is_offered(f"{parent}/{WORLD}"):

@@ -58,20 +58,10 @@ def call_node(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> An
 
 
 def call_plain(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> Any:
-    """Calls an XML-RPC method that answers in ROS's form, ``[code, text, value]``.
+    """Calls an XML-RPC method that answers in ROS's form, ``[code, text, value]``; returns the value.
 
-    Args:
-        uri: its ``http://`` address.
-        method: the method's name.
-        args: all of its arguments.
-        timeout: limit for connecting, for sending and for each part of the answer [s of wall time].
-
-    Returns:
-        The value.
-
-    Raises:
-        NoAnswer: nothing usable came back.
-        Refused: the answer's code is not 1.
+    `timeout` limits connecting, sending and each part of the answer [s of wall time]. Raises NoAnswer if
+    nothing usable came back, Refused if the answer's code is not 1.
     """
     try:
         with xmlrpc.client.ServerProxy(uri, transport=_Transport(timeout)) as proxy:
@@ -125,11 +115,7 @@ def call(method: str, *args: Any, timeout: float = TIMEOUT) -> Any:
 
 
 def require(timeout: float = TIMEOUT) -> None:
-    """Returns if the master answers within `timeout` [s].
-
-    Raises:
-        MasterDown: the master doesn't answer; the text says why.
-    """
+    """Raises MasterDown, which says why, unless the master answers within `timeout` [s]."""
     host_and_port()
     try:
         call("getPid", timeout=timeout)
@@ -145,9 +131,8 @@ def require(timeout: float = TIMEOUT) -> None:
 def is_up_or_startable() -> bool:
     """Returns True if the master answers, False if none does but one can be started there.
 
-    Raises:
-        MasterDown: another machine doesn't answer, or another program holds the port. (roslaunch
-            itself would wait for minutes.)
+    Raises MasterDown if another machine doesn't answer, or another program holds the port: roslaunch would
+    wait for minutes.
     """
     try:
         require()
@@ -165,11 +150,10 @@ def is_up_or_startable() -> bool:
 
 def is_up() -> bool:
     """Returns True if the master answers."""
-    try:
+    with contextlib.suppress(MasterDown):
         require()
-    except MasterDown:
-        return False
-    return True
+        return True
+    return False
 
 
 def host_and_port() -> tuple[str, int]:
@@ -218,15 +202,7 @@ def _same_machine(one: str, other: str) -> bool:
 
 
 def living_address(name: str, timeout: float = TIMEOUT) -> str | None:
-    """Returns the XML-RPC address of a node, or None if no such node answers.
-
-    Args:
-        name: the node's full name.
-        timeout: limit for each call [s]. A killed node's port refuses at once.
-
-    Raises:
-        NoAnswer: the master doesn't answer.
-    """
+    """Returns the XML-RPC address of a node, None if it doesn't answer; raises NoAnswer without a master."""
     try:
         address = str(call("lookupNode", name))
     except Refused:

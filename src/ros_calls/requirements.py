@@ -1,4 +1,4 @@
-"""Checks for the packages of requirements/base.txt, and names the command that installs missing ones.
+"""Check for the packages of requirements/base.txt, with the command that installs missing ones.
 
 Programs call it before any other import: in a user's own catkin workspace, rosdep and `catkin_make` don't
 install packages that only pip has.
@@ -28,7 +28,7 @@ def require(modules: tuple[str, ...]) -> None:
     """Ends the program if modules are missing, with one line that says how to install them.
 
     Raises:
-        SystemExit: a module is missing.
+        SystemExit: A module is missing.
     """
     text = lack(modules)
     if text:

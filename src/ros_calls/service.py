@@ -4,6 +4,7 @@ rospy's proxies have no time limit, keep a dead connection, and ask the process'
 know the address.
 """
 
+import contextlib
 import io
 import math
 import select
@@ -58,10 +59,10 @@ class ServiceClient:
     to a node that has ended. This client does neither: after a failure the next call reconnects.
 
     Args:
-        name: the service's name, global or relative to the node's namespace.
-        kind: the service's generated class.
-        persistent: keep the connection between calls, which is several times as fast.
-        timeout: limit for connecting and for an answer [s of wall time]; with infinity a call waits
+        name: The service's name, global or relative to the node's namespace.
+        kind: The service's generated class.
+        persistent: Keep the connection between calls, which is several times as fast.
+        timeout: Limit for connecting and for an answer [s of wall time]; with infinity a call waits
             until the caller's node shuts down. The attribute may be changed.
     """
 
@@ -83,12 +84,11 @@ class ServiceClient:
         """Calls the service with a request, or with its fields in order, and returns the response.
 
         Raises:
-            ServiceGone: no node offers the service, or the connection broke; the call may or may not
+            ServiceGone: No node offers the service, or the connection broke; the call may or may not
                 have been carried out.
-            ServiceHangs: no answer in time.
-            ServiceFailed: the service reported a failure, or the request can't be sent.
+            ServiceHangs: No answer in time.
+            ServiceFailed: The service reported a failure, or the request can't be sent.
         """
-        self._refuse_if_begun()
         try:
             self.begin(*request)
             return self.end()
@@ -100,13 +100,16 @@ class ServiceClient:
         """Sends a request and returns at once; `end` takes the response, and must come next.
 
         Raises:
-            ServiceFailed: as for a call.
-            RuntimeError: a call was begun and not ended.
+            ServiceFailed: As for a call.
+            RuntimeError: A call was begun and not ended.
         """
-        self._refuse_if_begun()
+        if self._begun:
+            raise RuntimeError(f"{self.name}: begin() once more before end()")
         try:
             message = request_message(self._kind, request)
-            self._connected().send(message, self.timeout)
+            if self._connection is None:
+                self._connection = Connection(self._address(), self.name, self._kind, self.timeout)
+            self._connection.send(message, self.timeout)
             self._begun = True
         except (TimeoutError, CallFailed) as fault:
             raise self._failure(fault) from fault
@@ -118,8 +121,8 @@ class ServiceClient:
         """Waits for the response to `begin` and returns it; the time limit starts again.
 
         Raises:
-            ServiceFailed: as for a call.
-            RuntimeError: no call was begun, or `close` was called since.
+            ServiceFailed: As for a call.
+            RuntimeError: No call was begun, or `close` was called since.
         """
         if not self._begun or self._connection is None:
             raise RuntimeError(f"{self.name}: end() without begin()")
@@ -134,36 +137,21 @@ class ServiceClient:
             if not kept:
                 self.close()
 
-    def _refuse_if_begun(self) -> None:
-        if self._begun:
-            raise RuntimeError(f"{self.name}: begin() once more before end()")
+    def call_idempotent(self, *request: Any) -> Any:
+        """Calls the service, again if a kept connection's node has ended; for what may be done twice."""
+        if self._connection is not None:
+            with contextlib.suppress(ServiceGone):
+                return self(*request)
+        return self(*request)
 
     def _failure(self, fault: Exception) -> ServiceFailed:
         if isinstance(fault, TimeoutError):
-            limit = "before the shutdown"
-            if self.timeout < math.inf:
-                limit = f"within {self.timeout:g} s"
+            is_bounded = self.timeout < math.inf
+            limit = f"within {self.timeout:g} s" if is_bounded else "before the shutdown"
             return ServiceHangs(f"{self.name}: no answer {limit}")
         if isinstance(fault, ConnectionEnded):
             return ServiceGone(f"{self.name}: the connection broke; its node has ended")
         return ServiceFailed(f"{self.name}: {fault}")
-
-    def call_idempotent(self, *request: Any) -> Any:
-        """Calls the service, a second time if a kept connection's node has ended.
-
-        Only for requests that may be carried out twice.
-        """
-        if self._connection is not None:
-            try:
-                return self(*request)
-            except ServiceGone:
-                pass
-        return self(*request)
-
-    def _connected(self) -> "Connection":
-        if self._connection is None:
-            self._connection = Connection(self._address(), self.name, self._kind, self.timeout)
-        return self._connection
 
     def _address(self) -> str:
         try:
@@ -194,18 +182,17 @@ class ConnectionEnded(CallFailed):
 
 
 class Connection:
-    """A lasting connection to one service. Not thread-safe.
+    """A lasting connection to the service at a ``rosrpc://`` address. Not thread-safe.
 
-    Time limits are wall time [s]; infinity means until the caller's node shuts down.
+    Time limits are wall time [s]; infinity means until the caller's node shuts down. After a TimeoutError the
+    connection can't be used any more.
+
+    Raises:
+        CallFailed: The connection failed, or the service has another type.
+        TimeoutError: No answer in time.
     """
 
     def __init__(self, address: str, name: str, kind: Any, timeout: float) -> None:
-        """Connects to the service at a ``rosrpc://`` address.
-
-        Raises:
-            CallFailed: the connection failed, or the service has another type.
-            TimeoutError: no answer in time.
-        """
         self._kind = kind
         deadline = time.monotonic() + timeout
         try:
@@ -238,12 +225,7 @@ class Connection:
         self._node = answer.get("callerid", "")
 
     def send(self, message: genpy.Message, timeout: float) -> None:
-        """Sends a request; `receive` must take its answer before the next one.
-
-        Raises:
-            CallFailed: the request can't be sent; ConnectionEnded: the connection broke.
-            TimeoutError: sending took too long; the connection can't be used afterwards.
-        """
+        """Sends a request; `receive` must take its answer before the next one."""
         payload = _serialized(message)
         try:
             self._socket.settimeout(_finite(timeout))
@@ -257,10 +239,6 @@ class Connection:
         """Returns the response to the last request; the time limit starts now.
 
         While a simulator in lock-step computes, no limit ends the wait.
-
-        Raises:
-            CallFailed: the service failed; ConnectionEnded: the connection broke.
-            TimeoutError: no answer in time; the connection can't be used afterwards.
         """
         try:
             self._socket.settimeout(_finite(timeout))
@@ -286,7 +264,10 @@ class Connection:
             try:
                 if data or timeout == math.inf:
                     self._await_data(deadline)
-                data += self._part()
+                part = self._socket.recv(CHUNK)
+                if not part:
+                    raise ConnectionError("the connection ended before the answer")
+                data += part
             except TimeoutError as fault:
                 ours = raised_in(fault) == __name__  # not in a signal's handler in the middle of it
                 if timeout == math.inf or not ours or not self._computes():
@@ -307,18 +288,8 @@ class Connection:
         except (NoAnswer, Refused):
             return False
 
-    def _part(self) -> bytes:
-        part = self._socket.recv(CHUNK)
-        if not part:
-            raise ConnectionError("the connection ended before the answer")
-        return part
-
     def _await_data(self, deadline: float) -> None:
-        """Returns once there is data, or the end, to read.
-
-        Raises:
-            TimeoutError: the deadline has passed, or it is infinity and the node has shut down.
-        """
+        """Waits for data; raises TimeoutError at the deadline, without one when the node shuts down."""
         poll = select.poll()
         poll.register(self._socket, select.POLLIN)
         left = deadline - time.monotonic()

@@ -21,27 +21,24 @@ Found = TypeVar("Found")
 
 
 def wait_until(look: Callable[[], Found], timeout: float, what: str) -> Found:
-    """Calls `look` until it returns something true, and returns that.
+    """Calls `look` until its result is true, and returns that; false after the timeout.
 
     Args:
-        look: returns something true once the wait is over; called at least once.
-        timeout: limit of the wait [s], or infinity; the last look may exceed it.
-        what: what is awaited, for the text of an interrupt.
-
-    Returns:
-        The last look's result; false after a timeout.
+        look: Called at least once.
+        timeout: Limit of the wait [s], or infinity; the last look may exceed it.
+        what: What is awaited, for the text of an interrupt.
 
     Raises:
-        rospy.ROSInterruptException: the node shut down meanwhile.
+        rospy.ROSInterruptException: The node shut down meanwhile.
     """
     deadline = time.monotonic() + timeout
-    while not (found := look()):
+    while not (result := look()):
         if rospy.is_shutdown():
             raise rospy.ROSInterruptException(f"shut down while waiting for {what}")
         if time.monotonic() > deadline:
             break
         time.sleep(POLL)
-    return found
+    return result
 
 
 def service_answers(name: str) -> bool:
@@ -57,35 +54,16 @@ def service_answers(name: str) -> bool:
 
 
 def service_comes_up(name: str, timeout: float) -> bool:
-    """Waits until a service answers, also while there is no master.
-
-    Args:
-        name: the service, global or relative to the node's namespace.
-        timeout: bound of the wait [s], or infinity.
-
-    Returns:
-        False if it doesn't in time.
-
-    Raises:
-        rospy.ROSInterruptException: the node shut down meanwhile.
-    """
+    """Waits until a service answers, also while there is no master; returns False after `timeout` [s]."""
     resolved = str(rospy.resolve_name(name))
     return wait_until(lambda: service_answers(resolved), timeout, f"service {resolved}")
 
 
 def wait_for_service(name: str, timeout: float = TIMEOUT) -> str:
-    """Waits until a service can be called; fails at once without a master.
+    """Waits until a service can be called, and returns its resolved name; doubled slashes are harmless.
 
-    Args:
-        name: the service, global or relative to the node's namespace; doubled slashes are harmless.
-        timeout: limit of the wait [s].
-
-    Returns:
-        The resolved name.
-
-    Raises:
-        ServiceMissing: no master, or the service doesn't come up in time.
-        rospy.ROSInterruptException: the node shut down meanwhile.
+    Raises ServiceMissing after `timeout` [s], and at once without a master; rospy.ROSInterruptException if
+    the node shut down meanwhile.
     """
     resolved = str(rospy.resolve_name(name))
 
@@ -96,10 +74,10 @@ def wait_for_service(name: str, timeout: float = TIMEOUT) -> str:
         return False
 
     try:
-        found = wait_until(look, timeout, f"service {resolved}")
+        is_up = wait_until(look, timeout, f"service {resolved}")
     except master.MasterDown as fault:
         raise ServiceMissing(f"service {resolved}: {fault}") from fault
-    if not found:
+    if not is_up:
         raise ServiceMissing(
             f"service {resolved} didn't come up within {timeout:g} s: {why_not_up(resolved)}"
         )
@@ -107,17 +85,11 @@ def wait_for_service(name: str, timeout: float = TIMEOUT) -> str:
 
 
 def wait_and_call(name: str, kind: Any, *request: Any, timeout: float = TIMEOUT) -> Any:
-    """Waits for a service, calls it, and returns the response.
+    """Waits for a service, calls it with a request, or its fields in order, and returns the response.
 
-    Args:
-        name: the service.
-        kind: the service's generated class.
-        request: the request, or its fields in order.
-        timeout: limit of the wait for the service, and again of the call [s].
-
-    Raises:
-        ServiceFailed: the service isn't up in time (ServiceMissing), or fails. See `ServiceClient`.
-        rospy.ROSInterruptException: the node shut down meanwhile.
+    `timeout` limits the wait for the service, and again the call [s]. Raises ServiceFailed (see
+    `ServiceClient`), ServiceMissing if it isn't up in time, rospy.ROSInterruptException if the node shut down
+    meanwhile.
     """
     resolved = wait_for_service(name, timeout)
     try:

@@ -1,4 +1,4 @@
-"""Waits until a world can be used, and says what is missing.
+"""Readiness of a world: a bounded wait, and what is missing.
 
 ready = Ready(models=["arm"], controllers=["joint_state_controller", "arm_controller"])
 ros_launch.ros_launch_from_pkg("my_arm", "arm.launch", ready=ready, timeout=120.0)
@@ -33,12 +33,12 @@ class Ready:
     """A requirement: a world that answers, with its models and running controllers.
 
     Args:
-        models: names of models that must be in the world.
-        controllers: names of controllers that must run; a name with a leading slash includes its
+        models: Names of models that must be in the world.
+        controllers: Names of controllers that must run; a name with a leading slash includes its
             namespace.
-        ns: the namespace of the other controllers' manager.
-        gazebo_ns: the simulator's node, the prefix of its services' names.
-        lockstep: the world must run in lock-step.
+        ns: The namespace of the other controllers' manager.
+        gazebo_ns: The simulator's node, the prefix of its services' names.
+        lockstep: The world must run in lock-step.
     """
 
     models: Sequence[str] = ()
@@ -53,10 +53,9 @@ class Ready:
                 object.__setattr__(self, name, (getattr(self, name),))
 
     def missing(self, timeout: float = _CALL_TIMEOUT) -> str:
-        """Returns the first missing thing and the command that fixes it; empty if nothing is missing.
+        """Returns the first missing thing and the command that fixes it; "" if nothing is missing.
 
-        Args:
-            timeout: limit of each call [s].
+        `timeout` limits each call [s].
         """
         try:
             _master.require(timeout)
@@ -67,14 +66,9 @@ class Ready:
             return f"the master at {_master.uri()}: {fault}"
 
     def wait(self, timeout: float = TIMEOUT) -> None:
-        """Waits until nothing is missing.
+        """Waits until nothing is missing; raises NotReady if something still is after `timeout` [s].
 
-        Args:
-            timeout: limit of the wait [s].
-
-        Raises:
-            NotReady: something is still missing after that.
-            rospy.ROSInterruptException: the caller's node was shut down meanwhile.
+        Raises rospy.ROSInterruptException if the caller's node was shut down meanwhile.
         """
         missing = still_missing(self, timeout)
         if missing:
@@ -98,12 +92,12 @@ class Ready:
 
     def _managers(self) -> dict[str, list[str]]:
         """Returns the controllers' names, by their manager's namespace."""
-        found: dict[str, list[str]] = {}
+        by_namespace: dict[str, list[str]] = {}
         for each in self.controllers:
             full = rosgraph.names.ns_join("/" + self.ns.strip("/"), each)
             namespace, _, name = full.rpartition("/")
-            found.setdefault(namespace, []).append(name)
-        return found
+            by_namespace.setdefault(namespace, []).append(name)
+        return by_namespace
 
 
 def still_missing(ready: Ready, timeout: float, is_over: Callable[[], bool] = lambda: False) -> str:
@@ -124,13 +118,7 @@ def still_missing(ready: Ready, timeout: float, is_over: Callable[[], bool] = la
 def controller_faults(namespace: str, names: Sequence[str], timeout: float) -> Iterator[str]:
     """Yields a line for each controller of a manager that isn't loaded or doesn't run, with the remedy.
 
-    Args:
-        namespace: of the manager, without a slash at its end.
-        names: of the controllers.
-        timeout: limit of the call [s].
-
-    Raises:
-        ServiceFailed: if the manager doesn't answer.
+    The namespace has no slash at its end. Raises ServiceFailed if the manager doesn't answer.
     """
     service = f"{namespace}/controller_manager/list_controllers"
     answer = ServiceClient(service, ListControllers, timeout=timeout)()

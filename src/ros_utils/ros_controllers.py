@@ -1,4 +1,4 @@
-"""Loads, starts, stops and unloads controllers through a controller manager's services.
+"""Controllers: loading, start, stop and unloading through a controller manager's services.
 
 `ns` is always the controller manager's namespace: its services are ``<ns>/controller_manager/…``;
 None is the root. `strictness` is BEST_EFFORT (1: skip what can't be done) or STRICT (2: all or
@@ -166,14 +166,14 @@ def switch_controllers_srv(
     """Starts and stops controllers in one step, with up to `max_retries` attempts.
 
     Args:
-        start_controllers: names to start.
-        stop_controllers: names to stop.
-        ns: see the module.
-        strictness: see the module.
-        start_asap: start each as soon as its hardware is ready; makes no difference in simulation.
-        timeout: the manager's own limit for the switch [s]; 0 for none.
+        start_controllers: Names to start.
+        stop_controllers: Names to stop.
+        ns: See the module.
+        strictness: See the module.
+        start_asap: Start each as soon as its hardware is ready; makes no difference in simulation.
+        timeout: The manager's own limit for the switch [s]; 0 for none.
         max_retries: attempts.
-        service_timeout: see the module.
+        service_timeout: See the module.
 
     Returns:
         True if the manager has switched; with BEST_EFFORT some controllers may still not run.

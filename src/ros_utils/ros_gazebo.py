@@ -1,9 +1,9 @@
-"""Starts, ends and controls a Gazebo-like simulator through the services of its node ``/gazebo``.
+"""A Gazebo-like simulator: launch, end, and the services of its node ``/gazebo``.
 
-Every function that calls a service takes two keywords: `timeout`, the limit for the service to come up
-and again for its answer [s], and `gazebo_ns`, the simulator's node, the prefix of its services' names.
-Failures are logged, never raised. Positions are in [m], orientations are quaternions; all zeros mean no
-rotation.
+Every function that calls a service takes two keywords: `timeout`, the limit for the service to come up and
+again for its answer [s], and `gazebo_ns`, the simulator's node, the prefix of its services' names. A function
+without other results returns True if the simulator did it. Failures are logged, never raised. Positions are
+in [m], orientations are quaternions; all zeros mean no rotation.
 """
 
 from ros_utils._internal.gazebo import launch, physics, spawn, state

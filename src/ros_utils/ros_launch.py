@@ -1,4 +1,4 @@
-"""Starts and ends launch files."""
+"""Launch files: start and end."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -30,17 +30,17 @@ def ros_launch_from_pkg(
 
     Args:
         pkg_name: ROS package.
-        launch_file: file in its launch folder.
-        args: launch arguments, ``"name:=value"`` each.
-        launch_new_term: in an xterm, if there is a display and xterm; otherwise the output goes to
+        launch_file: File in its launch folder.
+        args: Launch arguments, ``"name:=value"`` each.
+        launch_new_term: In an xterm, if there is a display and xterm; otherwise the output goes to
             a log file.
-        timeout: limit of the wait for roslaunch to start its nodes [s].
+        timeout: Limit of the wait for roslaunch to start its nodes [s].
         output: "log" for a log file, "screen" for this terminal.
         wait: False to return at once.
-        log_file: the file for the output; None for one of its own in ROS's log folder.
-        env: variables in addition to this process's.
-        master_uri: the master to launch under; None for this process's.
-        ready: models, running controllers and the like that must also be there within `timeout`;
+        log_file: The file for the output; None for one of its own in ROS's log folder.
+        env: Variables in addition to this process's.
+        master_uri: The master to launch under; None for this process's.
+        ready: Models, running controllers and the like that must also be there within `timeout`;
             None for nothing.
 
     Returns:
@@ -56,17 +56,9 @@ def ros_launch_from_pkg(
         _log.error(f"ros_launch_from_pkg: {fault}")
         return False
     return ros_launch_from_path(
-        path,
-        args,
-        launch_new_term,
-        timeout=timeout,
-        output=output,
-        wait=wait,
-        log_file=log_file,
-        env=env,
-        master_uri=master_uri,
-        ready=ready,
-    )
+        path, args, launch_new_term, timeout=timeout, output=output, wait=wait, log_file=log_file,
+        env=env, master_uri=master_uri, ready=ready,
+    )  # fmt: skip
 
 
 def ros_launch_from_path(

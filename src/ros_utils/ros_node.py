@@ -1,4 +1,4 @@
-"""Starts and ends nodes and the master."""
+"""Nodes and the master: start and end."""
 
 import shlex
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,7 @@ from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import packages as _packages
 from ros_utils._internal import programs as _programs
 from ros_utils._internal import roslaunch as _roslaunch
-from ros_utils._internal.programs import CannotStart, Handle, Started, await_start
+from ros_utils._internal.programs import CannotStart, Started, await_start
 from ros_utils.readiness import Ready
 
 
@@ -40,21 +40,21 @@ def ros_node_from_pkg(
 
     Args:
         pkg_name: ROS package.
-        node_name: its executable.
-        launch_master: start a master first if none runs.
-        launch_master_term: the master in an xterm of its own, if there is a display and xterm.
-        launch_new_term: the node in an xterm, if there is a display and xterm; otherwise see
+        node_name: Its executable.
+        launch_master: Start a master first if none runs.
+        launch_master_term: The master in an xterm of its own, if there is a display and xterm.
+        launch_new_term: The node in an xterm, if there is a display and xterm; otherwise see
             `output`.
-        name: the node's name; None for its own default.
+        name: The node's name; None for its own default.
         ns: namespace.
         output: "log" for a log file, "screen" for this terminal.
-        args: the node's arguments: a string, split as in a shell, or a list.
-        timeout: limit of the wait for the registration [s].
+        args: The node's arguments: a string, split as in a shell, or a list.
+        timeout: Limit of the wait for the registration [s].
         wait: False for a program that isn't a ROS node, or to return at once.
-        log_file: the file for the output; None for one of its own in ROS's log folder.
-        env: variables in addition to this process's.
-        master_uri: the master to register at; None for this process's.
-        ready: see `ros_launch.ros_launch_from_pkg`.
+        log_file: The file for the output; None for one of its own in ROS's log folder.
+        env: Variables in addition to this process's.
+        master_uri: The master to register at; None for this process's.
+        ready: See `ros_launch.ros_launch_from_pkg`.
 
     Returns:
         A true handle once the node is registered, or has ended with exit code 0, and everything in
@@ -71,14 +71,9 @@ def ros_node_from_pkg(
             _master.require()
             before = set(_nodes.node_uris().values())
             handle = _programs.start(
-                command,
-                "node",
-                label,
-                window=launch_new_term,
-                screen=output == "screen",
-                log_file=log_file,
-                env=env,
-            )
+                command, "node", label, window=launch_new_term, screen=output == "screen",
+                log_file=log_file, env=env,
+            )  # fmt: skip
         except (_packages.NotFound, CannotStart, _master.MasterDown, ValueError) as fault:
             _log.error(f"{label}: {fault}")
             return False
@@ -86,9 +81,13 @@ def ros_node_from_pkg(
             return Started(handle)
         full_name = rosgraph.names.ns_join(_global(ns), name) if name else None
         absent = f"not registered at {_master.uri()} (for a program that is not a node: wait=False)"
-        return await_start(
-            handle, lambda: _is_registered(handle, full_name, before), absent, timeout, ready
-        )
+
+        def is_registered() -> bool:  # an earlier node of that name doesn't count
+            addresses = [_nodes.node_uri(full_name)] if full_name else _nodes.node_uris().values()
+            new = [address for address in addresses if address and address not in before]
+            return any(handle.owns(_nodes.node_pid(address)) for address in new)
+
+        return await_start(handle, is_registered, absent, timeout, ready)
 
 
 def ros_kill_node(node_name: str) -> bool:
@@ -163,22 +162,19 @@ def _executable(package: str, name: str) -> str:
     """Returns the path of a package's executable, found as by rosrun."""
     _packages.folder(package)
     try:
-        found = roslib.packages.find_node(package, name, rospack=rospkg.RosPack())
+        paths = roslib.packages.find_node(package, name, rospack=rospkg.RosPack())
     except rospkg.ResourceNotFound as fault:
         raise _packages.NotFound(f"package '{fault}' not found") from fault
-    if not found:
+    if not paths:
         raise _packages.NotFound(
             f"package '{package}' has no executable '{name}': is its workspace built and sourced?"
         )
-    return str(found[0])
+    return str(paths[0])
 
 
 def _arguments(args: str | Sequence[str] | None) -> list[str]:
     """Returns the node's own arguments as a list; raises ValueError if a quote isn't closed."""
-    try:
-        return shlex.split(args) if isinstance(args, str) else [str(arg) for arg in args or []]
-    except ValueError as fault:
-        raise ValueError(f"args {args!r}: {fault}") from fault
+    return shlex.split(args) if isinstance(args, str) else [str(arg) for arg in args or []]
 
 
 def _global(ns: str | None) -> str:
@@ -192,10 +188,3 @@ def _remappings(name: str | None, ns: str | None) -> list[str]:
             f"name {name!r}: a node's name has letters, digits and underscores, and no slash"
         )
     return [*([f"__name:={name}"] if name else []), f"__ns:={_global(ns)}"]
-
-
-def _is_registered(handle: Handle, name: str | None, before: set[str]) -> bool:
-    """Returns True if a node of this process is registered; an earlier one of that name doesn't count."""
-    addresses = [_nodes.node_uri(name)] if name else list(_nodes.node_uris().values())
-    new = [address for address in addresses if address and address not in before]
-    return any(handle.owns(_nodes.node_pid(address)) for address in new)

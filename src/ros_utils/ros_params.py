@@ -1,4 +1,4 @@
-"""Loads YAML files into the parameter server."""
+"""YAML files on the parameter server."""
 
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,8 @@ def ros_load_yaml_from_pkg(pkg_name: str, file_name: str, ns: str = "/") -> bool
 
     Args:
         pkg_name: ROS package.
-        file_name: file in its config folder.
-        ns: namespace for the parameters.
+        file_name: File in its config folder.
+        ns: Namespace for the parameters.
 
     Returns:
         True if every parameter was set. False, with an error in the log, if the package or file is
@@ -52,7 +52,7 @@ def _read(path: str) -> list[dict[str, Any]]:
     """Returns all documents of a YAML file, which may use ROS's ``deg(90)`` and ``rad(pi)``.
 
     Raises:
-        FileError: the file can't be read or isn't YAML, or a document isn't a mapping; gives the place.
+        FileError: The file can't be read or isn't YAML, or a document isn't a mapping; gives the place.
     """
     documents = load_parameters(read_file(Path(path)))
     if not documents:

@@ -1,4 +1,4 @@
-"""Brings a robot into the simulation in one call: description, state publisher, model, controllers."""
+"""A robot in one call: description, state publisher, model, controllers."""
 
 from collections.abc import Sequence
 
@@ -17,9 +17,9 @@ def init_robot_state_pub(
     """Starts a robot_state_publisher as node ``<namespace>/rob_st_pub``.
 
     Args:
-        namespace: where `robot_description` and `joint_states` are.
-        max_pub_freq: limit of its publishing rate [Hz]; None for its default.
-        launch_new_term: in an xterm, if there is a display and xterm.
+        namespace: Where `robot_description` and `joint_states` are.
+        max_pub_freq: Limit of its publishing rate [Hz]; None for its default.
+        launch_new_term: In an xterm, if there is a display and xterm.
 
     Returns:
         True once it is registered at the master.
@@ -71,21 +71,21 @@ def spawn_model_in_gazebo(
         pkg_name: ROS package of the robot.
         model_urdf_file: URDF or xacro file in it.
         controllers_file: YAML file of the controllers; None for a robot without controllers.
-        controllers_list: controllers to load and start.
-        model_urdf_folder: the URDF's folder in the package.
-        ns: namespace of description, state publisher and controller manager.
-        args_xacro: xacro arguments, ``"name:=value"`` each.
-        max_pub_freq: limit of the state publisher's rate [Hz].
-        rob_st_term: the state publisher in an xterm.
-        gazebo_name: name of the new model.
-        gaz_ref_frame: model or link that the pose refers to.
-        pos_x, pos_y, pos_z: position [m].
-        ori_w, ori_x, ori_y, ori_z: orientation, a quaternion with w first here; all zeros means no
+        controllers_list: Controllers to load and start.
+        model_urdf_folder: The URDF's folder in the package.
+        ns: Namespace of description, state publisher and controller manager.
+        args_xacro: Xacro arguments, ``"name:=value"`` each.
+        max_pub_freq: Limit of the state publisher's rate [Hz].
+        rob_st_term: The state publisher in an xterm.
+        gazebo_name: Name of the new model.
+        gaz_ref_frame: Model or link that the pose refers to.
+        pos_x, pos_y, pos_z: Position [m].
+        ori_w, ori_x, ori_y, ori_z: Orientation, a quaternion with w first here; all zeros means no
             rotation.
-        controllers_pkg: package of `controllers_file`; None for `pkg_name`.
-        timeout, gazebo_ns: see `ros_gazebo`.
-        verify: return only once the model is in the world's list.
-        ready: return only once the model is there and all listed controllers run, within `timeout`
+        controllers_pkg: Package of `controllers_file`; None for `pkg_name`.
+        timeout, gazebo_ns: See `ros_gazebo`.
+        verify: Return only once the model is in the world's list.
+        ready: Return only once the model is there and all listed controllers run, within `timeout`
             after their start.
 
     Returns:

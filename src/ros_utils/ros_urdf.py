@@ -1,4 +1,4 @@
-"""Expands robot descriptions (xacro) and puts them on the parameter server."""
+"""Robot descriptions (xacro), expanded and put on the parameter server."""
 
 from collections.abc import Sequence
 
@@ -27,12 +27,12 @@ def urdf_load_from_pkg(
 
     Args:
         pkg_name: ROS package.
-        model_name: the file's name.
-        param_name: parameter to set, in `ns`; relative to the node's namespace if `ns` is None or
+        model_name: The file's name.
+        param_name: Parameter to set, in `ns`; relative to the node's namespace if `ns` is None or
             "/".
-        folder: the file's folder in the package.
-        ns: namespace of the parameter.
-        args_xacro: xacro arguments, ``"name:=value"`` each.
+        folder: The file's folder in the package.
+        ns: Namespace of the parameter.
+        args_xacro: Xacro arguments, ``"name:=value"`` each.
 
     Returns:
         True if the parameter was set. False, with an error in the log, if the package or file is

@@ -44,22 +44,21 @@ def reserved_port() -> int:
 
 
 class Simulation:
-    """A running simulator: master, Gazebo-like server, and everything started under them."""
+    """A running simulator: master, Gazebo-like server, and everything started under them.
+
+    Args:
+        port: The master's port; None for a free one.
+        gui: With a window.
+        timeout: Limit of the wait for an answer [s].
+        launch: Further arguments of `ros_gazebo.launch_Gazebo`, e.g. ``lockstep=True``.
+
+    Raises:
+        CannotSimulate: The port is in use, or the simulator doesn't come up.
+    """
 
     def __init__(
         self, *, port: int | None = None, gui: bool = False, timeout: float = 30.0, **launch: Any
     ) -> None:
-        """Starts master and simulator, and waits until it answers.
-
-        Args:
-            port: the master's port; None for a free one.
-            gui: with a window.
-            timeout: limit of the wait [s].
-            launch: further arguments of `ros_gazebo.launch_Gazebo`, e.g. ``lockstep=True``.
-
-        Raises:
-            CannotSimulate: the port is in use, or the simulator doesn't come up.
-        """
         self.master_uri = f"http://{LOOPBACK}:{reserved_port() if port is None else port}"
         with self.active():
             if _master.is_up():

@@ -1,4 +1,4 @@
-"""Steps a world in lock-step from Python, through the services of bullet_gazebo_msgs.
+"""Client for a world in lock-step, through the services of bullet_gazebo_msgs.
 
 client = StepClient()
 client.reset({"cart_pole": 0.1}, {"cart_pole": -0.5})
@@ -75,9 +75,9 @@ class PreparedSteps:
     A step is `begin` and `end`, so several simulators can move in parallel. Not thread-safe.
 
     Args:
-        service: the simulator's step_world; prepare_step and prepared_step share its namespace.
-        timeout: limit of a call [s of wall time], plus 10 ms for each tick.
-        client: the clients' class, which decides what errors are raised.
+        service: The simulator's step_world; prepare_step and prepared_step share its namespace.
+        timeout: Limit of a call [s of wall time], plus 10 ms for each tick.
+        client: The clients' class, which decides what errors are raised.
     """
 
     def __init__(
@@ -101,26 +101,26 @@ class PreparedSteps:
         Raises:
             ServiceFailed: StepRefused for a wrong name; otherwise see `ServiceClient`.
         """
-        found = self._prepared.get(names)
-        if found is None:
-            found = self._prepare(*names)
-            if not found.success:
-                raise StepRefused(found.status_message)
+        prepared = self._prepared.get(names)
+        if prepared is None:
+            prepared = self._prepare(*names)
+            if not prepared.success:
+                raise StepRefused(prepared.status_message)
             if len(self._prepared) >= MOST_PREPARED:
                 self._prepared.clear()
-            self._prepared[names] = found
-        return found
+            self._prepared[names] = prepared
+        return prepared
 
     def begin(self, names: StepNames, ticks: int, commands: Sequence[float]) -> None:
         """Sends a step; `end` takes its answer and must come next.
 
         Args:
-            names: what the commands are for, and what the answer reports.
-            ticks: number of physics steps; 0 only reads.
-            commands: numbers for the controllers, then for the joints.
+            names: What the commands are for, and what the answer reports.
+            ticks: Number of physics steps; 0 only reads.
+            commands: Numbers for the controllers, then for the joints.
 
         Raises:
-            ServiceFailed: see `prepare`.
+            ServiceFailed: See `prepare`.
         """
         request = PreparedStepRequest(self.prepare(names).handle, ticks, commands)
         self._begun = names, request
@@ -162,8 +162,8 @@ class StepClient:
     ros_utils.service_client (ServiceGone, ServiceHangs, ServiceFailed) and StepRefused.
 
     Args:
-        service: the simulator's step_world; its other services share the namespace.
-        timeout: limit of a call [s].
+        service: The simulator's step_world; its other services share the namespace.
+        timeout: Limit of a call [s].
     """
 
     def __init__(self, service: str = STEP_SERVICE, timeout: float = TIMEOUT) -> None:
@@ -186,14 +186,14 @@ class StepClient:
         Besides the joints, the answer holds only what is asked for; the rest costs nothing.
 
         Args:
-            ticks: at least 1; 0 if models, links or contacts are asked for, which only reports.
-            commands: by controller name: a number, or for a group one per joint
+            ticks: At least 1; 0 if models, links or contacts are asked for, which only reports.
+            commands: By controller name: a number, or for a group one per joint
                 [m, rad, m/s, rad/s, N, N m].
-            joint_commands: for joints without a running controller, by name.
-            model_states: models whose poses and twists are reported.
-            links: links whose poses and twists are reported, in this order: plain names, or
+            joint_commands: For joints without a running controller, by name.
+            model_states: Models whose poses and twists are reported.
+            links: Links whose poses and twists are reported, in this order: plain names, or
                 model::link. A mapping gives the link in whose frame each is reported; "": the world.
-            contacts: contacts of the last tick: all, or those of these models, links or collisions.
+            contacts: Contacts of the last tick: all, or those of these models, links or collisions.
         """
         commands, joint_commands = commands or {}, joint_commands or {}
         all_models, models = _chosen(model_states)
@@ -233,13 +233,13 @@ class StepClient:
         """Resets the world, begins an episode from a defined state, and returns that state.
 
         Args:
-            positions: joint positions [rad, m]. Other joints stay, or go to 0 with `everything`.
-            velocities: of the placed joints [rad/s, m/s]; the others rest.
-            seed: seed of the simulator's random numbers; 0 leaves them.
+            positions: Joint positions [rad, m]. Other joints stay, or go to 0 with `everything`.
+            velocities: Velocities of the placed joints [rad/s, m/s]; the others rest.
+            seed: Seed of the simulator's random numbers; 0 leaves them.
             everything: True as reset_simulation: time starts at 0. False as reset_world: time continues.
-            models: poses of models in the world; the others stand where they were spawned.
-            twists: of the placed models; the others rest.
-            ticks, commands, model_states, links, contacts: as for `step`; no step unless asked for.
+            models: Poses of models in the world; the others stand where they were spawned.
+            twists: Twists of the placed models; the others rest.
+            ticks, commands, model_states, links, contacts: As for `step`; no step unless asked for.
         """
         positions, models = positions or {}, models or {}
         for what, more, those in (

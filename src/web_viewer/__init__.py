@@ -1,6 +1,6 @@
 """A page in the browser, the curves of a growing table on it, and MP4 files.
 
-This leaf knows nothing of what it shows. Its modules are imported one by one, because `server` and
+It knows nothing about robots and trainings. Its modules are imported one by one, because `server` and
 `curves` need viser, which takes a second to load; `address`, `table` and `video` load at once.
 
 Modules:

@@ -1,4 +1,4 @@
-"""Where a page is served: a free port, the flags that choose it, and how users reach it."""
+"""Addresses of pages: free ports, flags, tokens, and advice for remote browsers."""
 
 import argparse
 import getpass
@@ -39,8 +39,8 @@ class Address:
         """Returns lines that say where the page is and how to reach it from another machine.
 
         Args:
-            what: the page's subject, as "the window".
-            power: what the page lets its visitors do, as "moves the simulation".
+            what: The page's subject, as "the window".
+            power: What the page lets its visitors do, as "moves the simulation".
         """
         lines = [f"{what} is the page {self.url}"]
         if self.token:
@@ -94,11 +94,11 @@ def find_address(host: str, port: int | None) -> Address:
     """Returns an address that can be served.
 
     Args:
-        host: the address to bind to.
-        port: the port; None for the first free one.
+        host: The address to bind to.
+        port: The port; None for the first free one.
 
     Raises:
-        PortInUse: if nothing can be served there.
+        PortInUse: If nothing can be served there.
     """
     ports = [port] if port is not None else range(FIRST_PORT, FIRST_PORT + MAX_TRIES)
     problem = ""

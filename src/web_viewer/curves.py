@@ -46,8 +46,8 @@ class Curves:
     """Charts in a tab or a folder of a page.
 
     Args:
-        gui: of the page.
-        container: the tab or folder.
+        gui: Of the page.
+        container: The tab or folder.
     """
 
     def __init__(self, gui: viser.GuiApi, container: Container) -> None:
@@ -63,7 +63,7 @@ class Curves:
         self._summarise("no training")
 
     def follow(self, path: Path) -> None:
-        """Shows another table, given by itself or by its folder."""
+        """Follows another table, named by its file or folder."""
         if self._table is None or self._table.path != path:
             self._table = GrowingTable(path)
             self._clear()

@@ -130,7 +130,7 @@ def is_used(raw: Any) -> bool:
     """Returns whether a page's message is one that pages of ours send, and can be read.
 
     Args:
-        raw: from the websocket. viser also takes files, forms, clicks, ..., and trusts them.
+        raw: From the websocket. viser also takes files, forms, clicks, ..., and trusts them.
     """
     try:
         content = msgspec.msgpack.decode(raw)
@@ -150,7 +150,7 @@ def can_be(props: object, value: Any) -> bool:
 
 
 def _check_fields(server: viser.ViserServer) -> None:
-    """Passes on only what a field can have: programs rely on it, and viser sends it to all other pages."""
+    """Drops values that a field doesn't admit; viser would pass them on to programs and other pages."""
     gui, pages = server.gui, server._websock_server
     pages.unregister_handler(messages.GuiUpdateMessage, gui._handle_gui_updates)
 
@@ -219,13 +219,13 @@ def serve(address: Address, title: str, camera: Point, look_at: Point) -> viser.
     """Starts the server, which runs in its own threads.
 
     Args:
-        address: from `find_address`.
-        title: of the page.
-        camera: where visitors look from [m].
-        look_at: what they look at [m].
+        address: From `find_address`.
+        title: Of the page.
+        camera: Where visitors look from [m].
+        look_at: What they look at [m].
 
     Raises:
-        PortInUse: if another process has taken the port since.
+        PortInUse: If another process has taken the port since.
     """
     server = _start(address, title)
     if server.get_port() != address.port:
@@ -247,7 +247,7 @@ def stop(server: viser.ViserServer) -> None:
 
 @contextlib.contextmanager
 def hidden_page() -> Iterator[viser.ViserServer]:
-    """Serves a page for recordings, which viser can make only from a server; no one has its token."""
+    """Serves a page for recordings, which viser makes only from a server; its token is secret."""
     server = _start(Address(LOOPBACK, 0, secrets.token_urlsafe(TOKEN_BYTES)))
     try:
         yield server
@@ -259,7 +259,7 @@ def open_browser(address: Address, warn: Callable[[str], None]) -> None:
     """Opens the page in a browser on this machine, if it has a display.
 
     Args:
-        warn: receives a line if no browser could be opened.
+        warn: Receives a line if no browser could be opened.
     """
     if not has_display():
         return

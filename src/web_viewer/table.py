@@ -29,7 +29,7 @@ class GrowingTable:
     """Follows a table that another process appends to, truncates, removes or starts over.
 
     Args:
-        path: the file, or a run folder that has it or will have it.
+        path: The file, or a run folder that has it or will have it.
     """
 
     def __init__(self, path: Path) -> None:

@@ -20,8 +20,8 @@ class Mp4Writer:
     """Writes a file that can be played once it is closed.
 
     Args:
-        path: the file; an older one is replaced.
-        rate: of the frames [Hz].
+        path: The file; an older one is replaced.
+        rate: Of the frames [Hz].
     """
 
     def __init__(self, path: Path, rate: float) -> None:
@@ -33,8 +33,8 @@ class Mp4Writer:
         """Adds a frame (H, W, 3) of uint8, of the first frame's size.
 
         Raises:
-            EncoderFailed: if ffmpeg has ended.
-            ValueError: for another size.
+            EncoderFailed: If ffmpeg has ended.
+            ValueError: For another size.
         """
         try:
             if self._frames is None:
@@ -62,7 +62,7 @@ class Mp4Writer:
         """Completes the file; may be called twice.
 
         Raises:
-            EncoderFailed: if the file can't be played.
+            EncoderFailed: If the file can't be played.
         """
         frames, self._frames = self._frames, None
         if frames is None:

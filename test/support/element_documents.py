@@ -38,6 +38,7 @@ MODEL = """<sdf version="1.7"><model name="m"><link name="l">
 </model></sdf>"""
 WORLD = """<sdf version="1.7"><world name="w"><light name="sun" type="point"/>
 <model name="m"><static>1</static><link name="l"/></model>
+<actor name="a"><link name="l"><visual name="v"><geometry/></visual></link></actor>
 <include><uri>model://table</uri></include>
 <state world_name="w"><model name="m"><pose/><link name="l"><pose>0 0 0 0 0 0</pose></link></model>
 <light name="sun"/></state></world></sdf>"""

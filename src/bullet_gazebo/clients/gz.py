@@ -15,7 +15,7 @@ from ros_calls import master
 NODE = "gazebo"
 METHOD = "gazeboWorld"  # of the node's XML-RPC server; `world_services.WorldControl` answers it
 CHUNK = 1000  # steps in one call, so that an interrupted client stops soon
-TIMEOUT = 60.0  # [s] for one call
+CALL_TIMEOUT = 60.0  # [s] for one call
 INSTEAD = {  # of Gazebo's other tools
     "camera": "gzclient's page follows a model that is chosen",
     "joint": "rosservice call /gazebo/apply_joint_effort, or a controller of controller_manager",
@@ -51,7 +51,7 @@ class RemoteWorld:
     def command(self, name: str, count: int = 1) -> None:
         """Runs one command: pause, unpause, step, reset, reset_models, reset_time, show or end_journal."""
         try:
-            master.call_node(self._address, METHOD, name, count, timeout=TIMEOUT)
+            master.call_node(self._address, METHOD, name, count, timeout=CALL_TIMEOUT)
         except master.Refused as fault:
             raise ControlFailed(f"{self._node}: {fault}") from fault
         except master.BadAnswer as fault:

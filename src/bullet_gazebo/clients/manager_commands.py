@@ -30,7 +30,7 @@ Groups are in the parameter controller_groups: {{GROUP: [NAME, ...], ...}}; they
 controller in no group is left alone. {MANAGER_HELP}"""
 PARAMETER = "controller_groups"
 LAST = "controller_manager/reload_controller_libraries"  # of a manager's services to come up
-PATIENCE = 30.0  # [s]; launch files start scripts before there is a manager
+MANAGER_PATIENCE = 30.0  # [s]; launch files start scripts before there is a manager
 NOTICE = 2.0  # [s] until the command prints which service it waits for
 
 Groups = dict[str, list[str]]
@@ -122,8 +122,8 @@ def _require_manager() -> None:
     name = str(rospy.resolve_name(LAST))
     if service_comes_up(name, NOTICE):
         return
-    print(f"waiting up to {PATIENCE:g} s for the service {name}", file=sys.stderr)
-    if not service_comes_up(name, PATIENCE - NOTICE):
+    print(f"waiting up to {MANAGER_PATIENCE:g} s for the service {name}", file=sys.stderr)
+    if not service_comes_up(name, MANAGER_PATIENCE - NOTICE):
         raise CommandFailed(
             f"there is no controller manager: no node offers the service {name}. Is the robot"
             " spawned, and is its manager in this namespace? (Another one: __ns:=/NAMESPACE)"

@@ -29,7 +29,7 @@ NAME = "shown_joints"
 WORLD = "world"
 PERIOD = 1.0 / 30.0  # [s of wall time]
 ASKING = 0.1  # [s of wall time] between two questions while no joint states come
-PATIENCE = 1.0  # [s of wall time] for a missing robot, or joint states that don't change
+STATES_PATIENCE = 1.0  # [s of wall time] for a missing robot, or joint states that don't change
 
 
 class ShownJoints:
@@ -59,7 +59,7 @@ class ShownJoints:
             state = JointState(header=_now(), name=names, position=positions)
             self._publisher.publish(state)
             time.sleep(PERIOD)  # no more often; only the newest state counts
-            if self._news.wait(ASKING if self._newest is None else PATIENCE):
+            if self._news.wait(ASKING if self._newest is None else STATES_PATIENCE):
                 self._news.clear()
                 assert self._newest is not None
                 names, positions = self._newest.name, self._newest.position
@@ -97,7 +97,7 @@ class ShownBase:
                 pose = self._pose()
             if pose is not None:
                 self._publish(pose)
-            time.sleep(PATIENCE if pose is None else PERIOD)
+            time.sleep(STATES_PATIENCE if pose is None else PERIOD)
 
     def _pose(self) -> Pose | None:
         """Returns the link's pose in the world, or None while no model has it."""

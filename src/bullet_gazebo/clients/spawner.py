@@ -30,7 +30,7 @@ from ros_calls.waiting import service_comes_up, wait_until
 BEST_EFFORT = srv.SwitchControllerRequest.BEST_EFFORT
 STRICT = srv.SwitchControllerRequest.STRICT
 PERIOD = 3.0  # [s of wall time]: simulated time may jump back
-PATIENCE = 30.0  # [s] for the services to come up
+MANAGER_PATIENCE = 30.0  # [s] for the services to come up
 ANSWER = 10.0  # [s] for one call of unspawner's
 SERVICES = ("load_controller", "switch_controller", "unload_controller")
 FAREWELL = 3.0  # [s] for a call during shutdown; the simulator may have gone before us
@@ -272,7 +272,7 @@ def unspawner_main(argv: Sequence[str] | None = None) -> int:
     def work() -> int:
         init_node("unspawner", command_line)
         manager = ManagerClient(user="Unspawner")
-        missing = manager.wait(("switch_controller", "list_controllers"), PATIENCE)
+        missing = manager.wait(("switch_controller", "list_controllers"), MANAGER_PATIENCE)
         if missing:
             rospy.logwarn("Unspawner couldn't find the controller manager: no service %s", missing)
             return 1

@@ -29,6 +29,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.controllers.joint_state import JointStateSample
 from robot_sim.control.controllers.pid_controllers import JointControllerSample
 from robot_sim.control.controllers.sensor_controllers import SensorSample
@@ -41,8 +42,7 @@ from robot_sim.physics.pose import Pose
 from robot_sim.sensors.imu import InertialSample
 from robot_sim.state import ContactPair
 
-NANOSECONDS = 1_000_000_000
-LARGEST = 1e12  # in any SI unit; beyond it the engine's arithmetic ends in infinities
+LARGEST_NUMBER = 1e12  # in any SI unit; beyond it the engine's arithmetic ends in infinities
 
 
 def to_time(now: int) -> genpy.Time:
@@ -198,16 +198,16 @@ def to_wrench_msg(force: poses.Vector, torque: poses.Vector) -> Wrench:
 
 def check_numbers(what: str, values: Sequence[float]) -> None:
     """Raises ControlError for a number that isn't finite, or is too large for a world."""
-    if all(map(math.isfinite, values)) and max(map(abs, values), default=0.0) <= LARGEST:
+    if all(map(math.isfinite, values)) and max(map(abs, values), default=0.0) <= LARGEST_NUMBER:
         return
     for value in values:
         if not math.isfinite(value):
             raise ControlError(f"{what} has {value}, which is not finite")
-        if abs(value) > LARGEST:
-            raise ControlError(f"{what} has {value}; it can't be beyond {LARGEST:g}")
+        if abs(value) > LARGEST_NUMBER:
+            raise ControlError(f"{what} has {value}; it can't be beyond {LARGEST_NUMBER:g}")
 
 
-def bad_number(message: genpy.Message, largest: float = LARGEST) -> str:
+def bad_number(message: genpy.Message, largest: float = LARGEST_NUMBER) -> str:
     """Finds a number that the world can't take, before a request changes anything.
 
     Returns:

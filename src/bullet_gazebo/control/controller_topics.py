@@ -10,11 +10,10 @@ from typing import Any
 import rospy
 from control_msgs.msg import JointControllerState, JointTrajectoryControllerState, PidState
 from dynamic_reconfigure.encoding import Config
-from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
-from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
+from four_wheel_steering_msgs.msg import FourWheelSteeringStamped
+from geometry_msgs.msg import TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Float64, Float64MultiArray
 from tf2_msgs.msg import TFMessage
 
 from bullet_gazebo.common.dynamic_server import FIRST, DynamicServer, Parameter
@@ -39,6 +38,7 @@ from robot_sim.control.errors import ControlError, faults
 from robot_sim.control.manager import ControllerManager
 from robot_sim.control.pid import Gains, Pid, PidSample
 from robot_sim.simulator import Simulator
+from ros_calls.commands import COMMANDS
 
 Convert = Callable[[Any], Any]
 
@@ -52,15 +52,6 @@ OUTPUTS: dict[str, tuple[type, Convert, int]] = {  # kind: message, conversion, 
     "InertialSample": (Imu, to_sensor_imu, 4),
     "Wrench": (WrenchStamped, to_sensor_wrench, 4),
     "TwistSample": (TwistStamped, to_twist_stamped, 100),
-}
-INPUTS: dict[str, tuple[type, Convert]] = {  # kind: message, the controller's command
-    "Float64": (Float64, lambda message: message.data),
-    "Float64MultiArray": (Float64MultiArray, lambda message: message.data),
-    "FourWheelSteering": (
-        FourWheelSteering,
-        lambda message: (message.speed, message.front_steering_angle, message.rear_steering_angle),
-    ),
-    "Twist": (Twist, lambda message: (message.linear.x, message.linear.y, message.angular.z)),
 }
 REPEAT = 1.0  # [s] between two logs of the same complaint
 MOST = 100_000.0
@@ -156,12 +147,14 @@ class ControllerTopics:
 
     def _subscribe(self, port: Input, namespace: str) -> None:
         topic = rospy.names.ns_join(namespace, port.topic)
-        of_numbers = port.kind in ("Float64", "Float64MultiArray")
-        kind, read = INPUTS[port.kind] if isinstance(port.kind, str) else (port.kind, _unchanged)
+        command_kind = COMMANDS[port.kind] if isinstance(port.kind, str) else None
+        read: Convert = command_kind.read if command_kind else _unchanged
+        of_joints = command_kind and (command_kind.single or command_kind.listed)
+        kind: Any = command_kind.message_type if command_kind else port.kind
 
         def receive(message: object) -> None:
             command = read(message)
-            if of_numbers and not _finite(command):
+            if of_joints and not _finite(command):
                 rospy.logerr_throttle(
                     REPEAT, f"{topic}: a command is not finite: no effort, or the position is held"
                 )

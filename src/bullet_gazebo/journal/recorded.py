@@ -14,7 +14,7 @@ from gazebo_msgs.srv import SpawnModel
 from file_access.content import open_file
 from file_access.limited import LimitedProcess, Limits, RequestRefused
 from file_access.text import did_you_mean
-from robot_sim.control.controllers import BUILT_IN
+from robot_sim.control.controllers import built_in
 
 LIMITS = Limits(processor_time=600, wall_time=600.0, memory=8 << 30, output=2 << 30)
 LENGTH = 8  # [bytes] of a message's length
@@ -109,7 +109,7 @@ def _imported(path: list[str], value: object = None) -> Iterator[str]:
     place = [each for each in path if each]
     is_controller = place[-1:] == ["type"] and isinstance(value, str) and "/" in value
     is_plugin = place[:2] == ["gazebo", "plugins"] and value is not None
-    if is_plugin or (is_controller and value not in BUILT_IN):
+    if is_plugin or (is_controller and value not in built_in()):
         yield str(value)
 
 

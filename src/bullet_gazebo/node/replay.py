@@ -20,11 +20,11 @@ from bullet_gazebo.journal.recorded import NoRecording, RecordedJournal, first_d
 from bullet_gazebo.node.gzserver import GazeboNode
 from bullet_gazebo.services.advance_service import reseed
 from bullet_gazebo.services.step_requests import SLICE
-from robot_sim.simulator import NANOSECONDS
+from robot_sim.constants import NANOSECONDS
 
 PACKAGES = re.compile(r"package://(\w+)/")
 LONGEST = 20  # digits of a command's number
-PATIENCE = 60.0  # [s of wall time] for an entry during which no time passes
+ENTRY_PATIENCE = 60.0  # [s of wall time] for an entry during which no time passes
 
 
 class Changes:
@@ -109,7 +109,7 @@ class Replay:
 
         threading.Thread(target=carry_out, name="replay", daemon=True).start()
         seen: tuple[object, ...] = ()
-        while not wait([outcome], PATIENCE).done:
+        while not wait([outcome], ENTRY_PATIENCE).done:
             entry, before = self._under_way, seen
             seen = id(entry), self._sim.elapsed
             if entry is not None and seen == before:

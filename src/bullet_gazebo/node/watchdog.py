@@ -21,7 +21,7 @@ from robot_sim.timing import FairLock
 
 STOP_TIMEOUT = 5.0  # [s] for the tick in progress
 GRACE = 0.5  # [s] the same if the tick is known to hang
-PATIENCE = 10.0  # [s of wall time] for whoever keeps the lock
+LOCK_PATIENCE = 10.0  # [s of wall time] for whoever keeps the lock
 LONGEST_LOOK = 1.0  # [s] counted between two looks; a suspended process sees more pass
 DEPTH = 12  # innermost frames that are logged
 
@@ -110,7 +110,7 @@ class Watchdog:
 
 
 class StallWatch:
-    """Notices that a thread has held the world's lock for PATIENCE without a tick.
+    """Notices that a thread has held the world's lock for LOCK_PATIENCE without a tick.
 
     A paused, held or slow world doesn't count: its lock is free in between.
     """
@@ -139,11 +139,11 @@ class StallWatch:
             self._seen, self._waited, self.reported = seen, 0.0, False
             return
         self._waited += passed
-        if self._waited >= PATIENCE and not self.reported:
+        if self._waited >= LOCK_PATIENCE and not self.reported:
             self.reported = True
             self._report(
-                f"Time stands still and services wait: for {PATIENCE:g} s of wall time the world's lock has "
-                f"been kept by {holder(self._sim.lock)}"
+                f"Time stands still and services wait: for {LOCK_PATIENCE:g} s of wall time the world's lock "
+                f"has been kept by {holder(self._sim.lock)}"
             )
 
 

@@ -1,8 +1,6 @@
 """Plugins by which clients act on a model: force, hand_of_god, joint_pose_trajectory, wheel_slip.
 
-`libgazebo_ros_force.so`: `bodyName`, `topicName`. `libgazebo_ros_hand_of_god.so`: `linkName`, `frameId`
-(hog), `kl` and `ka` (200). `libgazebo_ros_joint_pose_trajectory.so`: `topicName` (set_joint_trajectory),
-`updateRate` (0). `libgazebo_ros_wheel_slip.so` is accepted, without effect. See docs/contract/sensors.md 11.
+See docs/contract/sensors.md 11.3 and 11.5.
 """
 
 import math

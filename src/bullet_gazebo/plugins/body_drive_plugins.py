@@ -8,8 +8,8 @@ import math
 from bullet_gazebo.plugins.drive_topics import REST, DrivePlugin, choice
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import namespace_of
+from robot_sim.constants import NANOSECONDS
 from robot_sim.drives.odometry import (
-    NANOSECONDS,
     POSE,
     TWIST,
     UNKNOWN,

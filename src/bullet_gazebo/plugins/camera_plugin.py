@@ -1,10 +1,4 @@
-"""libgazebo_ros_camera.so, ..._multicamera.so and both triggered (docs/contract/sensors.md 4a, 4c, 11.6).
-
-`cameraName`, `imageTopicName` (image_raw), `cameraInfoTopicName` (camera_info), `frameName`, `updateRate`,
-`hackBaseline`, `Cx`, `Cy`, `focalLength`, `distortionK1` ... `distortionT2` are read; of a triggered camera
-also `triggerTopicName` (image_trigger), whose every message takes one picture. Of a multicamera's cameras,
-those with "left" or "right" in their names have topics, below left/ or right/; the right one has a baseline.
-"""
+"""libgazebo_ros_camera.so, ..._multicamera.so and both triggered (docs/contract/sensors.md 4a, 4c, 11.6)."""
 
 from collections.abc import Iterator
 from dataclasses import replace

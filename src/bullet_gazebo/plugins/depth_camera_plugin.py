@@ -1,9 +1,4 @@
-"""libgazebo_ros_depth_camera.so and libgazebo_ros_openni_kinect.so (docs/contract/sensors.md 4b).
-
-As the camera's plugin, with pictures at ir/image_raw, and `depthImageTopicName` (depth/image_raw),
-`depthImageCameraInfoTopicName` (depth/camera_info), `pointCloudTopicName` (points), `pointCloudCutoff`
-(0.4 m), `useDepth16UC1Format` (false), and `pointCloudCutoffMax` (5 m), which only the second one reads.
-"""
+"""libgazebo_ros_depth_camera.so and libgazebo_ros_openni_kinect.so (docs/contract/sensors.md 4b)."""
 
 from typing import ClassVar
 

@@ -24,8 +24,8 @@ from bullet_gazebo.plugins.sensor_topics import (
     subscribe,
     topic_in,
 )
+from robot_sim.constants import NANOSECONDS
 from robot_sim.drives.odometry import (
-    NANOSECONDS,
     POSE,
     TWIST,
     OdometrySample,

@@ -1,10 +1,4 @@
-"""ft_sensor, f3d and bumper: forces on joints and links, and contacts (docs/contract/sensors.md 5, 6e, 11.5).
-
-The first one reads `jointName`, `topicName` (both required), `updateRate` (0: every step) and
-`gaussianNoise` (0); it also works below a `<sensor type="force_torque">` of a joint. The second one reads
-`bodyName`, `topicName` (both required) and `frameName` (world), the third one `bumperTopicName`
-(bumper_states) and `frameName` (world). Of these two the frame is only a name: the axes are the world's.
-"""
+"""ft_sensor, f3d, bumper: forces on joints and links, contacts (docs/contract/sensors.md 5, 6e, 11.5)."""
 
 from typing import Any
 
@@ -48,11 +42,9 @@ class ForcePlugin(SensorPlugin):
         raise NotImplementedError
 
     def rate(self) -> float:
-        """Returns the rate of measurements [Hz]; 0 is every step."""
         return 0.0
 
     def measure(self, now: int) -> WrenchStamped | None:
-        """Returns the message of the last step's forces at a time [ns]; None if they aren't known."""
         context, found = self.context, self.forces()
         if found is None:
             if now != context.sensing.schedule.last_move(context.model).at:
@@ -83,11 +75,9 @@ class FtSensorPlugin(ForcePlugin):
         self.frame = frame_of(self.namespace, self.meter.link.rpartition("::")[2])
 
     def rate(self) -> float:
-        """Returns the plugin's rate, or else the sensor's [Hz]."""
         return self.context.rate("updateRate", self._rate)
 
     def forces(self) -> Forces | None:
-        """Returns what the joint transmits."""
         return self.meter.wrench()
 
 
@@ -102,7 +92,6 @@ class F3dPlugin(ForcePlugin):
         super().__init__(context)
 
     def forces(self) -> Forces | None:
-        """Returns all that acts on the link."""
         return self.meter.about_centre(self._link)
 
 
@@ -118,7 +107,6 @@ class BumperPlugin(SensorPlugin):
     measurement = ContactSensor
 
     def measure(self, now: int) -> ContactsState:
-        """Returns the message of the last step's contacts at a time [ns]."""
         header = Header(stamp=to_time(now), frame_id=self.frame)
         return ContactsState(header, [to_contact_state(pair) for pair in self.sensor.measure(now)])
 

@@ -76,7 +76,7 @@ class LinkAttacher:
         with self._sim.lock:
             first, second = self._link(*key[:2]), self._link(*key[2:])
             if first is None or second is None or first == second:
-                rospy.logerr("attach: there are no two links '%s::%s' and '%s::%s'", *key)
+                rospy.logerr("attach: there are no two links '%s::%s' and '%s::%s' to attach", *key)
                 return AttachResponse(ok=False)
             self._release(key)
             self._sim.world.attach(first, second)
@@ -96,7 +96,9 @@ class LinkAttacher:
 
     def _link(self, model: str, link: str) -> tuple[Model, str] | None:
         found = self._sim.world.models.get(model)
-        return (found, link) if found is not None and link in found.link_names else None
+        if found is None or link not in found.link_names or found.description.script is not None:
+            return None  # an actor follows its script, and nothing else
+        return found, link
 
 
 def _ends(attachment: Attachment) -> tuple[str, ...]:

@@ -1,11 +1,7 @@
-"""hector_gazebo_plugins' IMU, GPS, magnetometer and sonar (docs/contract/sensors.md 12.1).
-
-They publish without subscribers, at multiples of `updatePeriod` [s] or of that of `updateRate` (absent: every
-step) after `updateOffset` [s], and have errors that drift.
-"""
+"""hector's IMU, GPS, magnetometer and sonar, whose errors drift (docs/contract/sensors.md 12.1)."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -21,7 +17,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import Empty
 
 from bullet_gazebo.common.dynamic_server import FIRST, DynamicServer, Parameter
-from bullet_gazebo.common.messages import NANOSECONDS, to_time
+from bullet_gazebo.common.messages import to_time
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import (
     ContextPlugin,
@@ -30,19 +26,17 @@ from bullet_gazebo.plugins.sensor_topics import (
     offer_shared,
     topic_in,
 )
+from robot_sim.constants import NANOSECONDS
 from robot_sim.physics.files.elements import numbers, truth
 from robot_sim.physics.pose import conjugate, from_rpy, multiply, rotate
 from robot_sim.sensors.drift import DriftingError
 from robot_sim.sensors.imu import Imu, LinkMotion, motion_of
 from robot_sim.sensors.laser import LaserSensor, nearest
 from robot_sim.sensors.noise import checked_deviation
-from robot_sim.state_dict import Stateful
 
 MOST = 1e6  # that dynamic_reconfigure sets
 EQUATOR = 6378137.0  # [m], radius of WGS84
 FLATTENING = 1.0 / 298.257223563
-GPS_RATE = 4.0  # [Hz]
-SONAR_RATE = 10.0  # [Hz]
 GRAVITY = 9.8065  # [m/s²]
 ATTRIBUTES = {
     "gaussian_noise": "noise", "offset": "offset", "drift": "drift", "drift_frequency": "frequency",
@@ -54,33 +48,22 @@ MODEL = [
 ]
 
 
-class HectorTimer(Stateful):
-    """What they have in common: a clock that is always heard.
+class HectorPlugin(ContextPlugin):
+    """One that publishes whether or not it is heard; subclasses call `begin`, and have `publish`."""
 
-    Args:
-        context: the plugin's.
-        default: rate [Hz] without `<updateRate>`; 0 is every step.
-        errors: whose drift begins again when time does, and with a new seed.
-        send: publishes the measurement at a time [ns], some time [s] after the last one.
-    """
+    non_persistent = ("_errors",)
+    default_rate = 0.0  # [Hz]; 0 is every step
 
-    non_persistent = ("_send", "_errors")
-
-    def __init__(
-        self,
-        context: PluginContext,
-        default: float,
-        errors: Sequence[DriftingError],
-        send: Callable[[int, float], None],
-    ) -> None:
-        self._context = context
-        self._send = send
+    def __init__(self, context: PluginContext) -> None:
+        self.context = context
         self.namespace = namespace_of(context, absent="", empty="")
-        self._errors = errors
-        self._seeds = context.sensing.seeds
-        self._last = context.sim.now
         period = context.number("updatePeriod", 0.0)
-        self.rate = 1.0 / period if period > 0.0 else context.rate("updateRate", default)
+        self.rate = 1.0 / period if period > 0.0 else context.rate("updateRate", self.default_rate)
+
+    def begin(self, *errors: DriftingError) -> None:
+        """Publishes from now on; the drift of errors begins again when time does, and with a new seed."""
+        context = self.context
+        self._errors, self._seeds, self._last = errors, context.sensing.seeds, context.sim.now
         clock = context.clock(self.rate, self._measure, at_once=False)
         ticks = max(clock.period, 1)
         offset = math.fmod(context.number("updateOffset", 0.0), ticks / NANOSECONDS)
@@ -88,63 +71,58 @@ class HectorTimer(Stateful):
 
     def random(self, now: int) -> np.random.Generator:
         """Returns what draws the errors of a measurement at a time [ns]."""
-        return self._context.sensing.noise(self._context.model, self._context.key, now)
+        return self.context.sensing.noise(self.context.model, self.context.key, now)
 
     def _measure(self, now: int) -> None:
-        seeds = self._context.sensing.seeds
+        seeds = self.context.sensing.seeds
         if now < self._last or seeds != self._seeds:
             self._seeds = seeds
             for error in self._errors:
                 error.restart()
         seconds = max(now - self._last, 0) / NANOSECONDS
         self._last = now
-        self._send(now, seconds)
+        self.publish(now, seconds)
+
+    def publish(self, now: int, seconds: float) -> None:
+        """Publishes the measurement at a time [ns], some time [s] after the last one."""
+        raise NotImplementedError
 
 
-class HectorSensor(HectorTimer):
+class HectorSensor(HectorPlugin):
     """One that measures the motion of a link."""
 
-    def __init__(
-        self,
-        context: PluginContext,
-        default: float,
-        errors: Sequence[DriftingError],
-        send: Callable[[LinkMotion, int, float], None],
-    ) -> None:
+    def __init__(self, context: PluginContext) -> None:
+        super().__init__(context)
         self.link = context.link("bodyName", required=False)
-        self.frame = context.text("frameId", context.text("bodyName", self.link))
-        super().__init__(
-            context,
-            default,
-            errors,
-            lambda now, seconds: send(motion_of(context.model, self.link), now, seconds),
-        )
+        self.frame = context.text("frameId", context.text("bodyName", self.link)).lstrip("/")
+
+    @property
+    def motion(self) -> LinkMotion:
+        """That of the link."""
+        return motion_of(self.context.model, self.link)
 
 
-class HectorImuPlugin(ContextPlugin):
+class HectorImuPlugin(HectorSensor):
     """Feels gravity: +9.8 m/s² upwards at rest."""
 
     def __init__(self, context: PluginContext) -> None:
-        self._context = context
-        self._accel, self._rate, self._yaw = (
+        super().__init__(context)
+        self._accel, self._spin, self._yaw = (
             DriftingError(_reader(context), prefix) for prefix in ("accel", "rate", "yaw")
         )
         self._turn = from_rpy(*numbers(context.text("rpyOffset", "0 0 0"), "<rpyOffset>", 3))
-        self._sensor = sensor = HectorSensor(
-            context, 0.0, (self._accel, self._rate, self._yaw), self._publish
-        )
-        self._imu = Imu(True, sensor.rate)
-        self._frame = sensor.frame.lstrip("/")
-        topic = topic_in(sensor.namespace, context.text("topicName", "imu"))
-        bias = topic_in(sensor.namespace, context.text("biasTopicName", f"{topic}/bias"))
+        self.begin(self._accel, self._spin, self._yaw)
+        self._imu = Imu(True, self.rate)
+        topic = topic_in(self.namespace, context.text("topicName", "imu"))
+        bias = topic_in(self.namespace, context.text("biasTopicName", f"{topic}/bias"))
         self._publisher, self._bias = (
             advertised(context, name, ImuMsg, 10) for name in (topic, bias)
         )
         calibrate = context.text("serviceName", f"{topic}/calibrate")
-        self._offer(topic_in(sensor.namespace, calibrate), Empty, self._rate)
+        self._offer(topic_in(self.namespace, calibrate), Empty, self._spin)
         self._offer(f"{topic}/set_accel_bias", SetBias, self._accel)
-        self._offer(f"{topic}/set_rate_bias", SetBias, self._rate)
-        for name, error in (("accel", self._accel), ("rate", self._rate), ("yaw", self._yaw)):
+        self._offer(f"{topic}/set_rate_bias", SetBias, self._spin)
+        for name, error in (("accel", self._accel), ("rate", self._spin), ("yaw", self._yaw)):
             with suppress(rospy.ServiceException):
                 server = DynamicServer(MODEL, partial(self._configure, error), f"{topic}/{name}")
                 context.closing(server.shutdown)
@@ -157,15 +135,15 @@ class HectorImuPlugin(ContextPlugin):
             bias = (vector.x, vector.y, vector.z)
             if not all(map(math.isfinite, bias)):
                 raise rospy.ServiceException(f"the bias is not finite: {bias}")
-            with self._context.sim.lock:
+            with self.context.sim.lock:
                 error.restart(bias)
             return kind._response_class()
 
-        offer_shared(self._context, name, kind, answer)
+        offer_shared(self.context, name, kind, answer)
 
     def _configure(self, error: DriftingError, wanted: Config, level: int) -> Config:
         """Sets an error model; the first call asks for the file's, a number that isn't finite is left out."""
-        with self._context.sim.lock:
+        with self.context.sim.lock:
             for name, attribute in ATTRIBUTES.items():
                 if level == FIRST or not math.isfinite(wanted[name]):
                     wanted[name] = float(getattr(error, attribute)[0])
@@ -173,23 +151,23 @@ class HectorImuPlugin(ContextPlugin):
                     setattr(error, attribute, np.full(3, wanted[name]))
         return wanted
 
-    def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
-        sim, model = self._context.sim, self._context.model
-        moves, _ = self._context.sensing.schedule.last_move(model)
+    def publish(self, now: int, seconds: float) -> None:
+        sim, model, motion = self.context.sim, self.context.model, self.motion
+        moves, _ = self.context.sensing.schedule.last_move(model)
         # The offset turns the axes of all that is measured, not just the orientation.
         pose = motion.pose._replace(orientation=multiply(self._turn, motion.pose.orientation))
         sample = self._imu.measure(now, moves, motion._replace(pose=pose), sim.world.gravity)
         if sample is None:
             return
-        random = self._sensor.random(now)
+        random = self.random(now)
         acceleration = self._accel.applied(np.array(sample.linear_acceleration), seconds, random)
-        rate = self._rate.applied(np.array(sample.angular_velocity), seconds, random)
+        rate = self._spin.applied(np.array(sample.angular_velocity), seconds, random)
         yaw = float(self._yaw.applied(np.zeros(3), seconds, random)[2])
         turned = multiply(from_rpy(0.0, 0.0, yaw), sample.orientation)
         tilt = self._accel.noise[:2] ** 2 / GRAVITY**2
-        header = Header(stamp=to_time(now), frame_id=self._frame)
+        header = Header(stamp=to_time(now), frame_id=self.frame)
         if self._bias.is_heard:
-            drifts = (Vector3(*error.bias) for error in (self._rate, self._accel))
+            drifts = (Vector3(*error.bias) for error in (self._spin, self._accel))
             bias = ImuMsg(header=header, orientation=Quaternion(w=1.0))
             bias.angular_velocity, bias.linear_acceleration = drifts
             self._bias.publish(bias)
@@ -199,17 +177,20 @@ class HectorImuPlugin(ContextPlugin):
                 orientation=Quaternion(*turned),
                 orientation_covariance=_diagonal([*tilt, self._yaw.noise[2] ** 2]),
                 angular_velocity=Vector3(*rate),
-                angular_velocity_covariance=_diagonal(self._rate.noise**2),
+                angular_velocity_covariance=_diagonal(self._spin.noise**2),
                 linear_acceleration=Vector3(*acceleration),
                 linear_acceleration_covariance=_diagonal(self._accel.noise**2),
             )
         )
 
 
-class HectorGpsPlugin(ContextPlugin):
+class HectorGpsPlugin(HectorSensor):
     """Latitude, longitude [degrees] and altitude [m] on WGS84; velocities north, west and up [m/s]."""
 
+    default_rate = 4.0
+
     def __init__(self, context: PluginContext) -> None:
+        super().__init__(context)
         self._latitude, self._longitude, heading, self._altitude = (
             context.number(f"reference{name}", default)
             for name, default in (
@@ -224,17 +205,15 @@ class HectorGpsPlugin(ContextPlugin):
         self._east = EQUATOR / math.sqrt(share) * math.cos(math.radians(self._latitude))
         self._error = DriftingError(_reader(context), "")
         self._velocity_error = DriftingError(_reader(context), "velocity")
-        self._sensor = sensor = HectorSensor(
-            context, GPS_RATE, (self._error, self._velocity_error), self._publish
-        )
+        self.begin(self._error, self._velocity_error)
         self._frame = context.text("frameId", "/world")
-        fix = topic_in(sensor.namespace, context.text("topicName", "fix"))
+        fix = topic_in(self.namespace, context.text("topicName", "fix"))
         self._fix = advertised(context, fix, NavSatFix, 10)
-        velocity = topic_in(sensor.namespace, context.text("velocityTopicName", "fix_velocity"))
+        velocity = topic_in(self.namespace, context.text("velocityTopicName", "fix_velocity"))
         self._velocity = advertised(context, velocity, Vector3Stamped, 10)
 
-    def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
-        random = self._sensor.random(now)
+    def publish(self, now: int, seconds: float) -> None:
+        random, motion = self.random(now), self.motion
         place = self._error.applied(np.array(motion.pose.position), seconds, random)
         speed = self._velocity_error.applied(np.array(motion.linear), seconds, random)
         north, west = self._turned(place)
@@ -261,10 +240,12 @@ class HectorGpsPlugin(ContextPlugin):
         return x * cosine + y * sine, -x * sine + y * cosine
 
 
-class HectorMagneticPlugin(ContextPlugin):
+class HectorMagneticPlugin(HectorSensor):
     """The magnetic field of the earth in the sensor's axes, scaled to `magnitude`."""
 
     def __init__(self, context: PluginContext) -> None:
+        super().__init__(context)
+
         def angle(tag: str, default: float) -> float:
             return math.radians(context.number(tag, default))
 
@@ -275,17 +256,16 @@ class HectorMagneticPlugin(ContextPlugin):
         turn = heading - declination
         self._field = (across * math.cos(turn), across * math.sin(turn), down)
         self._error = DriftingError(_reader(context), "")
-        self._sensor = sensor = HectorSensor(context, 0.0, (self._error,), self._publish)
-        self._frame = sensor.frame.lstrip("/")
+        self.begin(self._error)
         self._is_field = truth(context.text("useMagneticFieldMsgs", "false"))
-        topic = topic_in(sensor.namespace, context.text("topicName", "magnetic"))
+        topic = topic_in(self.namespace, context.text("topicName", "magnetic"))
         kind = MagneticField if self._is_field else Vector3Stamped
         self._publisher = advertised(context, topic, kind, 1)
 
-    def _publish(self, motion: LinkMotion, now: int, seconds: float) -> None:
-        field = rotate(conjugate(motion.pose.orientation), self._field)
-        seen = Vector3(*self._error.applied(np.array(field), seconds, self._sensor.random(now)))
-        header = Header(stamp=to_time(now), frame_id=self._frame)
+    def publish(self, now: int, seconds: float) -> None:
+        field = rotate(conjugate(self.motion.pose.orientation), self._field)
+        seen = Vector3(*self._error.applied(np.array(field), seconds, self.random(now)))
+        header = Header(stamp=to_time(now), frame_id=self.frame)
         message = (
             MagneticField(header, seen, [0.0] * 9)
             if self._is_field
@@ -294,20 +274,23 @@ class HectorMagneticPlugin(ContextPlugin):
         self._publisher.publish(message)
 
 
-class HectorSonarPlugin(ContextPlugin):
+class HectorSonarPlugin(HectorPlugin):
     """The nearest range of a laser's rays."""
 
+    default_rate = 10.0
+
     def __init__(self, context: PluginContext) -> None:
+        super().__init__(context)
         self._sensor = LaserSensor(context)
         self._error = DriftingError(_reader(context), "")
-        self._timer = timer = HectorTimer(context, SONAR_RATE, (self._error,), self._publish)
+        self.begin(self._error)
         self._frame = context.text("frameId", "/sonar_link")
-        topic = topic_in(timer.namespace, context.text("topicName", "sonar"))
+        topic = topic_in(self.namespace, context.text("topicName", "sonar"))
         self._publisher = advertised(context, topic, Range, 1)
         context.show(topic, Range, self._sensor.sensor.link, self._sensor.sensor.pose)
 
-    def _publish(self, now: int, seconds: float) -> None:
-        laser, random = self._sensor.laser, self._timer.random(now)
+    def publish(self, now: int, seconds: float) -> None:
+        laser, random = self._sensor.laser, self.random(now)
         exact = nearest(self._sensor.scan(random), laser, 0.0, random)
         found = float(self._error.applied(np.full(3, exact), seconds, random)[0])
         self._publisher.publish(

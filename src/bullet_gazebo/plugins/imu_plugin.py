@@ -1,10 +1,4 @@
-"""Plugins of IMUs (docs/contract/sensors.md 3). `ModelImu` and `ImuSensor` read the rest of their elements.
-
-- libgazebo_ros_imu.so: the IMU of a model, which feels no gravity. `topicName` and `serviceName`
-  (/default_imu) and `frameName` (the body's name) are read.
-- libgazebo_ros_imu_sensor.so: a sensor of type imu, which feels gravity. `frameName`, which is required, and
-  `topicName` (imu_data) are read. The slower of the two rates counts.
-"""
+"""Plugins of IMUs, with and without gravity (docs/contract/sensors.md 3)."""
 
 import numpy as np
 from sensor_msgs.msg import Imu as ImuMsg
@@ -58,7 +52,6 @@ class ImuPlugin(SensorPlugin):
         offer_shared(self.context, service, Empty, lambda request: EmptyResponse())
 
     def measure(self, now: int) -> ImuMsg | None:
-        """Returns the message of a measurement at a time [ns]; None for the first."""
         sample = self.sensor.measure(now)
         return sample and to_imu(sample, now, self.frame, self.sensor.deviation)
 

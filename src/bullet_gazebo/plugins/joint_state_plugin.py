@@ -1,8 +1,4 @@
-"""libgazebo_ros_joint_state_publisher.so: joint states of a model without ros_control.
-
-As in gazebo_plugins, `jointName` lists the joints, `updateRate` is in Hz of simulated time (100 by
-default), and `robotNamespace` holds the topic `joint_states` (docs/contract/gazebo_launch.md 5.2).
-"""
+"""libgazebo_ros_joint_state_publisher.so: joint states of a model (docs/contract/gazebo_launch.md 5.2)."""
 
 import re
 
@@ -10,9 +6,10 @@ import rospy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from bullet_gazebo.common.messages import NANOSECONDS, to_time
+from bullet_gazebo.common.messages import to_time
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import ContextPlugin, advertised
+from robot_sim.constants import NANOSECONDS
 
 QUEUE = 1000
 RATE = "100.0"  # [Hz]

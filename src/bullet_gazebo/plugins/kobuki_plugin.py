@@ -1,8 +1,4 @@
-"""libgazebo_ros_kobuki.so: the base of TurtleBot 2 (docs/contract/sensors.md 12.4).
-
-All its elements are required but `wheel_drop_left_sensor_name`, `wheel_drop_right_sensor_name`, without which
-no wheel drops, `velocity_command_timeout` (none), `publish_tf` (false) and `update_rate` (every step).
-"""
+"""libgazebo_ros_kobuki.so: the base of TurtleBot 2 (docs/contract/sensors.md 12.4)."""
 
 import math
 from collections.abc import Callable
@@ -30,7 +26,8 @@ from bullet_gazebo.plugins.sensor_topics import (
     subscribe,
     topic_in,
 )
-from robot_sim.drives.odometry import NANOSECONDS, TWIST, DeadReckoning, OdometrySample, Triple
+from robot_sim.constants import NANOSECONDS
+from robot_sim.drives.odometry import TWIST, DeadReckoning, OdometrySample, Triple
 from robot_sim.drives.wheels import side_speeds
 from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.pose import conjugate, rotate, subtract

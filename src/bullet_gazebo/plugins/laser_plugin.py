@@ -1,15 +1,4 @@
-"""Plugins of lasers (docs/contract/sensors.md 2, 2b, 6a and 6f). The sensor says what isn't read here.
-
-`topicName` and `frameName` (/world) are read, and `gaussianNoise` (0) but for LaserScans. A laser meets
-collisions, a gpu laser visuals.
-
-- libgazebo_ros_laser.so, libgazebo_ros_gpu_laser.so: LaserScans; `topicName` is /world by default.
-- libgazebo_ros_block_laser.so: a PointCloud; /world.
-- libgazebo_ros_range.so: the nearest ray; /range. It reads `updateRate` (0), `radiation` (ultrasound, else
-  infrared) and `fov` (0.05 rad).
-- libgazebo_ros_velodyne_laser.so, ..._gpu_laser.so: a PointCloud2 of 22 bytes a point, as
-  upstream since 1.0.10; /points. They read `min_range` (0), `max_range` (none) and `min_intensity` (none).
-"""
+"""Plugins of lasers: scans, points, the nearest range (docs/contract/sensors.md 2, 2b, 6a and 6f)."""
 
 import math
 from typing import Any
@@ -68,7 +57,6 @@ class LaserPlugin(SensorPlugin):
         return Header(stamp=to_time(now), frame_id=self.frame)
 
     def measure(self, now: int) -> Any:
-        """Returns the message of a scan at a time [ns]."""
         laser, (scan, _) = self.sensor.laser, self.sensor.measure(now)
         return LaserScan(
             header=self.header(now),
@@ -92,7 +80,6 @@ class BlockLaserPlugin(LaserPlugin):
         self._deviation = context.deviation()
 
     def measure(self, now: int) -> PointCloud:
-        """Returns the message of a scan at a time [ns]."""
         laser, (scan, random) = self.sensor.laser, self.sensor.measure(now)
         ranges, intensities = np.minimum(scan.ranges, laser.high).ravel(), scan.intensities.ravel()
         with np.errstate(invalid="ignore"):  # inf * 0
@@ -120,7 +107,6 @@ class RangePlugin(LaserPlugin):
         self._field_of_view = context.number("fov", 0.05)
 
     def measure(self, now: int) -> Range:
-        """Returns the message of a range at a time [ns]."""
         laser = self.sensor.laser
         return Range(
             header=self.header(now),
@@ -150,7 +136,6 @@ class VelodynePlugin(LaserPlugin):
         )
 
     def measure(self, now: int) -> PointCloud2:
-        """Returns the message of a scan at a time [ns]."""
         scan, random = self.sensor.measure(now)
         ranges, intensities = scan.ranges.T, scan.intensities.T
         seen = self._within(ranges) & (intensities >= self._least)

@@ -1,8 +1,4 @@
-"""libgazebo_ros_p3d.so: the true state of a link (docs/contract/sensors.md 6b).
-
-`bodyName` and `topicName` are required. `frameName` (world), `xyzOffset`, `rpyOffset`, `gaussianNoise` (0)
-and `updateRate` (0: every step) are read. The twist is in world axes.
-"""
+"""libgazebo_ros_p3d.so: the true state of a link (docs/contract/sensors.md 6b)."""
 
 from geometry_msgs.msg import Point, PoseWithCovariance, Quaternion, TwistWithCovariance
 from geometry_msgs.msg import Pose as PoseMsg
@@ -34,11 +30,9 @@ class P3dPlugin(SensorPlugin):
         super().__init__(context)
 
     def rate(self) -> float:
-        """Returns the plugin's rate [Hz]; 0 is every step."""
         return self.context.rate()
 
     def measure(self, now: int) -> Odometry:
-        """Returns the message of the link's motion at a time [ns]."""
         pose, linear, angular = self._relative(motion_of(self.context.model, self._link))
         x, y, z = self._xyz
         place, turn = add(pose.position, (x, y, z)), multiply(self._turn, pose.orientation)

@@ -36,9 +36,9 @@ from robot_sim.simulator import Simulator
 
 CONTROL = re.compile("plugin .*(control|drive|steer|planar_move|hw_sim)", re.IGNORECASE)
 PARAMETER = "~plugins"  # users' plugins: library: "module:Factory"
-PATIENCE = 10.0  # [s of wall time]
+LOADING_PATIENCE = 10.0  # [s of wall time]
 # The same in lock-step: a step in the middle of a spawn can't be repeated, and a script waits 30 s for one.
-LOCKSTEP_PATIENCE = 25.0
+LOCKSTEP_LOADING_PATIENCE = 25.0
 Update = Callable[[int], None]
 
 
@@ -232,7 +232,7 @@ class PluginRegistry:
 
         If a plugin waits for time to pass, the hold ends after a while.
         """
-        patience = LOCKSTEP_PATIENCE if self._sim.lockstep else PATIENCE
+        patience = LOCKSTEP_LOADING_PATIENCE if self._sim.lockstep else LOADING_PATIENCE
         return self._sim.holds.hold(patience, partial(_warn_late, models, patience))
 
     def load(self, model: Model, robot_namespace: str) -> None:

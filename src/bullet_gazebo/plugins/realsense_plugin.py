@@ -1,11 +1,4 @@
-"""librealsense_gazebo_plugin.so: the cameras of a RealSense (docs/contract/sensors.md 12.2).
-
-They are the model's sensors `color`, `depth`, `ired1` and `ired2`, after `prefix`. Topics are in the plugin's
-name. `colorTopicName` (color), `depthTopicName` (depth), `infrared1TopicName` (infrared),
-`infrared2TopicName` (infrared2), `colorOpticalframeName` and so on, `colorUpdateRate`, `depthUpdateRate`,
-`infraredUpdateRate` (the sensor's), `rangeMinDepth` (0.2 m), `rangeMaxDepth` (10 m), `pointCloud` (false),
-`pointCloudTopicName` (depth/points), `pointCloudCutoff` (0.5 m) and `pointCloudCutoffMax` (5 m) are read.
-"""
+"""librealsense_gazebo_plugin.so: the cameras of a RealSense (docs/contract/sensors.md 12.2)."""
 
 import numpy as np
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import genpy
 import rospy
 
-from bullet_gazebo.common.messages import LARGEST, bad_number
+from bullet_gazebo.common.messages import LARGEST_NUMBER, bad_number
 
 NO_MODEL = "model does not exist"
 SCOPE = "did you forget to scope the link by model name?"
@@ -48,7 +48,7 @@ def offer(name: str, kind: Any, act: Callable[[Any], str | genpy.Message]) -> ro
     return rospy.Service(name, kind, handle)
 
 
-def check_message(message: genpy.Message, largest: float = LARGEST) -> None:
+def check_message(message: genpy.Message, largest: float = LARGEST_NUMBER) -> None:
     """Raises ServiceRefused for a message with a number that the world can't take."""
     fault = bad_number(message, largest)
     if fault:

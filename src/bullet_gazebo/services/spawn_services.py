@@ -220,7 +220,9 @@ def _log(what: str, found: WorldDescription | ModelDescription) -> None:
     """Logs a file's warnings, and what was left out of the world."""
     for warning in _listed(found.warnings):
         rospy.logwarn("%s: %s", what, warning)
-    for name in found.stand_ins if isinstance(found, ModelDescription) else ():
+    if isinstance(found, WorldDescription):
+        return
+    for name in found.stand_ins:
         _tell_stand_in(name)
     if found.left_out:
         text = ", ".join(_listed(found.left_out))

@@ -27,13 +27,12 @@ from robot_sim.physics.pose import Pose
 from robot_sim.robot import ControlledRobot
 from robot_sim.simulator import Simulator
 from robot_sim.state import NOTHING, LinkQuery, StateQuery, find_model
+from ros_calls.commands import COMMANDS, CommandKind
 
 MAX_TICKS = 1_000_000  # more than this is a mistake and would take minutes
 SLICE = 500  # ticks between which other services get their turn
 MOST_NAMES = 10_000  # that a request asks about in one list: each takes time in each step
 NAMES = ("link_states_of", "model_states_of", "contacts_of", "sensors")
-COMMANDS = (("command", "Float64"), ("command", "Float64MultiArray"), ("cmd_vel", "Twist"))
-COUNTS: dict[str | type, int] = {"Float64": 1, "Twist": 3}  # of others one for each joint
 Placing = tuple[dict[str, float], dict[str, float]]
 """Positions [rad, m] and velocities [rad/s, m/s] of joints by plain name."""
 Actuated = tuple[ControlledRobot, JointHandle]
@@ -105,9 +104,9 @@ class Addresses:
             if id(controller) in found:
                 raise ControlError(f"controllers names one twice: '{name}'")
             found[id(controller)] = controller
-            port = _command_port(controller)
-            count = COUNTS.get(port.kind, len(controller.claimed))
-            ports.append((port, size if port.kind == "Float64" else slice(size, size + count)))
+            port, kind = _command_port(controller)
+            count = kind.count(len(controller.claimed))
+            ports.append((port, size if kind.single else slice(size, size + count)))
             size += count
         pairs = [self._free_joint(name) for name in joints]
         handles = [joint for _, joint in pairs]
@@ -198,10 +197,11 @@ def _only(
     return found[0]
 
 
-def _command_port(controller: Controller) -> Input:
+def _command_port(controller: Controller) -> tuple[Input, CommandKind]:
     for port in controller.inputs:
-        if (port.topic, port.kind) in COMMANDS:
-            return port
+        kind = COMMANDS.get(port.kind) if isinstance(port.kind, str) else None
+        if kind is not None and port.topic == kind.topic:
+            return port, kind
     raise ControlError(f"controller '{controller.name}' ({controller.type_name}) takes no numbers")
 
 

@@ -9,10 +9,10 @@ import rospy
 import viser
 from controller_manager_msgs.msg import ControllerState
 from controller_manager_msgs.utils import ControllerLister, ControllerManagerLister
-from std_msgs.msg import Float64, Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from bullet_gazebo.window.remote_scene import Commands
+from ros_calls.commands import COMMANDS
 from ros_calls.service import ServiceFailed
 from ros_calls.waiting import wait_until
 
@@ -34,7 +34,7 @@ ONLY_STEPS = "a world in lock-step moves only by steps: a client's, or these her
 MANAGER = "controller_manager"
 SINGLE, GROUP = "JointPositionController", "JointGroupPositionController"
 TRAJECTORY = "JointTrajectoryController"
-MESSAGES = {SINGLE: Float64, GROUP: Float64MultiArray, TRAJECTORY: JointTrajectory}
+KINDS = {SINGLE: COMMANDS["Float64"], GROUP: COMMANDS["Float64MultiArray"]}
 MOVE_TIME = 0.5  # [s of simulated time] that a trajectory to the slider's position takes
 CONNECTING = 5.0  # [s]
 
@@ -164,7 +164,7 @@ class Controllers:
     def holder(self, joint: str) -> Holder | str:
         """Returns the running controller that takes positions of `joint`, or why there is none."""
         claims = [each for each in self._running() if joint in each.joints]
-        holders = [each for each in claims if each.kind in MESSAGES]
+        holders = [each for each in claims if each.kind in (*KINDS, TRAJECTORY)]
         if len(holders) == 1:
             return holders[0]
         if holders:  # robots may have joints of the same name
@@ -188,21 +188,19 @@ class Controllers:
         Raises:
             ServiceFailed: the controller doesn't subscribe.
         """
-        kind = MESSAGES[holder.kind]
+        kind = KINDS.get(holder.kind)
+        message = kind.message_type if kind else JointTrajectory
         if holder.topic not in self._publishers:
-            self._publishers[holder.topic] = rospy.Publisher(holder.topic, kind, queue_size=1)
+            self._publishers[holder.topic] = rospy.Publisher(holder.topic, message, queue_size=1)
         publisher = self._publishers[holder.topic]
         if not wait_until(publisher.get_num_connections, CONNECTING, holder.topic):
             raise ServiceFailed(f"{holder.topic}: no controller listens to commands")
-        if holder.kind == SINGLE:
-            publisher.publish(Float64(positions[joint]))
-            return
         order = list(holder.joints)
         if holder.kind == GROUP:  # claims are sorted, commands are in the parameter's order
             order = list(rospy.get_param(holder.topic.removesuffix("command") + "joints", order))
         targets = [positions.get(each, 0.0) for each in order]
-        if holder.kind == GROUP:
-            publisher.publish(Float64MultiArray(data=targets))
+        if kind is not None:
+            publisher.publish(kind.write(positions[joint] if kind.single else targets))
         else:
             point = JointTrajectoryPoint(
                 positions=targets, time_from_start=rospy.Duration.from_sec(MOVE_TIME)

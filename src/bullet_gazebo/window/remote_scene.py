@@ -23,7 +23,7 @@ from ros_calls.service import ServiceClient, ServiceFailed
 SIMULATOR = "gazebo"
 SILENCE = 2.0  # [s of wall time] without a message, after which the simulator is asked again
 SPAN = 30  # messages over which the real-time factor is measured
-TIMEOUT = 10.0  # [s of wall time] for an answer
+ANSWER_TIMEOUT = 10.0  # [s of wall time] for an answer
 LONGEST_STEP = 1000  # ticks in one request, so that others have their turn
 
 
@@ -112,7 +112,7 @@ class Commands:
         self._node = node
 
     def _call(self, service: str, kind: Any, *request: Any) -> Any:
-        answer = ServiceClient(f"{self._node}/{service}", kind, timeout=TIMEOUT)(*request)
+        answer = ServiceClient(f"{self._node}/{service}", kind, timeout=ANSWER_TIMEOUT)(*request)
         if not getattr(answer, "success", True):
             raise ServiceFailed(f"{service}: {answer.status_message}")
         return answer

@@ -92,15 +92,14 @@ class _Node:
 
 
 class Followers(Others):
-    """All nodes that follow the clock."""
+    """All nodes that follow the clock, which connect to a socket.
+
+    Args:
+        address: Path of the socket.
+        runner: The script's.
+    """
 
     def __init__(self, address: str, runner: ScriptRunner) -> None:
-        """Listens for nodes.
-
-        Args:
-            address: path of the socket.
-            runner: the script's.
-        """
         self._clock, self._world = runner.clock, runner.world
         self.starting = StartedProcesses()
         self._guard = originals.Condition()
@@ -146,11 +145,11 @@ class Followers(Others):
     def wake(self, node: str) -> None:
         """Wakes a node that has a message, and waits until it rests again."""
         with self._guard:
-            found = self._nodes.get(node)
-        if found is None:
+            follower = self._nodes.get(node)
+        if follower is None:
             self._world.forget_mail(node)  # the node has ended
-        elif found.rests:
-            self._go_on(found)
+        elif follower.rests:
+            self._go_on(follower)
 
     def _go_on(self, node: _Node) -> None:
         with self._guard:

@@ -1,4 +1,4 @@
-"""Observes processes and threads through /proc: whether they compute or wait."""
+"""Activity of processes and threads, observed in /proc."""
 
 from pathlib import Path
 
@@ -10,10 +10,9 @@ WORKING = "RD"  # states of a process: running, waiting for a disk
 
 
 class Seen:
-    """The observed activity of one process or thread."""
+    """The activity of a process or thread, seen in its folder in /proc; `quiet` idle checks mean rest."""
 
     def __init__(self, place: Path, quiet: int = QUIET) -> None:
-        """`place` is its folder in /proc; it counts as quiet after `quiet` idle checks in a row."""
         self.place = place
         self._looks = quiet
         self._used = -1  # [ticks] of processor time

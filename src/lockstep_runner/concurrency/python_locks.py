@@ -1,4 +1,4 @@
-"""Replaces threading.Lock and RLock where the script itself creates them: a thread that waits for one rests.
+"""The script's own threading.Lock and RLock: a thread that waits for one rests.
 
 Otherwise a callback blocked on a lock would seem to compute, and the lock's holder would wait for it.
 """

@@ -1,4 +1,4 @@
-"""Makes the waits of Python's threads take simulated time where the script itself calls them.
+"""Waits of Python's threads in simulated time, where the script itself calls them.
 
 Event.wait, Condition.wait, Thread.start and join; through them queue, threading.Timer and concurrent.futures.
 """

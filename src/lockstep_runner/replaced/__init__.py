@@ -1,4 +1,4 @@
-"""What replaces the functions that docs/lockstep.md lists, in this process."""
+"""The replacements of the functions that docs/lockstep.md lists."""
 
 import argparse
 import os
@@ -11,14 +11,9 @@ from lockstep_runner.world import ScriptWorld
 
 
 def install(args: argparse.Namespace, world: ScriptWorld | None = None) -> ScriptRunner:
-    """Replaces the functions that docs/lockstep.md lists.
+    """Replaces the functions that docs/lockstep.md lists; returns the runner that the replacements share.
 
-    Args:
-        args: the launcher's parsed options.
-        world: the world of a node that follows the script's clock; None in the script's own process.
-
-    Returns:
-        The runner that the replacements share.
+    `args` are the launcher's options, `world` that of a node that follows the script's clock.
     """
     triggers = None
     if args.step_on is not None:

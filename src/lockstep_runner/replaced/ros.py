@@ -1,4 +1,4 @@
-"""Replaces rospy's publishers, subscribers, service calls, waits, timers, and time readings.
+"""Replacements of rospy's publishers, subscribers, service calls, waits, timers, and time readings.
 
 Messages to and from the simulator travel with its time; connections to services are kept.
 """

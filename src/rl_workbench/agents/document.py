@@ -70,8 +70,8 @@ class PolicyGradientAgent(TwoNetworks):
     soon dies, since returns are positive.
 
     Args:
-        seed: seeds the agent's own generators, for the initial weights and for the actions.
-        settings: the algorithm's options.
+        seed: Seeds the agent's own generators, for the initial weights and for the actions.
+        settings: The algorithm's options.
     """
 
     def __init__(self, seed: int = 0, settings: DocumentSettings | None = None) -> None:
@@ -120,7 +120,7 @@ class PolicyGradientAgent(TwoNetworks):
         """Updates both networks once from one episode.
 
         Raises:
-            WorkbenchError: if a loss or the policy's gradient isn't finite, before any weight changes; or if
+            WorkbenchError: If a loss or the policy's gradient isn't finite, before any weight changes; or if
                 the value's gradient isn't.
         """
         observations = torch.from_numpy(np.stack(episode.observations))  # (T, 4)

@@ -1,4 +1,4 @@
-"""The DQN agent: acts, stores transitions, learns. It knows neither environments nor files."""
+"""The DQN agent: acting, replay, learning. It knows neither environments nor files."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -30,11 +30,11 @@ class DQNAgent:
     steps give bit-identical weights.
 
     Args:
-        settings: the algorithm's options.
+        settings: The algorithm's options.
         observation_size: D; observations are float32 of shape (D,).
         actions: A; actions are 0 to A - 1.
-        seed: seeds weights, exploration and batches.
-        device: the networks' torch device.
+        seed: Seeds weights, exploration and batches.
+        device: The networks' torch device.
     """
 
     def __init__(
@@ -149,7 +149,7 @@ class DQNAgent:
         """Runs one round of `settings.gradient_steps` gradient steps.
 
         Raises:
-            WorkbenchError: if the loss or the gradient isn't finite. That gradient step changes no
+            WorkbenchError: If the loss or the gradient isn't finite. That gradient step changes no
                 weight.
         """
         settings = self.settings
@@ -196,7 +196,7 @@ class DQNAgent:
         if not (math.isfinite(loss) and math.isfinite(norm)):
             raise WorkbenchError(
                 f"the loss is {loss} and the gradient's norm {norm} at step {self.steps}; the "
-                "networks were left unchanged; try a smaller learning_rate or reward_scale"
+                "networks are unchanged; try a smaller learning_rate or reward_scale"
             )
         if 0 < self.settings.max_grad_norm < norm:
             self._flat.gradient.mul_(self.settings.max_grad_norm / norm)

@@ -14,7 +14,7 @@ class Scaling(nn.Module):
     Args:
         offset: (D,) float32.
         factors: (D,) float32.
-        limit: the largest absolute result.
+        limit: The largest absolute result.
     """
 
     offset: torch.Tensor
@@ -56,9 +56,9 @@ class Continuous(nn.Module):
     """Maps observations (N, D) to continuous actions, in the action space's shape and type.
 
     Args:
-        outputs: maps observations to numbers (N, n).
-        low: the smallest action, in the space's shape and type.
-        high: the largest action.
+        outputs: Maps observations to numbers (N, n).
+        low: The smallest action, in the space's shape and type.
+        high: The largest action.
     """
 
     low: torch.Tensor
@@ -83,7 +83,7 @@ class Choice(nn.Module):
     """Maps observations (N, D), float32, to the actions that their scores choose.
 
     Args:
-        scores: maps observations to scores (N, A), on any scale.
+        scores: Maps observations to scores (N, A), on any scale.
     """
 
     def __init__(self, scores: nn.Module) -> None:
@@ -102,8 +102,8 @@ class SeveralChoices(Choice):
     """Chooses the action with the highest score in each group of scores, (N, groups).
 
     Args:
-        scores: maps observations to scores (N, A), on any scale.
-        sizes: of the groups; their sum is A.
+        scores: Maps observations to scores (N, A), on any scale.
+        sizes: Of the groups; their sum is A.
     """
 
     def __init__(self, scores: nn.Module, sizes: list[int]) -> None:

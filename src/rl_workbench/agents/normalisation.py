@@ -1,4 +1,4 @@
-"""Normalises observations by their running mean and standard deviation."""
+"""Normalisation of observations by their running mean and standard deviation."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What policy gradients share: episodes, a policy and a value network, losses, steps down them."""
+"""Base of policy-gradient agents: episodes, policy and value networks, losses, gradient steps."""
 
 import math
 from abc import ABC, abstractmethod
@@ -23,7 +23,7 @@ class Episode:
     final_observation: np.ndarray | None = None  # after the last step
     terminated: bool = False  # by the task; False: it was cut off
     success: bool | None = None  # None if the environment doesn't say
-    curves: dict[str, float] = field(default_factory=dict)  # by tag: what the environment tells
+    curves: dict[str, float] = field(default_factory=dict)  # by tag: means of its infos
 
     def add(self, observation: np.ndarray, action: Any, reward: float) -> None:
         self.observations.append(observation)
@@ -81,10 +81,10 @@ class TwoNetworks(ABC):
     """Base class: a policy and a value network, an Adam for each, and a generator for the actions.
 
     Args:
-        policy: maps observations (N, D) to probabilities (N, A).
-        value: maps observations (N, D) to estimated returns (N, 1).
-        rates: learning rates of policy and value.
-        seed: seeds the generator.
+        policy: Maps observations (N, D) to probabilities (N, A).
+        value: Maps observations (N, D) to estimated returns (N, 1).
+        rates: Learning rates of policy and value.
+        seed: Seeds the generator.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ def check_finite(losses: Losses) -> None:
     """Raises WorkbenchError if a loss isn't finite; call it before any weight changes."""
     for name, loss in losses._asdict().items():
         if not math.isfinite(loss):
-            raise WorkbenchError(f"the {name} loss is {loss}; the networks were left unchanged")
+            raise WorkbenchError(f"the {name} loss is {loss}; the networks are unchanged")
 
 
 def start_at_zero(layer: nn.Linear) -> None:
@@ -137,12 +137,12 @@ def descend(optimizer: torch.optim.Optimizer, loss: torch.Tensor) -> None:
     """Takes one optimizer step down the loss.
 
     Raises:
-        WorkbenchError: if the gradient isn't finite, which is possible even with a finite loss. The
+        WorkbenchError: If the gradient isn't finite, which is possible even with a finite loss. The
             weights are unchanged.
     """
     optimizer.zero_grad()
     loss.backward()
     gradients = [weight.grad for group in optimizer.param_groups for weight in group["params"]]
     if not math.isfinite(nn.utils.get_total_norm(gradients, math.inf)):
-        raise WorkbenchError("a gradient isn't finite; the networks were left unchanged")
+        raise WorkbenchError("a gradient isn't finite; the networks are unchanged")
     optimizer.step()

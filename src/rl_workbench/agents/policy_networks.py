@@ -20,7 +20,7 @@ class PolicyNetworkBase(nn.Module):
     Args:
         observations: D.
         outputs: A.
-        hidden: units of the hidden layer; 0 for no such layer.
+        hidden: Units of the hidden layer; 0 for no such layer.
     """
 
     def __init__(self, observations: int, outputs: int, hidden: int) -> None:
@@ -76,7 +76,7 @@ class PairActor:
     """Acts by one dot product: for two actions and no hidden layer.
 
     Args:
-        network: has two actions and no hidden layer.
+        network: Has two actions and no hidden layer.
         factors: (D,), multiply the observations.
     """
 
@@ -109,7 +109,7 @@ class SoftmaxActor:
         return self._outputs(self._prepare(observation)).astype(np.float64)
 
     def probabilities(self, observation: np.ndarray) -> np.ndarray:
-        """Of the actions: (A,), float64."""
+        """Returns the probabilities of the actions, (A,), float64."""
         preferences = self._preferences(observation)
         weights = np.exp(preferences - preferences.max())
         return weights / weights.sum()
@@ -161,9 +161,9 @@ class GaussianNetwork(PolicyNetworkBase):
 
     Args:
         observations: D.
-        bounds: of the actions.
-        hidden: units of the hidden layer; 0 for no such layer.
-        log_std: logarithm of the initial standard deviation.
+        bounds: Of the actions.
+        hidden: Units of the hidden layer; 0 for no such layer.
+        log_std: Logarithm of the initial standard deviation.
     """
 
     def __init__(self, observations: int, bounds: Bounds, hidden: int, log_std: float) -> None:

@@ -58,11 +58,11 @@ class ReinforceAgent(TwoNetworks):
     """Learns from batches of whole episodes, with a softmax policy or, for continuous actions, a Gaussian.
 
     Args:
-        seed: seeds the agent's own generators, for the initial weights and for the actions.
+        seed: Seeds the agent's own generators, for the initial weights and for the actions.
         scale: (D,), divides observations.
-        settings: the algorithm's options.
-        actions: number of discrete actions, or the bounds of continuous ones.
-        environments: how many play at the same time; each contributes equally to a batch.
+        settings: The algorithm's options.
+        actions: Number of discrete actions, or the bounds of continuous ones.
+        environments: How many play at the same time; each contributes equally to a batch.
     """
 
     def __init__(
@@ -138,7 +138,7 @@ class ReinforceAgent(TwoNetworks):
             The losses before the update; None if the batch isn't full yet.
 
         Raises:
-            WorkbenchError: if a loss or a gradient isn't finite. The network that it belongs to is as
+            WorkbenchError: If a loss or a gradient isn't finite. The network that it belongs to is as
                 before then.
         """
         batch = [*self._batch, *episodes]
@@ -241,7 +241,7 @@ def generalised_advantages(
     """Computes Â_t = Σ_k (γλ)^k δ_{t+k}, δ_t = r_t + γ V(s_{t+1}) - V(s_t) (Schulman et al. 2016, eq. 16).
 
     Args:
-        rewards: of T steps.
+        rewards: Of T steps.
         values: V at the T states and the final one, (T + 1,).
 
     Returns:

@@ -102,8 +102,8 @@ class NStepReturns:
     """Combines an episode's steps into n-step transitions, shorter ones at the episode's end.
 
     Args:
-        steps: n; with 1 each step is its own transition.
-        gamma: the discount factor.
+        steps: N; with 1 each step is its own transition.
+        gamma: The discount factor.
     """
 
     def __init__(self, steps: int, gamma: float) -> None:
@@ -117,10 +117,10 @@ class NStepReturns:
         """Adds one step; returns the transitions that it completes.
 
         Args:
-            step: observation before the action, action, reward.
-            following: the observation after it.
-            ended: whether the episode is over, by termination or truncation.
-            valued: whether the following observation's value counts; false after a termination.
+            step: Observation before the action, action, reward.
+            following: The observation after it.
+            ended: Whether the episode is over, by termination or truncation.
+            valued: Whether the following observation's value counts; false after a termination.
         """
         self._window.append(step)
         transitions = []

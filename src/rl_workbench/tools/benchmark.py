@@ -22,7 +22,7 @@ from rl_workbench.tools.jobs import claim, job_pool
 from rl_workbench.tools.runs import SUITE_RECORD, Run, open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm
-from rl_workbench.training.options import default_file, known_options, read_section
+from rl_workbench.training.options import default_file, read_section
 from rl_workbench.training.progress import tell, warn
 from rl_workbench.training.train import choose
 
@@ -77,7 +77,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     add("--params", nargs="+", default=[], metavar="KEY=VALUE", help="options of the training")
     add("--total-timesteps", type=number(1), metavar="N", help="length of each training [steps]")
     add("--seeds", type=number(1), metavar="N", help=f"how many (the suite's, or {SEEDS})")
-    add("--first-seed", type=number(0), default=0, metavar="N", help="default 0")
     add_job_flags(parser)
     add("--episodes", type=number(1), default=100, metavar="N",
         help="greedy episodes on fresh seeds for each policy's score (default 100)")  # fmt: skip
@@ -90,10 +89,9 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """Trains the incomplete runs, then writes results.md, costs.md, results.json and two pictures."""
     suite = _suite(arguments)
     for variant in suite.variants:
-        check_package(variant)
+        check_options(variant)
     folder = (arguments.out or Path("runs/benchmark") / suite.name).resolve()
-    first = arguments.first_seed
-    seeds = range(first, first + (arguments.seeds or suite.seeds))
+    seeds = range(arguments.seeds or suite.seeds)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -124,7 +122,7 @@ def _suite(arguments: argparse.Namespace) -> Suite:
     if arguments.suite:
         if arguments.algo or arguments.env_id or arguments.config or arguments.params or steps:
             raise WorkbenchError(
-                "a suite says what is trained: it takes no --algo, --env-id, --config, --total-timesteps "
+                "a suite defines its trainings and takes no --algo, --env-id, --config, --total-timesteps "
                 "or --params"
             )
         return read_suite(arguments.suite, arguments.suites)
@@ -168,7 +166,7 @@ def _options(value: Any, origin: str) -> dict[str, Any]:
 
 
 def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
-    """Makes a variant, and checks names and types of its options if the algorithm is our own."""
+    """Makes a variant; `check_options` checks its options."""
     if not NAME.fullmatch(name):
         raise WorkbenchError(
             f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}"
@@ -180,28 +178,21 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
     taken = [key for key in rest if key in OWN]
     if taken:
         raise WorkbenchError(f"{origin}: the benchmark sets {taken[0]} itself")
-    if not algorithm(kind).package:  # others are asked in `check_package`
-        known_options(algorithm(kind)).read(_without_special(kind, rest), f"{origin}: {name}")
     return Variant(name, kind, rest)
 
 
-def check_package(variant: Variant) -> None:
-    """Checks that the package of the variant's algorithm is installed and knows the options."""
-    kind = algorithm(variant.algorithm)
-    if kind.package:
-        choose(kind, training_flags(variant, 0)[2:])
-
-
-def _without_special(name: str, options: dict[str, Any]) -> dict[str, Any]:
-    """Leaves out the flags that choose a section or a file of options."""
-    special = ("config", *(("preset",) if algorithm(name).presets else ()))
-    return {key: value for key, value in options.items() if key not in special}
+def check_options(variant: Variant) -> None:
+    """Checks that the variant's algorithm knows its options, and that its package is installed."""
+    try:
+        choose(algorithm(variant.algorithm), training_flags(variant, 0)[2:])
+    except WorkbenchError as error:
+        raise WorkbenchError(f"{variant.name}: {error}") from error
 
 
 def training_flags(variant: Variant, seed: int) -> list[str]:
     """Returns the flags of `train` for one run, except --run-dir."""
-    rest = _without_special(variant.algorithm, variant.options)
-    special = {key: value for key, value in variant.options.items() if key not in rest}
+    rest = dict(variant.options)
+    special: dict[str, Any] = {key: rest.pop(key) for key in ("config", "preset") if key in rest}
     if "config" in special:  # a cluster node may have another current folder
         special["config"] = Path(special["config"]).resolve()
     own = {"exp_name": variant.name, "seed": seed, **special}
@@ -231,7 +222,7 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
             f"no training has a result; the first one ({planned[0].job.log}): {fault}"
         )
     groups = figures.grouped(results)
-    summary = figures.summary_table(groups, figures.RESULTS_SUMMARY)
+    summary = figures.summary_table(groups, figures.SUMMARY)
     every = figures.table(results, figures.RESULTS)
     costs = figures.summary_table(groups, figures.COSTS_SUMMARY)
     costs += f"\n\n{figures.table(results, figures.COSTS)}"

@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     every.sort(key=lambda result: (result.group, result.seed, result.run))
     groups = results.grouped(every)
     tell(results.table(every, results.COMPARE) + "\n")
-    tell(results.summary_table(groups, results.COMPARE_SUMMARY))
+    tell(results.summary_table(groups, results.SUMMARY))
     if arguments.json:
         kind = f"mean of {episodes} greedy episodes, {which} checkpoint"
         score = kind if episodes else "mean of the last 100 training episodes"

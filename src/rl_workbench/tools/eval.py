@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     with closing(policy.env):
         result = play(policy, arguments.episodes, arguments.seed)
     line = threshold(run.env_id)
-    checkpoint = str(getattr(policy, "checkpoint", RANDOM))
+    checkpoint = str(policy.checkpoint or RANDOM)
     found = {"run": str(run.folder), "checkpoint": checkpoint, **statistics(result, line)}
     # With JSON on standard output, the text goes to standard error.
     stream = sys.stderr if to_stdout else sys.stdout
@@ -54,8 +54,8 @@ def statistics(result: "Evaluation", threshold: float | None) -> dict[str, Any]:
     """Returns the statistics of episodes as plain numbers, for JSON.
 
     Args:
-        result: the episodes.
-        threshold: the mean return at which the environment counts as solved, if there is one.
+        result: The episodes.
+        threshold: The mean return at which the environment counts as solved, if there is one.
     """
     import numpy as np
 

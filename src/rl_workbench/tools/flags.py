@@ -1,4 +1,4 @@
-"""Flags that several commands share, and the writing of pictures."""
+"""Flags shared by several commands, and writing of pictures."""
 
 import argparse
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""One training as a job: a process that is started, watched, stopped and resumed.
+"""A training as a job: a process that is started, watched, stopped and resumed.
 
 FOLDER/NAME             the run folder
 FOLDER/NAME.log         the output of its training
@@ -81,11 +81,11 @@ def run_attempt(
     """Runs a training as a child process, which ends with this one.
 
     Args:
-        job: the training; it is resumed if it has a checkpoint.
-        program: how it is started.
-        stop_within: called several times a second. A KeyboardInterrupt stops the training, too.
-        since: when the command began [s since 1970]; earlier attempts don't count as lost.
-        death_signal: sent to the training if this process is killed.
+        job: The training; it is resumed if it has a checkpoint.
+        program: How it is started.
+        stop_within: Called several times a second. A KeyboardInterrupt stops the training, too.
+        since: When the command began [s since 1970]; earlier attempts don't count as lost.
+        death_signal: Sent to the training if this process is killed.
     """
     spans = cost_of(job.folder).get("spans", [])
     lost = _lost_attempts(job, since)

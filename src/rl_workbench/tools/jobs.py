@@ -1,12 +1,10 @@
-"""A pool of jobs, their states in FOLDER/jobs.json, and `jobs`, which lists them."""
+"""A pool of jobs, their states in FOLDER/jobs.json, and the command `jobs`."""
 
 import argparse
 import contextlib
 import datetime
-import io
 import json
 import os
-import sys
 import threading
 import time
 from collections import Counter
@@ -16,8 +14,6 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
-
-from tqdm import tqdm
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt, search_path
@@ -36,7 +32,7 @@ from rl_workbench.tools.job import (
 )
 from rl_workbench.tools.runs import cost_of
 from rl_workbench.training.folder import is_held
-from rl_workbench.training.progress import tell, writable
+from rl_workbench.training.progress import tell
 
 NAME = "jobs.json"
 WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
@@ -64,7 +60,6 @@ def job_pool(
             at_once = min(arguments.jobs or cluster.cpus, cluster.cpus)
             tell(where)
         pool = JobPool(folder, run, at_once, interrupt, jobs)
-        stack.callback(pool.close)
         pool.where = where
         yield pool
 
@@ -73,10 +68,10 @@ def claim(folder: Path, name: str, wanted: Any, refusal: str) -> None:
     """Writes the settings of a folder's runs to a file, or checks that the file has the same.
 
     Args:
-        folder: of a benchmark or a sweep.
-        name: of the file.
-        wanted: the settings as plain values.
-        refusal: the error's text, after the folder's name, if the file has other settings.
+        folder: Of a benchmark or a sweep.
+        name: Of the file.
+        wanted: The settings as plain values.
+        refusal: The error's text, after the folder's name, if the file has other settings.
     """
     found = read_json(folder / name)
     if found is None:
@@ -100,14 +95,14 @@ class JobEntry:
 
 
 class JobPool:
-    """Runs jobs in threads, shows their progress, and keeps jobs.json.
+    """Runs jobs in threads, reports each end, and keeps jobs.json.
 
     Args:
-        folder: contains jobs.json and all run folders.
-        run: runs a job, here or on a cluster.
-        at_once: the number of jobs at a time.
-        interrupt: ends all jobs.
-        jobs: those known from the beginning; `run` adds others.
+        folder: Contains jobs.json and all run folders.
+        run: Runs a job, here or on a cluster.
+        at_once: The number of jobs at a time.
+        interrupt: Ends all jobs.
+        jobs: Those known from the beginning; `run` adds others.
     """
 
     def __init__(
@@ -131,16 +126,7 @@ class JobPool:
             each.state = WAITING if each.state == RUNNING else each.state
         for job in jobs:
             self._set(job, DONE if job.is_done() else WAITING, write=False)
-        stream = sys.stderr or io.StringIO()
-        self._bar: Any = None
-        if stream.isatty():
-            self._bar = tqdm(total=self._total or None, unit="job", file=stream, dynamic_ncols=True)
         self._write()
-
-    def close(self) -> None:
-        """Ends the bar."""
-        if self._bar is not None:
-            self._bar.close()
 
     def run_all(self, jobs: Sequence[Job]) -> None:
         """Runs independent jobs."""
@@ -153,8 +139,8 @@ class JobPool:
         A job that is stopped, by the user or because it is not needed, has not failed.
 
         Args:
-            job: the job; skipped if it is complete.
-            is_needed: called several times a second; the training is stopped once it returns False.
+            job: The job; skipped if it is complete.
+            is_needed: Called several times a second; the training is stopped once it returns False.
         """
         if job.is_done():
             self._set(job, DONE)
@@ -185,24 +171,20 @@ class JobPool:
 
     def _lost(self, job: Job, reason: str) -> None:
         self._set(job, RUNNING, reason)
-        self._say(f"{job.name}: lost, and tried again: {reason}")
+        tell(f"{job.name}: lost, retrying: {reason}")
 
     def _ended(self, job: Job, failure: str) -> str:
         self._set(job, FAILED if failure else DONE, failure)
         summary = job.summary()
         words = failure or ("stopped" if summary.get("steps") is None else
                             f"{summary['steps']} steps {outcome(summary)}")  # fmt: skip
-        counts = self.counts()
+        with self._lock:
+            counts = Counter(each.state for each in self._entries.values())
         over = counts[DONE] + counts[FAILED]
         position = f"{over} of {self._total}" if self._total else str(over)
         failed = f", {counts[FAILED]} failed" if counts[FAILED] else ""
-        self._say(f"[{position}{failed}] {job.name}: {words}")
+        tell(f"[{position}{failed}] {job.name}: {words}")
         return failure
-
-    def counts(self) -> Counter[str]:
-        """Returns the number of jobs in each state."""
-        with self._lock:
-            return Counter(each.state for each in self._entries.values())
 
     def _set(self, job: Job, state: str, note: str = "", write: bool = True) -> None:
         folder = os.path.relpath(job.folder, self._folder)
@@ -212,20 +194,9 @@ class JobPool:
             self._write()
 
     def _write(self) -> None:
-        counts = self.counts()
         with self._lock:
             content = [asdict(each) for each in self._entries.values()]
             write_file(self._folder / NAME, as_json({"jobs": content}))
-            if self._bar is not None:
-                self._bar.n = counts[DONE] + counts[FAILED]
-                states = (f"{counts[state]} {state}" for state in (DONE, RUNNING, FAILED))
-                self._bar.set_postfix_str(", ".join(states))
-
-    def _say(self, text: str) -> None:
-        if self._bar is not None:
-            self._bar.write(writable(text, self._bar.fp), file=self._bar.fp)
-        else:
-            tell(text)
 
 
 def _failure(job: Job, ending: Ending) -> str:
@@ -264,14 +235,11 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of the command."""
     parser.add_argument("folder", type=Path, metavar="FOLDER",
                         help="folder of a benchmark or sweep; it may still be running")  # fmt: skip
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the list as JSON, too")
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """Lists the jobs of a benchmark or a sweep; only reads files."""
     found = read_jobs(arguments.folder)
-    if arguments.json:
-        write_file(arguments.json, as_json([asdict(each) for each in found]))
     width = max((len(each.name) for each in found), default=0)
     for each in found:
         steps = f"{each.step} of {each.steps}" if each.steps else str(each.step)
@@ -303,7 +271,7 @@ def _status(folder: Path, entry: JobEntry, is_alive: bool) -> JobStatus:
     if summary.get("complete"):
         step, state, line = summary["steps"], DONE, outcome(summary)
     elif state == DONE:
-        line = "ended early: the rest wasn't needed any more"
+        line = "stopped early: its result is no longer needed"
     elif not is_alive and (state == RUNNING or step and state == WAITING):
         state = STOPPED
         line = outcome(summary) if summary.get("interrupted") else line

@@ -1,4 +1,4 @@
-"""Loads learned policies with an environment to act in, and plays their episodes."""
+"""Learned policies with an environment to act in, and their episodes."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
@@ -25,21 +25,16 @@ TEST_SEED = 5_000_000  # other episodes than those of trainings and their evalua
 Act = Callable[[Any], Any]  # an observation to an action
 
 
-class RandomPolicy(NamedTuple):
-    """Random actions in a run's environment, which the caller closes."""
-
-    act: Act
-    env: gymnasium.Env[Any, Any]
-
-
-class LearnedPolicy(NamedTuple):
-    """A learned policy and an environment of the kind it learned in, which the caller closes."""
+class Player(NamedTuple):
+    """A learned or random policy and an environment of its training's kind, which the caller closes."""
 
     act: Act  # greedily, for one observation: (D,), or a dict as in the training
-    network: nn.Module | None  # observations (N, D) to actions; a choice of N has `scores`, too
     env: gymnasium.Env[Any, Any]
-    checkpoint: Path
-    steps: int  # of the training up to this checkpoint
+    network: nn.Module | None = (
+        None  # observations (N, D) to actions; a choice of N has `scores`, too
+    )
+    checkpoint: Path | None = None  # None for random actions
+    steps: int = 0  # of the training up to this checkpoint
 
 
 def environment_of(run: Run, options: Mapping[str, Any]) -> gymnasium.Env[Any, Any]:
@@ -49,14 +44,12 @@ def environment_of(run: Run, options: Mapping[str, Any]) -> gymnasium.Env[Any, A
     return make_environment(run.env_id, given, keep_dict=keeps_dict, wrapper=run.wrapper)
 
 
-def load_any(
-    run: Run, which: str, env_options: Mapping[str, Any], seed: int
-) -> LearnedPolicy | RandomPolicy:
+def load_any(run: Run, which: str, env_options: Mapping[str, Any], seed: int) -> Player:
     """Loads the policy of a checkpoint, see `load_learned`, or makes a random policy with that seed."""
     if which != RANDOM:
         return load_learned(run, which, env_options)
     env = environment_of(run, env_options)
-    return RandomPolicy(random_actions(env, seed), env)
+    return Player(random_actions(env, seed), env)
 
 
 def random_actions(env: gymnasium.Env[Any, Any], seed: int) -> Act:
@@ -71,18 +64,18 @@ def load_learned(
     env_options: Mapping[str, Any] | None = None,
     say: Callable[[str], None] = warn,
     env: gymnasium.Env[Any, Any] | None = None,
-) -> LearnedPolicy:
+) -> Player:
     """Loads the policy of a checkpoint, or of an earlier one if that is damaged.
 
     Args:
-        run: the run.
-        which: the checkpoint, "best" or "last".
-        env_options: options of the environment on top of the training's, such as `render_mode`.
-        say: receives a line for each skipped checkpoint.
-        env: the environment to act in; by default a new one of the run's kind.
+        run: The run.
+        which: The checkpoint, "best" or "last".
+        env_options: Options of the environment on top of the training's, such as `render_mode`.
+        say: Receives a line for each skipped checkpoint.
+        env: The environment to act in; by default a new one of the run's kind.
 
     Raises:
-        WorkbenchError: if no checkpoint can be read, it belongs to another run, or the environment
+        WorkbenchError: If no checkpoint can be read, it belongs to another run, or the environment
             can't be made.
     """
     paths = checkpoints.candidates(run.folder, best_first=which == "best")
@@ -104,9 +97,7 @@ def load_learned(
     raise WorkbenchError(f"{run.folder} has no policy: {reason}")
 
 
-def _learned(
-    run: Run, path: Path, content: dict[str, Any], env: gymnasium.Env[Any, Any]
-) -> LearnedPolicy:
+def _learned(run: Run, path: Path, content: dict[str, Any], env: gymnasium.Env[Any, Any]) -> Player:
     options = recorded_options(content.get("config"), str(path))
     recorded = recorded_options(run.config, str(run.folder / CONFIG_RECORD))
     try:
@@ -115,10 +106,11 @@ def _learned(
         raise WorkbenchError(f"{path} isn't a checkpoint of {run.folder}") from error
     with checkpoints.fitting("number of steps"):
         steps = int(content["steps"])
-    return LearnedPolicy(*load_policy(options, content, env, str(path)), env, path, steps)
+    policy = load_policy(options, content, env, str(path))
+    return Player(policy.act, env, policy.network, path, steps)
 
 
-def play(policy: LearnedPolicy | RandomPolicy, episodes: int, seed: int) -> Evaluation:
+def play(policy: Player, episodes: int, seed: int) -> Evaluation:
     """Plays episodes of a policy in its environment, seeded once."""
     try:
         result = run_greedily(policy.env, policy.act, TEST_SEED + seed, episodes)
@@ -144,10 +136,10 @@ def episode_steps(
     """Plays one episode; yields the reset and each step.
 
     Args:
-        env: the environment.
-        act: chooses the action for an observation.
-        seed: of the episode.
-        max_steps: steps after which the episode is cut off; 0 for never.
+        env: The environment.
+        act: Chooses the action for an observation.
+        seed: Of the episode.
+        max_steps: Steps after which the episode is cut off; 0 for never.
     """
     observation, _ = env.reset(seed=seed)
     yield Step(observation, None, 0.0, False, None)

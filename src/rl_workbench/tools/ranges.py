@@ -1,4 +1,4 @@
-"""The ranges that a sweep searches: config/sweep.yaml, or the user's file."""
+"""Search ranges of a sweep: config/sweep.yaml, or the user's file."""
 
 from pathlib import Path
 from typing import Any, NamedTuple

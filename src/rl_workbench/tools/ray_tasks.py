@@ -49,11 +49,11 @@ class NodeUnusable(Exception):
 def train(
     job: Job, program: Program, folder: Path, token: str, wanted: dict[str, str], since: float
 ) -> Ending:
-    """Ray's task: one attempt at a training, in a process of its own.
+    """Runs one attempt at a training in a separate process: Ray's task.
 
     Raises:
-        NodeUnusable: if this node doesn't see the folder, or has other versions of the libraries.
-        TrainingLost: if the process was killed.
+        NodeUnusable: If this node doesn't see the folder, or has other versions of the libraries.
+        TrainingLost: If the process was killed.
     """
     node = socket.gethostname()
     try:
@@ -62,13 +62,13 @@ def train(
         seen = ""
     if seen != token:
         raise NodeUnusable(
-            f"{node} doesn't see {folder}: --out has to be a folder that all nodes share"
+            f"{node} doesn't see {folder}: --out must be a folder that all nodes share"
         )
     found = library_versions()
     wrong = [name for name, its in wanted.items() if found.get(name) != its]
     others = [f"{name} {found.get(name)}, not {wanted[name]}" for name in wrong]
     if others:
-        raise NodeUnusable(f"{node} would come to other bits: it has {', '.join(others)}")
+        raise NodeUnusable(f"{node} would not be bit-identical: it has {', '.join(others)}")
     if is_hopeless(job, since):
         return Ending(lost="its worker or its process was killed again and again")
     own = os.environ.get("PYTHONPATH", "").split(os.pathsep)

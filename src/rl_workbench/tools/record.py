@@ -1,7 +1,6 @@
 """`record`: writes episodes as GIF, MP4, or an HTML file that plays them."""
 
 import argparse
-import base64
 import contextlib
 import shutil
 from collections.abc import Sequence
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from PIL.Image import Image
 
-    from rl_workbench.tools.policies import LearnedPolicy, RandomPolicy
+    from rl_workbench.tools.policies import Player
     from rl_workbench.tools.recording import EpisodeFrame
     from rl_workbench.tools.runs import Run
 
@@ -28,7 +27,6 @@ RATES = {".gif": 25.0, ".mp4": 50.0, ".html": 25.0}  # [Hz] by default, by the s
 MAX_GIF_RATE = 50.0  # [Hz]; browsers slow down faster ones
 GIF_TICK = 10  # [ms], the format's own
 COLOURS = 96  # of a GIF; drawings have few
-PAGE = Path(__file__).with_name("page.html")
 TEXT, PAPER = (40, 44, 52), (255, 255, 255)
 FADED = 0.4  # share of white in the picture of an episode that has ended
 LINES = 14.0  # lines of text that fit into a picture's height
@@ -112,9 +110,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     tell(f"{out}: {count} frames, {count / films[0].rate:.1f} s")
 
 
-def _policy(
-    arguments: argparse.Namespace, run: "Run", which: str
-) -> "LearnedPolicy | RandomPolicy":
+def _policy(arguments: argparse.Namespace, run: "Run", which: str) -> "Player":
     from rl_workbench.tools.policies import load_any
 
     options = {**env_options(arguments), "render_mode": "rgb_array"}
@@ -224,9 +220,9 @@ def write_video(path: Path, frames: "Sequence[np.ndarray]", rate: float) -> None
     """Writes a video in the format of the file's suffix; replaces an older file atomically.
 
     Args:
-        path: the file.
-        frames: at least one, all of one size, (H, W, 3) uint8.
-        rate: frame rate [Hz].
+        path: The file.
+        frames: At least one, all of one size, (H, W, 3) uint8.
+        rate: Frame rate [Hz].
     """
     from rl_workbench.storage import write_file
 
@@ -253,18 +249,17 @@ def _write_gif(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) ->
 
 
 def _write_html(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -> None:
-    """Writes a self-contained page: pictures as WebP in base64, and a script that plays them."""
-    from PIL import Image
+    """Writes a page that plays the pictures without a network."""
+    from rl_workbench.tools.recording import CAMERA, LOOK_AT, Screen
+    from web_viewer.server import hidden_page
 
-    height, width, _ = frames[0].shape
-    begin, end = PAGE.read_text(encoding="utf-8").split("@FRAMES@")
-    begin = begin.replace("@WIDTH@", str(width)).replace("@HEIGHT@", str(height))
-    stream.write(begin.replace("@RATE@", f"{rate:g}").encode())
-    for frame in frames:
-        packed = BytesIO()
-        Image.fromarray(frame).save(packed, "WEBP", quality=80)
-        stream.write(b'"' + base64.b64encode(packed.getvalue()) + b'",\n')
-    stream.write(end.encode())
+    with hidden_page() as server:
+        server.initial_camera.position, server.initial_camera.look_at = CAMERA, LOOK_AT
+        screen, recording = Screen(server), server.get_scene_serializer()
+        for frame in frames:
+            screen.show(frame)
+            recording.insert_sleep(1.0 / rate)
+        stream.write(recording.as_html().encode())
 
 
 def _write_mp4(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -> None:

@@ -1,4 +1,4 @@
-"""Records episodes frame by frame, for the files of `record` and for the page of `view`.
+"""Recording of episodes frame by frame, for the files of `record` and the page of `view`.
 
 For the page a thread records them, because an environment may be slower than real time, and some
 environments have to stay in one thread.
@@ -68,8 +68,28 @@ class EpisodeFrame(NamedTuple):
         return "   ".join([*parts, "ended"] if self.ended else parts)
 
 
+class Screen:
+    """A picture in the middle of a page, at most WIDTH by HEIGHT."""
+
+    def __init__(self, server: "viser.ViserServer") -> None:
+        self._server = server
+        self._image: viser.ImageHandle | None = None
+
+    def show(self, picture: np.ndarray) -> None:
+        """Shows a picture (H, W, 3) of uint8; all have the same size."""
+        if self._image is not None:
+            self._image.image = picture
+            return
+        high, wide = picture.shape[:2]
+        scale = min(HEIGHT / high, WIDTH / wide)
+        self._image = self._server.scene.add_image(
+            "/picture", picture, wide * scale, high * scale, format="jpeg", jpeg_quality=QUALITY,
+            wxyz=FACING, cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+
+
 class PictureView:
-    """Shows the pictures of `render`, of that size, in the middle of a page, if there is one."""
+    """Takes the pictures of `render`, scaled to a size, and shows them on a page if there is one."""
 
     def __init__(
         self,
@@ -79,8 +99,8 @@ class PictureView:
     ) -> None:
         if env.render_mode != "rgb_array":
             raise WorkbenchError("the environment draws no pictures")
-        self._env, self._server, self._size = env, server, size
-        self._shown: viser.ImageHandle | None = None
+        self._env, self._size = env, size
+        self._screen = Screen(server) if server else None
 
     def take(self) -> bytes:
         """Returns a PNG, because thousands are kept."""
@@ -98,18 +118,9 @@ class PictureView:
         return stream.getvalue()
 
     def show(self, seen: bytes, caption: str = "") -> None:
-        """Shows the picture; the page has captions of its own."""
-        assert self._server is not None
-        picture = np.asarray(Image.open(BytesIO(seen)))
-        if self._shown is not None:
-            self._shown.image = picture
-            return
-        high, wide = picture.shape[:2]
-        scale = min(HEIGHT / high, WIDTH / wide)
-        self._shown = self._server.scene.add_image(
-            "/picture", picture, wide * scale, high * scale, format="jpeg", jpeg_quality=QUALITY,
-            wxyz=FACING, cast_shadow=False, receive_shadow=False,
-        )  # fmt: skip
+        """Shows a picture; the page has captions of its own."""
+        assert self._screen is not None
+        self._screen.show(np.asarray(Image.open(BytesIO(seen))))
 
 
 class SceneView:
@@ -164,12 +175,12 @@ def record_episode(
     """Plays one episode; yields its frames.
 
     Args:
-        env: the environment.
-        act: chooses the action for an observation.
-        view: of the environment.
-        seed: of the episode.
-        stride: average number of steps between frames; the last step always has a frame.
-        max_steps: steps after which the episode is cut off; 0 for never.
+        env: The environment.
+        act: Chooses the action for an observation.
+        view: Of the environment.
+        seed: Of the episode.
+        stride: Average number of steps between frames; the last step always has a frame.
+        max_steps: Steps after which the episode is cut off; 0 for never.
     """
     total, due = 0.0, 0.0
     for length, step in enumerate(episode_steps(env, act, seed, max_steps)):
@@ -227,9 +238,9 @@ class EpisodeRecorder:
     """Plays and records episodes of a run; only its thread touches the environment.
 
     Args:
-        folder: the run folder, which may still be empty.
-        server: of the page.
-        env_options: of the environment, on top of the training's own.
+        folder: The run folder, which may still be empty.
+        server: Of the page.
+        env_options: Of the environment, on top of the training's own.
     """
 
     def __init__(
@@ -341,8 +352,8 @@ def check_robot_is_free(run: Run, options: dict[str, Any]) -> None:
     """Checks that an episode won't move the robot of a running training.
 
     Args:
-        run: the run, whose record has the options that name a shared robot.
-        options: of the episode's environment.
+        run: The run, whose record has the options that name a shared robot.
+        options: Of the episode's environment.
     """
     shared = run.config.get("shared_robot")
     if shared is None or not is_held(run.folder):

@@ -33,7 +33,6 @@ class RunResult:
     evaluations: float | None = None  # mean of all evaluations during the training
     avg20: float | None = None  # largest mean return of 20 consecutive training episodes
     solved_step: int | None = None  # of the first (confirmed) evaluation at the threshold
-    solved_seconds: float | None = None  # [s] until then, with evaluations, without pauses
     steps: int | None = None
     episodes: int | None = None
     seconds: float | None = None
@@ -52,13 +51,13 @@ def examine(
     """Collects the results of a run; unreadable ones become the row's `fault`, not an error.
 
     Args:
-        run: the run.
-        group: of the result.
-        episodes: greedy episodes on fresh seeds for each score; 0 to score a run by the mean of its
+        run: The run.
+        group: Of the result.
+        episodes: Greedy episodes on fresh seeds for each score; 0 to score a run by the mean of its
             last training episodes.
-        warn: receives a line for each skipped checkpoint.
-        which: the checkpoint, "best" or "last".
-        also_last: whether to play the last checkpoint, too.
+        warn: Receives a line for each skipped checkpoint.
+        which: The checkpoint, "best" or "last".
+        also_last: Whether to play the last checkpoint, too.
     """
     faults: list[str] = []
 
@@ -82,14 +81,14 @@ def examine(
         played = attempt(lambda: _greedy(run, episodes, which, warn))
         score, success = (played.mean_return, played.success_rate) if played else (None, None)
     last = attempt(lambda: _greedy(run, episodes, "last", warn)) if also_last else None
-    solved_step, solved_seconds = attempt(lambda: _solved(run)) or (None, None)
+    solved_step = attempt(lambda: _solved(run))
     evaluated = attempt(lambda: curve_of(run, EVALUATION).values)
     return RunResult(
         group=group, seed=run.seed, run=run.name, score=score, success=success,
         final=last.mean_return if last else None, training_mean=trained,
         evaluations=None if evaluated is None or not len(evaluated) else float(evaluated.mean()),
         avg20=_largest_mean(returns),
-        solved_step=solved_step, solved_seconds=solved_seconds, steps=steps,
+        solved_step=solved_step, steps=steps,
         episodes=summary.get("episodes") or len(returns) or None, seconds=summary.get("seconds"),
         cpu_seconds=cost_of(run.folder).get("cpu_seconds"), fault="; ".join(dict.fromkeys(faults)),
     )  # fmt: skip
@@ -107,40 +106,24 @@ def _largest_mean(returns: np.ndarray) -> float | None:
     return float(np.convolve(returns, np.full(WINDOW, 1 / WINDOW), mode="valid").max())
 
 
-def _solved(run: Run) -> tuple[int, float | None] | None:
-    """Returns step and seconds of the first (if possible confirmed) evaluation at the threshold, or None."""
+def _solved(run: Run) -> int | None:
+    """Returns the step of the first (if possible confirmed) evaluation at the threshold, or None."""
     line = threshold(run.env_id)
     curve = curve_of(run, CONFIRMED)
     if not len(curve.values):
         curve = curve_of(run, EVALUATION)
     above = np.flatnonzero(curve.values >= (math.inf if line is None else line))
-    if not len(above):
-        return None
-    return int(curve.steps[above[0]]), _seconds_until(run, float(curve.times[above[0]]))
+    return int(curve.steps[above[0]]) if len(above) else None
 
 
-def _seconds_until(run: Run, until: float) -> float | None:
-    """Returns the training time until then [s], without the pauses of an interrupted benchmark."""
-    began, spans = run.config.get("began"), cost_of(run.folder).get("spans", [])
-    if began is None:
-        return None
-    pauses = [
-        following - ended
-        for (_, ended), (following, _) in zip(spans[:-1], spans[1:], strict=True)
-        if began <= ended and following <= until  # before `began` there was no checkpoint
-    ]
-    return round(until - began - sum(pauses), 1)
-
-
-# The columns of each table: name and field of RunResult. A benchmark's costs depend on the clock, so they
+# The columns of each table: title and field of RunResult. A benchmark's costs depend on the clock, so they
 # have their own table: its results stay bit-identical however it was interrupted.
 COMPARE = {name: name for name in ("group", "run", "seed", "score", "success", "training_mean",
                                    "episodes", "steps", "seconds", "solved_step", "fault")}  # fmt: skip
 _RUN = {"variant": "group", "seed": "seed"}
 RESULTS = {**_RUN, "best": "score"} | {name: name for name in (
     "success", "final", "evaluations", "avg20", "solved_step", "steps", "episodes", "fault")}  # fmt: skip
-COSTS = _RUN | {name: name for name in ("solved_seconds", "seconds", "cpu_seconds")}
-SUCCESS = "success"  # column of success rates, left out if no environment reports them
+COSTS = _RUN | {name: name for name in ("seconds", "cpu_seconds")}
 
 
 def grouped(results: Sequence[RunResult]) -> dict[str, list[RunResult]]:
@@ -163,36 +146,30 @@ def rows(results: Sequence[RunResult], columns: Mapping[str, str]) -> list[dict[
 def figures(results: Sequence[RunResult]) -> dict[str, Any]:
     """Returns a group's statistics and runs as plain values, for JSON."""
     found = statistics_of(results)
-    statistics = found._asdict() if found else None
-    return {"statistics": statistics, "runs": rows(results, COMPARE)}
+    return {"statistics": found and found._asdict(), "runs": rows(results, COMPARE)}
 
 
 def table(results: Sequence[RunResult], columns: Mapping[str, str]) -> str:
-    """Returns a Markdown table with a row for each run."""
-    shown = {name: field for name, field in columns.items() if _is_shown(results, name)}
-    lines = [
-        [_percent(value) if name == SUCCESS else _cell(value) for name, value in row.items()]
-        for row in rows(results, shown)
-    ]
+    """Returns a Markdown table with a row for each run, without columns that no run has a value for."""
+    shown = {name: field for name, field in columns.items() if _has(results, field)}
+    lines = [[_cell(value, name) for name, value in row.items()] for row in rows(results, shown)]
     return _markdown([[name.replace("_", " ") for name in shown], *lines])
 
 
-# Formats a group's results as one cell of a summary.
-Cell = Callable[[Sequence[RunResult]], str]
+Cell = Callable[[Sequence[RunResult]], str]  # formats a group's results
+Column = tuple[str, str, Cell]  # title, the field that it needs, its cells
 
 
-def summary_table(
-    groups: Mapping[str, Sequence[RunResult]], columns: Sequence[tuple[str, Cell]]
-) -> str:
-    """Returns a Markdown table with a row for each group."""
+def summary_table(groups: Mapping[str, Sequence[RunResult]], columns: Sequence[Column]) -> str:
+    """Returns a Markdown table with a row for each group, without columns that no run has a value for."""
     every = [each for results in groups.values() for each in results]
-    shown = [(name, cell) for name, cell in columns if _is_shown(every, name)]
+    shown = [(title, cell) for title, field, cell in columns if _has(every, field)]
     lines = [[cell(results) for _, cell in shown] for results in groups.values()]
-    return _markdown([[name for name, _ in shown], *lines])
+    return _markdown([[title for title, _ in shown], *lines])
 
 
-def _is_shown(results: Sequence[RunResult], column: str) -> bool:
-    return column != SUCCESS or any(each.success is not None for each in results)
+def _has(results: Sequence[RunResult], field: str) -> bool:
+    return any(getattr(each, field) is not None for each in results)
 
 
 def _markdown(lines: list[list[str]]) -> str:
@@ -200,18 +177,16 @@ def _markdown(lines: list[list[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in [head, ["---"] * len(head), *rest])
 
 
-def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{value:.0%}"
-
-
-def _cell(value: Any) -> str:
+def _cell(value: Any, name: str = "") -> str:
     if value is None:
         return "-"
-    return f"{value:.1f}" if isinstance(value, float) else str(value).replace("|", "/")
+    if isinstance(value, float):
+        return f"{value:.0%}" if name == "success" else f"{value:.1f}"
+    return str(value).replace("|", "/")
 
 
-def _of(field: str, show: Callable[[Statistics], str]) -> Cell:
-    """Makes a cell for a field's statistic; it names the number of seeds if some lack the field."""
+def _of(title: str, field: str, show: Callable[[Statistics], str]) -> Column:
+    """Makes a column of a field's statistic; its cells name the number of seeds if some lack the field."""
 
     def cell(results: Sequence[RunResult]) -> str:
         found = statistics_of(results, field)
@@ -219,12 +194,7 @@ def _of(field: str, show: Callable[[Statistics], str]) -> Cell:
             return "-"
         return show(found) + (f" ({found.n} of {len(results)})" if found.n < len(results) else "")
 
-    return cell
-
-
-def _scored(results: Sequence[RunResult]) -> str:
-    count = sum(each.score is not None for each in results)
-    return str(count) if count == len(results) else f"{count} of {len(results)} (see faults)"
+    return title, field, cell
 
 
 def _solved_count(results: Sequence[RunResult]) -> str:
@@ -233,18 +203,14 @@ def _solved_count(results: Sequence[RunResult]) -> str:
     return f"{solved} of {len(results)}" + (f", {failed} failed" if failed else "")
 
 
-def _steps_to_solve(reduce: Callable[[list[float]], Any]) -> Cell:
-    """Makes a cell for the steps to solve; a seed that never solved it counts as infinite."""
+def _steps_to_solve(title: str, reduce: Callable[[list[float]], Any]) -> Column:
+    """Makes a column of the steps to solve; a seed that never solved it counts as infinite."""
 
     def cell(results: Sequence[RunResult]) -> str:
         found = reduce([each.solved_step or math.inf for each in results])
         return "never" if found == math.inf else f"{found:.0f}"
 
-    return cell
-
-
-def _range(interval: tuple[float, float] | None) -> str:
-    return "needs two seeds" if interval is None else f"{interval[0]:.1f} to {interval[1]:.1f}"
+    return title, "group", cell
 
 
 def _iqm(found: Statistics) -> str:
@@ -252,31 +218,21 @@ def _iqm(found: Statistics) -> str:
     return f"{found.iqm:.1f}" + (f" [{interval[0]:.1f}, {interval[1]:.1f}]" if interval else "")
 
 
-_SPREAD = _of("score", lambda each: f"{each.mean:.1f}" + f" ± {each.std:.1f}" * (each.n > 1))
-_SUCCESS_RATE = _of("success", lambda each: _percent(each.mean))
-COMPARE_SUMMARY = (
-    ("group", lambda results: results[0].group),
-    ("runs", _scored),
-    ("mean ± std", _SPREAD),
-    (SUCCESS, _SUCCESS_RATE),
-    ("median", _of("score", lambda each: f"{each.median:.1f}")),
-    ("IQM", _of("score", lambda each: f"{each.iqm:.1f}")),
-    ("95% of the mean", _of("score", lambda each: _range(each.mean_interval))),
-    ("95% of the IQM", _of("score", lambda each: _range(each.iqm_interval))),
-)
-RESULTS_SUMMARY = (
-    ("variant", lambda results: results[0].group),
-    ("seeds solved", _solved_count),
-    ("best: mean ± std", _SPREAD),
-    (SUCCESS, _SUCCESS_RATE),
-    ("IQM [95 %]", _of("score", _iqm)),
-    ("final: IQM [95 %]", _of("final", _iqm)),
-    ("evaluations: IQM [95 %]", _of("evaluations", _iqm)),
-    ("median steps to solve", _steps_to_solve(np.median)),
-    ("most", _steps_to_solve(max)),
-)
+_NAME: Column = ("variant", "group", lambda results: results[0].group)
+SUMMARY = (
+    _NAME,
+    ("seeds solved", "group", _solved_count),
+    _of("best: mean ± std", "score", lambda each: f"{each.mean:.1f}" + f" ± {each.std:.1f}" * (each.n > 1)),
+    _of("success", "success", lambda each: f"{each.mean:.0%}"),
+    _of("median", "score", lambda each: f"{each.median:.1f}"),
+    _of("IQM [95 %]", "score", _iqm),
+    _of("final: IQM [95 %]", "final", _iqm),
+    _of("evaluations: IQM [95 %]", "evaluations", _iqm),
+    _steps_to_solve("median steps to solve", np.median),
+    _steps_to_solve("most", max),
+)  # fmt: skip
 COSTS_SUMMARY = (
-    ("variant", lambda results: results[0].group),
-    ("median seconds", _of("seconds", lambda each: f"{each.median:.1f}")),
-    ("most", lambda results: _cell(max(each.seconds or 0.0 for each in results) or None)),
-)
+    _NAME,
+    _of("median seconds", "seconds", lambda each: f"{each.median:.1f}"),
+    ("most", "seconds", lambda results: _cell(max(each.seconds or 0.0 for each in results) or None)),
+)  # fmt: skip

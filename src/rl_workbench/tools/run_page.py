@@ -52,16 +52,16 @@ def show_run(
     """Serves the page until Ctrl-C, or until the training that started it ends.
 
     Args:
-        folder: the run folder.
-        policies: the choices; the first one is played first.
-        seed: of the first episode.
-        episodes: number of episodes, with consecutive seeds, that are repeated.
-        env_options: options of the environment on top of the training's.
-        host: the address to serve on.
-        port: the port to serve on; None for the first free one.
-        browser: whether to open a browser.
-        interrupt: ends the serving.
-        beside_training: whether a training started this process, which ends when its standard input closes.
+        folder: The run folder.
+        policies: The choices; the first one is played first.
+        seed: Of the first episode.
+        episodes: Number of episodes, with consecutive seeds, that are repeated.
+        env_options: Options of the environment on top of the training's.
+        host: The address to serve on.
+        port: The port to serve on; None for the first free one.
+        browser: Whether to open a browser.
+        interrupt: Ends the serving.
+        beside_training: Whether a training started this process, which ends when its standard input closes.
     """
     import torch
 
@@ -70,7 +70,12 @@ def show_run(
     draw_without_display()
     torch.set_num_threads(1)  # networks this small are slower on more
     interrupt.defer()
-    is_over = _end(interrupt, beside_training)
+
+    def is_over() -> bool:
+        # Standard input closes with the training, even if that is killed.
+        has_ended = beside_training and bool(select.select([sys.stdin], [], [], 0)[0])
+        return has_ended or interrupt.requested()
+
     try:
         address = find_address(host, port)
         server = serve(address, folder.name, CAMERA, LOOK_AT)
@@ -95,17 +100,6 @@ def show_run(
         curves = Curves(server.gui, server.gui.add_folder("Training"))
         curves.follow(folder)
         _play(server, playback, curves, is_over)
-
-
-def _end(interrupt: Interrupt, beside_training: bool) -> Callable[[], bool]:
-    """Returns what says whether the serving is over."""
-
-    def is_over() -> bool:
-        # Standard input closes with the training, even if that is killed.
-        has_ended = beside_training and bool(select.select([sys.stdin], [], [], 0)[0])
-        return has_ended or interrupt.requested()
-
-    return is_over
 
 
 def _play(
@@ -136,11 +130,11 @@ class Playback:
     """The controls of the page. One thread calls `tick`; clicks come in viser's threads.
 
     Args:
-        gui: of the page.
-        recorder: records the episodes.
-        policies: the choices; the first one is played first.
-        seed: of the first episode.
-        episodes: number of consecutive seeds to play before the first one follows again.
+        gui: Of the page.
+        recorder: Records the episodes.
+        policies: The choices; the first one is played first.
+        seed: Of the first episode.
+        episodes: Number of consecutive seeds to play before the first one follows again.
     """
 
     def __init__(
@@ -162,9 +156,7 @@ class Playback:
         self._speed = gui.add_dropdown("Speed", list(SPEEDS), initial_value="1 ×")
         self._which = gui.add_dropdown("Policy", list(policies), initial_value=policies[0])
         self._seed = gui.add_number("Seed", seed, min=0, max=MAX_SEED, step=1)
-        self._follow = gui.add_checkbox(
-            "Newest by itself", True, hint="play a checkpoint as soon as it is written"
-        )
+        self._follow = gui.add_checkbox("Follow newest", True, hint="play each new checkpoint")
         newest = gui.add_button("Play the newest now", icon=viser.Icon.REFRESH)
         self._about = gui.add_html("")  # below the controls, so that its size doesn't move them
         self._button.on_click(lambda _: self.toggle())

@@ -1,4 +1,4 @@
-"""Reads run folders: config.json, scalars.csv (also while it grows), summary.json at the end."""
+"""Run folders: config.json, scalars.csv (also while it grows), summary.json at the end."""
 
 import csv
 import glob
@@ -50,7 +50,6 @@ class Curve(NamedTuple):
 
     steps: np.ndarray
     values: np.ndarray
-    times: np.ndarray  # wall-clock time [s since 1970]
 
 
 def open_run(folder: Path) -> Run:
@@ -113,8 +112,8 @@ def find_runs(patterns: Sequence[str], warn: Callable[[str], None]) -> list[Run]
     """Returns the runs of run folders, of patterns such as 'runs/*dqn*', and of folders that hold runs.
 
     Args:
-        patterns: as the user typed them; matches that aren't runs are skipped.
-        warn: receives a line for each run that is skipped for its damaged record.
+        patterns: As the user typed them; matches that aren't runs are skipped.
+        warn: Receives a line for each run that is skipped for its damaged record.
     """
     found: dict[Path, Run] = {}
     for pattern in patterns:
@@ -154,11 +153,11 @@ def curve_of(run: Run, tag: str) -> Curve:
     """Returns the values of a tag; may be empty."""
     path = run.folder / SCALARS
     if not path.exists():
-        return Curve(*np.empty((3, 0)))
+        return Curve(*np.empty((2, 0)))
     try:
         with open_text(path) as file:
             points = [
-                (float(row["step"]), float(row["value"]), float(row["wall_time"]))
+                (float(row["step"]), float(row["value"]))
                 for row in csv.DictReader(file)
                 # A running training may not have completed the last line yet.
                 if row["tag"] == tag and row["wall_time"]
@@ -167,4 +166,4 @@ def curve_of(run: Run, tag: str) -> Curve:
         raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
     except (KeyError, ValueError, TypeError, csv.Error) as error:
         raise WorkbenchError(f"{path} isn't the table of a training: {error}") from error
-    return Curve(*np.array(points, dtype=float).reshape(-1, 3).T)
+    return Curve(*np.array(points, dtype=float).reshape(-1, 2).T)

@@ -147,7 +147,7 @@ def open_study(sweep: Sweep) -> Any:
 
 
 def _repair(path: Path) -> None:
-    """Removes what a killed search left: its lock, which no one else can hold, and an unfinished line."""
+    """Repairs the journal of a killed search: removes its stale lock and a partial last line."""
     path.with_name(f"{path.name}.lock").unlink(missing_ok=True)
     with contextlib.suppress(FileNotFoundError):
         content = path.read_bytes()
@@ -188,8 +188,8 @@ def _pruner(sweep: Sweep) -> Any:
     return pruners.MedianPruner() if sweep.pruner == "median" else pruners.NopPruner()
 
 
-class SearchInterrupted(BaseException):
-    """Interrupts a trial so that it can be continued; Optuna would count an Exception as its failure."""
+class SearchInterrupted(Exception):
+    """The search ends; its running trials can be continued."""
 
 
 class Search:
@@ -200,34 +200,33 @@ class Search:
 
     def run(self) -> None:
         """Finishes the trials that an earlier command left, then makes new ones."""
-        from optuna.trial import TrialState
+        from optuna.trial import Trial, TrialState
 
         trials = self._study.get_trials(deepcopy=False)
-        left = [each for each in trials if each.state == TrialState.RUNNING]
-        done, sweep = len(trials) - len(left), self._sweep
-        tell(f"{done} of {sweep.trials} trials are done: {sweep.folder}")
+        left = [each._trial_id for each in trials if each.state == TrialState.RUNNING]
+        sweep = self._sweep
+        tell(f"{len(trials) - len(left)} of {sweep.trials} trials are done: {sweep.folder}")
         with contextlib.suppress(SearchInterrupted):
             with ThreadPoolExecutor(self._pool.at_once) as threads:
-                list(threads.map(self._finish, left))
-            self._study.optimize(
-                self._objective,
-                n_trials=max(sweep.trials - len(trials), 0),
-                n_jobs=self._pool.at_once,
-                catch=(WorkbenchError,),
-            )
-        if self._pool.failure is not None:  # Optuna loses an error of its last trials
-            raise self._pool.failure
+                list(threads.map(lambda number: self._finish(Trial(self._study, number)), left))
+            with ThreadPoolExecutor(self._pool.at_once) as threads:
+                list(threads.map(self._try, range(len(trials), sweep.trials)))
 
-    def _finish(self, left: Any) -> None:
-        import optuna
+    def _try(self, _: int) -> None:
+        if self._interrupt.requested():
+            raise SearchInterrupted
+        self._finish(self._study.ask())
 
-        trial = optuna.trial.Trial(self._study, left._trial_id)
+    def _finish(self, trial: Any) -> None:
+        from optuna import TrialPruned
+        from optuna.trial import TrialState
+
         try:
             self._study.tell(trial, self._objective(trial))
-        except optuna.TrialPruned:
-            self._study.tell(trial, state=optuna.trial.TrialState.PRUNED)
+        except TrialPruned:
+            self._study.tell(trial, state=TrialState.PRUNED)
         except WorkbenchError:
-            self._study.tell(trial, state=optuna.trial.TrialState.FAIL)
+            self._study.tell(trial, state=TrialState.FAIL)
 
     def _objective(self, trial: Any) -> float:
         """Trains all seeds of a trial in turn; the first one decides whether it is pruned."""

@@ -1,4 +1,4 @@
-"""Exports a run's policy as a TorchScript file that also holds a description of the policy.
+"""Policies as TorchScript files with a description of the policy.
 
 The file's content is compared with the policy before it is written.
 """
@@ -22,7 +22,7 @@ from torch import nn
 from file_access.content import open_file
 from rl_workbench.agents.greedy import Choice, SeveralChoices, Switches
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.tools.policies import TEST_SEED, LearnedPolicy
+from rl_workbench.tools.policies import TEST_SEED, Player
 from rl_workbench.tools.runs import Run
 from rl_workbench.training.environments import as_float32
 from rl_workbench.training.folder import library_versions
@@ -93,7 +93,7 @@ def read(content: bytes) -> tuple[torch.jit.ScriptModule, dict[str, Any]]:
     """Reads what `written` returned.
 
     Raises:
-        RuntimeError, ValueError: if the content is something else.
+        RuntimeError, ValueError: If the content is something else.
     """
     extra: dict[str, Any] = {METADATA: ""}
     with _no_deprecation():
@@ -158,8 +158,8 @@ class OfDicts(nn.Module):
     """Maps observations, a dict of (N, ...) of any number type, to greedy actions (N, ...).
 
     Args:
-        network: takes the parts concatenated.
-        names: the parts' names, in the network's order.
+        network: Takes the parts concatenated.
+        names: The parts' names, in the network's order.
     """
 
     def __init__(self, network: nn.Module, names: Sequence[str]) -> None:
@@ -171,14 +171,14 @@ class OfDicts(nn.Module):
         return self.network(torch.cat(parts, dim=1))
 
 
-def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement]:
+def export(run: Run, policy: Player, seed: int) -> tuple[bytes, Agreement]:
     """Returns the file's content, and how it compares with the policy.
 
     Raises:
-        WorkbenchError: if the environment fails, its observations can't be exported, or the file
+        WorkbenchError: If the environment fails, its observations can't be exported, or the file
             would act differently.
     """
-    if policy.network is None:
+    if policy.network is None or policy.checkpoint is None:
         raise WorkbenchError(
             f"a policy of {run.folder} can't be exported: only Stable-Baselines3 computes it "
             "(images, or a --policy of your own)"
@@ -221,7 +221,7 @@ def _module(network: nn.Module, space: spaces.Space[Any], env_id: str) -> OfVect
     return OfDicts(own, list(space))
 
 
-def _observations(policy: LearnedPolicy, seed: int) -> list[Observation]:
+def _observations(policy: Player, seed: int) -> list[Observation]:
     """Returns observations from episodes of alternating greedy and random actions."""
     env = policy.env
     env.action_space.seed(seed)
@@ -237,35 +237,32 @@ def _observations(policy: LearnedPolicy, seed: int) -> list[Observation]:
 
 
 def _compare(
-    file: torch.jit.ScriptModule, policy: LearnedPolicy, observations: list[Observation]
+    file: torch.jit.ScriptModule, policy: Player, observations: list[Observation]
 ) -> Agreement:
-    """Compares the file's actions with the policy's, for all observations at once and for single ones.
+    """Compares the file's actions with the policy's.
 
     Raises:
-        WorkbenchError: if actions differ by more than rounding can explain.
+        WorkbenchError: If actions differ by more than rounding can explain.
     """
     wanted = np.stack([np.asarray(policy.act(each)) for each in observations])
     with torch.no_grad():
-        together = file(batch(observations)).numpy()
-        singly = torch.cat([file(batch([each])) for each in observations]).numpy()
+        found = file(batch(observations)).numpy()
     space = policy.env.action_space
-    results = [_differences(found, wanted, space) for found in (together, singly)]
-    equal = np.logical_and(*(same for same, _ in results))
-    distances = np.maximum(*(distance for _, distance in results))
+    equal, distances = _differences(found, wanted, space)
     is_continuous = isinstance(space, spaces.Box)
     wrong = distances > ROUNDING if is_continuous else ~equal
     if wrong.any() and not is_continuous:
         wrong &= ~_tied(policy, observations)
     if wrong.any():
         raise WorkbenchError(
-            f"not written: in {wrong.sum()} of {len(wanted)} observations the file acts otherwise than "
+            f"not written: in {wrong.sum()} of {len(wanted)} observations the file's actions differ from "
             "the run's policy"
         )
     return Agreement(len(wanted), int(equal.sum()), float(distances.max()))
 
 
-def _tied(policy: LearnedPolicy, observations: list[Observation]) -> np.ndarray:
-    """Returns where scores choose so narrowly that rounding may choose otherwise, (N,)."""
+def _tied(policy: Player, observations: list[Observation]) -> np.ndarray:
+    """Returns whether rounding may change the choice, (N,)."""
     network = policy.network
     if not isinstance(network, Choice):
         return np.zeros(len(observations), bool)

@@ -1,1 +1,1 @@
-"""Trainings: one frame for all algorithms, and an adapter for each."""
+"""Trainings: one loop for all algorithms, and an adapter for each."""

@@ -7,7 +7,6 @@ learning loop and the content of a checkpoint. Its module has two functions:
     load_policy(options, checkpoint, env) -> Policy      of a checkpoint's content
 """
 
-import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from importlib import import_module
@@ -40,16 +39,16 @@ class Algorithm(ABC):
 
     @abstractmethod
     def start_environment(self, state: Any, say: Say) -> None:
-        """Seeds the environment, then brings it to where `environment_state` found it.
+        """Seeds the environment, then restores `environment_state`.
 
         Args:
             state: What that returned; None in a new training.
-            say: Is called if the environment can't be brought there.
+            say: Called if that fails.
         """
 
     @abstractmethod
     def learn(self, frame: Any) -> None:
-        """Learns until `frame.is_over()`. It calls `frame.step_done()` wherever it can be saved.
+        """Learns until `frame.is_over()`, and calls `frame.step_done()` wherever it can be saved.
 
         Args:
             frame: The `training.Training`.
@@ -80,16 +79,16 @@ class Algorithm(ABC):
         return self.environment_state()
 
     def restore_environment(self, state: Any, say: Say) -> None:
-        """Brings the environment back after an evaluation in it.
+        """Restores the environment after an evaluation in it.
 
         Args:
             state: What `leave_environment` returned.
-            say: Is called if the environment can't be brought back.
+            say: Called if that fails.
         """
         raise NotImplementedError
 
     def settle(self) -> bool:
-        """Discards what was under way when something failed.
+        """Discards unfinished work after a failure.
 
         Returns:
             Whether the training can be saved now and continued.
@@ -110,11 +109,8 @@ def check_device(name: str) -> None:
     try:
         torch.empty(0, device=name)
     except (RuntimeError, AssertionError) as error:
-        there = "cpu and cuda" if torch.cuda.is_available() else "cpu"
-        reason = textwrap.shorten(str(error), 60, placeholder=" ...")
-        raise WorkbenchError(
-            f"torch can't use the device {name!r} ({reason}); here it has {there}"
-        ) from error
+        reason = str(error).split("\n")[0]
+        raise WorkbenchError(f"torch can't use the device {name!r}: {reason}") from error
 
 
 class Policy(NamedTuple):

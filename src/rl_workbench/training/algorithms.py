@@ -25,7 +25,6 @@ class AlgorithmKind:
         settings: The dataclass of the algorithm's own options, as `module:Class`.
         section: The name of an environment's section in that file.
         defaults: Common options whose default differs for this algorithm.
-        presets: Whether the file has sections that are named after no environment.
         keeps_dict: Whether it learns from a Dict of arrays as it is. The others get one flat vector.
         learns_in_several: Whether it learns in several environments at the same time.
         package: The optional package that it needs, as (module, name).
@@ -38,7 +37,6 @@ class AlgorithmKind:
     settings: str
     section: str = "{env_id}"
     defaults: Mapping[str, Any] = field(default_factory=dict)
-    presets: bool = False
     keeps_dict: bool = False
     learns_in_several: bool = False
     package: tuple[str, str] | None = None
@@ -68,7 +66,6 @@ _OURS = (
             "confirm_episodes": 100,
             "checkpoint_frequency": 5_000,
         },
-        presets=True,
     ),
     AlgorithmKind(
         name="reinforce",

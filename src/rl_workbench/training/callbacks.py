@@ -53,27 +53,26 @@ class Callback:
 
     Callbacks run in the order of the list, after our own. They must not touch the random generators of
     Python, NumPy or torch, or the training ends with other weights. A callback that raises ends the
-    training with one line, which names the step up to which what was learned is saved; the other callbacks
-    still hear of the event.
+    training with one line, which names the step up to which progress is saved.
     """
 
     def on_training_start(self, training: Any) -> None:
-        """The environments are made. A resumed training has loaded its checkpoint."""
+        """Called once the environments are made; a resumed training has loaded its checkpoint."""
 
     def on_step(self, training: Any) -> None:
-        """The algorithm has learned from its last steps: one of them, or a rollout, or an episode."""
+        """Called after the algorithm has learned from a step, a rollout or an episode."""
 
     def on_episode(self, training: Any, episode: EpisodeResult) -> None:
-        """An episode has ended."""
+        """Called at the end of an episode."""
 
     def on_evaluation(self, training: Any, result: EvaluationResult) -> None:
-        """The policy was evaluated."""
+        """Called after an evaluation."""
 
     def on_checkpoint(self, training: Any, path: "Path") -> None:
-        """A checkpoint was written."""
+        """Called after a checkpoint was written."""
 
     def on_training_end(self, training: Any) -> None:
-        """Everything is saved; the training is complete, interrupted, or has failed."""
+        """Called at the end, when everything is saved, also of an interrupted or failed training."""
 
 
 class ScalarLogger(Callback):
@@ -117,7 +116,7 @@ def load_callbacks(names: str) -> list[Callback]:
     """Makes callbacks of the user's own.
 
     Args:
-        names: module:Class, several with commas.
+        names: Module:Class, several with commas.
     """
     return [_load(name.strip()) for name in names.split(",") if name.strip()]
 
@@ -145,22 +144,13 @@ class CallbackList:
         self._own, self._users = own, users
 
     def call(self, event: str, training: Any, *arguments: Any) -> None:
-        """Calls the method of an event; all of the user's hear of it, whatever another one raises.
-
-        Of several failures the first one propagates.
-        """
-        failures: list[tuple[str, Exception]] = []
-        try:
-            for own in self._own:
-                getattr(own, event)(training, *arguments)
-        finally:
-            for user in self._users:
-                try:
-                    getattr(user, event)(training, *arguments)
-                except Exception as error:  # noqa: BLE001 - the others hear of it first
-                    name = type(user).__name__
-                    text = f"the callback {name} failed in {event}(): {error_line(error)}"
-                    failures.append((text, error))
-        if failures:
-            text, cause = failures[0]
-            raise EnvironmentFailure(text) from cause
+        """Calls the method of an event."""
+        for own in self._own:
+            getattr(own, event)(training, *arguments)
+        for user in self._users:
+            try:
+                getattr(user, event)(training, *arguments)
+            except Exception as error:
+                name = type(user).__name__
+                text = f"the callback {name} failed in {event}(): {error_line(error)}"
+                raise EnvironmentFailure(text) from error

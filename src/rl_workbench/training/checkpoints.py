@@ -76,7 +76,7 @@ class Checkpoints:
         return path
 
     def remove_leftovers(self) -> None:
-        """Removes what a killed training had begun to write. No one else may be writing."""
+        """Removes the partial files of a killed training. The caller holds the folder's lock."""
         for folder in (self._run, self._run / FOLDER):
             for pattern in LEFTOVERS:
                 for path in folder.glob(pattern):
@@ -151,10 +151,7 @@ def candidates(run: Path, best_first: bool = False) -> list[Path]:
     for path in best + others if best_first else others + best:
         try:
             status = path.stat()
-        except FileNotFoundError:
+        except OSError:
             continue
-        except OSError:  # a link to itself, ...: reading it tells
-            found[path] = path
-        else:
-            found.setdefault((status.st_dev, status.st_ino), path)
+        found.setdefault((status.st_dev, status.st_ino), path)
     return list(found.values())

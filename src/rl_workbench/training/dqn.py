@@ -1,4 +1,4 @@
-"""DQN in our frame: steps the environment, and learns after each step that is due."""
+"""DQN as an algorithm of the training loop: one environment step, then learning if it is due."""
 
 from typing import Any
 
@@ -150,6 +150,6 @@ class DQNTraining(Algorithm):
         self._observation = self._repeatable.load_state_dict(state["episode"])
         self._reward = float(state["reward"])
         if self._observation is None:
-            say("the environment doesn't repeat itself: the episode under way is given up")
+            say("the environment is not repeatable: the current episode is abandoned")
             self._reward = 0.0
             self._agent.episode_done()

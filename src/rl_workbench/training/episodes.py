@@ -1,4 +1,4 @@
-"""Whole episodes to learn from: rounds of one from each environment."""
+"""Collection of whole episodes: rounds of one episode per environment."""
 
 from collections.abc import Callable, Generator, Sequence
 from functools import partial

@@ -1,4 +1,4 @@
-"""Evaluates policies by greedy episodes, without any effect on the training."""
+"""Evaluation of policies by greedy episodes, without side effects on the training."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -75,7 +75,7 @@ class Score(NamedTuple):
 
 
 class Evaluator:
-    """Evaluates an algorithm's policy, in an environment of its own wherever there can be one.
+    """Evaluates an algorithm's policy, in a separate environment if possible.
 
     If all environments share one robot, an evaluation moves the training's, which is brought back afterwards.
     """
@@ -100,7 +100,7 @@ class Evaluator:
                     raise
                 self._is_guest = True
                 say(
-                    f"evaluated in the training's own environment, since a second one fails: {error}"
+                    f"evaluating in the training's environment, because a second one can't be made: {error}"
                 )
 
     def evaluate(self, best: float, say: Say, is_last: bool = False) -> Score | None:
@@ -111,8 +111,8 @@ class Evaluator:
 
         Args:
             best: The mean return of the best policy so far.
-            say: Called if the episode under way can't be brought back.
-            is_last: Whether the training is over, so that no episode has to be brought back.
+            say: Called if the current episode can't be restored.
+            is_last: Whether the training is over, so that no episode needs restoring.
         """
         self._algorithm.check_weights()
         with self._undisturbed(say, is_last):

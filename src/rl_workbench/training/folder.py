@@ -1,4 +1,4 @@
-"""The folder of one run: its name, its lock, and config.json with the versions that wrote it."""
+"""Run folders of trainings: name, lock, and config.json with the versions that wrote it."""
 
 import contextlib
 import platform
@@ -88,7 +88,7 @@ def is_held(folder: Path) -> bool:
 
 
 def versions() -> dict[str, str]:
-    """Returns what the figures depend on: interpreter, libraries, machine, the command."""
+    """Returns the versions of interpreter and libraries, the machine, and the command."""
     import gymnasium
     import numpy
     import torch

@@ -97,7 +97,7 @@ def evaluation_of(state: Any) -> tuple[int, float]:
 
 
 class Outcome(NamedTuple):
-    """A training at its end, whatever ended it."""
+    """The outcome of a training."""
 
     options: TrainingOptions
     folder: Path
@@ -166,7 +166,7 @@ class Outcome(NamedTuple):
         text += f"{len(self.history.returns)} episodes"
         if saved_at >= 0:
             until = "" if saved_at == self.steps else f" up to step {saved_at}"
-            text += f", what was learned{until} is saved in {self.folder}"
+            text += f", progress{until} is saved in {self.folder}"
         return text + self._how_to_resume()
 
     def _how_to_resume(self) -> str:

@@ -1,4 +1,4 @@
-"""What one training does: the common options, the algorithm's own, and how config.json records them."""
+"""Options of a training: common ones, the algorithm's own, and their record in config.json."""
 
 import json
 from collections.abc import Mapping, Sequence

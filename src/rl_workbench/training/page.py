@@ -1,4 +1,4 @@
-"""The page of a training as a callback: served from a process of its own, which ends with the training."""
+"""The page of a training: a callback that serves it from a separate process."""
 
 import contextlib
 import os

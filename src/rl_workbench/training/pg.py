@@ -1,4 +1,4 @@
-"""Policy gradients in our frame: play a round of episodes, learn from it."""
+"""Policy gradients as algorithms of the training loop: a round of episodes, then learning."""
 
 from pathlib import Path
 from typing import Any
@@ -40,7 +40,7 @@ def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
     if isinstance(settings, DocumentSettings):
         if (size, actions) != (4, 2):
             raise WorkbenchError(
-                f"{options.kind.name} is made for 4 observations and 2 actions; {run.env_id} has {size} "
+                f"{options.kind.name} needs 4 observations and 2 actions; {run.env_id} has {size} "
                 f"and {actions}: --algo reinforce learns in it"
             )
         return PolicyGradientAgent(run.seed, settings)

@@ -1,8 +1,7 @@
-"""What the user sees while training: a bar on a terminal, and a line every 20 episodes."""
+"""Progress output: a bar on a terminal, and a line every 20 episodes."""
 
 import contextlib
 import io
-import os
 import sys
 import time
 from collections.abc import Callable
@@ -12,19 +11,12 @@ from rl_workbench.training.callbacks import Callback, EpisodeResult
 
 LINE_EVERY = 20  # [episodes]
 SILENCE = 60.0  # [s] without a line
-WIDTH = 100  # [columns] of the bar on a terminal that doesn't report its size
 
 
 def tell(text: str, stream: TextIO | None = None) -> None:
-    """Prints a line and flushes it. A closed stream or its encoding can't make this fail."""
+    """Prints a line and flushes it. A closed stream can't make this fail."""
     with contextlib.suppress(OSError):
-        print(writable(text, stream or sys.stdout), file=stream, flush=True)
-
-
-def writable(text: str, stream: TextIO | None) -> str:
-    """Returns a text, such as a path, with backslash escapes for what the stream can't encode."""
-    encoding = getattr(stream, "encoding", None) or "utf-8"
-    return text.encode(encoding, "backslashreplace").decode(encoding)
+        print(text, file=stream, flush=True)
 
 
 def warn(text: str) -> None:
@@ -58,11 +50,9 @@ class Progress(Callback):
         if self._stream.isatty():
             from tqdm import tqdm
 
-            # tqdm would draw a bar of no width on a terminal that doesn't report its size.
-            size: dict[str, int] = {"dynamic_ncols": True}
-            if not _has_size(self._stream):
-                size = {"ncols": WIDTH, "nrows": 2}
-            self._bar = tqdm(total=total, initial=done, unit=unit, file=self._stream, **size)
+            self._bar = tqdm(
+                total=total, initial=done, unit=unit, file=self._stream, dynamic_ncols=True
+            )
 
     def on_step(self, training: Any) -> None:
         if self._counts_steps:
@@ -96,7 +86,7 @@ class Progress(Callback):
         """Prints a line above the bar."""
         self._told = self._clock()
         if self._bar is not None:
-            self._bar.write(writable(text, self._stream), file=self._stream)
+            self._bar.write(text, file=self._stream)
         else:
             tell(text, self._stream)
 
@@ -104,10 +94,3 @@ class Progress(Callback):
         """Closes the bar at its present position."""
         if self._bar is not None:
             self._bar.close()
-
-
-def _has_size(stream: TextIO) -> bool:
-    try:
-        return os.get_terminal_size(stream.fileno()).columns > 0
-    except (OSError, ValueError):
-        return False

@@ -1,4 +1,4 @@
-"""The environment of a training, with what brings back the episode under way.
+"""An environment whose current episode can be restored.
 
 No environment can be saved in the middle of an episode. But the same start and the same actions lead to the
 same place, so those are saved.
@@ -75,7 +75,7 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         return EpisodeMark(self._start, self._seed, self._actions, self.length, last, generator)
 
     def take_back(self, mark: EpisodeMark) -> None:
-        """Forgets what was done since `mark`: `state_dict` describes that place again.
+        """Undoes the steps since `mark`: `state_dict` describes that place again.
 
         The environment itself isn't moved: this is for the end of a training.
         """

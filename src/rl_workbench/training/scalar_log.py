@@ -35,7 +35,7 @@ class ScalarLog:
         folder: Where both files go.
         settings: Shown as a table under TEXT, and under HPARAMS next to those of other trainings.
         length: The CSV's length [bytes] at the checkpoint to continue from; 0 starts a new one.
-        say: Is called if the CSV has lost rows since then. The training doesn't depend on them.
+        say: Is called if the CSV lacks rows. The training doesn't depend on them.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class ScalarLog:
         return os.fstat(self._file.fileno()).st_size
 
     def close(self) -> None:
-        """Writes what is still in memory."""
+        """Flushes and closes both files."""
         try:
             self._events.close()
         finally:
@@ -128,7 +128,7 @@ class EventFile:
         self._records.write(event.SerializeToString())
 
     def flush(self) -> None:
-        """Writes what is still in memory."""
+        """Writes what is buffered."""
         self._file.flush()
 
     def close(self) -> None:
@@ -143,8 +143,7 @@ def _truncated(path: Path, length: int, say: Callable[[str], None]) -> list[Poin
         content = file.read(length)
     points: list[Point] = []
     complete = len(HEADER) if content.startswith(HEADER) else 0
-    rows = content[complete:].splitlines(keepends=True) if complete else []
-    for row in rows:
+    for row in content[complete:].splitlines(keepends=True) if complete else []:
         try:
             step, tag, value, wall_time = row.decode().split(",")
             point = (tag, float(value), int(step), float(wall_time))

@@ -50,6 +50,7 @@ EPILOG = """\
 dqn, reinforce and reinforce-document are our own, the others are Stable-Baselines3's.
 Each has flags of its own: --algo NAME --help shows them."""
 SESSION = Options(SessionOptions)
+SOURCES = ("config", "preset", "params", "resume")  # flags that name where options come from
 
 
 def train(algo: str, callbacks: Sequence[Callback] = (), **options: Any) -> Path:
@@ -246,17 +247,16 @@ def choose(
     """
     options = known_options(kind)
     default = env_id or kind.defaults.get("env_id", RunOptions.env_id)
-    special = ("config", "params", "resume", *(("preset",) if kind.presets else ()))
-    known = [*special, *options.names, *SESSION.names]
+    known = [*SOURCES, *options.names, *SESSION.names]
     from_flags = _parse(_parser(kind, options, prog, default, parents), flags, known)
     parameters = parameters or {}
     if strange := [name for name in parameters if name not in known]:
         raise WorkbenchError(f"parameters: {unknown('parameter', strange[0], known)}")
 
     # What isn't an option of the training: files, presets, and what holds for this session only.
-    files = {name: str(parameters[name]) for name in special if parameters.get(name)}
+    files = {name: str(parameters[name]) for name in SOURCES if parameters.get(name)}
     pairs = [*shlex.split(files.pop("params", "")), *from_flags.pop("params", [])]
-    files |= {name: from_flags.pop(name) for name in special if name in from_flags}
+    files |= {name: from_flags.pop(name) for name in SOURCES if name in from_flags}
     here = SESSION.read(_of(SESSION, parameters), "parameters")
     here |= {name: from_flags.pop(name) for name in SESSION.names if name in from_flags}
     session = SessionOptions(**here)
@@ -308,8 +308,7 @@ def _parser(
     )
     add = parser.add_argument
     add("--config", metavar="FILE", help=f"options in YAML (default config/{kind.config})")
-    if kind.presets:
-        add("--preset", metavar="NAME", help="section of that file to use, e.g. tutorial")
+    add("--preset", metavar="NAME", help="section of that file to use, e.g. tutorial")
     add("--params", metavar="KEY=VALUE", nargs="+", help="options by name")
     add("--resume", metavar="RUN_DIR", help="continue an interrupted training")
     options.add_flags(parser, {"exp_name": kind.name, **kind.defaults, "env_id": env_id})

@@ -1,4 +1,4 @@
-"""The frame of every training: open or resume a folder, learn, evaluate, keep the best, save, report."""
+"""The training loop around an algorithm: open or resume, learn, evaluate, keep the best, save, report."""
 
 import contextlib
 import math
@@ -134,7 +134,7 @@ class Training:
             restore_random_states(content["random"])
 
     def _score_of_a_changed_task(self) -> tuple[int, float] | None:
-        """Returns step and score of the best policy so far, if what it was scored by isn't the same now."""
+        """Returns step and new score of the best policy if the task's code has changed; else None."""
         before, path = read_record(self.folder).get("task"), self.folder / BEST
         if before in (None, self._task) or not path.exists():
             return None
@@ -150,7 +150,7 @@ class Training:
     # --- the course of a training ---------------------------------------------------------------
 
     def run(self) -> None:
-        """Trains and writes everything. When it fails, what was learned until then is saved."""
+        """Trains and writes everything. After a failure it saves the progress."""
         failure: WorkbenchError | None = None
         try:
             self._train()
@@ -182,18 +182,18 @@ class Training:
             self.log.close()
 
     def _begin(self) -> None:
-        """Brings environment and generators to where they begin, or to where they were."""
+        """Starts or restores environment and generators."""
         run, algorithm = self._run, self._algorithm
         if not self._resumed:
             algorithm.start_environment(None, self._progress.say)
             about = f"training {self.options.kind.name} in {run.env_id} with seed {run.seed}"
             tell(f"{about}: {self.folder}")
             self._callbacks.call("on_training_start", self)
-            self._save()  # so that there is something to resume from, whatever happens
+            self._save()  # so that a training can be resumed from its first moment
             return
         others = run_folder.other_versions(read_record(self.folder).get("versions"))
         if others:
-            tell(f"{others}: from here on the bits may differ")
+            tell(f"{others}: the bits may differ from here on")
         with fitting("state of the environment"):
             algorithm.start_environment(self._resumed["environment"], self._progress.say)
         restore_random_states(self._resumed["random"])
@@ -226,7 +226,7 @@ class Training:
                     self._save()
             raise
 
-    # --- what an algorithm calls while it learns ------------------------------------------------
+    # --- called by algorithms ------------------------------------------------------------------
 
     def is_interrupted(self) -> bool:
         """Returns whether the user interrupts."""

@@ -1,4 +1,4 @@
-"""What moves a robot: this process's own physics, or a simulator over ROS, in lock-step or in real time.
+"""Backends: physics in this process, or a simulator over ROS, in lock-step or in real time.
 
 Importing this is cheap: a backend's modules are imported when one is made. Only `ros/` needs ROS.
 """
@@ -34,19 +34,17 @@ def need_ros(what: str) -> None:
 def make_backend(
     scene: "Scene", backend: str | None, control_period: float, deadline: float | None = None
 ) -> "RobotBackend":
-    """Makes what moves a scene's robots; over ROS it starts what isn't running.
+    """Makes what moves a scene's robots, one of `BACKENDS`; over ROS it starts what isn't running.
 
     Args:
-        scene: the robots and objects.
-        backend: one of `BACKENDS`; None: in this process, with the first robot's engine.
-        control_period: simulated time of one action [s]; in real time 0 takes the newest joint state without
-            waiting.
-        deadline: wall time that a simulator in lock-step may take for an answer, on top of 10 ms for each
-            tick [s]; None: the backend's default.
+        scene: The robots and objects.
+        backend: None: in this process, with the first robot's engine.
+        control_period: Simulated time of one action [s]; in real time 0 takes the newest joint state at once.
+        deadline: Wall time for an answer in lock-step, on top of 10 ms for each tick [s]; None: the default.
 
     Raises:
-        ValueError: for an unknown backend, or a control period that isn't a whole number of physics steps.
-        RobotEnvError: if ROS isn't installed, or the robots can't be brought up.
+        ValueError: For an unknown backend, or a control period of a fraction of physics steps.
+        RobotEnvError: If ROS isn't installed, or the robots can't be brought up.
     """
     from file_access.text import nearest_or_all
     from robot_envs.backends.backend import PHYSICS_STEP, ticks_per_action

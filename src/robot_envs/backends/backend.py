@@ -1,4 +1,4 @@
-"""What an environment needs of a world, be it simulated here, over ROS, or real."""
+"""The interface of backends, and simulators that start side by side."""
 
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
@@ -33,18 +33,16 @@ class RobotBackend(Protocol):
     def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         """Begins an episode; returns the state reached.
 
-        `seed` is that of the sensors' noise; 0 goes on with what there is.
-
-        A backend that can't set velocities puts joints at rest, and its state says so. The environment sends
-        `initial.commands`.
+        `seed` is that of the sensors' noise; 0 continues it. A backend that can't set velocities puts joints
+        at rest, and its state says so. The environment sends `initial.commands`.
         """
         ...
 
     def begin(self, commands: Commands) -> None:
         """Sends commands and returns at once; `act` with the same commands waits for the result.
 
-        Calling it is optional, and does nothing in this process and in real time. Any other call before
-        `act` takes the answer first; a reset drops it.
+        Optional; without effect in this process and in real time. Any other call before `act` takes the
+        answer first; a reset drops it.
         """
         ...
 
@@ -108,13 +106,10 @@ _group: ContextVar[_Group | None] = ContextVar("simulators", default=None)
 
 @contextlib.contextmanager
 def side_by_side(count: int) -> Iterator[None]:
-    """Starts, or ends, several simulators of the backend "ros-own" at the same time.
+    """Starts, or ends, `count` simulators of the backend "ros-own" at the same time.
 
-    Environments that are made or closed in the block don't wait for their simulators; the end of the block
-    waits for all. If one doesn't start, all are ended, and the first error is raised.
-
-    Args:
-        count: how many will start; they are refused at once if there isn't the memory for all.
+    The end of the block waits for all environments that were made or closed in it. If one doesn't start, all
+    are ended, and the first error is raised; all are refused at once if there isn't the memory for them.
     """
     group = _Group(count)
     token = _group.set(group)

@@ -1,4 +1,4 @@
-"""Robots in a physics world of this process: no ROS, and bit-identical to a simulator in lock-step."""
+"""Backend in this process: no ROS, and bit-identical to a simulator in lock-step."""
 
 import contextlib
 import math
@@ -30,6 +30,7 @@ from robot_envs.world_state import (
     WorldState,
     link_keys,
 )
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import RobotHardware
 from robot_sim.control.joint import JointHandle
@@ -53,7 +54,7 @@ from robot_sim.physics.world import NameTaken, SnapshotError, World
 from robot_sim.robot import ControlledRobot, control_period_of
 from robot_sim.sensors.sensing import Sensing
 from robot_sim.sensors.sensor_readers import SensorReaders, offer_sensors
-from robot_sim.simulator import NANOSECONDS, Simulator
+from robot_sim.simulator import Simulator
 from robot_sim.state import NOTHING, StateReader, UnknownName, find_link, find_model
 from robot_sim.state_dict import StateError
 
@@ -69,17 +70,8 @@ def _refusals() -> Iterator[None]:
 class InProcessWorld(RobotBackend):
     """A scene's robots and their controllers, in a world of their own.
 
-    No other thread knows this world, so its lock is never taken.
-
-    Args:
-        scene: the robots and objects.
-        control_period: simulated time [s] of one action.
-        engine: "bullet", or "mujoco"; see `robot_sim.physics.engines`.
-
-    Raises:
-        ValueError: if the period isn't a whole number of physics steps, or the engine is unknown or not
-            installed.
-        RobotEnvError: if a file isn't found, or something in it is wrong.
+    No other thread knows this world, so its lock is never taken. Raises ValueError for a control period [s]
+    of a fraction of physics steps or a missing engine, RobotEnvError for a wrong file.
     """
 
     deterministic, complete, shared = True, True, False
@@ -244,8 +236,8 @@ class InProcessWorld(RobotBackend):
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         with _refusals():
-            found = [find_link(self._sim.world, name) for name in links]
-        return [model.link_state(link)[0] for model, link in found]
+            pairs = [find_link(self._sim.world, name) for name in links]
+        return [model.link_state(link)[0] for model, link in pairs]
 
     def close(self) -> None:
         """Frees the world; may be called twice."""

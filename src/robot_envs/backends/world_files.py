@@ -1,4 +1,4 @@
-"""Models of a world in this process besides its robots: those of a world file, and a task's objects."""
+"""Models of world files and of a task's objects, for a world in this process."""
 
 import logging
 from collections.abc import Sequence
@@ -24,24 +24,19 @@ logger = logging.getLogger(f"rosout.{__name__}")
 
 
 def fill(sim: Simulator, source: Source | None) -> None:
-    """Loads a world file into an empty world: models, gravity and physics step, as gzserver does.
+    """Loads a world file into an empty world, as gzserver does: models, gravity and physics step.
 
-    Args:
-        sim: of the world.
-        source: the file; `EMPTY`: a ground plane; None: nothing.
-
-    Raises:
-        RobotEnvError: if the file can't be read or simulated.
+    `EMPTY` is a ground plane, None nothing. Raises RobotEnvError if the file can't be read or simulated.
     """
     if source is None:
         return
-    found = empty_world() if source == EMPTY else _read(source)
-    for warning in found.warnings:
+    world = empty_world() if source == EMPTY else _read(source)
+    for warning in world.warnings:
         logger.warning("world %s: %s", _shown(source), warning)
-    sim.set_time_step(found.time_step)
-    sim.world.set_gravity(found.gravity)
-    sim.world.set_solver(found.solver)
-    for name, error in fill_world(sim.world, found.models):
+    sim.set_time_step(world.time_step)
+    sim.world.set_gravity(world.gravity)
+    sim.world.set_solver(world.solver)
+    for name, error in fill_world(sim.world, world.models):
         if error is not None:
             raise RobotEnvError(f"world {_shown(source)}: model '{name}': {error}") from error
 
@@ -63,15 +58,7 @@ def world_models(source: Source | None) -> dict[str, ModelDescription]:
 
 
 def loose_joints(source: Source | None, objects: Sequence[Object]) -> list[tuple[str, str]]:
-    """Returns model and name of all movable joints besides the robots', which a reset puts at 0, at rest.
-
-    Args:
-        source: the world file.
-        objects: of the task.
-
-    Raises:
-        RobotEnvError: if one of them can't be read.
-    """
+    """Returns model and name of the world's and the objects' movable joints, which a reset puts at 0."""
     models = {**world_models(source), **{each.name: object_model(each) for each in objects}}
     return [(name, each.name) for name, model in models.items() for each in model.movable_joints]
 

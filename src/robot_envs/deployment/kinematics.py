@@ -1,4 +1,4 @@
-"""Where a robot's links are and how they move, computed from its joints alone."""
+"""Forward kinematics of a robot's links, with velocities, from its joints alone."""
 
 from collections.abc import Mapping
 
@@ -18,14 +18,8 @@ _WORLD = ("", "world")
 class LinkView:
     """Computes the links of a query, for a robot that is fixed to the world where its description says.
 
-    Poses are the engine's, by forward kinematics; twists are their derivatives.
-
-    Args:
-        robot: the robot.
-        query: of a task.
-
-    Raises:
-        RobotEnvError: if the query asks for what the joints don't determine.
+    Poses are the engine's, by forward kinematics; twists are their derivatives. Raises RobotEnvError if the
+    query asks for what the joints don't determine.
     """
 
     def __init__(self, robot: Robot, query: StateQuery) -> None:
@@ -53,10 +47,10 @@ class LinkView:
             poses = [each[link].compose(offset) for each in (now, before, after)]
             return Motion(poses[0], _twist(poses[1], poses[2]))
 
-        found = {}
+        motions = {}
         for key, place, frame in self._wanted:
-            found[key] = motion(place).seen_from(AT_REST if frame is None else motion(frame))
-        return found
+            motions[key] = motion(place).seen_from(AT_REST if frame is None else motion(frame))
+        return motions
 
     def _poses(self, joints: Mapping[str, JointState], time: float) -> dict[str, Pose]:
         """Returns the poses of all links at a time from now [s]."""
@@ -92,11 +86,7 @@ def _check(robot: Robot, query: StateQuery) -> None:
 
 
 def _of_link(robot: Robot, name: str) -> tuple[str, Pose]:
-    """Returns the link that joints move, and the pose in it of the link of that name, which it may include.
-
-    Raises:
-        RobotEnvError: if there is none, or it depends on a joint whose position isn't known.
-    """
+    """Returns the link that joints move, and the pose in it of the one named, which may be lumped into it."""
     model, _, plain = name.rpartition(SCOPE)
     links = robot.links
     if model not in ("", robot.model) or not (plain in links.links or plain in links.lumped):

@@ -1,4 +1,4 @@
-"""A task and a policy in control of a robot, step by step, within its limits; without ROS or a clock."""
+"""The control loop of task and policy, step by step, within limits; without ROS or a clock."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from robot_envs.deployment.kinematics import LinkView
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.task import GoalTask, Task, Unjudged
+from robot_envs.task import GoalTask, Task, Unrewarded
 from robot_envs.world_state import (
     ODOMETRY,
     Command,
@@ -36,11 +36,11 @@ class CommandLimits:
     | speeds of a vehicle | the controller's own limits |
 
     Args:
-        robot: with these limits.
-        port: of the controller.
-        way: largest move of a position from one command to the next, as a share of what the joint's velocity
+        robot: With these limits.
+        port: Port of the controller.
+        way: Largest move of a position from one command to the next, as a share of what the joint's velocity
             limit allows; infinity: no limit.
-        period: from one command to the next [s].
+        period: From one command to the next [s].
     """
 
     def __init__(self, robot: Robot, port: CommandPort, way: float, period: float) -> None:
@@ -62,21 +62,18 @@ class CommandLimits:
         return self._bounded(near), exceeded  # last, whatever it starts from
 
     def _numbers(self, command: Command) -> list[float]:
-        return [command] if self._port.single else list(command)  # type: ignore[list-item, arg-type]
+        return self._port.kind.numbers(command)
 
     def stop(self, joints: Mapping[str, JointState]) -> Command:
-        """Returns the command that stops the joints: zero velocity or effort, or their present positions.
-
-        A joint beyond a stop is commanded to the stop.
-        """
+        """Returns the command that stops the joints, within their stops: zero, or their present positions."""
         command = self._port.at_start({name: each.position for name, each in joints.items()})
         return self._bounded(self._numbers(command))
 
     def _bounded(self, numbers: list[float]) -> Command:
         """Returns the nearest command within the bounds."""
         bounds = zip(numbers, self._bounds, strict=True)
-        found = tuple(min(max(value, lower), upper) for value, (lower, upper) in bounds)
-        return found[0] if self._port.single else found
+        bounded = tuple(min(max(value, lower), upper) for value, (lower, upper) in bounds)
+        return bounded[0] if self._port.single else bounded
 
 
 def _bounds(limits: JointLimits, quantity: str) -> tuple[float, float]:
@@ -122,18 +119,18 @@ class Pilot:
     aren't moved to the task's initial state.
 
     Args:
-        robot: the robot.
-        task: what the policy has learned.
-        act: the policy: the action for an observation.
-        period: from one step to the next [s].
-        seed: of what the task draws, such as a goal.
-        goal: of a task that has goals; None: it draws one.
-        way: see `CommandLimits`.
-        say: reports commands beyond their limits, once for each controller.
+        robot: The robot.
+        task: What the policy has learned.
+        act: The policy: the action for an observation.
+        period: From one step to the next [s].
+        seed: Seed of what the task draws, such as a goal.
+        goal: Goal of a task that has goals; None: it draws one.
+        way: See `CommandLimits`.
+        say: Reports commands beyond their limits, once for each controller.
 
     Raises:
-        RobotEnvError: if the robot's description is wrong, or the task asks for what joints don't determine.
-        ValueError: if the goal isn't one of the task's.
+        RobotEnvError: If the robot's description is wrong, or the task asks for what joints don't determine.
+        ValueError: If the goal isn't one of the task's.
     """
 
     def __init__(
@@ -150,7 +147,7 @@ class Pilot:
         self._scene, self._task, self._act, self._say = Scene([robot]), task, act, say
         if not robot.ports:
             raise RobotEnvError(f"the robot '{robot.model}' has no controller that takes commands")
-        self._judge = task if task.reward_query == StateQuery() else Unjudged()
+        self._evaluator = task if task.reward_query == StateQuery() else Unrewarded()
         self._links, self._model = LinkView(robot, task.query), robot.model
         self._limits = {port.name: CommandLimits(robot, port, way, period) for port in robot.ports}
         self._read_action = checks.action_reader(checks.made_space(task, "action_space"))
@@ -199,23 +196,14 @@ class Pilot:
     def step(
         self, time: float, joints: Joints, sensors: Sensors = NO_SENSORS
     ) -> dict[str, Command] | None:
-        """One step.
+        """Returns commands for a time since the beginning [s]; None if the task's episode would end.
 
-        Args:
-            time: since the beginning [s].
-            joints: their states.
-            sensors: readings of those that the task's query names.
-
-        Returns:
-            Commands to send, by controller; None if the task's episode would have ended.
-
-        Raises:
-            ValueError: if the policy or the task returns something impossible.
+        Raises ValueError if the policy or the task returns something impossible.
         """
         task, state = self._task, self._state(time, joints, sensors)
-        over = self._judge.is_terminal(state)
+        over = self._evaluator.is_terminal(state)
         if self._action is not None:
-            self._judge.reward(state, self._action)
+            self._evaluator.reward(state, self._action)
         if over:
             self._action = None
             return None
@@ -223,7 +211,7 @@ class Pilot:
         return self._limited(self._scene.commands(task.apply(self._action, state)))
 
     def _limited(self, commands: Mapping[str, Command]) -> dict[str, Command]:
-        found = {}
+        limited = {}
         for name, wanted in commands.items():
             command, exceeded = self._limits[name](wanted, self._held[name])
             if exceeded and name not in self._reported:
@@ -231,8 +219,8 @@ class Pilot:
                 self._say(
                     f"{name} is commanded beyond the limits of {', '.join(exceeded)}: it is kept within"
                 )
-            found[name] = self._held[name] = command
-        return found
+            limited[name] = self._held[name] = command
+        return limited
 
     def _observation(self, state: WorldState) -> Any:
         seen, task = self._read(self._task.observe(state)), self._task

@@ -1,4 +1,4 @@
-"""A policy that moves a robot over ROS, simulated or real: joint states and sensors in, commands out."""
+"""The ROS node of a policy: joint states and sensors in, commands out."""
 
 import math
 import os
@@ -12,7 +12,7 @@ import rospy
 from std_msgs.msg import Float64MultiArray
 
 from robot_envs.backends.ros import node
-from robot_envs.backends.ros.bringup import command_message, command_publisher, full_name
+from robot_envs.backends.ros.bringup import command_publisher, full_name
 from robot_envs.backends.ros.running import lockstep_hint
 from robot_envs.backends.ros.sensor_listener import SensorListener
 from robot_envs.controllers import TWIST
@@ -42,19 +42,19 @@ class PolicyNode:
     The topic `~goal` (std_msgs/Float64MultiArray) changes the goal of a task with goals.
 
     Args:
-        robot: the robot; nothing of it is started, spawned or set.
-        task: what the policy has learned.
-        act: the policy: the action for an observation.
-        period: of control [s].
-        late: how long the robot may be without a joint state before it is stopped [s], or without a reading,
+        robot: The robot; nothing of it is started, spawned or set.
+        task: What the policy has learned.
+        act: The policy: the action for an observation.
+        period: Period of control [s].
+        late: How long the robot may be without a joint state before it is stopped [s], or without a reading,
             but at least three of its sensor's periods; None: 5 control periods, but at
             least 0.1 s, and at most 0.3 s for a vehicle.
-        seed: see `Pilot`.
-        goal: see `Pilot`.
-        way: see `CommandLimits`.
+        seed: See `Pilot`.
+        goal: See `Pilot`.
+        way: See `CommandLimits`.
 
     Raises:
-        RobotEnvError: see `Pilot`.
+        RobotEnvError: See `Pilot`.
     """
 
     def __init__(
@@ -99,14 +99,10 @@ class PolicyNode:
         self._wanted = message.data
 
     def run(self, should_end: Callable[[], bool]) -> None:
-        """Runs until it should end, or the node is shut down.
+        """Runs until `should_end`, which is polled, or the node is shut down.
 
-        Args:
-            should_end: polled. A signal handler can't end the run itself: it may have interrupted a
-                command that is being published.
-
-        Raises:
-            RobotEnvError: if policy or task return something impossible; the robot was stopped.
+        A signal handler can't end the run itself: it may have interrupted a command that is being published.
+        Raises RobotEnvError if policy or task return something impossible; the robot is stopped then.
         """
         self._should_end = should_end
         rospy.on_shutdown(self._end_in_time)
@@ -243,7 +239,7 @@ class PolicyNode:
 
     def _publish(self, commands: Mapping[str, Command]) -> None:
         for name, command in commands.items():
-            self._topics[name].publish(command_message(self._ports[name], command))
+            self._topics[name].publish(self._ports[name].kind.write(command))
 
     def _end(self) -> None:
         """Stops the robot, if it has moved."""
@@ -285,16 +281,9 @@ def _late(robot: Robot, period: float) -> float:
 def run_node(
     name: str, argv: list[str], make: Callable[[], PolicyNode], should_end: Callable[[], bool]
 ) -> None:
-    """Makes this process a node, and runs it.
+    """Makes this process a node, and runs the `PolicyNode` that `make` makes; see `PolicyNode.run`.
 
-    Args:
-        name: the node's, with namespace.
-        argv: the process's arguments, with roslaunch's remappings.
-        make: makes what it runs.
-        should_end: see `PolicyNode.run`.
-
-    Raises:
-        RobotEnvError: if there is no master, or a node of that name; and see `PolicyNode`.
+    `argv` has roslaunch's remappings. Raises RobotEnvError without a master, or beside a node of that name.
     """
     if not node.master_is_up():
         raise RobotEnvError(

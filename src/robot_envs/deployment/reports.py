@@ -1,4 +1,4 @@
-"""What a robot reports to its policy: the newest states of its joints, and whether its controllers run."""
+"""Joint states and controller states that a robot publishes."""
 
 import math
 import threading
@@ -20,18 +20,12 @@ ASKING = 1.0  # [s] of wall time between two questions to the controller manager
 
 
 class JointListener:
-    """Keeps the newest state of each joint, and when it has come.
+    """The newest state of each joint, and when it came.
 
     States without velocities are ignored, and so are those whose stamp isn't newer than the one before: a
     driver that repeats itself reports nothing new. A state that the joint can't have, or a stamp in the
-    future or long past, is a fault until the joint's next good state.
-
-    Args:
-        topic: of the joint states.
-        model: of the robot: joints may be named model::joint.
-        joints: their plain names.
-        limits: of the joints that have any.
-        late: how old a stamp may be [s], at least 1 s.
+    future or older than `late` [s] (1 s at least), is a fault until the joint's next good state. Joints may
+    be named model::joint.
     """
 
     def __init__(
@@ -114,13 +108,9 @@ class JointListener:
 
 
 class ControllerWatch:
-    """Asks a robot's controller manager again and again, in a thread, whether the controllers run.
+    """Asks a robot's controller manager repeatedly, in a thread until `over`, whether controllers run.
 
     A real robot may have no controller manager; then nothing is known of them.
-
-    Args:
-        robot: whose controllers take the commands.
-        over: ends the thread.
     """
 
     def __init__(self, robot: Robot, over: threading.Event) -> None:

@@ -1,1 +1,1 @@
-"""What a robot looks like, in pictures, on pages and in a window; touches no physics."""
+"""Rendering: pictures, pages and windows; without physics."""

@@ -31,17 +31,8 @@ RENDER_MODES = ("human", "rgb_array")
 class RobotPicture:
     """Draws a robot and a ground, without a display; loads what it needs with the first picture.
 
-    Args:
-        robot: the robot.
-        width: of the pictures [pixels].
-        height: of the pictures [pixels].
-        camera: for the robot as it is spawned; see `Placement.camera`.
-        base: returns the pose of its root link, which the camera follows; None: where it is spawned.
-        beside: what else is in its world; None: nothing.
-
-    Raises:
-        ValueError: for an impossible size or camera.
-        RobotEnvError: later, if the robot's file can't be read.
+    `base` returns the pose of its root link, which the camera follows; None: where it is spawned. Raises
+    ValueError for an impossible size or camera, and later RobotEnvError if the robot's file can't be read.
     """
 
     def __init__(
@@ -176,7 +167,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         """Returns a picture of the robot, (height, width, 3) of uint8; None in the render mode "human".
 
         Raises:
-            SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
+            SimulatorError: If the backend has to be asked where the robot is, and doesn't answer.
         """
         return self._picture(self._positions()) if self.render_mode == "rgb_array" else None
 
@@ -191,8 +182,8 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
             robot()
 
         Args:
-            server: of the page.
-            beside: how many robots of this kind are on the page already; it is drawn beside them.
+            server: Server of the page.
+            beside: How many robots of this kind are on the page already; it is drawn beside them.
 
         Returns:
             What moves the robot on the page to where it is now: a function, which takes a caption to show
@@ -200,6 +191,6 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
             the robot is, and `show()`, which moves it there, then or later.
 
         Raises:
-            SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
+            SimulatorError: If the backend has to be asked where the robot is, and doesn't answer.
         """
         return self._picture.draw_on(server, self._positions, beside)

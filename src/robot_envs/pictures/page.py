@@ -1,4 +1,4 @@
-"""A robot on a viser page, as the simulator's window shows it, without a simulator."""
+"""A robot on a viser page, without a simulator's window."""
 
 import logging
 import time
@@ -36,19 +36,9 @@ class Placed(NamedTuple):
 class RobotOnPage:
     """A robot on a page; the first one brings ground, lights, initial camera and a switch to follow it.
 
-    A followed robot stays in place on the page, and the world moves instead. So all cameras follow, however
-    a viewer has turned them, and so does a recording's.
-
-    Args:
-        server: of the page.
-        placement: of the robot.
-        positions: returns its joints' positions [rad, m], by name.
-        camera: of its pictures.
-        size: of its pictures [pixels].
-        beside: how many robots of its kind are on the page already.
-
-    Raises:
-        SimulatorError: here and later, if the backend has to be asked where the robot is, and doesn't answer.
+    A followed robot stays in place on the page, and the world moves instead. So all cameras follow, however a
+    viewer has turned them, and so does a recording's. `beside` is the number of robots already there. Raises
+    SimulatorError, here and later, if the backend has to be asked where the robot is, and doesn't answer.
     """
 
     def __init__(
@@ -91,18 +81,14 @@ class RobotOnPage:
         self()
 
     def __call__(self, caption: str = "") -> None:
-        """Moves it to where it is now.
-
-        Args:
-            caption: a line of text below it; empty: the present one stays.
-        """
+        """Moves it to where it is now; a caption appears below it, "" keeps the present one."""
         self.show(self.look(), caption)
 
     def look(self) -> Placed:
         """Where it is now, to be shown later; doesn't change the page."""
         positions, base = self._positions(), self._placement.base()
-        found = self._placement.poses(positions, base)
-        poses = [found[model.name][link.name] for model in self._seen for link in model.links]
+        by_model = self._placement.poses(positions, base)
+        poses = [by_model[model.name][link.name] for model in self._seen for link in model.links]
         rows = [[*pose.position, *pose.orientation] for pose in poses]
         return Placed(np.array(rows), np.array(self._placement.travelled(positions, base)))
 
@@ -138,15 +124,7 @@ class RobotOnPage:
 
 
 class LivePage:
-    """A page of this machine that shows a robot's states at about the pace of real time.
-
-    Prints its address once.
-
-    Args:
-        title: of the page.
-        draw_on: see `RobotEnv.draw_on`.
-        period: wall time for which each state is shown [s].
-    """
+    """A page of this machine that shows each state for a period [s of wall time]; prints its address."""
 
     def __init__(
         self, title: str, draw_on: Callable[[viser.ViserServer], RobotOnPage], period: float

@@ -1,4 +1,4 @@
-"""Where a robot's links are in a state, what surrounds it, and a camera that sees all of it."""
+"""Link poses of a state, surroundings, and a camera that sees all of it."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
@@ -26,13 +26,8 @@ Shapes = list[tuple[str, Shape]]  # each with its link
 class Surroundings:
     """What is visible besides the first robot: other robots, a task's objects and goal, the world's models.
 
-    A backend is asked where they are, and also for the first robot's links if it has joints that a state
-    doesn't have.
-
-    Args:
-        scene: the robots and objects.
-        ask: returns the poses of link frames in the world, each link named model::link.
-        goal: the task's `goal_mark`.
+    `ask` returns the poses of link frames, named model::link: of these, and of the first robot's links if it
+    has joints that a state doesn't have. `goal` is the task's `goal_mark`.
     """
 
     def __init__(
@@ -63,14 +58,14 @@ class Surroundings:
     def poses(self) -> dict[str, dict[str, Pose]]:
         """Returns the poses of links, by model."""
         asked = self._asked
-        found: dict[str, dict[str, Pose]] = {model: {} for model, _ in asked}
+        poses: dict[str, dict[str, Pose]] = {model: {} for model, _ in asked}
         if asked:
             names = [f"{model}::{link}" for model, link in asked]
             for (model, link), pose in zip(asked, self._ask(names), strict=True):
-                found[model][link] = pose
+                poses[model][link] = pose
         if (mark := self._goal()) is not None:
-            found[GOAL] = {GOAL: Pose(mark[0])}
-        return found
+            poses[GOAL] = {GOAL: Pose(mark[0])}
+        return poses
 
     @cached_property
     def _asked(self) -> list[tuple[str, str]]:
@@ -98,12 +93,9 @@ QUARTERS = (0.0, pi / 2.0, pi, -pi / 2.0)  # [rad] of a joint without stops
 
 
 class Placement:
-    """A robot on a ground at z = 0, or above it.
+    """A robot on a ground at z = 0, or above it, with its surroundings.
 
-    Args:
-        robot: the robot.
-        base: returns the pose of its root link; None: where it is spawned.
-        beside: what else is in its world; None: nothing.
+    `base` returns the pose of its root link; None: where it is spawned.
     """
 
     def __init__(
@@ -127,12 +119,7 @@ class Placement:
         return {self.name: self.shapes, **(self._beside.shapes if self._beside else {})}
 
     def poses(self, positions: Mapping[str, float], base: Pose) -> dict[str, dict[str, Pose]]:
-        """Returns the frame of every link in the world, by model.
-
-        Args:
-            positions: of the robot's joints [rad, m].
-            base: the pose of its root link.
-        """
+        """Returns the frame of every link in the world, by model; positions are in [rad, m]."""
         others = self._beside.poses() if self._beside else {}
         own = {} if self.name in others else link_poses(self.description, base, positions)
         return {self.name: own, **others}
@@ -154,13 +141,10 @@ class Placement:
         return np.concatenate([np.zeros((0, 3)), *corners])
 
     def camera(self, camera: CameraLike, aspect: float) -> Camera:
-        """`camera`, or one that sees all that joints can reach, or in which a robot that drives is a third.
+        """Returns `camera`, or one that sees all that joints reach, or a vehicle as a third of the picture.
 
-        A task's goal on the floor is seen from above, with more around the robot.
-
-        Args:
-            camera: for the robot as it is spawned, or some of its fields.
-            aspect: of the pictures, width to height.
+        A task's goal on the floor is seen from above, with more around the robot. `aspect` is width to
+        height.
         """
         if isinstance(camera, Camera):
             return camera

@@ -1,20 +1,4 @@
-"""The robots that come with the library; importing this registers their environments with Gymnasium.
-
-| id | what is to be learned |
-|---|---|
-| `robot_envs/TwoLinkReach-v0` | the tip of a two-link arm goes to a point |
-| `robot_envs/TwoLinkReachGoal-v0` | the same with goals and a sparse reward, for hindsight replay |
-| `robot_envs/SixJointReach-v0` | the tip of a six-joint arm goes to a point in space |
-| `robot_envs/PickCube-v0` | an arm with a gripper picks a cube from a table and lifts it |
-| `robot_envs/PickCubeGoal-v0` | it takes the cube to a goal: a sparse reward, for hindsight replay |
-| `robot_envs/Furuta-v0` | a Furuta pendulum swings up and stays up |
-| `robot_envs/DoublePendulum-v0` | a cart keeps two rods upright, one on top of the other |
-| `robot_envs/Hopper-v0` | a one-legged robot hops forward |
-| `robot_envs/Navigate-v0` | a robot on two wheels drives to a goal by its laser |
-| `robot_envs/NavigateImages-v0` | the same by its depth camera |
-
-docs/robots.md describes them.
-"""
+"""The robots of docs/robots.md; importing this registers their environments with Gymnasium."""
 
 import gymnasium
 import numpy as np

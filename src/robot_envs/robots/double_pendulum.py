@@ -53,7 +53,7 @@ class Balance(Task):
     steps of 0.02 s.
 
     Args:
-        noise: see above.
+        noise: See above.
     """
 
     max_steps = 500

@@ -1,4 +1,4 @@
-"""A vehicle drives to a goal on the floor of a world without touching anything: for robots of any package."""
+"""Navigation of a vehicle to a goal on the floor without collisions; for robots of any package."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -62,14 +62,14 @@ class DriveToGoal(Task):
     `distance`: of the goal [m]. `is_success`: whether it is there. `touched`.
 
     Args:
-        robot: the vehicle, with one controller that takes cmd_vel.
-        laser: its sensor; None: it has none, and nothing is touched.
-        ranges: sectors of the laser, up to the number of its rays.
-        world: a world file in place of the robot's.
-        touch: range of the laser at which the vehicle touches something [m].
-        clearance: of starts and goals, from the vehicle's middle [m].
-        nearest: of goals from the start [m].
-        furthest: of goals from the start [m].
+        robot: The vehicle, with one controller that takes cmd_vel.
+        laser: Its sensor; None: it has none, and nothing is touched.
+        ranges: Sectors of the laser, up to the number of its rays.
+        world: A world file in place of the robot's.
+        touch: Range of the laser at which the vehicle touches something [m].
+        clearance: Clearance of starts and goals, from the vehicle's middle [m].
+        nearest: Least distance of goals from the start [m].
+        furthest: Largest distance of goals from the start [m].
     """
 
     non_persistent = ("robot", "port", "floor")
@@ -104,10 +104,10 @@ class DriveToGoal(Task):
     @cached_property
     def port(self) -> CommandPort:
         """The controller that takes cmd_vel; raises TaskError if there isn't one."""
-        found = [each for each in self.robot.ports if each.quantity == TWIST]
-        if len(found) != 1:
+        ports = [each for each in self.robot.ports if each.quantity == TWIST]
+        if len(ports) != 1:
             raise TaskError(f"the robot '{self.robot.model}' needs one controller with cmd_vel")
-        return found[0]
+        return ports[0]
 
     @cached_property
     def fastest(self) -> tuple[float, float]:
@@ -193,10 +193,10 @@ class DriveToGoal(Task):
     def reward(self, state: WorldState, action: np.ndarray) -> float:
         distance, room = self.distance(state), self.room(state)
         gained = 0.0 if self._before is None else self._before - distance
-        found = 2.0 * gained - 0.02 - 0.2 * max(0.0, 1.0 - max(room, 0.0) / NEAR)
+        reward = 2.0 * gained - 0.02 - 0.2 * max(0.0, 1.0 - max(room, 0.0) / NEAR)
         if room <= 0.0:
-            return found - 5.0
-        return found + 5.0 if distance <= THERE else found
+            return reward - 5.0
+        return reward + 5.0 if distance <= THERE else reward
 
     def info(self, state: WorldState) -> dict[str, Any]:
         distance, touched = self.distance(state), self.room(state) <= 0.0
@@ -210,17 +210,15 @@ def heading(pose: Pose) -> Vector:
 
 
 class Floor:
-    """What stands on the floor of a world, seen from above.
+    """What stands on the floor of a world, seen from above; planes and meshes don't count.
 
-    Args:
-        models: of the world. Planes and meshes don't count.
-        size: how far points may be from things that span less, or from the origin [m].
+    Points are up to `size` [m] from things that span less, or from the origin.
     """
 
     def __init__(self, models: Mapping[str, ModelDescription], size: float) -> None:
-        found = [box for model in models.values() for box in _boxes(model)]
-        self._boxes = np.array(found).reshape(-1, 5)
-        middles = self._boxes[:, :2] if found else np.zeros((1, 2))
+        boxes = [box for model in models.values() for box in _boxes(model)]
+        self._boxes = np.array(boxes).reshape(-1, 5)
+        middles = self._boxes[:, :2] if boxes else np.zeros((1, 2))
         low, high = middles.min(axis=0), middles.max(axis=0)
         margin = np.where(high - low < size, size, 0.0)
         self.low, self.high = low - margin, high + margin
@@ -241,17 +239,7 @@ class Floor:
         start: tuple[float, float] | None = None,
         away: tuple[float, float] = (0.0, math.inf),
     ) -> tuple[float, float]:
-        """Draws a free point (x, y) [m].
-
-        Args:
-            rng: draws it.
-            clearance: from all things [m].
-            start: another point.
-            away: least and largest distance from that [m].
-
-        Raises:
-            TaskError: if none is found.
-        """
+        """Draws a free point (x, y) [m], `away` from `start` [m]; raises TaskError if none is found."""
         for _ in range(TRIES):
             points = rng.uniform(self.low, self.high, (AT_ONCE, 2))
             fit = self.clearance(points) >= clearance

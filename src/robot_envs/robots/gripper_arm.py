@@ -134,7 +134,7 @@ class PickCube(Picking):
     `height`: h [m]. `is_success`: whether it is at least 0.1 m.
 
     Args:
-        helped: share of episodes that begin with the cube in the hand, or with the open gripper up to 0.1 m
+        helped: Share of episodes that begin with the cube in the hand, or with the open gripper up to 0.1 m
             above it, each as likely: so a training soon meets what it is about.
     """
 
@@ -188,7 +188,7 @@ class PickCubeGoal(Picking, GoalTask):
     `is_success`: whether the cube is there, and the tip.
 
     Args:
-        helped: as in `PickCube`; without it hindsight learns little, since most goals achieved are the same.
+        helped: As in `PickCube`; without it hindsight learns little, since most goals achieved are the same.
     """
 
     def observation_space(self) -> gymnasium.spaces.Box:

@@ -33,9 +33,9 @@ class Navigate(DriveToGoal):
     """The rover drives to a goal by its laser; see `DriveToGoal`.
 
     Args:
-        ranges: sectors of the laser, 1 to 360.
+        ranges: Sectors of the laser, 1 to 360.
         world: "room", "maze", "gates", or a world file.
-        options: of `DriveToGoal`.
+        options: Options of `DriveToGoal`.
     """
 
     def __init__(self, ranges: int = 24, world: Source = "room", **options: Any) -> None:
@@ -57,7 +57,7 @@ class NavigateImages(DriveToGoal):
 
     Args:
         world: "room", "maze", "gates", or a world file.
-        options: of `DriveToGoal`.
+        options: Options of `DriveToGoal`.
     """
 
     def __init__(self, world: Source = "room", **options: Any) -> None:

@@ -33,12 +33,12 @@ def check_stands(robot: Robot, joints: Mapping[str, float], seconds: float = 5.0
     """Checks that a robot with a free base stands while its controllers hold where its joints start.
 
     Args:
-        robot: a robot that is spawned on the ground.
-        joints: where its joints start [rad, m]; others start at 0.
-        seconds: simulated time [s].
+        robot: A robot that is spawned on the ground.
+        joints: Where its joints start [rad, m]; others start at 0.
+        seconds: Simulated time [s].
 
     Raises:
-        AssertionError: if it sinks or tilts.
+        AssertionError: If it sinks or tilts.
     """
     root, time, fallen = robot.links.root, 0.0, ""
     backend = make_backend(Scene([robot]), None, robot.control_period)

@@ -1,4 +1,4 @@
-"""Checks that an environment repeats itself: by seed, in other instances, backends and vectors."""
+"""Checks of repeatability: by seed, in other instances, backends and vectors."""
 
 import copy
 import pickle

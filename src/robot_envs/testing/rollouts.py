@@ -1,4 +1,4 @@
-"""Rollouts of an environment under test, and where two of them differ."""
+"""Rollouts of an environment under test, and their differences."""
 
 import contextlib
 import math
@@ -41,13 +41,7 @@ class Subject:
 
 
 def expect_error(call: Callable[[], Any], what: str, *kinds: type[Exception]) -> None:
-    """Raises AssertionError unless a call raises an error of some kinds.
-
-    Args:
-        call: what should be refused.
-        what: describes the call, for the error.
-        kinds: the errors that may be raised.
-    """
+    """Raises AssertionError, which says `what`, unless a call raises an error of some kinds."""
     wanted = " or ".join(kind.__name__ for kind in kinds)
     try:
         call()
@@ -71,13 +65,9 @@ PARTS = {
 
 
 def rollout(env: gymnasium.Env[Any, Any], steps: int, seed: int, two_phases: bool = False) -> Given:
-    """Returns the results of an environment for seeded random actions; episodes follow one another.
+    """Returns the results of seeded random actions; episodes follow one another.
 
-    Args:
-        env: the environment.
-        steps: number of actions.
-        seed: of the first episode, and of the actions.
-        two_phases: call `begin_step` before each step.
+    With `two_phases` it calls `begin_step` before each step.
     """
     env.action_space.seed(seed)
     given: Given = [env.reset(seed=seed)]
@@ -129,8 +119,8 @@ def outside(space: gymnasium.Space[Any], value: Any) -> str:
     if isinstance(space, gymnasium.spaces.Dict) and isinstance(value, Mapping):
         if value.keys() != space.keys():
             return f"it has {', '.join(value)}, and the space {', '.join(space.keys())}"
-        found = ((key, outside(part, value[key])) for key, part in space.items())
-        return next(f"{key}: {why}" for key, why in found if why)
+        reasons = ((key, outside(part, value[key])) for key, part in space.items())
+        return next(f"{key}: {why}" for key, why in reasons if why)
     if not isinstance(space, gymnasium.spaces.Box) or not isinstance(value, np.ndarray):
         return f"{value!r} isn't of {space}"
     if value.shape != space.shape or not np.can_cast(value.dtype, space.dtype):

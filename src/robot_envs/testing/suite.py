@@ -34,15 +34,15 @@ def check_robot_env(
     finds nothing. In this process also: vectors are bit-identical to environments alone.
 
     Args:
-        env: an id, "my_arm/Reach-v0" or "my_module:my_arm/Reach-v0"; or a function that makes an
+        env: An id, "my_arm/Reach-v0" or "my_module:my_arm/Reach-v0"; or a function that makes an
             environment from keyword arguments, which are `RobotEnv`'s.
-        backends: names of them.
-        options: that it is made with.
-        steps: of each rollout.
+        backends: Names of them.
+        options: That it is made with.
+        steps: Steps of each rollout.
 
     Raises:
-        AssertionError: lists broken promises and the environment's own errors, a line each.
-        RuntimeError: under `python -O`, which removes the checks.
+        AssertionError: Lists broken promises and the environment's own errors, a line each.
+        RuntimeError: Under `python -O`, which removes the checks.
     """
     if not __debug__:
         raise RuntimeError("check_robot_env checks by assert statements: run Python without -O")

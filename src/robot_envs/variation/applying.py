@@ -1,4 +1,4 @@
-"""Applies variations to robots, in one order on all backends, and restores the robots afterwards."""
+"""Application of variations to robots, in one order on all backends, and their reversal."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -63,11 +63,7 @@ class Applier:
         self._gravity: Vector | None = None
 
     def __call__(self, variation: Variation) -> None:
-        """Applies a variation to the robots as they were found.
-
-        Raises:
-            SimulatorError: for an unknown name, or if the world refuses.
-        """
+        """Applies a variation to the robots as they were found; raises SimulatorError for an unknown name."""
         if self._parts is None and variation.is_nominal:
             return
         parts = self._parts = self._parts or Parts(self._scene)

@@ -25,17 +25,10 @@ def is_number(value: Any) -> bool:
 def by_name(
     option: str, given: Any, names: Sequence[str], kind: str, which: str = ""
 ) -> dict[str, Any]:
-    """Returns an option's values by name, unchecked; a mapping may leave names out.
+    """Returns an option's values by name, unchecked: one for all, or a mapping, which may leave names out.
 
-    Args:
-        option: its name, for the error.
-        given: one value for all, or a mapping by name.
-        names: that exist.
-        kind: what has these names, for the error: "joint", "controller".
-        which: more about that, for the error: "that moves".
-
-    Raises:
-        ValueError: for an unknown name, with the nearest one.
+    `kind` and `which` describe what has the names ("joint", "that moves") in the ValueError for an unknown
+    one.
     """
     if not isinstance(given, Mapping):
         return dict.fromkeys(names, given)
@@ -87,19 +80,19 @@ class Sensor:
     control period, as drivers compute it: a multiple of step / period, without noise of its own.
 
     Args:
-        joints: their names.
-        period: of control [s].
-        noise: standard deviation of the normal noise on positions and velocities [m, m/s, rad, rad/s]: a
+        joints: Their names.
+        period: Period of control [s].
+        noise: Standard deviation of the normal noise on positions and velocities [m, m/s, rad, rad/s]: a
             number, or a pair (position, velocity), for all joints, or by joint. It is drawn for all joints,
             those of a mapping first, in its order, and added before an encoder rounds. A mapping may name
             sensors, too: a number for all that one measures, or by attribute of its `Reading`.
-        delay: age of a measurement [control steps]; until there are any so old, the episode's first is
+        delay: Age of a measurement [control steps]; until there are any so old, the episode's first is
             repeated.
-        encoder_step: resolution of positions [rad, m]: one for all joints, or by joint; 0: exact.
-        sensors: names of the sensors of a state.
+        encoder_step: Resolution of positions [rad, m]: one for all joints, or by joint; 0: exact.
+        sensors: Names of the sensors of a state.
 
     Raises:
-        ValueError: for an impossible number, or an unknown joint.
+        ValueError: For an impossible number, or an unknown joint.
     """
 
     def __init__(
@@ -117,10 +110,10 @@ class Sensor:
             self._sensors = {name: _by_part(noise[name]) for name in noise if name in sensors}
             noise = {name: each for name, each in noise.items() if name not in sensors}
         self._readings: dict[str, tuple[float, Reading]] = {}  # noisy ones, with their times [s]
-        found = by_name("sensor_noise", noise, joints, "joint")
-        sizes = {name: _pair("sensor_noise", size) for name, size in found.items()}
-        found = by_name("encoder_step", encoder_step, joints, "joint")
-        notches = {name: at_least_zero("encoder_step", size) for name, size in found.items()}
+        by_joint = by_name("sensor_noise", noise, joints, "joint")
+        sizes = {name: _pair("sensor_noise", size) for name, size in by_joint.items()}
+        by_joint = by_name("encoder_step", encoder_step, joints, "joint")
+        notches = {name: at_least_zero("encoder_step", size) for name, size in by_joint.items()}
         for size in notches.values():
             if 0.0 < size < LEAST_STEP:
                 raise ValueError(f"encoder_step must be 0 or at least {LEAST_STEP:g}, not {size!r}")
@@ -190,10 +183,10 @@ class Sensor:
         values = dict(reading.values)
         for part in [each for each in values if each in sizes]:
             exact = values[part]
-            found = exact + rng.normal(0.0, sizes[part], exact.shape)
+            noised = exact + rng.normal(0.0, sizes[part], exact.shape)
             if exact.dtype == np.uint8:
-                found = np.rint(np.clip(found, 0.0, 255.0))
-            values[part] = found.astype(exact.dtype)
+                noised = np.rint(np.clip(noised, 0.0, 255.0))
+            values[part] = noised.astype(exact.dtype)
         noisy = Reading(reading.time, values)
         self._readings[name] = (reading.time, noisy)
         return noisy
@@ -238,17 +231,17 @@ class Actuator:
     Angles are treated as plain numbers: a set-point that jumps from pi to -pi passes 0.
 
     Args:
-        holds: whether a controller takes positions, or else velocities or efforts, by its name.
-        period: of control [s].
-        delay: how many control steps pass before a command arrives; until then controllers hold what they
+        holds: Whether a controller takes positions, or else velocities or efforts, by its name.
+        period: Period of control [s].
+        delay: How many control steps pass before a command arrives; until then controllers hold what they
             held at the episode's start.
-        limit: one for all, or by controller. Efforts [N, N m] and velocities [m/s, rad/s] are clipped to it,
+        limit: One for all, or by controller. Efforts [N, N m] and velocities [m/s, rad/s] are clipped to it,
             either way; positions move no faster than that [m/s, rad/s].
-        lag: time constant of a first-order lag [s]: one for all, or by controller; 0: none. During a control
+        lag: Time constant of a first-order lag [s]: one for all, or by controller; 0: none. During a control
             period a controller gets what the lag reaches at its end: 1 - exp(-t / lag) of a step.
 
     Raises:
-        ValueError: for an impossible number, or an unknown controller.
+        ValueError: For an impossible number, or an unknown controller.
     """
 
     def __init__(
@@ -292,21 +285,13 @@ class Actuator:
         return not (self._delay or self._limits or self._lags)
 
     def begin(self, held: Mapping[str, Any]) -> None:
-        """Starts an episode.
-
-        Args:
-            held: what the controllers hold, all of them.
-        """
+        """Starts an episode with what all controllers hold."""
         self._sent.clear()
         self._sent.extend([dict(held)] * self._delay)
         self._limited, self._reached = dict(held), dict(held)
 
     def __call__(self, commands: Mapping[str, Any]) -> Commands:
-        """Returns the commands that reach the controllers in a control period.
-
-        Args:
-            commands: what is sent to each of them, or was sent last.
-        """
+        """Returns the commands that reach the controllers; `commands` has the last one of each."""
         self._sent.append(dict(commands))
         arriving = self._sent[0]
         self._limited = _ruled(self._limits, arriving, self._limited)
@@ -328,11 +313,11 @@ def _lag(share: float, wanted: float, before: float) -> float:
 
 def _ruled(rules: Rules, wanted: Commands, before: Commands) -> Commands:
     """Applies each controller's rule, number by number."""
-    found = dict(wanted)
+    ruled = dict(wanted)
     for name, (rule, size) in rules.items():
         to, at = wanted[name], before[name]
         if isinstance(to, tuple):
-            found[name] = tuple(rule(size, *each) for each in zip(to, at, strict=True))
+            ruled[name] = tuple(rule(size, *each) for each in zip(to, at, strict=True))
         else:
-            found[name] = rule(size, to, at)
-    return found
+            ruled[name] = rule(size, to, at)
+    return ruled

@@ -37,9 +37,6 @@ class Parts:
     | `lumped` | links that a fixed joint merges into another one: that one's name |
     | `joints` | joints that move |
     | `controllers` | controllers that run |
-
-    Raises:
-        RobotEnvError: if something in a robot's description is wrong.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -65,19 +62,19 @@ class Parts:
 
     def pids(self) -> dict[str, dict[str, Gains]]:
         """The gains of all PIDs, by controller and place below it; only controllers that have PIDs."""
-        found = {name: gains_of(part) for name, part in self.controllers.items()}
-        return {name: gains for name, gains in found.items() if gains}
+        gains_by_controller = {name: gains_of(part) for name, part in self.controllers.items()}
+        return {name: gains for name, gains in gains_by_controller.items() if gains}
 
 
 def varied(parts: Mapping[str, RobotPart], kind: str, names: Iterable[str]) -> dict[str, RobotPart]:
     """Returns the parts with these names; raises SimulatorError, which tells their kind, if there is none."""
-    found = {}
+    chosen = {}
     for name in names:
         if name not in parts:
             hint = nearest_or_all(name, parts)
             raise SimulatorError(f"there is no {kind} '{name}' to vary{hint}")
-        found[name] = parts[name]
-    return found
+        chosen[name] = parts[name]
+    return chosen
 
 
 def gains_of(controller: RobotPart) -> dict[str, Gains]:
@@ -91,15 +88,7 @@ def gains_of(controller: RobotPart) -> dict[str, Gains]:
 
 
 def check_tunable(pids: Mapping[str, Mapping[str, Gains]], factors: Mapping[str, float]) -> None:
-    """Checks that gains can be changed over ROS: dynamic_reconfigure silently clips large ones.
-
-    Args:
-        pids: gains by controller, and place below it.
-        factors: the largest, by controller.
-
-    Raises:
-        ValueError: if gains are too large for dynamic_reconfigure.
-    """
+    """Raises ValueError for gains, times their largest factors, that dynamic_reconfigure would clip."""
     for controller, factor in factors.items():
         for place, gains in pids[controller].items():
             for name, most in MOST_GAINS.items():

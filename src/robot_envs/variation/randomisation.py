@@ -74,15 +74,9 @@ def check_names(given: Iterable[str]) -> None:
 
 
 def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, UniformRange]:
-    """Returns the intervals of an option, by name.
+    """Returns an option's intervals by name, from a number, a pair (low, high), or a mapping.
 
-    Args:
-        option: the option.
-        given: a number, a pair (low, high), or a mapping with either by name.
-        names: of the links, joints or controllers that have it.
-
-    Raises:
-        ValueError: for an impossible interval, or an unknown name.
+    Raises ValueError for an impossible interval, or an unknown name.
     """
     if not names:
         raise ValueError(
@@ -92,9 +86,9 @@ def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, Unifor
         return dict.fromkeys(names, _range(option, given, option.name))
     if option.of == WORLD:
         raise ValueError(f"randomisation of {option.name} is one for the world, not {dict(given)}")
-    found = by_name(f"randomisation of {option.name}", given, names, *option.of)
+    values = by_name(f"randomisation of {option.name}", given, names, *option.of)
     return {
-        name: _range(option, value, f"{option.name} of '{name}'") for name, value in found.items()
+        name: _range(option, value, f"{option.name} of '{name}'") for name, value in values.items()
     }
 
 
@@ -145,12 +139,12 @@ class UniformRandomisation(Shared):
     The same count of random numbers is drawn whatever the options, so that later draws don't depend on them.
 
     Args:
-        scene: the robots; names are as in `Parts`.
-        options: by name.
+        scene: The robots; names are as in `Parts`.
+        options: By name.
 
     Raises:
-        ValueError: for an unknown option or name, or an impossible interval.
-        RobotEnvError: if something in a robot's description is wrong.
+        ValueError: For an unknown option or name, or an impossible interval.
+        RobotEnvError: If something in a robot's description is wrong.
     """
 
     def __init__(self, scene: Scene, options: Mapping[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""What may differ from a robot as it was made, and what becomes of a link's inertia."""
+"""Variations of a robot, and their effect on a link's inertia."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -31,12 +31,12 @@ class Variation:
     Links, joints and controllers that aren't named stay as the variation before left them.
 
     Args:
-        links: by the link's name.
-        damping: viscous friction that is added to a joint's own [N s/m, N m s/rad], by its name.
-        friction: dry friction that is added to a joint's own [N, N m], by its name.
-        surfaces: factors of a link's surface friction, by its name.
-        gains: factors of p, i and d of all PIDs of a controller, by its name; clamps stay.
-        gravity: factor of the world's; None: unchanged.
+        links: By the link's name.
+        damping: Viscous friction that is added to a joint's own [N s/m, N m s/rad], by its name.
+        friction: Dry friction that is added to a joint's own [N, N m], by its name.
+        surfaces: Factors of a link's surface friction, by its name.
+        gains: Factors of p, i and d of all PIDs of a controller, by its name; clamps stay.
+        gravity: Factor of the world's; None: unchanged.
     """
 
     links: Mapping[str, LinkScale] = field(default_factory=dict)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
-from robot_sim.control.controllers import BUILT_IN
+from robot_sim.control.controllers import built_in
 from robot_sim.control.controllers.base import Controller
 from robot_sim.control.errors import ControlError, faults
 from robot_sim.control.hardware import RobotHardware
@@ -39,7 +39,7 @@ class ControllerManager:
 
     def __init__(self, hardware: RobotHardware) -> None:
         self.hardware = hardware
-        self.types: dict[str, type[Controller]] = dict(BUILT_IN)
+        self.types: dict[str, type[Controller]] = dict(built_in())
         self._controllers: dict[str, Controller] = {}
         self._running: list[Controller] = []
         self.version = 0  # changes whenever `loaded` does

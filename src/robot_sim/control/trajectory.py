@@ -7,11 +7,11 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.joint import JointHandle, shortest_distance
 from robot_sim.control.pid import Pid
 from robot_sim.state_dict import Stateful, load
 
-NANOSECONDS = 1_000_000_000
 Coefficients = tuple[float, float, float, float, float, float]
 
 

@@ -8,13 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.errors import ControlError
-from robot_sim.control.trajectory import NANOSECONDS, Axis, Waypoint
+from robot_sim.control.trajectory import Axis, Waypoint
 
 SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS = 0, -1, -2  # control_msgs/FollowJointTrajectoryResult
 PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = -4, -5
 MOST_NAMED = 10  # joints of the client in an error text
-LARGEST = 1e12  # of a position and its derivatives: a spline's coefficients would overflow
+LARGEST_VALUE = 1e12  # of a position and its derivatives: a spline's coefficients would overflow
 SUCCEEDED, ABORTED, CANCELED = "succeeded", "aborted", "canceled"
 
 
@@ -106,9 +107,11 @@ def _fault(point: TrajectoryPoint, joints: int) -> str:
     for what, values in zip(point._fields[1:], point[1:], strict=True):
         if values and len(values) != joints:
             return f"it has {len(values)} {what} for {joints} joints"
-        bad = [value for value in values if not (math.isfinite(value) and abs(value) <= LARGEST)]
+        bad = [
+            value for value in values if not (math.isfinite(value) and abs(value) <= LARGEST_VALUE)
+        ]
         if bad:
-            return f"its {what} must be finite and within {LARGEST:g}: {bad[0]}"
+            return f"its {what} must be finite and within {LARGEST_VALUE:g}: {bad[0]}"
     return ""
 
 

@@ -5,11 +5,11 @@ from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.state_dict import Stateful
 
 Triple = tuple[float, float, float]
 STRAIGHT = 1e-6  # [rad]; below it an arc is a line
-NANOSECONDS = 1_000_000_000
 SLOWEST = 1e-9  # [Hz]
 UNKNOWN = 1e12  # the variance of what is not measured
 POSE = (1e-5, 1e-5, UNKNOWN, UNKNOWN, UNKNOWN, 1e-3)  # covariances of most plugins

@@ -3,6 +3,7 @@
 import math
 import os
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import NamedTuple
@@ -279,6 +280,7 @@ class ModelDescription:
         root: the link that no joint carries.
         root_pose: of the root link in the model.
         world_joints: joints that fix the root link to the world.
+        foot: how many joints come before the one to the world, if `joints` hasn't got it.
         left_out: plugins and the like, which nothing simulates.
         stand_ins: models of Gazebo's database that aren't installed, in whose place simpler ones stand.
         islands: links of a static model that no joint connects with the root, and their poses seen from it.
@@ -286,6 +288,7 @@ class ModelDescription:
         lumped: links that a fixed joint has made part of another one: that link, and their poses in it.
         initial_pose: where the file puts the model.
         start: how it begins, if not there.
+        script: of an actor: where it is at a time [s], if it was at a pose before it started.
     """
 
     name: str
@@ -294,6 +297,7 @@ class ModelDescription:
     root: str
     root_pose: Pose = Pose()
     world_joints: list[str] = field(default_factory=list)
+    foot: int = 0
     plugins: list[Plugin] = field(default_factory=list)
     sensors: list[Sensor] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -304,6 +308,7 @@ class ModelDescription:
     lumped: dict[str, tuple[str, Pose]] = field(default_factory=dict)
     initial_pose: Pose = Pose()
     start: SavedMotion | None = None
+    script: Callable[[float, Pose], Pose] | None = None
     static: bool = False
 
     @property

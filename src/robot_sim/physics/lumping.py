@@ -92,6 +92,7 @@ def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
     """
     model.joints = dict(sorted(model.joints.items()))
     detach_from_world(model)
+    model.foot = 0
     order = _depth_first(model)
     above = {joint.child: joint for joint in model.joints.values()}
     for child in reversed(_depth_first(model, backwards=True)):
@@ -144,6 +145,7 @@ def detach_from_world(model: ModelDescription) -> None:
     anchors = [joint for joint in model.joints.values() if joint.parent == WORLD]
     model.world_joints = [joint.name for joint in anchors if joint.kind == "fixed"]
     if len(anchors) == 1 and anchors[0].kind == "fixed":
+        model.foot = list(model.joints).index(anchors[0].name)
         del model.joints[anchors[0].name], model.links[WORLD]
         model.root, model.root_pose = anchors[0].child, anchors[0].pose
     elif not model.world_joints:

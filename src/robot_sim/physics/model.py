@@ -60,10 +60,10 @@ class Model(Shared):
 
     @property
     def all_joints(self) -> list[str]:
-        """Names of all joints that Gazebo lists, fixed ones included."""
-        anchors = [name for name in self.description.world_joints if name != WORLD]
-        others = [name for name in self.description.joints if name not in anchors]
-        return anchors + others
+        """Names of all joints that Gazebo lists, fixed ones included, in document order."""
+        names, place = list(self.description.joints), self.description.foot
+        names[place:place] = set(self.description.world_joints) - {WORLD, *names}  # one at most
+        return names
 
     def joint_index(self, name: str) -> int:
         """Returns the index of a movable joint in the body."""
@@ -84,15 +84,19 @@ class Model(Shared):
 
     def link_poses(self) -> list[Pose]:
         """Returns the poses of the frames of all links in `link_names`, in world axes."""
-        return [pose for name, pose in self.body.link_poses().items() if name != WORLD]
+        return [pose for name, pose in self.poses_by_link().items() if name != WORLD]
+
+    def poses_by_link(self) -> dict[str, Pose]:
+        """Returns the poses of the frames of all links, in world axes."""
+        return self.body.link_poses()
 
     def root_state(self) -> tuple[Pose, Twist]:
         """Returns pose and twist of the canonical (first) link's frame, in world axes."""
-        return self.body.link_state(self.description.root)
+        return self.link_state(self.description.root)
 
     def state(self) -> tuple[Pose, Twist]:
         """Returns the model frame's pose and the twist of its canonical (first) link, in world axes."""
-        pose, twist = self.body.link_state(self.description.root)
+        pose, twist = self.link_state(self.description.root)
         return pose.compose(self.description.root_pose.inverse()), twist
 
     def place(self, pose: Pose, twist: Twist = AT_REST) -> None:

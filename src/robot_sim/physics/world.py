@@ -1,10 +1,11 @@
 """The physics world: models by name, Gazebo's name look-up, and the step that integrates them all."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from robot_sim.physics import passive_forces
+from robot_sim.physics.actor import Actor
 from robot_sim.physics.description import (
     DescriptionError,
     Inertia,
@@ -13,7 +14,7 @@ from robot_sim.physics.description import (
     ModelDescription,
     Shape,
 )
-from robot_sim.physics.engine import Contact, Engine, Side, Twist
+from robot_sim.physics.engine import Body, Contact, Engine, Side, Twist
 from robot_sim.physics.entity_names import EntityNames
 from robot_sim.physics.model import AT_REST, Model
 from robot_sim.physics.pose import Pose, Vector, conjugate, rotate, subtract
@@ -80,6 +81,7 @@ class World(Shared):
         self.models: dict[str, Model] = {}
         self.lights: dict[str, Light] = {}
         self.attachments: list[Attachment] = []
+        self.clock: Callable[[], float] = lambda: 0.0  # of the simulator
         self.version = 0  # counts what changes the look of the world: models and lights
         self._names = EntityNames()
         self._special: list[Model] = []  # with springs, decay or a kinematic link
@@ -101,11 +103,13 @@ class World(Shared):
             raise NameTaken(name)
         self._renew()
         body = self.engine.load(description, pose.compose(description.root_pose))
-        return self.admit(Model(name, description, body, pose))
+        return self.admit(name, description, body, pose)
 
-    def admit(self, model: Model) -> Model:
+    def admit(self, name: str, description: ModelDescription, body: Body, pose: Pose) -> Model:
         """Adds a model whose body the engine has."""
-        description, body = model.description, model.body
+        given = name, description, body, pose
+        now = lambda: self.clock()  # noqa: E731, PLW0108 - a simulator replaces the clock
+        model = Actor(now, *given) if description.script else Model(*given)
         try:
             model.apply_damping(self.time_step)
             model.put_followers()

@@ -18,11 +18,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.physics.description import Shape
 from robot_sim.physics.engines import installing
 from robot_sim.physics.model import Model
 from robot_sim.pictures.visuals import VisibleModel, visible_model, visible_shapes
-from robot_sim.simulator import NANOSECONDS, Simulator
+from robot_sim.simulator import Simulator
 
 MAIN = "import sys; from robot_sim.pictures.films import main; sys.exit(main())"
 SUFFIXES = (".mp4", ".html", ".png")

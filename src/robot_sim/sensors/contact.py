@@ -3,9 +3,9 @@
 import logging
 from typing import ClassVar
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.physics.lumping import LUMPED
 from robot_sim.sensors.sensing import Field, Measurement, Mount, sensor_of
-from robot_sim.simulator import NANOSECONDS
 from robot_sim.state import ContactPair, contact_pairs
 
 logger = logging.getLogger(f"rosout.{__name__}")

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from robot_sim.applied_forces import Wrench
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.hardware import FORCE_TORQUE
 from robot_sim.physics.description import DescriptionError, Inertia, Joint, ModelDescription
 from robot_sim.physics.dynamics import tensor_in
@@ -26,7 +27,7 @@ from robot_sim.physics.pose import (
     subtract,
 )
 from robot_sim.sensors.sensing import Measurement, Mount, sensor_of
-from robot_sim.simulator import NANOSECONDS, Simulator
+from robot_sim.simulator import Simulator
 from robot_sim.state_dict import Stateful
 
 NOTHING: Wrench = (ZERO, ZERO)

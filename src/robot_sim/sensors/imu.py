@@ -5,6 +5,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.hardware import IMU
 from robot_sim.physics.files.elements import numbers, truth
 from robot_sim.physics.model import Model
@@ -23,7 +24,6 @@ from robot_sim.physics.pose import (
 )
 from robot_sim.sensors.noise import read_noise
 from robot_sim.sensors.sensing import Field, Measurement, Mount, sensor_of, slower
-from robot_sim.simulator import NANOSECONDS
 from robot_sim.state_dict import Stateful
 
 HERE = Pose()

@@ -14,7 +14,7 @@ from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.files.sdf_parts import value
 
 GAUSSIAN = ("gaussian", "gaussian_quantized")
-LARGEST = 1e9
+LARGEST_DEVIATION = 1e9
 DEVIATIONS = ("stddev", "bias_stddev")
 
 
@@ -68,13 +68,17 @@ def read_noise(parent: Element | None, where: str) -> Noise | None:
     for name, number in found.items():
         what = f"{where}, <noise>: <{name}>"
         checked_deviation(number if name in DEVIATIONS else abs(number), what)
-        if name == "precision" and 0.0 < abs(number) < 1.0 / LARGEST:
-            raise DescriptionError(f"{what} is {number:g}; it must be {1.0 / LARGEST:g} or more")
+        if name == "precision" and 0.0 < abs(number) < 1.0 / LARGEST_DEVIATION:
+            raise DescriptionError(
+                f"{what} is {number:g}; it must be {1.0 / LARGEST_DEVIATION:g} or more"
+            )
     return Noise(**{name: number + 0.0 for name, number in found.items()})
 
 
 def checked_deviation(deviation: float, what: str) -> float:
     """Returns a deviation; a negative or absurd one is a DescriptionError."""
-    if not 0.0 <= deviation <= LARGEST:
-        raise DescriptionError(f"{what} is {deviation:g}; it must be between 0 and {LARGEST:g}")
+    if not 0.0 <= deviation <= LARGEST_DEVIATION:
+        raise DescriptionError(
+            f"{what} is {deviation:g}; it must be between 0 and {LARGEST_DEVIATION:g}"
+        )
     return deviation + 0.0  # of -0.0 NumPy's generator says that it is negative

@@ -276,7 +276,7 @@ class RayScene:
         for index in targets.tolist():
             model, link = self.targets[index][:2]
             if model not in poses:
-                poses[model] = model.body.link_poses()
+                poses[model] = model.poses_by_link()
             links.append(poses[model][link])
         turns, places = frames(links)
         self._turns[targets] = turns @ self._own_turns[targets]

@@ -11,9 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.moves import Moved
 from robot_sim.physics.model import Model
-from robot_sim.simulator import NANOSECONDS, Simulator
+from robot_sim.simulator import Simulator
 from robot_sim.state_dict import Shared, Stateful
 
 Measure = Callable[[int], None]

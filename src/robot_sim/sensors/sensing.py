@@ -17,7 +17,7 @@ from robot_sim.simulator import Simulator
 from robot_sim.state_dict import Shared, Stateful
 
 FURTHEST = 1e9  # [m] that a sensor reaches
-LARGEST = 1e30  # number of a plugin: messages have 32-bit floats
+LARGEST_NUMBER = 1e30  # number of a plugin: messages have 32-bit floats
 
 
 class Sensing(Shared, Stateful):
@@ -96,8 +96,8 @@ class Mount(Shared):
     def number(self, tag: str, default: float) -> float:
         """Returns the number in the plugin's child element `tag`; a faulty one is a DescriptionError."""
         found = value(self.plugin.element, tag, f"plugin {self.plugin.filename}", default)
-        if found != default and abs(found) > LARGEST:
-            raise DescriptionError(f"<{tag}> is {found:g}; it must be within ±{LARGEST:g}")
+        if found != default and abs(found) > LARGEST_NUMBER:
+            raise DescriptionError(f"<{tag}> is {found:g}; it must be within ±{LARGEST_NUMBER:g}")
         return found
 
     def rate(self, tag: str = "updateRate", default: float = 0.0) -> float:

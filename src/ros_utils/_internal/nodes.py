@@ -1,4 +1,4 @@
-"""Queries and shuts down the nodes of a ROS master; every call has a time limit."""
+"""Nodes of a ROS master: queries and shutdown; every call has a time limit."""
 
 import contextlib
 import time
@@ -33,8 +33,8 @@ def node_uri(name: str) -> str | None:
 
 def node_uris() -> dict[str, str]:
     """Returns the XML-RPC addresses of all registered nodes, by name."""
-    found = {name: node_uri(name) for name in node_names()}
-    return {name: address for name, address in found.items() if address}
+    uris = {name: node_uri(name) for name in node_names()}
+    return {name: address for name, address in uris.items() if address}
 
 
 def node_pid(address: str) -> int | None:
@@ -79,9 +79,7 @@ def _started_with(pid: int) -> str | None:
 def ask_to_shut_down(address: str) -> bool:
     """Asks the node at an XML-RPC address to shut itself down, as rosnode kill does.
 
-    Returns:
-        False if no one listens there, or a node of another master does: it may have got a dead
-        node's port.
+    Returns False if no one listens there, or a node of another master, which got a dead node's port.
     """
     theirs = _master_of(address)
     if theirs is not None and not _master.is_at(theirs):
@@ -96,16 +94,9 @@ def ask_to_shut_down(address: str) -> bool:
 
 
 def shut_down_nodes(nodes: dict[str, str], timeout: float = 5.0) -> list[str]:
-    """Asks nodes to shut down and waits until they are unregistered.
+    """Shuts down nodes, given by name and XML-RPC address, but not the caller's own and rosout.
 
-    Skips the caller's own node and rosout.
-
-    Args:
-        nodes: XML-RPC addresses by name.
-        timeout: limit of the wait for all of them [s].
-
-    Returns:
-        The names that are still registered afterwards.
+    Returns the names that are still registered after `timeout` [s].
     """
     asked = {
         name: address
@@ -118,24 +109,17 @@ def shut_down_nodes(nodes: dict[str, str], timeout: float = 5.0) -> list[str]:
     # Not wait_until(): it ends once the caller's own node has shut down.
     while asked and time.monotonic() < deadline:
         for name, address in list(asked.items()):
-            if _is_dead(address):
+            try:
+                call_node(address, "getPid", timeout=1.0)
+            except NobodyListens:
                 _unregister(name, address)
+            except (NoAnswer, Refused):
+                pass
         # Not by lookupNode: it also knows nodes of which only a parameter subscription is left
         asked = {name: asked[name] for name in node_names() if name in asked}
         if asked:
             time.sleep(POLL)
     return list(asked)
-
-
-def _is_dead(address: str) -> bool:
-    """Returns True if no one listens at a node's XML-RPC address any more."""
-    try:
-        call_node(address, "getPid", timeout=1.0)
-    except NobodyListens:
-        return True
-    except (NoAnswer, Refused):
-        pass
-    return False
 
 
 def _unregister(name: str, address: str) -> None:

@@ -1,4 +1,4 @@
-"""Finds packages and the files in them; expands robot descriptions (xacro)."""
+"""Package lookup, and expansion of robot descriptions (xacro)."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Reads and sets parameters of the current master (`ros_calls.master.using`), with a time limit.
+"""Parameters of the current master (`ros_calls.master.using`), with a time limit.
 
 rospy's own functions know one master per process.
 """
@@ -13,12 +13,7 @@ from ros_calls.master import NoAnswer, Refused
 
 
 def get(name: str) -> Any:
-    """Returns the value of a parameter.
-
-    Raises:
-        KeyError: the parameter isn't set.
-        MasterDown: no master.
-    """
+    """Returns a parameter; raises KeyError if it isn't set, MasterDown without a master."""
     _master.require()
     resolved = rospy.resolve_name(name)
     try:

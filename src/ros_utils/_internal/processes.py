@@ -1,4 +1,4 @@
-"""Finds the programs that this toolkit started, from any process of the user, and ends them.
+"""Programs that this toolkit started, found from any process of the user, and their end.
 
 All descendants of a start carry its description in an environment variable. So they are found even if their
 parent was killed, and there is no list that could be out of date.
@@ -95,42 +95,34 @@ def families(tokens: Sequence[str]) -> list[dict[int, psutil.Process]]:
             marks[process.pid] = process.environ().get(MARK, "")
     result = []
     for token in tokens:
-        found = {pid for pid, mark in marks.items() if token in mark}
-        while grown := {pid for pid, parent in parents.items() if parent in found} - found:
-            found |= grown
-        result.append({pid: everything[pid] for pid in found if _lives(pid)})
+        pids = {pid for pid, mark in marks.items() if token in mark}
+        while grown := {pid for pid, parent in parents.items() if parent in pids} - pids:
+            pids |= grown
+        result.append({pid: everything[pid] for pid in pids if _lives(pid)})
     return result
 
 
 def started(own: Sequence[Start]) -> list[Start]:
     """Returns what any process of this user started under this master and still runs.
 
-    Args:
-        own: of the calling process; one whose main thread has ended, but not the others, has no
-            environment any more.
+    `own` are the caller's: a process whose main thread has ended, but not the others, has no environment any
+    more.
     """
-    found = {start.token: start for start in own}
+    starts = {start.token: start for start in own}
     for process in psutil.process_iter():
         with contextlib.suppress(psutil.Error):
             for start in _starts(process.environ().get(MARK, "")):
-                found[start.token] = start
+                starts[start.token] = start
     with contextlib.suppress(_master.MasterDown):
-        return [start for start in found.values() if _master.is_at(start.master)]
+        return [start for start in starts.values() if _master.is_at(start.master)]
     return []
 
 
 def end(starts: Sequence[Start], reap: Callable[[set[str]], bool]) -> bool:
-    """Ends starts with their descendants, nodes first and the master last.
+    """Ends starts with their descendants, nodes first and the master last; returns whether nothing is left.
 
-    Skips a start that the calling process itself descends from.
-
-    Args:
-        starts: what to end.
-        reap: collects exit codes of ended children; given tokens, waits for theirs and returns whether
-            all have come.
-
-    Returns:
-        Whether nothing else of them is left.
+    Skips a start that the calling process itself descends from. `reap` collects exit codes of ended children;
+    given tokens, it waits for theirs and returns whether all have come.
     """
     own_line = {process.pid for process in (psutil.Process(), *psutil.Process().parents())}
     gone = True
@@ -148,11 +140,8 @@ def end(starts: Sequence[Start], reap: Callable[[set[str]], bool]) -> bool:
 def end_orphans(reap: Callable[[set[str]], bool]) -> bool:
     """Waits until launches and masters with a killed caller are gone: the kernel has signalled them.
 
-    That takes some seconds, in which their master still answers. Those that don't end by themselves are
-    ended.
-
-    Returns:
-        Whether none is left.
+    In these seconds their master still answers. Ends those that don't end by themselves; returns whether none
+    is left.
     """
     orphans = [each for each in started(()) if each.kind != "node" and each.is_orphan]
     deadline = time.monotonic() + max((END_PATIENCE[each.kind] for each in orphans), default=0.0)
@@ -213,12 +202,12 @@ def _end_with(
 
 def _children(members: dict[int, psutil.Process]) -> set[int]:
     """Returns the ids of members whose parent is one, too."""
-    found = set()
+    children = set()
     for pid, process in members.items():
         with contextlib.suppress(psutil.Error):
             if process.ppid() in members:
-                found.add(pid)
-    return found
+                children.add(pid)
+    return children
 
 
 def _group(pid: int) -> int:

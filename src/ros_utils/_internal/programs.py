@@ -1,4 +1,4 @@
-"""Starts programs, waits until they are ready, and ends them when this process exits.
+"""Programs: start, readiness, and their end when this process exits.
 
 Every program gets its own session: Ctrl-C in the terminal reaches only the caller, whose exit then ends the
 programs in order. If the caller is killed outright, the kernel sends them SIGTERM (needs setpriv of
@@ -90,14 +90,14 @@ class Handle:
 class Started(int):
     """A started program. It is true and equal to True, so ``if ros_launch_…(…):`` works.
 
-    It ends with `close` or a ``with`` block, and at the latest when this Python process exits.
+    It ends with `close` or a ``with`` block, and at the latest when this Python process exits. Without a
+    handle the program ran before, and `close` doesn't end it.
     """
 
     _handle: Handle | None
     master_uri: str
 
     def __new__(cls, handle: Handle | None = None) -> "Started":
-        """Without a handle the program ran before, and `close` doesn't end it."""
         self = super().__new__(cls, 1)
         self._handle = handle
         self.master_uri = _master.uri()
@@ -154,20 +154,16 @@ def start(
     log_file: str | None = None,
     env: Mapping[str, str] | None = None,
 ) -> Handle:
-    """Starts a program in its own session.
+    """Starts a program in its own session; raises CannotStart if it or its log can't be opened.
 
     Args:
-        command: the program and its arguments.
+        command: The program and its arguments.
         kind: "master", "launch" or "node"; programs are ended in the order node, launch, master.
-        label: the program's name for the user.
-        window: run it in an xterm if there is a display and xterm is installed; otherwise its
-            output goes to a file.
-        screen: its output goes to the caller's terminal instead of a file.
-        log_file: the file for its output; None for one of its own in ROS's log folder.
-        env: variables in addition to the caller's.
-
-    Raises:
-        CannotStart: no such program, or the log file can't be written.
+        label: The program's name for the user.
+        window: Run it in an xterm if there is a display and xterm; otherwise its output goes to a file.
+        screen: Its output goes to the caller's terminal instead of a file.
+        log_file: The file for its output; None for one of its own in ROS's log folder.
+        env: Variables in addition to the caller's.
     """
     if shutil.which(command[0]) is None:
         raise CannotStart(f"{command[0]}: no such program, or not executable")
@@ -215,13 +211,10 @@ def started() -> list[_processes.Start]:
 
 
 def _reap(tokens: set[str]) -> bool:
-    """Collects exit codes of ended children, which stay zombies until then.
+    """Collects exit codes of ended children; returns False if one with these tokens gives none.
 
-    On a busy machine a process's other threads may outlive its main thread for a while; it has no exit
-    code until they end.
-
-    Returns:
-        False if a child with one of these tokens gives no exit code in time.
+    On a busy machine a process's other threads may outlive its main thread for a while; until they end it has
+    none.
     """
     with _lock:
         ours = [handle.process for handle in _handles if handle.start.token in tokens]
@@ -312,15 +305,12 @@ def await_start(
     """Waits for a started program, then for its world; ends it and logs the reason if one isn't there.
 
     Args:
-        handle: the program.
-        is_there: returns whether it can be used.
-        absent: what to report if it can't in time.
-        timeout: limit of each of the waits, the second one from now on [s].
-        ready: the world to wait for; None for no wait.
-        may_end: whether it may end by itself, without an error, before that.
-
-    Raises:
-        rospy.ROSInterruptException: the caller's node was shut down meanwhile.
+        handle: The program.
+        is_there: Returns whether it can be used.
+        absent: What to report if it can't in time.
+        timeout: Limit of each of the waits, the second one from now on [s].
+        ready: The world to wait for; None for no wait.
+        may_end: Whether it may end by itself, without an error, before that.
     """
     begin = time.monotonic()
 
@@ -329,11 +319,11 @@ def await_start(
         ended = handle.exit_code() is not None
         return "there" if is_there() else "ended" if ended else ""
 
-    found = wait_until(look, timeout, handle.start.label)
+    result = wait_until(look, timeout, handle.start.label)
     fault, code = "", handle.exit_code()
-    if not found:
+    if not result:
         fault = f"{absent} after {timeout:g} s; ended it"
-    elif code or (found == "ended" and not may_end):
+    elif code or (result == "ended" and not may_end):
         fault = f"ended with exit code {code}"
     if fault:
         reason = handle.reason()  # before it is told to end, and reports that
@@ -346,16 +336,9 @@ def await_start(
 def wait_for_world(
     started: Started, ready: Ready | None, deadline: float, timeout: float
 ) -> Started | bool:
-    """Waits until a world is ready after a start; ends the started program if it isn't.
+    """Waits until a world is ready; ends the program if it isn't by the deadline (time.monotonic()).
 
-    Args:
-        started: the program, and the result on success.
-        ready: the world to wait for; None for no wait.
-        deadline: of the wait, by time.monotonic() [s].
-        timeout: what the wait is reported to have taken [s].
-
-    Raises:
-        rospy.ROSInterruptException: the caller's node was shut down meanwhile.
+    `timeout` is the wait that the error reports [s].
     """
     if ready is None:
         return started

@@ -1,4 +1,4 @@
-"""Starts roslaunch, and asks it about its processes. Part of `ros_launch` and `ros_gazebo`."""
+"""roslaunch and its processes. Part of `ros_launch` and `ros_gazebo`."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -25,22 +25,12 @@ def start(
     log_file: str | None = None,
     env: Mapping[str, str] | None = None,
 ) -> Handle:
-    """Starts roslaunch without waiting for anything.
-
-    Raises:
-        MasterDown: there is no master and roslaunch couldn't start one there.
-        CannotStart: roslaunch can't be run.
-    """
+    """Starts roslaunch; raises CannotStart, or MasterDown if it couldn't start a master either."""
     _programs.end_orphans()  # else their ending master would pass for a lasting one
     _master.is_up_or_startable()
+    command = ["roslaunch", *arguments]
     return _programs.start(
-        ["roslaunch", *arguments],
-        "launch",
-        label,
-        window=window,
-        screen=screen,
-        log_file=log_file,
-        env=env,
+        command, "launch", label, window=window, screen=screen, log_file=log_file, env=env
     )
 
 
@@ -74,11 +64,7 @@ def list_processes(handle: Handle) -> tuple[list[str], list[str]] | None:
 
 
 def await_nodes(handle: Handle) -> bool:
-    """Waits until the processes of a launch have registered as nodes; briefly, as not every program is one.
-
-    Returns:
-        False, at once, while the launch hasn't started its processes.
-    """
+    """Waits, briefly, until a launch's processes have registered; returns False while there are none."""
     if list_processes(handle) is None:
         return False
     deadline = time.monotonic() + SETTLE
@@ -92,15 +78,12 @@ def await_nodes(handle: Handle) -> bool:
         if time.monotonic() - since > quiet and _own_nodes(handle) >= len(seen[0]):
             break
         time.sleep(POLL)
-    if seen[1]:
-        _warn(handle, f"ended already: {', '.join(seen[1])}")
-    for line in handle.lines("cannot launch node"):  # roslaunch continues with the other nodes
-        _warn(handle, line)
+    told = [f"ended already: {', '.join(seen[1])}"] if seen[1] else []
+    for line in told + handle.lines(
+        "cannot launch node"
+    ):  # roslaunch continues with the other nodes
+        _log.warn(f"{handle.start.label}: {line}{handle.where()}")
     return True
-
-
-def _warn(handle: Handle, text: str) -> None:
-    _log.warn(f"{handle.start.label}: {text}{handle.where()}")
 
 
 def _own_nodes(handle: Handle) -> int:

@@ -47,12 +47,7 @@ def failure_folder(test: str) -> Path:
 def tell(folder: Path, seed: int, failure: str, message: str, again: str) -> str:
     """Writes the failure and the seed beside the recording, and returns what to say about it.
 
-    Args:
-        folder: of the recording.
-        seed: of the world.
-        failure: the test's failure, with where it was.
-        message: the same in one line.
-        again: that of the second, recorded run; empty if it passed.
+    `message` is the failure in one line, `again` that of the second, recorded run; empty if it passed.
     """
     folders = filter(None, os.environ.get("CARTPOLE_WITH", "").split(":"))
     ws = [f"--with {shlex.quote(each)}" for each in folders]
@@ -88,12 +83,7 @@ class Bench:
 
     @contextlib.contextmanager
     def world(self, seed: int, recorded: Path | None = None) -> Iterator[RobotWorld]:
-        """Yields an empty world at time 0.
-
-        Args:
-            seed: of the sensors' noise; at least 1.
-            recorded: a folder for a picture, a page in 3-D and a bag; None for no recording.
-        """
+        """Yields an empty world at time 0, recorded in a folder: a picture, a page in 3-D and a bag."""
         if seed < 1:
             raise WorldError(f"the seed is {seed}: 1 or more is needed")
         with contextlib.ExitStack() as ending:

@@ -4,12 +4,10 @@ import contextlib
 import queue
 from collections.abc import Sequence
 
-import roslib.message
 import rospy
-from geometry_msgs.msg import Twist
-from std_msgs.msg import Float64, Float64MultiArray
 
 from ros_calls import master
+from ros_calls.commands import COMMANDS
 from ros_calls.waiting import wait_until
 from ros_utils import ros_node
 from ros_utils._internal import nodes
@@ -30,6 +28,14 @@ class FollowedNode:
     The simulator reports to this process what it sends to the node, and ends a step after that. The commands
     come to this process, which gives them to the simulator with the next step. So it doesn't matter when a
     message arrives anywhere.
+
+    Args:
+        name, package, executable, args: Of the node.
+        hears: The topic that it answers.
+        commands: The topic of its answers, on which it commands a controller.
+
+    Raises:
+        WorldError: It doesn't start or connect, or the simulator doesn't publish `hears`.
     """
 
     def __init__(
@@ -41,16 +47,6 @@ class FollowedNode:
         hears: str,
         commands: str,
     ) -> None:
-        """Starts it.
-
-        Args:
-            name, package, executable, args: of the node.
-            hears: the topic that it answers.
-            commands: the topic of its answers, on which it commands a controller.
-
-        Raises:
-            WorldError: it doesn't start or connect, or the simulator doesn't publish `hears`.
-        """
         self.controller = commands.rpartition("/")[0] or commands
         self.name, self._hears, self._waiting = f"/{name}", hears, 0
         self._answers: queue.SimpleQueue[rospy.AnyMsg] = queue.SimpleQueue()
@@ -110,12 +106,9 @@ class FollowedNode:
 
 def _numbers(message: rospy.AnyMsg) -> list[float]:
     """Returns a command's numbers, as a step takes them."""
-    kind = message._connection_header["type"]
-    command = roslib.message.get_message_class(kind)().deserialize(message._buff)
-    if isinstance(command, Twist):
-        return [command.linear.x, command.linear.y, command.angular.z]
-    if isinstance(command, Float64):
-        return [command.data]
-    if isinstance(command, Float64MultiArray):
-        return list(command.data)
-    raise WorldError(f"a command is {kind}: Float64, Float64MultiArray and Twist can be followed")
+    name = message._connection_header["type"]
+    followed = {kind.message: kind for kind in COMMANDS.values() if kind.topic}
+    kind = followed.get(name)
+    if kind is None:
+        raise WorldError(f"a command is {name}: {', '.join(followed)} can be followed")
+    return kind.numbers(kind.read(kind.message_type().deserialize(message._buff)))

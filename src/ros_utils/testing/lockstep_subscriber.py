@@ -1,4 +1,4 @@
-"""What the simulator publishes, whole and in order: its messages come with calls, not over connections."""
+"""A subscriber in lock-step: messages come whole and in order, with calls."""
 
 import socket
 
@@ -20,18 +20,12 @@ class WorldError(Exception):
 
 
 class LockstepSubscriber:
-    """A subscriber of a topic without a node of its own, in lock-step only; see AdvanceWorld.srv."""
+    """A subscriber, in lock-step only, of a simulator's topic; see AdvanceWorld.srv.
+
+    `name` is a node's that isn't there. Raises WorldError if the simulator doesn't publish the topic.
+    """
 
     def __init__(self, name: str, topic: str) -> None:
-        """Subscribes.
-
-        Args:
-            name: a node's that isn't there.
-            topic: of the simulator's.
-
-        Raises:
-            WorldError: the simulator doesn't publish the topic.
-        """
         self._name, self._topic = name, topic
         address = nodes.node_uri(SIMULATOR) or ""
         try:
@@ -49,13 +43,9 @@ class LockstepSubscriber:
         self._heard = len(self._call(request).messages)
 
     def advance(self, ticks: int) -> tuple[int, int]:
-        """Lets at most `ticks` pass, until there is a message.
+        """Advances until there is a message; returns the ticks that passed, and the number of messages.
 
-        Returns:
-            How many have passed, and the number of messages since the last call.
-
-        Raises:
-            WorldError: the world is paused, so that no time would ever pass.
+        Raises WorldError if the world is paused, so that no time would ever pass.
         """
         request = AdvanceWorldRequest(
             node=self._name, ticks=min(ticks, LONGEST), until=[self._topic]

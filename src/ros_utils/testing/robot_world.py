@@ -33,7 +33,6 @@ class RobotWorld(SteppedWorld):
     """
 
     def __init__(self, seed: int) -> None:
-        """See the base class."""
         super().__init__(seed)
         self._prismatic: set[str] = set()  # joints
 
@@ -55,16 +54,16 @@ class RobotWorld(SteppedWorld):
         Args:
             file: URDF, xacro or SDF: a path, or package://PACKAGE/PATH.
             controllers: YAML file of the controllers, likewise.
-            run: names of controllers to load and start.
-            name: of the model.
-            ns: namespace of its description, controllers and topics.
-            xyz: position [m].
-            rpy: roll, pitch and yaw [rad].
-            joints: positions in which it starts [rad, m]; the others start at 0.
-            arguments: of xacro, "name:=value" each.
+            run: Names of controllers to load and start.
+            name: Name of the model.
+            ns: Namespace of its description, controllers and topics.
+            xyz: Position [m].
+            rpy: Roll, pitch and yaw [rad].
+            joints: Positions in which it starts [rad, m]; the others start at 0.
+            arguments: Arguments of xacro, "name:=value" each.
 
         Raises:
-            WorldError: if one of these fails; the log says why.
+            WorldError: If one of these fails; the log says why.
         """
         if name in ros_gazebo.gazebo_get_model_names():
             raise WorldError(f"there is a model '{name}' already: give this one another name=...")
@@ -185,13 +184,13 @@ class RobotWorld(SteppedWorld):
         """Asserts a condition of your own, looked at after each physics step.
 
         Args:
-            look: returns what is wrong; empty if the condition holds.
-            wanted: what was wanted, for the text of a failure.
-            by: the simulated time until it has to hold [s].
-            stays: how long it has to hold then [s].
+            look: Returns what is wrong; empty if the condition holds.
+            wanted: What was wanted, for the text of a failure.
+            by: The simulated time until it has to hold [s].
+            stays: How long it has to hold then [s].
 
         Raises:
-            AssertionError: it doesn't; the text says what was wrong in the end, and what was wanted.
+            AssertionError: It doesn't; the text says what was wrong in the end, and what was wanted.
         """
         __tracebackhide__ = True
         most, least, passed = self._ticks(by), self._ticks(stays), 0

@@ -19,14 +19,12 @@ Vector = tuple[float, float, float]
 
 
 class SteppedWorld:
-    """A simulated world in lock-step, which is emptied when this object is made."""
+    """A simulated world in lock-step, which is emptied, at time 0, when this object is made.
+
+    `seed` is that of the sensors' noise, at least 1.
+    """
 
     def __init__(self, seed: int) -> None:
-        """Empties the world, at time 0.
-
-        Args:
-            seed: of the sensors' noise; at least 1.
-        """
         self.seed = seed
         self._steps, self._client = PreparedSteps(), StepClient()
         self._commands: dict[str, Sequence[float]] = {}  # for the next step
@@ -59,12 +57,12 @@ class SteppedWorld:
         From then on, time waits for it: it has to answer each message that it hears with one command.
 
         Args:
-            package: of the node.
-            executable: as for rosrun.
-            hears: a topic of the simulator's, such as /joint_states.
-            commands: the topic of its commands, such as /elbow_controller/command; of the types Float64,
+            package: Package of the node.
+            executable: As for rosrun.
+            hears: A topic of the simulator's, such as /joint_states.
+            commands: The topic of its commands, such as /elbow_controller/command; of the types Float64,
                 Float64MultiArray and Twist.
-            args: of the node.
+            args: Arguments of the node.
         """
         name = f"{executable.partition('.')[0]}_under_test_{len(self._nodes)}"
         self._nodes.append(FollowedNode(name, package, executable, args, hears, commands))
@@ -73,10 +71,10 @@ class SteppedWorld:
         """Commands a running controller from the next step on.
 
         Args:
-            controller: its name, or /namespace/name where several robots have one of that name.
-            values: as many as its command topic takes [rad, m, rad/s, m/s, N m, N]; of a vehicle ahead, to
+            controller: Its name, or /namespace/name where several robots have one of that name.
+            values: As many as its command topic takes [rad, m, rad/s, m/s, N m, N]; of a vehicle ahead, to
                 the left and about.
-            every: period in which it is sent again, until the next command [s]: a vehicle that hears none
+            every: Period in which it is sent again, until the next command [s]: a vehicle that hears none
                 for a while stops. None: it is sent once.
         """
         self._repeated.pop(controller, None)
@@ -175,13 +173,13 @@ class SteppedWorld:
     def contacts(self, link: str) -> list[str]:
         """Returns the collisions that a link, or model::link, touches, as model::link::collision."""
         self._look(self._touched, link)
-        found: dict[str, None] = {}
+        touched: dict[str, None] = {}
         for each in self._state.contacts:
             pair = each.collision1_name, each.collision2_name
             for mine, other in (pair, pair[::-1]):
                 if f"::{link}::" in f"::{mine}":
-                    found[other] = None
-        return list(found)
+                    touched[other] = None
+        return list(touched)
 
     def sensor(self, name: str) -> dict[str, np.ndarray]:
         """Returns the last measurement of a sensor, or model::sensor; empty before the first.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""pg_train.py when something fails: one clear line within seconds, and what was learned is saved."""
+"""pg_train.py when something fails: one clear line within seconds, and progress is saved."""
 
 import json
 import signal
@@ -33,7 +33,7 @@ class PgTrainFaults(unittest.TestCase):
         self.assertNotIn("Traceback", training.output)
         complaints = [line for line in training.output.splitlines() if "pg_train.py:" in line]
         self.assertEqual(len(complaints), 1, training.output)
-        self.assertIn("what was learned is saved", complaints[0])
+        self.assertIn("progress is saved", complaints[0])
         self.assertIsNotNone(self.assert_saved(place)["failure"])
         self.assertEqual(place.left_after(), {})
 

@@ -1,6 +1,6 @@
 """A JointTrajectoryController on obedient joints, stepped tick by tick."""
 
-from robot_sim.control.controllers import BUILT_IN
+from robot_sim.control.controllers import built_in
 from robot_sim.control.hardware import RobotHardware
 from robot_sim.control.trajectory_goals import (
     GoalRequest,
@@ -44,7 +44,7 @@ class Rig:
         self.hardware = RobotHardware(read_description(urdf(interface)))
         self.joints = self.hardware.joints
         self.now = 100 * S
-        kind = BUILT_IN[f"{interface.lower()}_controllers/JointTrajectoryController"]
+        kind = built_in()[f"{interface.lower()}_controllers/JointTrajectoryController"]
         params = {"joints": joints and list(joints), "gains": GAINS} | params
         self.controller = kind.create("arm", params, self.hardware)
         self.obedient = interface == "Position"

@@ -1,8 +1,16 @@
 """A world for lockstep_runner that only counts ticks."""
 
+import queue
+import threading
+from concurrent.futures import _base as futures
 from types import SimpleNamespace
 
 MS = 1_000_000  # [ns]
+# What python_threads replaces besides executors
+WAITS = (
+    (threading.Thread, "start"), (threading.Thread, "join"), (threading.Event, "wait"),
+    (threading.Condition, "wait"), (threading, "_time"), (queue, "time"), (futures, "time"),
+)  # fmt: skip
 
 
 class Counter:

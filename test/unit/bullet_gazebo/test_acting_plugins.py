@@ -17,8 +17,11 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from bullet_gazebo.common.messages import to_transform
 from bullet_gazebo.plugins import acting_plugins, gripper_plugins
 from bullet_gazebo.plugins.plugin_loader import PluginRegistry
+from robot_sim.physics.files.reading import Resources
 from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.files.world_file import fill, parse_world
 from robot_sim.physics.pose import Pose, from_rpy, to_rpy
+from robot_sim.physics.world import World
 from robot_sim.simulator import Simulator
 
 MODEL = """<robot name="m">{links}<joint name="hinge" type="revolute"><parent link="body"/><child link="arm"/>
@@ -130,6 +133,21 @@ def test_a_link_attacher_keeps_nothing_of_models_that_are_gone(make_world, monke
         assert not attacher._detach(request).ok
     gc.collect()
     assert [each() for each in gone] == [None] * 6
+
+
+def test_nothing_is_attached_to_an_actor(new_engine, monkeypatch):
+    world, sent = World(new_engine()), []
+    monkeypatch.setattr(gripper_plugins.rospy, "Service", lambda *arguments: None)
+    monkeypatch.setattr(gripper_plugins.rospy, "logerr", lambda text, *names: sent.append(names))
+    attacher = gripper_plugins.LinkAttacher(Simulator(world, lockstep=True))
+    world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 1.0)))
+    trajectory = "<trajectory><waypoint><time>0</time></waypoint></trajectory>"
+    actor = f'<actor name="a"><script>{trajectory}</script></actor>'
+    text = f'<sdf version="1.6"><world name="w">{actor}</world></sdf>'
+    assert list(fill(world, parse_world(text, Resources()).models)) == [("a", None)]
+    assert not attacher._attach(Attaching("cube", "cube_link", "a", "a_pose")).ok
+    assert len(sent) == 1
+    world.close()
 
 
 def test_a_second_vacuum_gripper_in_a_namespace_is_told_in_a_line(free):

@@ -319,7 +319,7 @@ def test_a_handler_that_waits_for_what_comes_later_ends_the_replay(
     monkeypatch.setattr(
         replay, "get_service_manager", lambda: SimpleNamespace(get_service=lambda _: service)
     )
-    monkeypatch.setattr(replay, "PATIENCE", 0.05)
+    monkeypatch.setattr(replay, "ENTRY_PATIENCE", 0.05)
     node = SimpleNamespace(sim=sim, journal=journal, control=None, steps=SimpleNamespace(series=0))
     repeated = replay.Replay(RecordedJournal(path), node, replay.Changes({}, ()), 9.0)
     repeated.run()

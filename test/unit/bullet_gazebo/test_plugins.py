@@ -103,12 +103,12 @@ def setting(sim, tmp_path, monkeypatch):
 
 
 def test_in_lockstep_a_model_holds_time_for_longer(new_engine, monkeypatch) -> None:
-    monkeypatch.setattr(plugin_loader, "PATIENCE", 0.01)
+    monkeypatch.setattr(plugin_loader, "LOADING_PATIENCE", 0.01)
     paced, stepped = (Simulator(World(new_engine()), lockstep=each) for each in (False, True))
     with PluginRegistry(stepped, None).time_held("a"), PluginRegistry(paced, None).time_held("b"):
         assert wait_until(lambda: not paced.holds, 60.0, "the end of a hold")
         assert stepped.holds
-    assert plugin_loader.LOCKSTEP_PATIENCE < world.TIMEOUT  # of a script for a step
+    assert plugin_loader.LOCKSTEP_LOADING_PATIENCE < world.TIMEOUT  # of a script for a step
 
 
 @pytest.mark.parametrize("error", RAISED)

@@ -276,7 +276,7 @@ def test_in_a_world_plugin_and_controller_are_named_and_the_end_does_not_wait_fo
 ) -> None:
     told: list[str] = []
     monkeypatch.setattr(rospy, "logwarn", told.append)
-    monkeypatch.setattr(module, "PATIENCE", 0.5)
+    monkeypatch.setattr(module, "LOCK_PATIENCE", 0.5)
     sim, code = Simulator(World(make_engine())), Stuck()
     name = add(sim, code)
     watchdog = Watchdog(sim)

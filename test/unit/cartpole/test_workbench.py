@@ -3,7 +3,6 @@
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -24,18 +23,6 @@ def test_the_cart_pole_is_known_and_roslaunchs_arguments_are_left_out(
     extra = ["__name:=workbench", "__log:=workbench.log"]
     assert main(["eval", str(run), "--episodes=1", "--json=-", *extra]) == 0
     assert len(json.loads(capsys.readouterr().out)["returns"]) == 1
-
-
-def test_errors_begin_with_the_name_it_was_called_by(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(sys, "argv", ["/somewhere/workbench.py"])
-    assert main(["eval", str(tmp_path)]) == 1
-    assert capsys.readouterr().err.startswith("workbench.py: ")
-    with pytest.raises(SystemExit) as ended:  # refused before it starts, as a wrong option is
-        main(["train", f"--resume={tmp_path}"])
-    assert ended.value.code == 2
-    assert capsys.readouterr().err.splitlines()[-1].startswith("workbench.py train: error: ")
 
 
 def test_no_free_port_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,12 @@ def _nothing_was_told(monkeypatch):
 
 
 @pytest.fixture
+def put_back(monkeypatch):
+    """Has attributes be put back that a test replaces."""
+    return lambda *places: [monkeypatch.setattr(*each, getattr(*each)) for each in places]
+
+
+@pytest.fixture
 def runner(monkeypatch):
     """For a script whose world is a `Counter`; nothing is replaced yet."""
     monkeypatch.setattr(rospy.rostime, "_rostime_current", None)

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from lockstep_runner.launcher import _parse, main
+from lockstep_runner.launcher import _parse
 from lockstep_runner.script import AfterImport, seed_everything
 
 
@@ -46,12 +46,6 @@ def test_what_makes_no_sense_is_refused(given, capsys):
         _parse(given)
     assert ended.value.code == 2
     assert "lockstep.py: error:" in capsys.readouterr().err
-
-
-def test_no_such_script_is_one_line(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(os, "environ", {**os.environ})
-    assert main([str(tmp_path / "none.py")]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_seeds_reach_every_generator(monkeypatch):

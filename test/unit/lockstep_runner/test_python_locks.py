@@ -3,7 +3,7 @@
 import threading
 
 import pytest
-from support.ros.lockstep_world import MS
+from support.ros.lockstep_world import MS, WAITS
 
 from lockstep_runner import originals
 from lockstep_runner.concurrency import python_locks, python_threads
@@ -12,13 +12,8 @@ KINDS = ["Lock", "RLock"]
 
 
 @pytest.fixture
-def replaced(runner, monkeypatch):
-    for owner, name in (
-        (threading, "Lock"), (threading, "RLock"), (threading.Thread, "start"),
-        (threading.Thread, "join"), (threading.Event, "wait"), (threading.Condition, "wait"),
-        (threading, "_time"),
-    ):  # fmt: skip
-        monkeypatch.setattr(owner, name, getattr(owner, name))  # so that it is put back
+def replaced(runner, put_back):
+    put_back((threading, "Lock"), (threading, "RLock"), *WAITS)
     python_threads.replace_threads(runner)
     python_locks.install(runner)
     return runner

@@ -5,12 +5,11 @@ import queue
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from concurrent.futures import _base as futures
 from concurrent.futures import thread as pools
 
 import pytest
 import rospy
-from support.ros.lockstep_world import MS
+from support.ros.lockstep_world import MS, WAITS
 
 from lockstep_runner import originals
 from lockstep_runner.concurrency import python_threads
@@ -20,13 +19,9 @@ BOUND = 30.0  # [s of wall time]
 
 
 @pytest.fixture
-def replaced(runner, monkeypatch):
-    for owner, name in (
-        (threading.Thread, "start"), (threading.Thread, "join"), (threading.Event, "wait"),
-        (threading.Condition, "wait"), (threading, "_time"), (queue, "time"), (futures, "time"),
-        (ThreadPoolExecutor, "submit"), (ThreadPoolExecutor, "shutdown"), (pools._WorkItem, "run"),
-    ):  # fmt: skip
-        monkeypatch.setattr(owner, name, getattr(owner, name))  # so that it is put back
+def replaced(runner, put_back):
+    executor = ThreadPoolExecutor
+    put_back((executor, "submit"), (executor, "shutdown"), (pools._WorkItem, "run"), *WAITS)
     python_threads.replace_threads(runner)
     python_threads.replace_futures(runner)
     return runner
@@ -44,12 +39,9 @@ def passed(runner):
 
 
 @pytest.mark.parametrize("uptime", [0.1, 0.3, 65_536.7, 67_003.123_456_789, 4e6 + 0.1])
-def test_time_limits_end_whatever_the_clock_shows(runner, monkeypatch, uptime):
+def test_time_limits_end_whatever_the_clock_shows(runner, put_back, monkeypatch, uptime):
     """The sums of simulated and wall time are rounded: what is left of a limit may be 1e-11 s, not 0."""
-    for owner, name in ((threading.Condition, "wait"), (threading, "_time"), (queue, "time"),
-                        (threading.Thread, "start"), (threading.Thread, "join"),
-                        (threading.Event, "wait"), (futures, "time")):  # fmt: skip
-        monkeypatch.setattr(owner, name, getattr(owner, name))
+    put_back(*WAITS)
     monkeypatch.setattr(python_threads.originals, "monotonic", lambda: uptime)
     python_threads.replace_threads(runner)
     condition = threading.Condition()

@@ -227,3 +227,8 @@ def test_without_mujoco_it_says_so(check, monkeypatch):
 def test_our_robots_are_fine(check, name):
     code, page, _ = check(ROOT / f"urdf/{name}.urdf.xacro")
     assert code == 0, page
+
+
+def test_joints_of_a_closed_loop_move_together(check):
+    _, page, _ = check(ROOT / "test/data/robots/four_bar_gripper.urdf")
+    assert page.count("commands move 7 of 7 joints") == 2

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -164,32 +163,6 @@ def test_a_joint_that_mimics_another_is_told(new):
     assert "joints that follow another one by <mimic>: finger\n" in told
 
 
-def test_its_readme_and_report_name_no_place_by_detours(new, tmp_path):
-    """A README is read in clones, elsewhere."""
-    others = tmp_path / "others/my_parts"
-    others.mkdir(parents=True)
-    (others / "package.xml").write_text(
-        "<package><name>my_parts</name><version>1.0.0</version><description>d</description>"
-        '<maintainer email="a@b.c">a</maintainer><license>l</license></package>'
-    )
-    (others / "rod.xacro").write_text(robot(LINK.format("rod", "")))
-    include = '<xacro:include filename="$(find my_parts)/rod.xacro"/>'
-    path = os.environ["ROS_PACKAGE_PATH"]
-    os.environ["ROS_PACKAGE_PATH"] = f"{others.parent}:{path}"  # which the fixture puts back
-    folder, *_, told = new(
-        "my_needy",
-        robot(BARE[0], FIXED, SWING, include),
-        "--to",
-        str(tmp_path / "others/../packages"),
-    )
-    assert f"written: {folder}\n" in told
-    readme = (folder / "README.md").read_text()
-    assert str(tmp_path) not in readme
-    assert "\n./ws --with FOLDER --with ../my_needy test ../my_needy\n" in readme
-    assert "`FOLDER` has what the robot needs of other packages: `my_parts`." in readme
-    assert (folder / ".gitignore").read_text() == "__pycache__/\n"
-
-
 def test_it_is_written_beside_the_checkout(root, tmp_path, monkeypatch, capsys):
     assert root.parent == package.PARENT
     monkeypatch.setattr(package, "PARENT", tmp_path)
@@ -251,18 +224,3 @@ def test_its_test_holds_for_a_task_that_takes_the_place_of_reach_in_a_clone(new,
              "ROS_PACKAGE_PATH": f"{clone}:{os.environ['ROS_PACKAGE_PATH']}"},
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
-
-
-def test_a_reader_that_goes_is_no_fault(root, tmp_path):
-    """As in `new_robot.py my_arm | head -n 0`."""
-    command = [sys.executable, root / "scripts/new_robot.py", "my_arm", "--to", tmp_path]
-    read, write = os.pipe()
-    os.close(read)
-    for unbuffered in ("", "1"):
-        done = subprocess.run(
-            command, stdout=write, stderr=subprocess.PIPE, check=False,
-            env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
-        )  # fmt: skip
-        assert done.stderr == b"" and (tmp_path / "my_arm/package.xml").is_file()
-        shutil.rmtree(tmp_path / "my_arm")
-    os.close(write)

@@ -9,6 +9,8 @@ import pytest
 SRC = Path(__file__).parents[3] / "src"
 OURS = {path.name for path in SRC.iterdir() if path.is_dir()}
 HEAVY = (
+    "gymnasium",
+    "numpy",
     "torch",
     "ray",
     "optuna",

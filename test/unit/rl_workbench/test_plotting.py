@@ -66,20 +66,6 @@ def test_a_seed_that_has_ended_keeps_its_last_value_in_the_mean() -> None:
     assert np.interp([200, 600, 1000], positions, mean) == pytest.approx([300, 300, 300])
 
 
-def test_the_mean_begins_where_every_seed_has_a_value() -> None:
-    positions, mean, _, _ = mean_over_seeds([seed([10, 20], [1, 1]), seed([15, 30], [3, 3])])
-    assert positions[0] == 15 and mean == pytest.approx(np.full(len(mean), 2.0))
-
-
-def test_few_points_are_met_exactly_and_many_are_thinned() -> None:
-    few = [seed([100, 200, 900], [1, 5, 2]), seed([100, 300], [1, 9])]
-    positions, mean, _, _ = mean_over_seeds(few)
-    assert positions.tolist() == [100, 200, 300, 900] and mean[2] == np.mean([5 - 3 / 7, 9])
-    many = [seed(np.arange(5000.0).tolist(), np.arange(5000.0).tolist())] * 2
-    positions, mean, _, _ = mean_over_seeds(many)
-    assert len(positions) < 500 and mean == pytest.approx(positions)
-
-
 def test_the_band_lies_around_the_mean_and_one_seed_has_none() -> None:
     curves = [seed([1, 2], [value, 2 * value]) for value in (1.0, 2.0, 6.0)]
     _, mean, low, high = mean_over_seeds(curves)

@@ -1,7 +1,6 @@
 """A robot's environment on a page of viser's."""
 
 import math
-import socket
 import time
 import urllib.error
 import urllib.request
@@ -12,10 +11,8 @@ from support.pages.viser_recording import Recording
 from support.robots.bodies import ROVER_ROBOT
 
 import cartpole  # noqa: F401 - registers its environments
-from robot_envs.pictures import page
 from robot_envs.pictures.drawn import Camera, RobotPicture
 from robot_sim.physics.pose import Pose
-from web_viewer.address import LOOPBACK, Address
 
 
 def shapes(nodes, kind):
@@ -137,16 +134,3 @@ def test_the_render_mode_human_shows_the_robot_on_a_page_in_real_time(capsys):
     env.close()
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(address)
-
-
-def test_another_process_that_takes_the_port_at_the_same_moment_is_no_fault(monkeypatch, capsys):
-    with socket.create_server((LOOPBACK, 0)) as other:
-        found = iter([Address(LOOPBACK, other.getsockname()[1])])
-        look = page.find_address
-        monkeypatch.setattr(page, "find_address", lambda *where: next(found, None) or look(*where))
-        env = gymnasium.make("cartpole/Classic-v0", render_mode="human")
-        env.reset(seed=0)
-    address = capsys.readouterr().out.rpartition(" ")[2]
-    with urllib.request.urlopen(address) as opened:
-        assert opened.status == 200
-    env.close()

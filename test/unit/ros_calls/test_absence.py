@@ -15,15 +15,10 @@ LOCKSTEP = "roslaunch gazebo_ros empty_world.launch lockstep:=true"
 @pytest.mark.parametrize(
     ("service", "offered", "words"),
     [
-        (
-            "/gazebo/step_world",
-            WORLD,
-            f"the simulator isn't in lock-step; start it with: {LOCKSTEP}",
-        ),
+        ("/gazebo/step_world", WORLD, f"isn't in lock-step; start it with: {LOCKSTEP}"),
         ("/gazebo/step_world", "/sim/get_world_properties", "no simulator runs at"),
         ("/sim/set_link_friction", "", f"; start one with: {LOCKSTEP}"),
         ("/gazebo/set_link_properties", "", "no simulator runs at"),
-        ("/sim/advance_world", "", f"; start one with: {LOCKSTEP}"),
         (WORLD, "", "start one with: roslaunch gazebo_ros empty_world.launch"),
         (
             "/controller_manager/list_controllers",

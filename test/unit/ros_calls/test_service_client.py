@@ -247,12 +247,6 @@ def test_ctrl_c_ends_a_call_and_the_connection(offer, client):
     assert call(True).success, "the answer to the first call isn't taken for the second one's"
 
 
-def test_it_is_called_during_a_shutdown(offer, client, monkeypatch):
-    offer()
-    monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
-    assert client()(True).success
-
-
 def test_a_failure_because_of_a_shutdown_is_an_interrupt(offer, monkeypatch):
     down = threading.Event()
     offer(lambda request: down.set() or [failed("too late")])

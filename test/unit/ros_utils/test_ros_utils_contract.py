@@ -12,9 +12,7 @@ from pathlib import Path
 import pytest
 
 import ros_utils
-from ros_calls import master
 from ros_utils import ros_gazebo, simulation
-from ros_utils._internal.gazebo import calls as _gazebo_calls
 
 PAGE = Path(__file__).resolve().parents[3] / "docs/contract/ros_utils.md"
 LIST = PAGE.read_text(encoding="utf-8").split("\n## 10 ")[1]
@@ -24,10 +22,6 @@ SIGNATURES = [
     for module, block in re.findall(r"`(\w+)`:\n\n```\n(.*?)```", LIST, re.DOTALL)
     for each in block.splitlines()
 ]
-
-
-def test_the_list_is_complete():
-    assert len(SIGNATURES) == 53
 
 
 @pytest.mark.parametrize(("module", "signature"), SIGNATURES, ids=[each for _, each in SIGNATURES])
@@ -51,12 +45,6 @@ def test_every_call_has_a_bound_and_a_simulator(function):
     assert parameters["gazebo_ns"].default == "/gazebo"
 
 
-@pytest.mark.parametrize("number", [float("nan"), float("inf")])
-def test_what_is_not_finite_is_found(number):
-    assert _gazebo_calls.not_finite("speed", 1.0, number).startswith("speed: [1.0, ")
-    assert _gazebo_calls.not_finite("speed", 1.0) == ""
-
-
 def test_reserved_ports_differ_and_can_be_taken_by_a_master():
     ports = {simulation.reserved_port() for _ in range(20)}
     assert len(ports) == 20
@@ -64,10 +52,3 @@ def test_reserved_ports_differ_and_can_be_taken_by_a_master():
         with socket.socket() as server:
             server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as a ROS master does
             server.bind(("127.0.0.1", port))
-
-
-def test_another_master_is_for_the_block_only(monkeypatch):
-    monkeypatch.setenv("ROS_MASTER_URI", "http://here:1")
-    with master.using("http://there:2"):
-        assert master.uri() == "http://there:2"
-    assert master.uri() == "http://here:1"

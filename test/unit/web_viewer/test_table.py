@@ -66,16 +66,6 @@ def test_a_resumed_training_cuts_it_back(place):
     assert [point[0] for point in look.points] == [1.0]
 
 
-def test_one_that_grew_again_beyond_what_was_read_begins_anew_too(place):
-    place.write_text(HEADER + row(1, 1) + row(2, 2))
-    followed = GrowingTable(place)
-    followed.read()
-    place.write_text(HEADER + row(1, 1) + row(2, 7) + row(3, 3) + row(4, 4))
-    look = followed.read()
-    assert look.restarted
-    assert [point[2] for point in look.points] == [1.0, 7.0, 3.0, 4.0]
-
-
 def test_a_folder_that_is_gone_may_come_back(place):
     folder = place.parent / "run"
     folder.mkdir()

@@ -1,4 +1,4 @@
-"""What a model of Stable-Baselines3 has learned: a policy, also as a torch module without the library."""
+"""Policies of Stable-Baselines3's models, also as torch modules without the library."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Stable-Baselines3 in our frame: its own loop, with a callback that reports to the frame.
+"""Stable-Baselines3 as an algorithm of the training loop: its own loop, with a callback for ours.
 
 It is evaluated and saved between two rollouts, and continues from there bit-identical.
 """
@@ -146,7 +146,7 @@ class SB3Training(Algorithm):
     def _say_lost(self, index: int, say: Say) -> None:
         count = self._model.n_envs
         which = "the environment" if count == 1 else f"environment {index + 1} of {count}"
-        say(f"{which} doesn't repeat itself: the episode under way is cut off")
+        say(f"{which} is not repeatable: the current episode is truncated")
 
     def leave_environment(self) -> Any:
         # Evaluations only move the first environment.
@@ -210,7 +210,7 @@ class FrameCallback(BaseCallback):
         self._mark, self._can_go_back = self._positions.mark(), True
 
     def go_back(self) -> bool:
-        """Takes back what was done since the last rollout; returns whether it could."""
+        """Undoes the steps since the last rollout; returns whether it could."""
         if self._can_go_back and self._mark is not None:
             self._positions.take_back(self._mark)
         return self._can_go_back

@@ -53,7 +53,15 @@ class SB3Options:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OnPolicyOptions(SB3Options):
+class ExplorationOptions(SB3Options):
+    """Generalised state-dependent exploration (gSDE)."""
+
+    use_sde: bool = option(False, "state-dependent exploration, smoother than independent noise")
+    sde_sample_freq: int = option(-1, "steps between new noise of use_sde; -1: once a rollout")
+
+
+@dataclass(frozen=True, kw_only=True)
+class OnPolicyOptions(ExplorationOptions):
     """Algorithms that learn from a rollout and then forget it."""
 
     n_steps: int = option(2048, "steps of a rollout in each environment", 1, inf)
@@ -62,8 +70,6 @@ class OnPolicyOptions(SB3Options):
     ent_coef: float = option(0.0, "weight of the entropy in the loss")
     vf_coef: float = option(0.5, "weight of the value function in the loss")
     max_grad_norm: float = option(0.5, "clips the gradient's norm")
-    use_sde: bool = option(False, "state-dependent exploration, smoother than independent noise")
-    sde_sample_freq: int = option(-1, "steps between new noise of use_sde; -1: once a rollout")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +122,7 @@ class OffPolicyOptions(SB3Options):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SACOptions(OffPolicyOptions):
+class SACOptions(OffPolicyOptions, ExplorationOptions):
     """SAC."""
 
     library_class = "SAC"
@@ -125,8 +131,6 @@ class SACOptions(OffPolicyOptions):
     ent_coef: Any = option("auto", "weight of the entropy; auto learns it, auto_0.1 from there on")
     target_update_interval: int = option(1, "gradient steps between updates of the target", 1, inf)
     target_entropy: Any = option("auto", "entropy that auto aims at")
-    use_sde: bool = option(False, "state-dependent exploration, smoother than independent noise")
-    sde_sample_freq: int = option(-1, "steps between new noise of use_sde; -1: once a rollout")
     use_sde_at_warmup: bool = option(False, "use_sde also before learning_starts")
 
 

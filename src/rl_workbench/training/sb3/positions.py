@@ -63,7 +63,7 @@ class Positions:
         )
 
     def take_back(self, mark: ModelMark) -> None:
-        """Discards what was done since `mark`, so that `state_dict` describes that place.
+        """Undoes the steps since `mark`, so that `state_dict` describes that place.
 
         The environments aren't moved.
         """

@@ -1,1 +1,1 @@
-"""Robots over ROS: brought up, commanded and read."""
+"""Backends over ROS."""

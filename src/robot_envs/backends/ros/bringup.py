@@ -1,4 +1,4 @@
-"""Brings robots up in a running simulator: models, parameters and controllers."""
+"""Bring-up of robots in a running simulator: models, parameters and controllers."""
 
 import contextlib
 import os
@@ -8,12 +8,10 @@ from typing import Any
 
 import rospy
 from controller_manager_msgs.srv import ListControllers
-from geometry_msgs.msg import Twist, Vector3
-from std_msgs.msg import Float64, Float64MultiArray
 
 from robot_envs.backends.ros import node, running
 from robot_envs.backends.ros.running import WORLD_SERVICE, SimulatorService, Undo
-from robot_envs.controllers import TWIST, CommandPort
+from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
@@ -31,17 +29,10 @@ Say = Callable[[str], None]
 
 
 def bring_up(scene: Scene, say: Say) -> list[Undo]:
-    """Spawns robots and starts their controllers, where they are missing.
+    """Spawns robots and starts their controllers, where they are missing; `say` reports each step.
 
-    Args:
-        scene: the robots; `SharedWorld` spawns its objects.
-        say: called with a line for each thing that is done.
-
-    Returns:
-        What undoes the changes, in the order in which they were made.
-
-    Raises:
-        RobotEnvError: if something can't be loaded, spawned or started.
+    Returns the functions that undo the changes, in the order of these; raises RobotEnvError if something
+    fails.
     """
     changes = [
         undo
@@ -62,18 +53,8 @@ def full_name(robot: Robot, name: str) -> str:
 
 def command_publisher(robot: Robot, port: CommandPort) -> rospy.Publisher:
     """Advertises the topic on which a controller takes commands."""
-    kind, topic = (Float64 if port.single else Float64MultiArray), "command"
-    if port.quantity == TWIST:
-        kind, topic = Twist, "cmd_vel"
-    return rospy.Publisher(f"{full_name(robot, port.name)}/{topic}", kind, queue_size=1)
-
-
-def command_message(port: CommandPort, command: Any) -> Float64 | Float64MultiArray | Twist:
-    """Returns the message of a command."""
-    if port.quantity == TWIST:
-        ahead, left, turn = command
-        return Twist(Vector3(ahead, left, 0.0), Vector3(0.0, 0.0, turn))
-    return Float64(command) if port.single else Float64MultiArray(data=list(command))
+    topic = f"{full_name(robot, port.name)}/{port.kind.topic}"
+    return rospy.Publisher(topic, port.kind.message_type, queue_size=1)
 
 
 def ready(scene: Scene) -> Ready:
@@ -147,11 +128,7 @@ def _controller_states(robot: Robot) -> dict[str, str]:
 
 
 def spawn_command(robot: Robot, argv: list[str]) -> int:
-    """Runs the command spawn_robot.py: waits for a simulator, brings the robot up, ends.
-
-    Returns:
-        The exit code; a failure is one line.
-    """
+    """Runs the command spawn_robot.py; returns the exit code."""
     try:
         name = node.full_name(argv, "spawn_robot")
         rospy.init_node(os.path.basename(name), argv=["", *argv], disable_signals=True)

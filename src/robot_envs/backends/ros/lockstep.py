@@ -1,4 +1,4 @@
-"""Robots in a simulator over ROS that moves in lock-step."""
+"""Backend for a simulator over ROS that moves in lock-step."""
 
 import contextlib
 import secrets
@@ -69,13 +69,8 @@ class KeptSnapshot:
 class LockstepWorld(RobotBackend):
     """One service call for each action: command, advance, read; time stands still between.
 
-    `begin` sends the request, `act` takes the answer; so several simulators move at the same time.
-
-    Args:
-        scene: the robots and objects; they are there, and the controllers run.
-        ticks: physics steps of one action.
-        world: shared with the other environments of this process.
-        timeout: wall time [s] that an answer may take, on top of 10 ms for each tick.
+    `begin` sends the request, `act` takes the answer; so several simulators move at the same time. `timeout`
+    is the wall time [s] that an answer may take, on top of 10 ms for each tick.
     """
 
     deterministic = complete = shared = True

@@ -1,4 +1,4 @@
-"""This process as a ROS node: its arguments, its parameters, its master; every wait has a bound."""
+"""This process's ROS node: arguments, parameters and master; every wait has a bound."""
 
 import os
 from typing import Any
@@ -24,12 +24,7 @@ def full_name(argv: list[str], default: str) -> str:
 
 
 def master_is_up() -> bool:
-    """Returns whether the ROS master answers.
-
-    Raises:
-        RobotEnvError: if it doesn't answer and can't be started here: it is another machine's, or something
-            else uses its port.
-    """
+    """Returns whether the master answers; raises RobotEnvError if none could be started at its address."""
     try:
         return master.is_up_or_startable()
     except master.MasterDown as error:
@@ -43,8 +38,8 @@ def service_is_registered(name: str) -> bool:
 
 def private_parameters(name: str) -> dict[str, Any]:
     """Returns the private parameters of a node; empty if there are none, or no master."""
-    found = _ask_master("getParam", name) if master_is_up() else None
-    return found if isinstance(found, dict) else {}
+    parameters = _ask_master("getParam", name) if master_is_up() else None
+    return parameters if isinstance(parameters, dict) else {}
 
 
 def _ask_master(method: str, name: str) -> Any:
@@ -60,10 +55,10 @@ def _ask_master(method: str, name: str) -> Any:
 def command_line_parameters(argv: list[str]) -> dict[str, Any]:
     """Returns the private parameters among arguments, as in `_seed:=3`; raises RobotEnvError for bad YAML."""
     try:
-        found: dict[str, Any] = rospy.client.load_command_line_node_params(argv)
+        parameters: dict[str, Any] = rospy.client.load_command_line_node_params(argv)
     except rospy.ROSInitException as error:
         raise RobotEnvError(" ".join(str(error).split())) from error
-    return found
+    return parameters
 
 
 def refuse_twin(name: str) -> None:

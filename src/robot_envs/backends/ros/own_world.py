@@ -17,8 +17,8 @@ from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, Sim
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
+from robot_sim.constants import NANOSECONDS
 from robot_sim.physics.pose import Pose
-from robot_sim.simulator import NANOSECONDS
 from ros_calls import master
 
 DEADLINE = (

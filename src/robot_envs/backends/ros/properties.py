@@ -1,4 +1,4 @@
-"""Changes a robot's physical properties by Gazebo's services and ros_control's dynamic_reconfigure."""
+"""Physical properties over Gazebo's services, and gains over ros_control's dynamic_reconfigure."""
 
 import contextlib
 from collections.abc import Mapping
@@ -40,12 +40,7 @@ TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 class RosVariation:
-    """Varies the robots of a simulator, and restores them as they were found; see `Changeable`.
-
-    Args:
-        scene: the robots.
-        timeout: of a call [s].
-    """
+    """Varies the robots of a simulator, and restores them as they were found; see `Changeable`."""
 
     def __init__(self, scene: Scene, timeout: float = TIMEOUT) -> None:
         self._timeout = timeout

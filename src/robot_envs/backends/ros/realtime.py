@@ -1,4 +1,4 @@
-"""A robot in a simulator that runs in real time, by Gazebo's own services and topics alone."""
+"""Backend for a simulator in real time, by Gazebo's own services and topics alone."""
 
 import contextlib
 import threading
@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState as JointStateMsg
 from std_srvs.srv import Empty
 
 from robot_envs.backends.backend import RobotBackend
-from robot_envs.backends.ros.bringup import command_message, command_publisher, full_name, ready
+from robot_envs.backends.ros.bringup import command_publisher, full_name, ready
 from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.backends.ros.running import (
     JointStateReader,
@@ -88,19 +88,13 @@ class JointStates:
     def _is_at(self, positions: Mapping[str, float]) -> bool:
         if self._newest is None:
             return False
-        found = self._read(self._newest[0])
-        return all(abs(joint.position - positions[name]) < _SAME for name, joint in found.items())
+        joints = self._read(self._newest[0])
+        return all(abs(joint.position - positions[name]) < _SAME for name, joint in joints.items())
 
     def wait_until(self, due: float | None) -> tuple[float, dict[str, JointState]]:
-        """Waits for the joint state of a simulated time [s]; None: takes any.
+        """Waits for the joint state of a time, or any for None; returns its time [s], and the joints.
 
-        There is no bound on a long control period as long as joint states come.
-
-        Returns:
-            Its simulated time [s], and the joints.
-
-        Raises:
-            SimulatorError: if they stop coming.
+        There is no bound on a long control period; raises SimulatorError if joint states stop coming.
         """
         with self._arrived:
             while True:
@@ -126,13 +120,7 @@ class JointStates:
 
 
 class CommandTopic:
-    """The topic on which a controller listens for commands.
-
-    Args:
-        scene: the robots.
-        robot: whose controller it is.
-        port: how that is commanded.
-    """
+    """The topic on which a robot's controller listens for commands."""
 
     def __init__(self, scene: Scene, robot: Robot, port: CommandPort) -> None:
         self._scene, self._robot, self._port = scene, robot, port
@@ -140,16 +128,13 @@ class CommandTopic:
 
     def publish(self, value: Any) -> None:
         """Commands the controller."""
-        self._publisher.publish(command_message(self._port, value))
+        self._publisher.publish(self._port.kind.write(value))
 
     def wait(self) -> None:
         """Waits until the controller listens; advertises the topic again halfway.
 
-        rospy turns a subscriber away that connects after one environment's end and before the next one's
-        beginning in the same process, and doesn't try again.
-
-        Raises:
-            SimulatorError: if the controller doesn't listen in time.
+        rospy turns a subscriber away that connects between one environment's end and the next one's beginning
+        in the same process, and doesn't try again. Raises SimulatorError after STATE_TIMEOUT.
         """
         topic = self._publisher.resolved_name
         if wait_until(self._publisher.get_num_connections, STATE_TIMEOUT / 2, topic):
@@ -165,19 +150,10 @@ class CommandTopic:
 
 
 class RealtimeWorld(RobotBackend):
-    """Moves a robot as the existing script does, with nothing but Gazebo's services and topics.
+    """Moves one robot as the existing script does, with nothing but Gazebo's services and topics.
 
-    An action unpauses the world, publishes the commands, and takes the newest joint state. How much simulated
-    time passes depends on the machine.
-
-    Args:
-        scene: the robot, which is there, with its controllers running.
-        control_period: simulated time from one joint state to the next one that is taken [s]; 0 takes the
-            newest one without waiting.
-        world: shared with the other environments of this process.
-
-    Raises:
-        RobotEnvError: for several robots.
+    An action unpauses the world, publishes the commands, and takes the joint state one control period [s]
+    later, or the newest for 0. How much simulated time passes depends on the machine.
     """
 
     deterministic, complete, shared = False, False, True
@@ -210,8 +186,8 @@ class RealtimeWorld(RobotBackend):
     def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         """See `RobotBackend.reset`; leaves the world paused, and joints at rest.
 
-        Waits for the joint state that the reset publishes. If the simulator publishes none while it is
-        paused, the joints are taken to be where they were put.
+        A simulator that publishes no joint state while paused is taken to have the joints where they were
+        put.
         """
         positions = {name: at for name, (at, _) in self.scene.placed_joints(initial).items()}
         with self._simulator:
@@ -307,15 +283,15 @@ class RealtimeWorld(RobotBackend):
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         """See `RobotBackend.poses`; makes a call for each."""
-        found = []
+        poses = []
         with self._simulator:
             for link in links:
                 answer = self._get_link(link, "world")
                 check_success(answer, f"the pose of '{link}' isn't known")
                 at = answer.link_state.pose
                 place, turn = at.position, at.orientation
-                found.append(Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)))
-        return found
+                poses.append(Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)))
+        return poses
 
     def close(self) -> None:
         """Leaves the topics, and restores robot and objects; the world stays paused or running."""

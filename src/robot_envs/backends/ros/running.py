@@ -1,4 +1,4 @@
-"""The running simulator: calls to it, what is in its world, what it reports, and who has it."""
+"""The running simulator: its services, models, joint states, and the environment that holds it."""
 
 import contextlib
 import math
@@ -131,9 +131,7 @@ def lockstep_hint() -> str:
 def world_path(source: Source | None, folder: Path) -> str | None:
     """Returns the world file for a simulator to be started; None: its default, a ground plane.
 
-    Args:
-        source: the robot's world.
-        folder: gets the file of a world that was given as text.
+    A world that was given as text is written into `folder`.
     """
     if source is None or source == EMPTY:
         return None
@@ -145,11 +143,7 @@ def world_path(source: Source | None, folder: Path) -> str | None:
 
 
 def physics_step(wanted: float | None = None) -> float:
-    """Returns the simulator's physics step [s], once the one that is wanted is set.
-
-    Raises:
-        RobotEnvError: if the simulator refuses, or doesn't answer.
-    """
+    """Returns the physics step [s], after setting the one wanted; raises RobotEnvError if that fails."""
     if wanted and not ros_gazebo.gazebo_set_time_step(wanted):
         raise RobotEnvError(f"the physics step can't be {wanted:g} s; see the messages above")
     step = ros_gazebo.gazebo_get_time_step()
@@ -175,19 +169,9 @@ def models() -> list[str]:
 
 
 def spawn(name: str, text: str, pose: Pose, namespace: str = "") -> Undo:
-    """Spawns a model.
+    """Spawns a model, with its plugins in a namespace; returns the function that deletes it.
 
-    Args:
-        name: of the model.
-        text: its URDF or SDF.
-        pose: in the world.
-        namespace: of the topics and services of its plugins.
-
-    Returns:
-        What deletes it.
-
-    Raises:
-        SimulatorError: if the simulator refuses it, or doesn't answer.
+    Raises SimulatorError if the simulator refuses it, or doesn't answer.
     """
     kind = "urdf" if "<robot" in text else "sdf"
     at = PoseMsg(Point(*pose.position), Quaternion(*pose.orientation))
@@ -234,11 +218,7 @@ class SharedWorld:
         return self._holder is user
 
     def claim(self, user: SharedBackend) -> None:
-        """Begins an episode: those of others end, and their variations are undone.
-
-        Raises:
-            RobotEnvError: if an object can't be read or spawned, or the simulator doesn't answer.
-        """
+        """Begins an episode: those of others end, and their variations are undone."""
         before, self._holder = self._holder, None  # no one's, if something fails
         if before is not None and before is not user:
             before.restore()
@@ -262,11 +242,7 @@ class SharedWorld:
             )
 
     def place_objects(self, wanted: Sequence[Object]) -> None:
-        """Spawns these objects, in this order, in place of all others that were spawned here.
-
-        Raises:
-            RobotEnvError: if one can't be read or spawned, or the simulator doesn't answer.
-        """
+        """Spawns these objects, in this order, in place of all others that were spawned here."""
         if list(wanted) == self._objects:
             return
         # All are spawned again: the order of a world's models affects its bits.
@@ -311,11 +287,7 @@ class JointStateReader:
         velocities: Sequence[float],
         efforts: Sequence[float],
     ) -> Joints:
-        """Returns the joints under the names that they have in a state.
-
-        Raises:
-            SimulatorFault: if a joint is missing or a value isn't finite.
-        """
+        """Returns the joints by name; raises SimulatorFault for a missing or infinite one."""
         if names != self._names:
             self._places = self._found(names)
             self._names = names

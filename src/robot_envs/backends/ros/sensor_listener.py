@@ -62,17 +62,11 @@ class _Heard(NamedTuple):
 
 
 class SensorListener:
-    """Keeps the newest reading of each sensor, and when it has come.
+    """The newest reading of each sensor, and when it came, by `clock` [s].
 
-    Args:
-        robot: whose plugins, or `sensor_topics`, name the topics.
-        names: of its sensors.
-        clock: tells the time of arrival [s].
-        off: how far stamps may be off that clock [s]; then, too, a reading counts only if its stamp is newer
-            than the one before. None: the clock isn't that of the stamps.
-
-    Raises:
-        RobotEnvError: if the robot has no such sensor, or none whose topic is known.
+    Stamps may differ from that clock by `off` [s]; then, too, a reading counts only if its stamp is newer
+    than the one before. None: the clock isn't that of the stamps. Raises RobotEnvError for an unknown sensor
+    or topic.
     """
 
     def __init__(
@@ -140,10 +134,7 @@ class SensorListener:
             )
 
     def trouble(self, late: float) -> str:
-        """Returns what can't be read, or is older than `late` [s] and three periods; empty if all is well.
-
-        Time counts from the last `resume` at the earliest.
-        """
+        """Returns which sensor is unreadable, or silent for `late` [s] and three periods since `resume`."""
         now = self._clock()
         with self._arrived:
             for name, heard in self._heard.items():

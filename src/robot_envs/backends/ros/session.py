@@ -1,4 +1,4 @@
-"""What a process's environments over ROS share: master, simulator and robots, started if they don't run."""
+"""The master, simulator and robots that a process's environments over ROS share."""
 
 import atexit
 import contextlib
@@ -33,14 +33,14 @@ class RosSession:
     "ros" ("ros-realtime" if `realtime`) use it.
 
     Args:
-        robots: the robot, or several that share a world.
-        name: this process's node name, with namespace.
-        argv: the process's arguments, with roslaunch's remappings.
-        realtime: let the world run in real time, instead of in lock-step.
-        gui: open the simulator's window, if it isn't open.
-        seed: of a simulator that is started here.
-        rviz: show the robot in RViz.
-        curves: a run folder, whose curves the window shows next to the robot, whoever opened it.
+        robots: The robot, or several that share a world.
+        name: This process's node name, with namespace.
+        argv: The process's arguments, with roslaunch's remappings.
+        realtime: Let the world run in real time, instead of in lock-step.
+        gui: Open the simulator's window, if it isn't open.
+        seed: Seed of a simulator that is started here.
+        rviz: Show the robot in RViz.
+        curves: A run folder, whose curves the window shows next to the robot, whoever opened it.
     """
 
     def __init__(
@@ -65,14 +65,9 @@ class RosSession:
         self._started_simulator = False
 
     def start(self, say: Say) -> None:
-        """Starts what is missing, and makes this the process's session.
+        """Starts what is missing, which `say` reports, and makes this the process's session.
 
-        Args:
-            say: called with a line for each thing that is started.
-
-        Raises:
-            RobotEnvError: if something can't be started, or what runs doesn't fit; `close` ends what was
-                started before.
+        Raises RobotEnvError if something can't be started, or what runs doesn't fit; `close` ends the rest.
         """
         robot = self._scene.robots[0]
         if rospy.core.is_initialized() and rospy.is_shutdown():
@@ -158,18 +153,7 @@ class RosSession:
     def connect(
         self, scene: Scene, control_period: float, deadline: float | None = None
     ) -> RobotBackend:
-        """Makes a backend that moves the robots; the caller closes it.
-
-        Args:
-            scene: the session's robots, and objects, which are in the world during this backend's episodes.
-            control_period: simulated time of one action [s]; in real time 0 takes the newest joint state
-                without waiting.
-            deadline: wall time that an answer in lock-step may take, on top of 10 ms for each tick [s].
-
-        Raises:
-            ValueError: if the period isn't a whole number of physics steps.
-            RobotEnvError: if the simulator doesn't answer, or an object can't be spawned.
-        """
+        """Makes a backend that moves the robots; the caller closes it. See `make_backend`."""
         ticks = ticks_per_action(control_period, running.physics_step()) if control_period else 0
         if self._realtime:
             from robot_envs.backends.ros.realtime import RealtimeWorld
@@ -200,11 +184,8 @@ class RosSession:
 def running_session(scene: Scene, realtime: bool) -> RosSession:
     """Returns the process's session, started if there is none; it runs until the process ends.
 
-    If its simulator has died, another one is started. A session of other robots ends.
-
-    Raises:
-        RobotEnvError: if something can't be started, what runs doesn't fit, or an environment of other robots
-            is open.
+    If its simulator has died, another one is started. A session of other robots ends; raises RobotEnvError if
+    an environment of these is open.
     """
     for session in reversed(_sessions[:]):
         answers, has_them = running.simulator_answers(), session._scene.robots == scene.robots

@@ -46,12 +46,9 @@ def start_master() -> str:
 def main(argv: list[str]) -> int:
     """Runs master and simulator until the simulator or the client ends, or a signal comes.
 
-    Args:
-        argv: the client's process id, the file descriptor to which the master's address and the simulator's
-            process id are written, and the simulator's arguments.
-
-    Returns:
-        0 after a signal; otherwise the simulator's exit code, or 128 + the number of its signal.
+    `argv` has the client's process id, the file descriptor for the master's address and the simulator's
+    process id, and the simulator's arguments. Returns 0 after a signal, else the simulator's exit code, or
+    128 + signal.
     """
     client, report = int(argv[1]), int(argv[2])
     signalled, wakeup = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)

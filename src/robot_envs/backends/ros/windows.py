@@ -1,4 +1,4 @@
-"""The simulator's window, a page in the browser, and RViz: opened along with a session."""
+"""Windows of a session: the simulator's page in the browser, and RViz."""
 
 import contextlib
 import os
@@ -52,10 +52,7 @@ def open_window(say: Say) -> Callable[[], object]:
 
 
 def report_open(say: Say) -> None:
-    """Says where a window is that was open before.
-
-    A window for other machines has a token in its address, so only whoever opened it is shown that.
-    """
+    """Says where a window is that was open before; only who opened it knows the token in its address."""
     for line in rospy.get_param(WINDOW, []) or [
         "the simulator's window is open already; whoever opened it was told its address"
     ]:
@@ -65,9 +62,7 @@ def report_open(say: Say) -> None:
 def report_opening(say: Say, registered: bool) -> None:
     """Waits for a window to open, and says where it is: the simulator's own output goes to its log.
 
-    Args:
-        say: called with each line.
-        registered: whether its node has registered already, so that it has ended if it isn't there.
+    `registered` is whether its node has registered already, so that it has ended if it isn't there.
     """
     lines: list[str] = []
 

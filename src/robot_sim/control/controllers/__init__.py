@@ -1,73 +1,31 @@
 """The controllers, by the type name that a parameter file gives them.
 
-To add one: a module next to this one, and its class in BUILT_IN. Users write their own as `type:
-my_package/MyController`, a Python class (docs/controllers.md).
+To add one: a module next to this one, with a table CONTROLLERS of type names, classes and interfaces. Users
+write their own as `type: my_package/MyController`, a Python class (docs/controllers.md).
 """
 
 import importlib
 import importlib.util
+import pkgutil
+from functools import cache
 
 from robot_sim.control.controllers.base import Controller, Input, Output
-from robot_sim.control.controllers.diff_drive import DiffDriveController
-from robot_sim.control.controllers.forward import (
-    EffortGroup,
-    EffortJoint,
-    PositionGroup,
-    PositionJoint,
-    VelocityGroup,
-    VelocityJoint,
-)
-from robot_sim.control.controllers.gripper import EffortGripper, PositionGripper
-from robot_sim.control.controllers.joint_state import JointStateController
-from robot_sim.control.controllers.joint_trajectory import (
-    EffortTrajectory,
-    PositionTrajectory,
-    VelocityTrajectory,
-)
-from robot_sim.control.controllers.pid_controllers import (
-    EffortGroupPosition,
-    EffortJointPosition,
-    EffortJointVelocity,
-    VelocityJointPosition,
-)
-from robot_sim.control.controllers.sensor_controllers import (
-    ForceTorqueSensorController,
-    ImuSensorController,
-)
-from robot_sim.control.controllers.steering import (
-    AckermannSteeringController,
-    FourWheelSteeringController,
-)
 from robot_sim.control.errors import ControlError, faults
 
-__all__ = ["BUILT_IN", "Controller", "Input", "Output", "find_type"]
+__all__ = ["Controller", "Input", "Output", "built_in", "find_type"]
 
-BUILT_IN: dict[str, type[Controller]] = {
-    controller.type_name: controller
-    for controller in (
-        JointStateController,
-        DiffDriveController,
-        AckermannSteeringController,
-        FourWheelSteeringController,
-        ImuSensorController,
-        ForceTorqueSensorController,
-        EffortJoint,
-        EffortJointPosition,
-        EffortJointVelocity,
-        EffortGroup,
-        EffortGroupPosition,
-        EffortTrajectory,
-        EffortGripper,
-        PositionJoint,
-        PositionGroup,
-        PositionTrajectory,
-        PositionGripper,
-        VelocityJoint,
-        VelocityJointPosition,
-        VelocityGroup,
-        VelocityTrajectory,
-    )
-}
+
+@cache
+def built_in() -> dict[str, type[Controller]]:
+    """Returns the controllers of this folder's modules, by type name."""
+    modules = [
+        importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__)
+    ]
+    return {
+        name: type(made.__name__, (made,), {"type_name": name, "interface": interface})
+        for module in modules
+        for name, (made, interface) in getattr(module, "CONTROLLERS", {}).items()
+    }
 
 
 def find_type(type_name: str) -> type[Controller] | None:

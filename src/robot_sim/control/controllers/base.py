@@ -1,12 +1,11 @@
 """The base of controllers: a life cycle, an update on each control tick, inputs and outputs."""
 
-import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from robot_sim.control.errors import ControlError
+from robot_sim.control.controllers.parameters import OneJoint, Parameters, number
 from robot_sim.control.hardware import RobotHardware
 from robot_sim.control.joint import JointHandle
 from robot_sim.control.pid import Loop, Pid, one_listener
@@ -68,6 +67,7 @@ class Controller(Stateful, ABC):
     non_persistent: ClassVar[tuple[str, ...]] = ("name", "claimed", "inputs", "outputs", "loops")
     type_name: ClassVar[str]
     interface: ClassVar[str]
+    parameters: ClassVar[Sequence[type[Parameters]]] = ()  # that `create` reads
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -122,27 +122,7 @@ def number_param(params: Mapping[str, object], key: str, place: str) -> float:
     Raises:
         ControlError: if it is missing or not a finite number.
     """
-    value = params.get(key)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ControlError(
-            f"parameter {place}/{key} is missing or is not a finite number: {value!r}"
-        )
-    return float(value)
-
-
-def option(params: Mapping[str, object], key: str, place: str, default: Any) -> Any:
-    """Returns the parameter `key`, of the same type as its `default`; a number is finite.
-
-    Raises:
-        ControlError: if it is of another type.
-    """
-    value = params.get(key, default)
-    if isinstance(default, float):
-        return number_param({key: value}, key, place)
-    if not isinstance(value, type(default)) or isinstance(value, bool) != isinstance(default, bool):
-        kind = type(default).__name__
-        raise ControlError(f"parameter {place}/{key} must be of type {kind}: {value!r}")
-    return value
+    return number(params.get(key), f"{place}/{key}")
 
 
 def joint_param(
@@ -153,23 +133,4 @@ def joint_param(
     Raises:
         ControlError: if there is no such joint with that interface.
     """
-    joint = params.get("joint")
-    if not isinstance(joint, str) or not joint:
-        raise ControlError(f"parameter {name}/joint is missing or is not a string: {joint!r}")
-    return hardware.joint(interface, joint)
-
-
-def joints_param(
-    params: Mapping[str, object], name: str, interface: str, hardware: RobotHardware
-) -> list[JointHandle]:
-    """Returns the joints that the parameter `joints` of controller `name` lists.
-
-    Raises:
-        ControlError: if it isn't a list of joints with that interface, is empty, or names one twice.
-    """
-    names = params.get("joints")
-    if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
-        raise ControlError(f"parameter {name}/joints must be a list of joint names: {names!r}")
-    if len(set(names)) < len(names):
-        raise ControlError(f"parameter {name}/joints names a joint twice: {names!r}")
-    return [hardware.joint(interface, joint) for joint in names]
+    return hardware.joint(interface, OneJoint.read(params, name).joint)

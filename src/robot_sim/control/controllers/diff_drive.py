@@ -1,16 +1,11 @@
 """diff_drive_controller/DiffDriveController (docs/contract/sensors.md 7)."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
-from robot_sim.control.controllers.base import Output, option
-from robot_sim.control.controllers.vehicle import (
-    VehicleController,
-    VehicleOptions,
-    length_param,
-    multiplier_param,
-    names_param,
-)
+from robot_sim.control.controllers.base import Output
+from robot_sim.control.controllers.parameters import parameter, positive, wheel_names
+from robot_sim.control.controllers.vehicle import VehicleController, VehicleParameters
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import VELOCITY, RobotHardware
 from robot_sim.control.joint import JointHandle
@@ -22,7 +17,20 @@ from robot_sim.state_dict import Stateful
 
 LEFT, RIGHT = "left_wheel_radius_multiplier", "right_wheel_radius_multiplier"
 SEPARATION = "wheel_separation_multiplier"
-STATE = "publish_wheel_joint_controller_state"
+
+
+class DiffDriveParameters(VehicleParameters):
+    left_wheel: list[str] = parameter("a joint, or a list", read=wheel_names)
+    right_wheel: list[str] = parameter("a joint, or a list", read=wheel_names)
+    wheel_separation: float | None = parameter("[m]; else the description's", None, positive)
+    wheel_radius: float | None = parameter("[m]; else the description's", None, positive)
+    wheel_separation_multiplier: float = parameter("of the separation", 1.0, positive)
+    wheel_radius_multiplier: float = parameter("of both radii", 1.0, positive)
+    left_wheel_radius_multiplier: float | None = parameter("else that of both", None, positive)
+    right_wheel_radius_multiplier: float | None = parameter("else that of both", None, positive)
+    publish_wheel_joint_controller_state: bool = parameter(
+        "whether `wheel_joint_controller_state` is published", False
+    )
 
 
 class Side(Stateful):
@@ -48,11 +56,10 @@ class Side(Stateful):
 class DiffDriveController(VehicleController):
     """Wheels on the left and on the right."""
 
-    type_name = "diff_drive_controller/DiffDriveController"
-    interface = VELOCITY
+    parameters = (DiffDriveParameters,)
 
     def __init__(
-        self, name: str, options: VehicleOptions, sides: tuple[Side, Side], separation: float,
+        self, name: str, options: VehicleParameters, sides: tuple[Side, Side], separation: float,
         scales: Mapping[str, float],
     ) -> None:  # fmt: skip
         super().__init__(name, options)
@@ -62,39 +69,33 @@ class DiffDriveController(VehicleController):
         self.tunables = {
             key: (scale, min(scale, 0.5), max(scale, 1.5)) for key, scale in scales.items()
         }
-        self.tunables["publish_rate"] = (options.rate, 0.0, 2000.0)
-        self.tunables["enable_odom_tf"] = (options.tf, False, True)
+        self.tunables["publish_rate"] = (options.publish_rate, 0.0, 2000.0)
+        self.tunables["enable_odom_tf"] = (options.enable_odom_tf, False, True)
         self._joints = sides[0].joints + sides[1].joints
         self.claimed = tuple(sorted(joint.name for joint in self._joints))
         self._wheels = Output("wheel_joint_controller_state", "TrajectorySample")
 
     @classmethod
-    def create(
-        cls, name: str, params: Mapping[str, object], hardware: RobotHardware
-    ) -> "DiffDriveController":
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
+        given, robot = DiffDriveParameters.read(params, name), hardware.robot
         sides = [
-            [hardware.joint(VELOCITY, each) for each in names_param(params, key, name)]
-            for key in ("left_wheel", "right_wheel")
+            [hardware.joint(VELOCITY, each) for each in names]
+            for names in (given.left_wheel, given.right_wheel)
         ]
         if len(sides[0]) != len(sides[1]):
             raise ControlError(f"{name}/left_wheel and right_wheel must have the same length")
-        first = [side[0].name for side in sides]
-        separation = length_param(
-            params, "wheel_separation", name, lambda: distance(hardware.robot, *first)
-        )
-        radius = length_param(
-            params, "wheel_radius", name, lambda: wheel_radius(hardware.robot, first[0])
-        )
-        both = multiplier_param(params, "wheel_radius_multiplier", name)
+        first = given.left_wheel[0], given.right_wheel[0]
+        separation = given.length("wheel_separation", name, lambda: distance(robot, *first))
+        radius = given.length("wheel_radius", name, lambda: wheel_radius(robot, first[0]))
+        both = given.wheel_radius_multiplier
         scales = {
-            LEFT: multiplier_param(params, LEFT, name, both),
-            RIGHT: multiplier_param(params, RIGHT, name, both),
-            SEPARATION: multiplier_param(params, SEPARATION, name),
+            LEFT: given.left_wheel_radius_multiplier or both,
+            RIGHT: given.right_wheel_radius_multiplier or both,
+            SEPARATION: given.wheel_separation_multiplier,
         }
         left, right = (Side(joints, radius) for joints in sides)
-        options = VehicleOptions.read(params, name)
-        found = cls(name, options, (left, right), separation, scales)
-        if option(params, STATE, name, default=False):
+        found = cls(name, given, (left, right), separation, scales)
+        if given.publish_wheel_joint_controller_state:
             found.outputs.append(found._wheels)
         return found
 
@@ -136,3 +137,6 @@ class DiffDriveController(VehicleController):
         errors = tuple(a - b for a, b in zip(commands, speeds, strict=True))
         names = tuple(joint.name for joint in self._joints)
         return TrajectorySample(now, names, ((), commands, ()), (positions, speeds), ((), errors))
+
+
+CONTROLLERS = {"diff_drive_controller/DiffDriveController": (DiffDriveController, VELOCITY)}

@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Self
 
-from robot_sim.control.controllers.base import Controller, Input, joint_param, joints_param
+from robot_sim.control.controllers.base import Controller, Input, joint_param
+from robot_sim.control.controllers.parameters import OneJoint, SomeJoints
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import EFFORT, POSITION, VELOCITY, RobotHardware
 from robot_sim.control.joint import JointHandle
@@ -33,6 +34,8 @@ class Forward(Controller):
 class ForwardJoint(Forward):
     """Drives the joint that the parameter `joint` names."""
 
+    parameters = (OneJoint,)
+
     def __init__(self, name: str, joints: list[JointHandle]) -> None:
         super().__init__(name, joints)
         self.inputs = [Input("command", "Float64", self.command)]
@@ -48,47 +51,20 @@ class ForwardJoint(Forward):
 class ForwardGroup(Forward):
     """Drives the joints that the parameter `joints` lists."""
 
+    parameters = (SomeJoints,)
+
     def __init__(self, name: str, joints: list[JointHandle]) -> None:
         super().__init__(name, joints)
         self.inputs = [Input("command", "Float64MultiArray", self.command_all)]
 
     @classmethod
     def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
-        return cls(name, joints_param(params, name, cls.interface, hardware))
+        joints = SomeJoints.read(params, name).joints
+        return cls(name, [hardware.joint(cls.interface, joint) for joint in joints])
 
     def command_all(self, values: Sequence[float]) -> None:
         check_length(self, values, len(self._joints))
         self._commands = list(values)
-
-
-class EffortJoint(ForwardJoint):
-    type_name = "effort_controllers/JointEffortController"
-    interface = EFFORT
-
-
-class PositionJoint(ForwardJoint):
-    type_name = "position_controllers/JointPositionController"
-    interface = POSITION
-
-
-class VelocityJoint(ForwardJoint):
-    type_name = "velocity_controllers/JointVelocityController"
-    interface = VELOCITY
-
-
-class EffortGroup(ForwardGroup):
-    type_name = "effort_controllers/JointGroupEffortController"
-    interface = EFFORT
-
-
-class PositionGroup(ForwardGroup):
-    type_name = "position_controllers/JointGroupPositionController"
-    interface = POSITION
-
-
-class VelocityGroup(ForwardGroup):
-    type_name = "velocity_controllers/JointGroupVelocityController"
-    interface = VELOCITY
 
 
 def check_length(controller: Controller, values: Sequence[float], joints: int) -> None:
@@ -97,3 +73,13 @@ def check_length(controller: Controller, values: Sequence[float], joints: int) -
         raise ControlError(
             f"controller '{controller.name}' has {joints} joints, but {len(values)} commands came: ignored"
         )
+
+
+CONTROLLERS = {
+    "effort_controllers/JointEffortController": (ForwardJoint, EFFORT),
+    "effort_controllers/JointGroupEffortController": (ForwardGroup, EFFORT),
+    "position_controllers/JointPositionController": (ForwardJoint, POSITION),
+    "position_controllers/JointGroupPositionController": (ForwardGroup, POSITION),
+    "velocity_controllers/JointVelocityController": (ForwardJoint, VELOCITY),
+    "velocity_controllers/JointGroupVelocityController": (ForwardGroup, VELOCITY),
+}

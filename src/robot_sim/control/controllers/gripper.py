@@ -4,13 +4,14 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple, Self
 
-from robot_sim.control.controllers.base import Controller, joint_param, option
+from robot_sim.constants import NANOSECONDS
+from robot_sim.control.controllers.base import Controller
+from robot_sim.control.controllers.parameters import OneJoint, Parameters, parameter, rate
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import EFFORT, POSITION, RobotHardware
 from robot_sim.control.joint import JointHandle
 from robot_sim.control.limits import clamp
 from robot_sim.control.pid import Loop, Pid
-from robot_sim.control.trajectory import NANOSECONDS
 from robot_sim.control.trajectory_goals import ABORTED, CANCELED, SUCCEEDED, GoalObserver
 
 
@@ -31,26 +32,32 @@ class GripperOutcome(NamedTuple):
     sample: GripperSample
 
 
-class GripperSettings(NamedTuple):
-    """The parameters: [rad, m], [N m, N], [rad/s, m/s], [s], [Hz]."""
+class GripperParameters(OneJoint):
+    goal_tolerance: float = parameter("how near a goal is reached [rad, m]", 0.01)
+    max_effort: float = parameter("the most before the first goal, and after a stop [N m, N]", 0.0)
+    stall_velocity_threshold: float = parameter("below it the joint stands [rad/s, m/s]", 0.001)
+    stall_timeout: float = parameter("how long it stands until a goal has stalled [s]", 1.0)
+    action_monitor_rate: float = parameter("of feedback [Hz], above 0", 20.0, rate)
 
-    goal_tolerance: float = 0.01
-    max_effort: float = 0.0
-    stall_velocity_threshold: float = 0.001
-    stall_timeout: float = 1.0
-    action_monitor_rate: float = 20.0
+
+class GripperGains(Parameters):
+    pid: Pid = parameter(
+        "gains of its [PID](#pid); for effort joints", read=Pid.from_params, key="gains/<joint>"
+    )
 
 
 class GripperActionController(Controller):
     """Moves a joint to a goal's position, and ends the goal when it is there, or stalls on the way.
 
-    Its time is uptime [ns], the sum of its periods since it was started: the clock may jump.
+    A PID moves effort joints, cut at the goal's effort; position joints ignore that. Its time is uptime [ns],
+    the sum of its periods since it was started: the clock may jump.
     """
 
+    parameters = (GripperParameters, GripperGains)
     non_persistent = ("_goal", "_settings")  # a goal's client knows nothing of snapshots
 
     def __init__(
-        self, name: str, joint: JointHandle, settings: GripperSettings, pid: Pid | None = None
+        self, name: str, joint: JointHandle, settings: GripperParameters, pid: Pid | None = None
     ) -> None:
         super().__init__(name)
         self.claimed = (joint.name,)
@@ -64,18 +71,11 @@ class GripperActionController(Controller):
 
     @classmethod
     def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
-        joint = joint_param(params, name, cls.interface, hardware)
-        defaults = GripperSettings()._asdict()
-        settings = GripperSettings(
-            **{key: option(params, key, name, default) for key, default in defaults.items()}
-        )
-        if settings.action_monitor_rate <= 0.0:
-            raise ControlError(f"parameter {name}/action_monitor_rate must be more than 0 [Hz]")
+        given = GripperParameters.read(params, name)
+        joint = hardware.joint(cls.interface, given.joint)
         if cls.interface == POSITION:
-            return cls(name, joint, settings)
-        gains = option(params, "gains", name, {})
-        pid = Pid.from_params(gains.get(joint.name), f"{name}/gains/{joint.name}")
-        return cls(name, joint, settings, pid)
+            return cls(name, joint, given)
+        return cls(name, joint, given, GripperGains.read(params, name, given.joint).pid)
 
     def starting(self, now: int) -> None:
         self._end(CANCELED, "the controller started over: it was restarted, or its joint was moved")
@@ -153,15 +153,7 @@ class GripperActionController(Controller):
             goal[1].finished(GripperOutcome(kind, text, self._sample(kind)))
 
 
-class EffortGripper(GripperActionController):
-    """Moves the joint by a PID to an effort, cut at that of the goal."""
-
-    type_name = "effort_controllers/GripperActionController"
-    interface = EFFORT
-
-
-class PositionGripper(GripperActionController):
-    """Commands the position; the goal's effort doesn't count."""
-
-    type_name = "position_controllers/GripperActionController"
-    interface = POSITION
+CONTROLLERS = {
+    "effort_controllers/GripperActionController": (GripperActionController, EFFORT),
+    "position_controllers/GripperActionController": (GripperActionController, POSITION),
+}

@@ -4,15 +4,16 @@ See docs/contract/ros_control.md 3.1.
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
-from robot_sim.control.controllers.base import Controller, Output, number_param
+from robot_sim.constants import NANOSECONDS
+from robot_sim.control.controllers.base import Controller, Output
+from robot_sim.control.controllers.parameters import SLOWEST, name_list, parameter
+from robot_sim.control.controllers.sensor_controllers import PublishRate
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import STATE, RobotHardware
 from robot_sim.control.joint import JointHandle
 
-NANOSECONDS = 1_000_000_000
-SLOWEST = 1e-6  # [Hz]; below it, as at 0, nothing is ever published
 Extra = tuple[str, tuple[float, ...]]  # a constant joint: name; position, velocity, effort
 EXTRA_FIELDS = ("position", "velocity", "effort")
 
@@ -27,11 +28,17 @@ class JointStateSample(NamedTuple):
     efforts: tuple[float, ...]
 
 
+class JointStateParameters(PublishRate):
+    joints: list[str] | None = parameter("those to report; all without it", None, name_list)
+    extra_joints: Any = parameter(
+        "constant ones: a list of `{name, position, velocity, effort}`", (), lambda value, _: value
+    )
+
+
 class JointStateController(Controller):
     """Publishes `joint_states` at `publish_rate` [Hz of simulated time], phase-locked to the first one."""
 
-    type_name = "joint_state_controller/JointStateController"
-    interface = STATE
+    parameters = (JointStateParameters,)
 
     def __init__(
         self, name: str, joints: list[JointHandle], rate: float, extra: list[Extra]
@@ -46,18 +53,15 @@ class JointStateController(Controller):
         self.outputs = [self._output]
 
     @classmethod
-    def create(
-        cls, name: str, params: Mapping[str, object], hardware: RobotHardware
-    ) -> "JointStateController":
-        rate = number_param(params, "publish_rate", name)
-        wanted = params.get("joints", list(hardware.joints))
-        if not isinstance(wanted, list) or not all(isinstance(joint, str) for joint in wanted):
-            raise ControlError(f"parameter {name}/joints must be a list of joint names: {wanted!r}")
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
+        given = JointStateParameters.read(params, name)
+        wanted = list(hardware.joints) if given.joints is None else given.joints
         unknown = [joint for joint in wanted if joint not in hardware.joints]
         if unknown:
             raise ControlError(f"parameter {name}/joints: the robot has no joint {unknown}")
-        extra = _extra_joints(params.get("extra_joints", []), wanted)
-        return cls(name, [hardware.joints[joint] for joint in wanted], rate, extra)
+        extra = _extra_joints(given.extra_joints, wanted)
+        joints = [hardware.joints[joint] for joint in wanted]
+        return cls(name, joints, given.publish_rate, extra)
 
     def starting(self, now: int) -> None:
         if self._period is not None:
@@ -102,3 +106,6 @@ def _extra_joints(entries: object, names: list[str]) -> list[Extra]:
             seen.add(entry["name"])
             extra.append((entry["name"], tuple(values)))
     return extra
+
+
+CONTROLLERS = {"joint_state_controller/JointStateController": (JointStateController, STATE)}

@@ -3,15 +3,22 @@
 See docs/contract/ros_control.md 3.5.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple, Self
 
-from robot_sim.control.controllers.base import Controller, Output, joints_param, number_param
-from robot_sim.control.errors import ControlError
+from robot_sim.constants import NANOSECONDS
+from robot_sim.control.controllers.base import Controller, Output
+from robot_sim.control.controllers.parameters import (
+    SLOWEST,
+    Parameters,
+    SomeJoints,
+    parameter,
+    rate,
+    truth,
+)
 from robot_sim.control.hardware import EFFORT, POSITION, VELOCITY, RobotHardware
-from robot_sim.control.joint import JointHandle
 from robot_sim.control.pid import Loop, Pid
-from robot_sim.control.trajectory import NANOSECONDS, Axis, State
+from robot_sim.control.trajectory import Axis, State
 from robot_sim.control.trajectory_goals import (
     CANCELED,
     INVALID_GOAL,
@@ -31,9 +38,40 @@ from robot_sim.control.trajectory_goals import (
     monitored_joints,
 )
 
-SLOWEST = 1e-6  # [Hz]; below it, as at 0, no state is published
-STOPPED_VELOCITY = 0.01  # [rad/s, m/s]
 FOR_EVER = 1e12  # [s]; longer durations are cut
+
+
+class TrajectoryParameters(SomeJoints):
+    goal_time: float = parameter(
+        "how late a goal may be reached [s]; 0: at any time", 0.0, key="constraints/goal_time"
+    )
+    stopped_velocity_tolerance: float = parameter(
+        "largest velocity at a goal [rad/s, m/s]", 0.01,
+        key="constraints/stopped_velocity_tolerance",
+    )  # fmt: skip
+    state_publish_rate: float = parameter("of `state` [Hz of simulated time]; 0: none", 50.0)
+    action_monitor_rate: float = parameter("of feedback [Hz], above 0", 20.0, rate)
+    stop_trajectory_duration: float = parameter("in which a joint comes to rest [s]", 0.0)
+    allow_partial_joints_goal: bool = parameter("whether some joints may be sent", False, truth)
+
+
+class JointTolerances(Parameters):
+    trajectory: float = parameter(
+        "largest error on the way [rad, m]; 0: any", 0.0, key="constraints/<joint>/trajectory"
+    )
+    goal: float = parameter(
+        "largest error at a goal [rad, m]; 0: any", 0.0, key="constraints/<joint>/goal"
+    )
+
+
+class JointGains(Parameters):
+    pid: Pid = parameter(
+        "gains of its [PID](#pid); not of positions", read=Pid.from_params, key="gains/<joint>"
+    )
+    feed: float = parameter(
+        "share of the desired velocity in the command; not of positions", 0.0,
+        key="velocity_ff/<joint>",
+    )  # fmt: skip
 
 
 class Settings(NamedTuple):
@@ -46,71 +84,33 @@ class Settings(NamedTuple):
     constraints: Constraints
 
 
-def read_settings(
-    params: Mapping[str, object], joints: Sequence[JointHandle], name: str
-) -> Settings:
+def read_settings(params: Mapping[str, object], given: TrajectoryParameters, name: str) -> Settings:
     """Reads the settings of controller `name`."""
-    state_rate = _number(params, "state_publish_rate", 50.0, name)
-    monitor_rate = _number(params, "action_monitor_rate", 20.0, name)
-    if monitor_rate <= SLOWEST:
-        raise ControlError(f"parameter {name}/action_monitor_rate must be more than 0 [Hz]")
-    partial = params.get("allow_partial_joints_goal", False)
-    if not isinstance(partial, bool):
-        raise ControlError(
-            f"parameter {name}/allow_partial_joints_goal must be true or false: {partial!r}"
-        )
+    joints = [JointTolerances.read(params, name, joint) for joint in given.joints]
+    path = tuple(Tolerance(each.trajectory) for each in joints)
+    goal = tuple(Tolerance(each.goal, given.stopped_velocity_tolerance) for each in joints)
+    rate = given.state_publish_rate
     return Settings(
-        round(NANOSECONDS / state_rate) if state_rate > SLOWEST else 0,
-        round(NANOSECONDS / monitor_rate),
-        _duration(params, "stop_trajectory_duration", name),
-        partial,
-        _constraints(_tree(params, "constraints", name), joints, f"{name}/constraints"),
+        round(NANOSECONDS / rate) if rate > SLOWEST else 0,
+        round(NANOSECONDS / given.action_monitor_rate),
+        _duration(given.stop_trajectory_duration),
+        given.allow_partial_joints_goal,
+        Constraints(path, goal, _duration(given.goal_time)),
     )
 
 
-def read_axes(params: Mapping[str, object], joints: Sequence[JointHandle], name: str) -> list[Axis]:
-    """Makes axes with a PID from `gains` and `velocity_ff`."""
-    gains, feed = _tree(params, "gains", name), _tree(params, "velocity_ff", name)
-    axes = []
-    for joint in joints:
-        pid = Pid.from_params(gains.get(joint.name), f"{name}/gains/{joint.name}")
-        axes.append(Axis(joint, pid, _number(feed, joint.name, 0.0, f"{name}/velocity_ff")))
-    return axes
-
-
-def _constraints(
-    params: Mapping[str, object], joints: Sequence[JointHandle], place: str
-) -> Constraints:
-    stopped = _number(params, "stopped_velocity_tolerance", STOPPED_VELOCITY, place)
-    path, goal = [], []
-    for joint in joints:
-        own, where = _tree(params, joint.name, place), f"{place}/{joint.name}"
-        path.append(Tolerance(_number(own, "trajectory", 0.0, where)))
-        goal.append(Tolerance(_number(own, "goal", 0.0, where), stopped))
-    return Constraints(tuple(path), tuple(goal), _duration(params, "goal_time", place))
-
-
-def _duration(params: Mapping[str, object], key: str, place: str) -> int:
-    return round(min(max(0.0, _number(params, key, 0.0, place)), FOR_EVER) * NANOSECONDS)
-
-
-def _tree(params: Mapping[str, object], key: str, place: str) -> Mapping[str, object]:
-    tree = params.get(key, {})
-    if not isinstance(tree, Mapping):
-        raise ControlError(f"parameter {place}/{key} must hold parameters by name: {tree!r}")
-    return tree
-
-
-def _number(params: Mapping[str, object], key: str, default: float, place: str) -> float:
-    return number_param(params, key, place) if key in params else default
+def _duration(seconds: float) -> int:
+    return round(min(max(0.0, seconds), FOR_EVER) * NANOSECONDS)
 
 
 class JointTrajectoryController(Controller):
     """Moves joints along trajectories, and holds them when there is none.
 
-    Its time is uptime [ns], the sum of its periods since it was started: the clock may jump.
+    Positions are commanded; efforts and velocities come from a PID of both errors. Its time is uptime
+    [ns], the sum of its periods since it was started: the clock may jump.
     """
 
+    parameters = (TrajectoryParameters, JointTolerances, JointGains)
     non_persistent = ("_goal", "_settings")  # a goal's client knows nothing of snapshots
 
     def __init__(self, name: str, axes: list[Axis], settings: Settings) -> None:
@@ -130,11 +130,14 @@ class JointTrajectoryController(Controller):
 
     @classmethod
     def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
-        joints = joints_param(params, name, cls.interface, hardware)
-        settings = read_settings(params, joints, name)
+        given = TrajectoryParameters.read(params, name)
+        joints = [hardware.joint(cls.interface, joint) for joint in given.joints]
+        settings = read_settings(params, given, name)
         if cls.interface == POSITION:
             return cls(name, [Axis(joint) for joint in joints], settings)
-        return cls(name, read_axes(params, joints, name), settings)
+        gains = [JointGains.read(params, name, joint) for joint in given.joints]
+        axes = [Axis(joint, each.pid, each.feed) for joint, each in zip(joints, gains, strict=True)]
+        return cls(name, axes, settings)
 
     def starting(self, now: int) -> None:
         self._end_goal("the controller started over: it was restarted, or its joints were moved")
@@ -272,22 +275,7 @@ class JointTrajectoryController(Controller):
             goal.listener.finished(goal.outcome or GoalOutcome(CANCELED, text=reason))
 
 
-class EffortTrajectory(JointTrajectoryController):
-    """Follows trajectories by a PID from the errors of position and velocity to an effort."""
-
-    type_name = "effort_controllers/JointTrajectoryController"
-    interface = EFFORT
-
-
-class PositionTrajectory(JointTrajectoryController):
-    """Follows trajectories by commanding positions."""
-
-    type_name = "position_controllers/JointTrajectoryController"
-    interface = POSITION
-
-
-class VelocityTrajectory(JointTrajectoryController):
-    """Follows trajectories by a PID from the errors of position and velocity to a velocity."""
-
-    type_name = "velocity_controllers/JointTrajectoryController"
-    interface = VELOCITY
+CONTROLLERS = {
+    f"{interface}_controllers/JointTrajectoryController": (JointTrajectoryController, kind)
+    for interface, kind in (("effort", EFFORT), ("position", POSITION), ("velocity", VELOCITY))
+}

@@ -11,10 +11,9 @@ from robot_sim.control.controllers.base import (
     Controller,
     Input,
     Output,
-    joint_param,
-    joints_param,
 )
 from robot_sim.control.controllers.forward import check_length
+from robot_sim.control.controllers.parameters import OneJoint, Parameters, SomeJoints, parameter
 from robot_sim.control.hardware import EFFORT, VELOCITY, RobotHardware
 from robot_sim.control.joint import JointHandle
 from robot_sim.control.pid import Loop, Pid
@@ -38,6 +37,14 @@ class JointControllerSample(NamedTuple):
     d: float
     i_clamp: float
     antiwindup: bool
+
+
+class JointPid(OneJoint):
+    pid: Pid = parameter("gains of its [PID](#pid)", read=Pid.from_params)
+
+
+class OwnPid(Parameters):
+    pid: Pid = parameter("gains of its [PID](#pid)", read=Pid.from_params, key="<joint>/pid")
 
 
 class PositionLoop(Stateful):
@@ -74,6 +81,7 @@ class PidJoint(Controller):
     The state is published on every tenth update since the controller's load.
     """
 
+    parameters = (JointPid,)
     non_persistent = ("_pid",)  # one of its `pids`
     of_velocity: ClassVar[bool] = False  # whether the error is one of velocity
 
@@ -92,8 +100,8 @@ class PidJoint(Controller):
 
     @classmethod
     def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
-        joint = joint_param(params, name, cls.interface, hardware)
-        return cls(name, joint, Pid.from_params(params.get("pid"), f"{name}/pid"))
+        given = JointPid.read(params, name)
+        return cls(name, hardware.joint(cls.interface, given.joint), given.pid)
 
     @abstractmethod
     def command(self, value: float) -> None:
@@ -118,11 +126,8 @@ class PidJoint(Controller):
         )  # fmt: skip
 
 
-class EffortJointPosition(PidJoint):
+class PidPosition(PidJoint):
     """Holds a joint at its set-point [rad, m]. It starts by holding the position that it finds."""
-
-    type_name = "effort_controllers/JointPositionController"
-    interface = EFFORT
 
     def __init__(self, name: str, joint: JointHandle, pid: Pid) -> None:
         super().__init__(name, joint, pid)
@@ -146,18 +151,9 @@ class EffortJointPosition(PidJoint):
             self._report(now, dt, self._loop.target, joint.position, joint.velocity, error)
 
 
-class VelocityJointPosition(EffortJointPosition):
-    """The same with a velocity [rad/s, m/s] as output."""
-
-    type_name = "velocity_controllers/JointPositionController"
-    interface = VELOCITY
-
-
-class EffortJointVelocity(PidJoint):
+class PidVelocity(PidJoint):
     """Keeps a joint at its commanded velocity [rad/s, m/s], initially 0."""
 
-    type_name = "effort_controllers/JointVelocityController"
-    interface = EFFORT
     of_velocity = True
 
     def __init__(self, name: str, joint: JointHandle, pid: Pid) -> None:
@@ -180,11 +176,10 @@ class EffortJointVelocity(PidJoint):
             self._report(now, dt, self._set_point, velocity, 0.0, error)
 
 
-class EffortGroupPosition(Controller):
+class PidGroupPosition(Controller):
     """Holds joints at their set-points [rad, m]. It starts by holding the positions that it finds."""
 
-    type_name = "effort_controllers/JointGroupPositionController"
-    interface = EFFORT
+    parameters = (SomeJoints, OwnPid)
 
     def __init__(self, name: str, loops: list[PositionLoop]) -> None:
         super().__init__(name)
@@ -196,12 +191,10 @@ class EffortGroupPosition(Controller):
 
     @classmethod
     def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
-        loops = []
-        for joint in joints_param(params, name, cls.interface, hardware):
-            own = params.get(joint.name)
-            gains = own.get("pid") if isinstance(own, Mapping) else None
-            loops.append(PositionLoop(joint, Pid.from_params(gains, f"{name}/{joint.name}/pid")))
-        return cls(name, loops)
+        joints = SomeJoints.read(params, name).joints
+        handles = [hardware.joint(cls.interface, joint) for joint in joints]
+        pids = [OwnPid.read(params, name, joint).pid for joint in joints]
+        return cls(name, list(map(PositionLoop, handles, pids)))
 
     def command_all(self, values: Sequence[float]) -> None:
         check_length(self, values, len(self._loops))
@@ -215,3 +208,11 @@ class EffortGroupPosition(Controller):
     def update(self, now: int, dt: float) -> None:
         for loop in self._loops:
             loop.update(dt)
+
+
+CONTROLLERS = {
+    "effort_controllers/JointPositionController": (PidPosition, EFFORT),
+    "effort_controllers/JointVelocityController": (PidVelocity, EFFORT),
+    "effort_controllers/JointGroupPositionController": (PidGroupPosition, EFFORT),
+    "velocity_controllers/JointPositionController": (PidPosition, VELOCITY),
+}

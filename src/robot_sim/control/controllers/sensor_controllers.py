@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any, ClassVar, NamedTuple, Self
 
-from robot_sim.control.controllers.base import Controller, Output, number_param
+from robot_sim.control.controllers.base import Controller, Output
+from robot_sim.control.controllers.parameters import Parameters, parameter
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import FORCE_TORQUE, IMU, RobotHardware, SensorHandle
 from robot_sim.drives.odometry import Period
@@ -21,9 +22,14 @@ class SensorSample(NamedTuple):
     value: Any
 
 
+class PublishRate(Parameters):
+    publish_rate: float = parameter("[Hz of simulated time]; 0 publishes nothing")
+
+
 class SensorController(Controller):
     """Publishes each sensor of a kind at `publish_rate` [Hz of simulated time], under the sensor's name."""
 
+    parameters = (PublishRate,)
     sensors: ClassVar[str]  # what they are called in messages
     kind: ClassVar[str]  # of the outputs
 
@@ -38,13 +44,13 @@ class SensorController(Controller):
 
     @classmethod
     def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
-        rate = number_param(params, "publish_rate", name)
+        given = PublishRate.read(params, name)
         handles = [make() for make in hardware.sensors[cls.interface]]
         if not handles:
             raise ControlError(
                 f"the robot has no {cls.sensors}, and so no hardware_interface::{cls.interface}"
             )
-        return cls(name, handles, rate)
+        return cls(name, handles, given.publish_rate)
 
     def starting(self, now: int) -> None:
         self._period.restart(now)
@@ -71,12 +77,19 @@ class SensorController(Controller):
 class ImuSensorController(SensorController):
     """Reports the links' sensors of type imu."""
 
-    type_name = "imu_sensor_controller/ImuSensorController"
-    interface, sensors, kind = IMU, '<sensor type="imu">', "InertialSample"
+    sensors, kind = '<sensor type="imu">', "InertialSample"
 
 
 class ForceTorqueSensorController(SensorController):
     """Reports the joints' sensors of type force_torque."""
 
-    type_name = "force_torque_sensor_controller/ForceTorqueSensorController"
-    interface, sensors, kind = FORCE_TORQUE, '<sensor type="force_torque">', "Wrench"
+    sensors, kind = '<sensor type="force_torque">', "Wrench"
+
+
+CONTROLLERS = {
+    "imu_sensor_controller/ImuSensorController": (ImuSensorController, IMU),
+    "force_torque_sensor_controller/ForceTorqueSensorController": (
+        ForceTorqueSensorController,
+        FORCE_TORQUE,
+    ),
+}

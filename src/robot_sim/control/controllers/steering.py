@@ -6,17 +6,17 @@ ackermann_steering_controller and four_wheel_steering_controller.
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
-from robot_sim.control.controllers.base import Input, Output, option
-from robot_sim.control.controllers.vehicle import (
-    VehicleController,
-    VehicleOptions,
-    length_param,
-    multiplier_param,
-    names_param,
+from robot_sim.control.controllers.base import Input, Output
+from robot_sim.control.controllers.parameters import (
+    number,
+    parameter,
+    positive,
+    reader,
+    wheel_names,
 )
-from robot_sim.control.errors import ControlError
+from robot_sim.control.controllers.vehicle import VehicleController, VehicleParameters
 from robot_sim.control.hardware import POSITION, VELOCITY, RobotHardware
 from robot_sim.control.joint import JointHandle
 from robot_sim.control.transmissions import distance, wheel_radius
@@ -35,10 +35,35 @@ class SteeringSample(NamedTuple):
     speed: float
 
 
+_pair = reader(lambda value: len(value) == 2, "must list two joints", before=wheel_names)
+
+
+class SteeringParameters(VehicleParameters):
+    wheel_radius: float | None = parameter("[m]; else the description's", None, positive)
+
+
+class AckermannParameters(SteeringParameters):
+    rear_wheel: str = parameter("joint of the driven wheel", "rear_wheel_joint")
+    front_steer: str = parameter("joint of the fork", "front_steer_joint")
+    wheel_separation_h: float | None = parameter("[m]; else the description's", None, positive)
+    wheel_separation_h_multiplier: float = parameter("of the separation", 1.0, positive)
+    wheel_radius_multiplier: float = parameter("of the measured way", 1.0, positive)
+    steer_pos_multiplier: float = parameter("of the measured angle", 1.0)
+
+
+class FourWheelParameters(SteeringParameters):
+    front_wheel: list[str] = parameter("two joints, the left one first", read=_pair)
+    rear_wheel: list[str] = parameter("two joints, the left one first", read=_pair)
+    front_steering: list[str] = parameter("two joints, the left one first", read=_pair)
+    rear_steering: list[str] = parameter("two joints, the left one first", read=_pair)
+    track: float | None = parameter("[m]; else the description's", None, positive)
+    wheel_base: float | None = parameter("[m]; else the description's", None, positive)
+    wheel_steering_y_offset: float | None = parameter("[m]; else the description's", None, number)
+
+
 class SteeringController(VehicleController):
     """A vehicle with driven wheels and steered forks."""
 
-    interface = VELOCITY
     wheels: list[JointHandle]
     forks: list[JointHandle]
 
@@ -56,10 +81,10 @@ class SteeringController(VehicleController):
 class AckermannSteeringController(SteeringController):
     """One driven wheel behind, one steered fork before it; `angular.z` of a command is its angle [rad]."""
 
-    type_name = "ackermann_steering_controller/AckermannSteeringController"
+    parameters = (AckermannParameters,)
 
     def __init__(
-        self, name: str, options: VehicleOptions, wheel: JointHandle, fork: JointHandle,
+        self, name: str, options: VehicleParameters, wheel: JointHandle, fork: JointHandle,
         base: float, radius: float,
     ) -> None:  # fmt: skip
         super().__init__(name, options)
@@ -69,22 +94,18 @@ class AckermannSteeringController(SteeringController):
         self._last_turned = 0.0
 
     @classmethod
-    def create(
-        cls, name: str, params: Mapping[str, object], hardware: RobotHardware
-    ) -> "AckermannSteeringController":
-        wheel = hardware.joint(VELOCITY, option(params, "rear_wheel", name, "rear_wheel_joint"))
-        fork = hardware.joint(POSITION, option(params, "front_steer", name, "front_steer_joint"))
-        base = length_param(
-            params, "wheel_separation_h", name,
-            lambda: distance(hardware.robot, wheel.name, fork.name),
-        )  # fmt: skip
-        radius = length_param(
-            params, "wheel_radius", name, lambda: wheel_radius(hardware.robot, wheel.name)
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
+        given, robot = AckermannParameters.read(params, name), hardware.robot
+        wheel = hardware.joint(VELOCITY, given.rear_wheel)
+        fork = hardware.joint(POSITION, given.front_steer)
+        base = given.length(
+            "wheel_separation_h", name, lambda: distance(robot, wheel.name, fork.name)
         )
-        base *= multiplier_param(params, "wheel_separation_h_multiplier", name)
-        found = cls(name, VehicleOptions.read(params, name), wheel, fork, base, radius)
-        found.scale_radius = multiplier_param(params, "wheel_radius_multiplier", name)
-        found.scale_angle = option(params, "steer_pos_multiplier", name, 1.0)
+        radius = given.length("wheel_radius", name, lambda: wheel_radius(robot, wheel.name))
+        base *= given.wheel_separation_h_multiplier
+        found = cls(name, given, wheel, fork, base, radius)
+        found.scale_radius = given.wheel_radius_multiplier
+        found.scale_angle = given.steer_pos_multiplier
         return found
 
     def remember(self) -> None:
@@ -107,15 +128,15 @@ class AckermannSteeringController(SteeringController):
 class FourWheelSteeringController(SteeringController):
     """Four driven wheels on forks: front left, front right, rear left, rear right."""
 
-    type_name = "four_wheel_steering_controller/FourWheelSteeringController"
+    parameters = (FourWheelParameters,)
     non_persistent = ("_geometry",)
     _angles: tuple[float, float] | None  # of the axles [rad], if they are commanded
 
     def __init__(
-        self, name: str, options: VehicleOptions, joints: list[list[JointHandle]],
+        self, name: str, options: VehicleParameters, joints: list[list[JointHandle]],
         geometry: SteeredWheels, radius: float,
     ) -> None:  # fmt: skip
-        super().__init__(name, replace(options, odom_frame="odom"))
+        super().__init__(name, replace(options, odom_frame_id="odom"))
         self.claim([*joints[0], *joints[1]], [*joints[2], *joints[3]])
         self._geometry, self._radius = geometry, radius
         self._steer = Output("odom_steer", "SteeringSample", whole=True)
@@ -124,27 +145,24 @@ class FourWheelSteeringController(SteeringController):
         self.inputs.append(steering)
 
     @classmethod
-    def create(
-        cls, name: str, params: Mapping[str, object], hardware: RobotHardware
-    ) -> "FourWheelSteeringController":
-        joints = []
-        for key in ("front_wheel", "rear_wheel", "front_steering", "rear_steering"):
-            kind, names = VELOCITY if "wheel" in key else POSITION, names_param(params, key, name)
-            if len(names) != 2:
-                raise ControlError(f"parameter {name}/{key} must list two joints: {names!r}")
-            joints.append([hardware.joint(kind, each) for each in names])
-        (left, right), (rear, _), forks = joints[0], joints[1], joints[2]
-        robot = hardware.robot
-        between = distance(robot, left.name, right.name)
-        offset = 0.5 * (between - distance(robot, forks[0].name, forks[1].name))
-        offset = option(params, "wheel_steering_y_offset", name, offset)
-        track = length_param(params, "track", name, lambda: between)
-        base = length_param(
-            params, "wheel_base", name, lambda: distance(robot, left.name, rear.name)
-        )
-        radius = length_param(params, "wheel_radius", name, lambda: wheel_radius(robot, left.name))
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
+        given, robot = FourWheelParameters.read(params, name), hardware.robot
+        groups = given.front_wheel, given.rear_wheel, given.front_steering, given.rear_steering
+        kinds = VELOCITY, VELOCITY, POSITION, POSITION
+        joints = [
+            [hardware.joint(kind, each) for each in names]
+            for kind, names in zip(kinds, groups, strict=True)
+        ]
+        (left, right), (rear, _), forks = groups[:3]
+        between = distance(robot, left, right)
+        offset = 0.5 * (between - distance(robot, *forks))
+        if given.wheel_steering_y_offset is not None:
+            offset = given.wheel_steering_y_offset
+        track = given.length("track", name, lambda: between)
+        base = given.length("wheel_base", name, lambda: distance(robot, left, rear))
+        radius = given.length("wheel_radius", name, lambda: wheel_radius(robot, left))
         geometry = SteeredWheels(base, track - 2.0 * offset, offset)
-        return cls(name, VehicleOptions.read(params, name), joints, geometry, radius)
+        return cls(name, given, joints, geometry, radius)
 
     def _halt(self) -> None:
         super()._halt()
@@ -196,3 +214,15 @@ def axle_angle(left: float, right: float) -> float:
     one, other = math.tan(left), math.tan(right)
     both = one + other
     return math.atan(2.0 * one * other / both) if abs(both) > STRAIGHT else 0.0
+
+
+CONTROLLERS = {
+    "ackermann_steering_controller/AckermannSteeringController": (
+        AckermannSteeringController,
+        VELOCITY,
+    ),
+    "four_wheel_steering_controller/FourWheelSteeringController": (
+        FourWheelSteeringController,
+        VELOCITY,
+    ),
+}

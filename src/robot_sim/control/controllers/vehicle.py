@@ -3,14 +3,21 @@
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
-from robot_sim.control.controllers.base import Controller, Input, Output, number_param, option
+from robot_sim.constants import NANOSECONDS
+from robot_sim.control.controllers.base import Controller, Input, Output
+from robot_sim.control.controllers.parameters import (
+    Parameters,
+    length,
+    number,
+    of_type,
+    parameter,
+    reader,
+)
 from robot_sim.control.errors import ControlError
 from robot_sim.control.transmissions import is_number
 from robot_sim.drives.odometry import (
-    NANOSECONDS,
     DeadReckoning,
     OdometrySample,
     Period,
@@ -31,50 +38,57 @@ class TwistSample(NamedTuple):
     angular: float
 
 
-@dataclass(frozen=True)
-class VehicleOptions:
-    """The parameters that all vehicles have."""
+_diagonal = reader(
+    lambda value: isinstance(value, list) and len(value) == AXES and all(map(is_number, value)),
+    f"must be a list of {AXES} numbers",
+    lambda value: tuple(map(float, value)),
+)
 
-    rate: float  # [Hz]
-    open_loop: bool
-    timeout: float  # [s]
-    window: int
-    several_publishers: bool
-    base_frame: str
-    odom_frame: str
-    tf: bool
-    pose_covariance: tuple[float, ...]
-    twist_covariance: tuple[float, ...]
-    linear: SpeedLimits
-    angular: SpeedLimits
-    publish_cmd: bool
 
-    @classmethod
-    def read(cls, params: Mapping[str, object], name: str) -> Self:
-        """Reads the parameters of controller `name`.
+def _limits(axis: str) -> Callable[[Any, str], SpeedLimits]:
+    """Returns a reader of the limits of an axis, of the kinds that are switched on."""
+
+    def read(value: Any, key: str) -> SpeedLimits:
+        place, found = f"{key}/{axis}", {}
+        tree = value.get(axis, {}) if isinstance(value, Mapping) else {}
+        if not isinstance(tree, Mapping):
+            raise ControlError(f"parameter {place} must hold limits: {tree!r}")
+        for kind in ("velocity", "acceleration", "jerk"):
+            limited = f"has_{kind}_limits"
+            if of_type(bool)(tree.get(limited, False), f"{place}/{limited}"):
+                most = number(tree.get(f"max_{kind}"), f"{place}/max_{kind}")
+                found[kind] = number(tree.get(f"min_{kind}", -most), f"{place}/min_{kind}"), most
+        return SpeedLimits(**found)
+
+    return read
+
+
+LIMITS = "`{}/`: `has_velocity_limits`, `max_velocity`, `min_velocity` (minus the most); accelerations, jerks"
+
+
+class VehicleParameters(Parameters):
+    pose_covariance_diagonal: tuple[float, ...] = parameter("six numbers", read=_diagonal)
+    twist_covariance_diagonal: tuple[float, ...] = parameter("six numbers", read=_diagonal)
+    publish_rate: float = parameter("of odometry [Hz]", 50.0)
+    open_loop: bool = parameter("odometry from commands instead of wheels", False)
+    cmd_vel_timeout: float = parameter("age of a command at which the vehicle brakes [s]", 0.5)
+    velocity_rolling_window_size: int = parameter("measurements in the mean velocity", 10)
+    allow_multiple_cmd_vel_publishers: bool = parameter("else several make it brake", True)
+    base_frame_id: str = parameter("frame of the vehicle", "base_link")
+    odom_frame_id: str = parameter("frame of the odometry", "odom")
+    enable_odom_tf: bool = parameter("whether tf has the odometry", True)
+    linear: SpeedLimits = parameter(LIMITS.format("x"), SpeedLimits(), _limits("x"))
+    angular: SpeedLimits = parameter(LIMITS.format("z"), SpeedLimits(), _limits("z"))
+    publish_cmd: bool = parameter("`cmd_vel_out` (TwistStamped) has what the limits leave", False)
+
+    def length(self, key: str, name: str, look_up: Callable[[], float]) -> float:
+        """Returns a length that is given [m], or what `look_up` finds in the robot's description.
 
         Raises:
-            ControlError: if one is wrong.
+            ControlError: if there is nothing above 0 to be found.
         """
-
-        def get(key: str, default: Any) -> Any:
-            return option(params, key, name, default)
-
-        return cls(
-            rate=get("publish_rate", 50.0),
-            open_loop=get("open_loop", False),
-            timeout=get("cmd_vel_timeout", 0.5),
-            window=get("velocity_rolling_window_size", 10),
-            several_publishers=get("allow_multiple_cmd_vel_publishers", True),
-            base_frame=get("base_frame_id", "base_link"),
-            odom_frame=get("odom_frame_id", "odom"),
-            tf=get("enable_odom_tf", True),
-            pose_covariance=_diagonal(params, "pose_covariance_diagonal", name),
-            twist_covariance=_diagonal(params, "twist_covariance_diagonal", name),
-            linear=_limits(params, ("linear", "x"), name),
-            angular=_limits(params, ("angular", "z"), name),
-            publish_cmd=get("publish_cmd", False),
-        )
+        given: float | None = getattr(self, key)
+        return length(look_up(), f"{name}/{key}") if given is None else given
 
 
 class VehicleController(Controller):
@@ -86,19 +100,19 @@ class VehicleController(Controller):
 
     non_persistent = ("options",)
 
-    def __init__(self, name: str, options: VehicleOptions) -> None:
+    def __init__(self, name: str, options: VehicleParameters) -> None:
         super().__init__(name)
         self.options = options
         self.place = DeadReckoning()
-        self._means = [RollingMean(options.window) for _ in REST]
+        self._means = [RollingMean(options.velocity_rolling_window_size) for _ in REST]
         self._velocity: Triple = REST  # ahead, to the left [m/s], turning [rad/s]
-        self.period = Period(options.rate, 0, late=True)
+        self.period = Period(options.publish_rate, 0, late=True)
         self._now = self._sent = -1  # [ns]
         self._halt()
         self._odom = Output("odom", "OdometrySample", whole=True)
         self._tf = Output("/tf", "TransformSample", whole=True)
         self._cmd_out = Output("cmd_vel_out", "TwistSample")
-        self.tf_on = options.tf
+        self.tf_on = options.enable_odom_tf
         self.outputs = [self._odom, self._tf, *([self._cmd_out] if options.publish_cmd else [])]
         self.cmd_vel = Input("cmd_vel", "Twist", self.command)
         self.inputs = [self.cmd_vel]
@@ -136,7 +150,7 @@ class VehicleController(Controller):
         """
         if self.state != "running":
             raise ControlError(f"controller '{self.name}' is not running: the command is ignored")
-        if not self.options.several_publishers and self.cmd_vel.publishers() > 1:
+        if not self.options.allow_multiple_cmd_vel_publishers and self.cmd_vel.publishers() > 1:
             self._halt()
             raise ControlError("there is more than one publisher: the vehicle brakes")
         if not all(map(math.isfinite, numbers)):
@@ -186,7 +200,7 @@ class VehicleController(Controller):
 
     def is_late(self, now: int) -> bool:
         """Whether the last command is too old at a time [ns]."""
-        return now - self._stamp > self.options.timeout * NANOSECONDS
+        return now - self._stamp > self.options.cmd_vel_timeout * NANOSECONDS
 
     def _limit(self, linear: float, angular: float, dt: float) -> tuple[float, float]:
         limits = self.options.linear, self.options.angular
@@ -212,67 +226,7 @@ class VehicleController(Controller):
         """Returns the odometry at a time [ns]."""
         options, (ahead, left, turn) = self.options, self._velocity
         return OdometrySample(
-            now, options.odom_frame, options.base_frame, self.place.position,
+            now, options.odom_frame_id, options.base_frame_id, self.place.position,
             self.place.orientation, (ahead, left, 0.0), (0.0, 0.0, turn),
-            options.pose_covariance, options.twist_covariance,
+            options.pose_covariance_diagonal, options.twist_covariance_diagonal,
         )  # fmt: skip
-
-
-def length_param(
-    params: Mapping[str, object], key: str, place: str, look_up: Callable[[], float]
-) -> float:
-    """Returns the parameter `key` [m], or what `look_up` finds in the robot's description.
-
-    Raises:
-        ControlError: if it isn't above 0 and finite, or there is nothing to be found.
-    """
-    found = number_param(params, key, place) if key in params else look_up()
-    if not 0.0 < found < math.inf:
-        raise ControlError(f"parameter {place}/{key} must be above 0 and finite: {found}")
-    return found
-
-
-def multiplier_param(
-    params: Mapping[str, object], key: str, place: str, default: float = 1.0
-) -> float:
-    """Returns the parameter `key`, a factor of a length.
-
-    Raises:
-        ControlError: if it isn't above 0 and finite.
-    """
-    return length_param(params, key, place, lambda: default)
-
-
-def names_param(params: Mapping[str, object], key: str, place: str) -> list[str]:
-    """Returns the joints that a parameter names, one or a list.
-
-    Raises:
-        ControlError: if it names none.
-    """
-    value = params.get(key)
-    names = [value] if isinstance(value, str) else value
-    if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
-        raise ControlError(f"parameter {place}/{key} must name a joint, or list some: {value!r}")
-    return names
-
-
-def _diagonal(params: Mapping[str, object], key: str, place: str) -> tuple[float, ...]:
-    value = params.get(key)
-    if not isinstance(value, list) or len(value) != AXES or not all(map(is_number, value)):
-        raise ControlError(f"parameter {place}/{key} must be a list of {AXES} numbers: {value!r}")
-    return tuple(map(float, value))
-
-
-def _limits(params: Mapping[str, object], path: tuple[str, str], name: str) -> SpeedLimits:
-    """Returns the limits below `path`, of the kinds that are switched on."""
-    tree: object = params
-    for part in path:
-        tree = tree.get(part, {}) if isinstance(tree, Mapping) else {}
-    if not isinstance(tree, Mapping):
-        raise ControlError(f"parameter {name}/{'/'.join(path)} must hold limits: {tree!r}")
-    place, found = "/".join((name, *path)), {}
-    for kind in ("velocity", "acceleration", "jerk"):
-        if option(tree, f"has_{kind}_limits", place, default=False):
-            most = number_param(tree, f"max_{kind}", place)
-            found[kind] = (option(tree, f"min_{kind}", place, -most), most)
-    return SpeedLimits(**found)

@@ -19,6 +19,7 @@ from robot_sim.physics.engines.bullet_body import BASE, BulletBody
 from robot_sim.physics.engines.bullet_constraints import add_weld, weld_of
 from robot_sim.physics.engines.bullet_contacts import Separation
 from robot_sim.physics.engines.bullet_files import is_plane, write_urdf
+from robot_sim.physics.engines.bullet_meshes import SharedMeshes, static_mesh
 from robot_sim.physics.engines.quiet_pybullet import pybullet
 from robot_sim.physics.pose import ZERO, Pose, Vector, add, scale
 
@@ -70,7 +71,8 @@ class BulletClient:
         self._bodies: dict[int, BulletBody] = {}
         self._sides: dict[tuple[int, int], Side] = {}  # by body and link
         self._weightless: set[tuple[int, int]] = set()  # body and link, where gravity doesn't act
-        self._sizes: dict[int, int] = {}  # [bytes] by body
+        self._sizes: dict[int, int] = {}  # [bytes] by body, without shared meshes
+        self._meshes = SharedMeshes(self._client)
         self.fastened: dict[int, Fastening] = {}
         self._count = count()  # of what was fastened
         self.waste = 0
@@ -83,7 +85,7 @@ class BulletClient:
 
     @property
     def live(self) -> int:
-        return sum(self._sizes.values())
+        return sum(self._sizes.values()) + self._meshes.size
 
     def apply(self, settings: BulletSettings) -> None:
         """Applies settings to the world."""
@@ -124,16 +126,20 @@ class BulletClient:
 
     def _load_files(self, model: ModelDescription, pose: Pose, flags: int) -> int:
         """Loads a model in the engine's form by way of files; returns PyBullet's number of the body."""
+        size = PLANE
         try:
             with scratch_folder() as folder:
-                path = folder / "model.urdf"
-                path.write_text(write_urdf(parents_first(model), folder), encoding="utf-8")
-                size = _size(folder)
-                with _decimal_points():
-                    body: int = pybullet.loadURDF(
-                        str(path), pose.position, pose.orientation, useFixedBase=model.fixed_base,
-                        flags=flags, physicsClientId=self._client,
-                    )  # fmt: skip
+                if mesh := static_mesh(model):
+                    body = self._meshes.load(mesh, pose, folder)
+                else:
+                    path = folder / "model.urdf"
+                    path.write_text(write_urdf(parents_first(model), folder), encoding="utf-8")
+                    size = _size(folder)
+                    with _decimal_points():
+                        body = pybullet.loadURDF(
+                            str(path), pose.position, pose.orientation, flags=flags,
+                            useFixedBase=model.fixed_base, physicsClientId=self._client,
+                        )  # fmt: skip
         except pybullet.error as error:
             self.waste += size
             raise DescriptionError(f"the physics engine can't load the model: {error}") from error
@@ -168,7 +174,7 @@ class BulletClient:
         """Takes a body out of the world."""
         pybullet.removeBody(body, physicsClientId=self._client)
         self._weightless -= {key for key in self._weightless if key[0] == body}
-        self.waste += self._sizes.pop(body)
+        self.waste += self._sizes.pop(body) + self._meshes.remove(body)
         self._bodies.pop(body, None)
         self._separation.remove(body)
         self._sides = {key: side for key, side in self._sides.items() if key[0] != body}

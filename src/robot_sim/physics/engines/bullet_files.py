@@ -11,6 +11,7 @@ from robot_sim.physics.files.meshes import stl
 from robot_sim.physics.pose import Pose, to_rpy
 
 TURNING = ("revolute", "continuous")
+UNSEEN = 0.001  # [m]
 TREAD = 1e-6  # [m]; much less than contacts yield, so the whole line carries
 
 
@@ -88,6 +89,10 @@ def _write_link(robot: Element, link: Link, static: bool, folder: Path) -> None:
     element = SubElement(robot, "link", name=link.name)
     # Without an inertial PyBullet would assume 1 kg; only the immovable link `world` has none.
     _write_inertia(element, link.inertia or Inertia(mass=0.0))
+    if any(
+        shape.solid for shape in link.collisions
+    ):  # else PyBullet keeps them once more, to draw them
+        _write_shape(SubElement(element, "visual"), Shape("sphere", (UNSEEN,)))
     for shape in link.collisions:
         written = SubElement(element, "collision")
         if static and shape.kind == "mesh":

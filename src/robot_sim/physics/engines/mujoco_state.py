@@ -58,7 +58,7 @@ class MujocoState:
                 self._drive()
             if self.placed:
                 self._ease_contacts()
-            if may_lift:
+            if may_lift and self.data.ncon:
                 self._keep_down()
             mujoco.mj_step2(self.model, self.data)
         else:

@@ -4,9 +4,10 @@ Whatever is raised here over broken materials only leaves the mesh without them.
 """
 
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
@@ -23,6 +24,7 @@ LARGEST_IMAGE = 1024  # [pixels] a side, for pictures
 STOPGAP = 2  # [pixels] a side of the image by which trimesh replaces a missing one
 WHITE = (255, 255, 255, 255)
 NONE = np.zeros(0)
+IDENTITY = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
 
 
 def read_glb(path: Path) -> bytes:
@@ -63,14 +65,15 @@ def _scene(path: Path) -> "trimesh.Scene | None":
     """Returns the file's scene (in metres) with its materials, or None if it has none."""
     import trimesh
 
-    scene = trimesh.load_scene(str(path))
+    if path.suffix.lower() == ".dae":
+        root = parse_collada(path.read_bytes())
+        folder = trimesh.resolvers.FilePathResolver(str(path))
+        scene = trimesh.load_scene(BytesIO(tostring(root)), file_type="dae", resolver=folder)
+        scene.apply_scale(meters_of(root))
+    else:
+        scene = trimesh.load_scene(str(path))
     if not any(_has_look(part) for part in scene.geometry.values()):
         return None
-    if path.suffix.lower() == ".dae":
-        root = parse(path.read_bytes())
-        for element in root.iter():
-            element.tag = element.tag.rpartition("}")[2]
-        scene.apply_scale(meters_of(root))
     for part in scene.geometry.values():
         _brighten(getattr(getattr(part, "visual", None), "material", None))
     return scene
@@ -83,6 +86,24 @@ def meters_of(root: Element) -> float:
     if not meters > 0.0:
         raise DescriptionError(f"<unit meter>: a unit of {meters} m has no length")
     return meters
+
+
+def parse_collada(data: bytes) -> Element:
+    """Returns the root of a COLLADA file whose scenes show skins in bind pose, as geometries of their own."""
+    root = parse(data)
+    for element in root.iter():
+        element.tag = element.tag.rpartition("}")[2]
+    root.set("xmlns", "http://www.collada.org/2005/11/COLLADASchema")
+    skins = {f"#{each.get('id')}": each.find("skin") for each in root.iter("controller")}
+    for scene in root.findall("library_visual_scenes/visual_scene"):
+        for instance in list(scene.iter("instance_controller")):
+            skin = skins.get(instance.get("url", ""))
+            if skin is not None:
+                node = SubElement(scene, "node")
+                SubElement(node, "matrix").text = skin.findtext("bind_shape_matrix", IDENTITY)
+                geometry = SubElement(node, "instance_geometry", url=skin.get("source", ""))
+                geometry.extend(instance)
+    return root
 
 
 def _has_look(part: object) -> bool:

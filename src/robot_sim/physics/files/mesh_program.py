@@ -17,12 +17,11 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from file_access.content import FileError, read_file
-from file_access.xml_text import parse
 from robot_sim.physics.description import DescriptionError, Mesh
 from robot_sim.physics.files.elements import numbers, place, shown
 from robot_sim.physics.files.hull import convex_pieces, hull_points
 from robot_sim.physics.files.mesh_cache import kept, read_arrays, written
-from robot_sim.physics.files.mesh_looks import meters_of, read_glb, read_parts
+from robot_sim.physics.files.mesh_looks import meters_of, parse_collada, read_glb, read_parts
 from robot_sim.physics.files.meshes import IMAGES, Selection, Submesh
 from robot_sim.physics.files.plain_obj import READ, plain_obj
 from robot_sim.physics.files.shape_meshes import MADE, heightmap
@@ -32,7 +31,7 @@ MOST_TRIANGLES = 1_000_000
 MOST_VERTICES = 3 * MOST_TRIANGLES
 MOST_PARTS = 256  # hulls of one mesh
 LARGE = 500_000  # [bytes] of a file that takes a tenth of a second
-KEPT = "mesh-1"  # begins the names of kept meshes; another one when others would come out
+KEPT = "mesh-2"  # begins the names of kept meshes; another one when others would come out
 LARGEST = 1e12  # of a coordinate, in the file's unit: 32-bit floats lose their digits beyond it
 MOST_NAMES = 10  # that an error lists
 
@@ -42,7 +41,6 @@ NAME = re.compile(r"(?:^[ \t]*|\bend)solid(?:(?!facet)[^\r\n])*", re.IGNORECASE 
 VERTEX = re.compile(r"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 
 # COLLADA
-SPACE = "http://www.collada.org/2005/11/COLLADASchema"
 FACES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 OF_NODES = ("node", "instance_node", "instance_geometry",
             "matrix", "translate", "rotate", "scale", "lookat", "skew")  # fmt: skip
@@ -307,18 +305,15 @@ def _read_collada(data: bytes, only: str) -> list[Part]:
     from trimesh.exchange.dae import load_collada
 
     try:
-        root = parse(data)
+        root = parse_collada(data)
     except FileError as error:
         raise DescriptionError(str(error)) from error
-    for element in root.iter():
-        element.tag = element.tag.rpartition("}")[2]
     if root.tag != "COLLADA":
         raise DescriptionError("it is not COLLADA")
     meters = meters_of(root)
     _leave_shapes(root)
     if only:
         _leave_node(root, only)
-    root.set("xmlns", SPACE)
     loaded = load_collada(BytesIO(ElementTree.tostring(root)), ignore_broken=False)
     vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), int)], 0
     for instance in loaded["graph"]:

@@ -84,7 +84,8 @@ def _begin(model: ModelDescription, element: Element, where: str) -> Iterator[st
     at_zero = poses_at_zero(rigid(model) if model.static else model)
     rest = {name: base.compose(pose) for name, pose in at_zero.items()}
     given = dict(_links(element, "", where, rest))
-    links = {name: given.get(name, (pose, (ZERO, ZERO))) for name, pose in rest.items()}
+    whole = {name: link.owner for name, link in model.links.items()}  # of links that close loops
+    links = {name: given.get(whole[name], (pose, (ZERO, ZERO))) for name, pose in rest.items()}
     unknown = [f"'{shown(name)}'" for name in given if name not in rest]
     if unknown:
         yield f"{where}: it has no link {', '.join(unknown[:MOST_NAMES])}"
@@ -103,7 +104,7 @@ def _begin(model: ModelDescription, element: Element, where: str) -> Iterator[st
     apart = [
         f"'{shown(name)}'"
         for name, pose in _placed(model, model.start)
-        if name in given and _distance(pose, links[name][0]) > SLACK
+        if whole[name] in given and _distance(pose, links[name][0]) > SLACK
     ]
     if apart:
         yield f"{where}: its joints don't let link {', '.join(apart[:MOST_NAMES])} be there"

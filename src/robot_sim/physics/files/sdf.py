@@ -69,7 +69,7 @@ class FileContext:
 
 
 def open_include(include: Element, context: FileContext) -> tuple[Element, FileContext]:
-    """Returns the model or light that `include` names, with the include's name, pose and static flag."""
+    """Returns what `include` names, a model, light or actor, with its name, pose and static flag."""
     uri = (include.findtext("uri") or "").strip()
     with place(f"<include> of '{shown(uri)}'"):
         if not uri:
@@ -100,7 +100,7 @@ def _open_file(uri: str, context: FileContext) -> tuple[Element, FileContext]:
         if root.tag not in ("sdf", "gazebo"):
             raise DescriptionError(f"the root element is <{shown(root.tag)}>, not <sdf>")
         for element in root:
-            if element.tag in ("model", "light"):
+            if element.tag in ("model", "light", "actor"):
                 version = _version(root.get("version", "1.4")) or (1, 4)
                 return element, replace(context, version=version, folder=path.parent)
         raise DescriptionError("there is no <model>")
@@ -297,7 +297,7 @@ def _nested(
         inner, inner_context, origin = element, context, ""
         if element.tag == "include":
             inner, inner_context = open_include(element, context)
-            if inner.tag == "light":  # no part of a body
+            if inner.tag != "model":  # no part of a body
                 continue
             origin = f" (<include> of '{shown((element.findtext('uri') or '').strip())}')"
         name = named(inner, "model")

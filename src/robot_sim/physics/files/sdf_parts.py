@@ -176,7 +176,10 @@ class JointReader:
         joint.pose = child.relative_to(parent)
         pose, relative_to = read_pose(element, where)
         if joint.kind != "fixed" and (pose != Pose() or relative_to not in ("", joint.child)):
-            joint.anchor = self.frames.resolve(joint.name).relative_to(child)
+            frame = self._link(
+                relative_to or joint.child, where
+            )  # not the joint's: a link may have its name
+            joint.anchor = frame.compose(pose).relative_to(child)
 
     def _link(self, name: str, where: str) -> Pose:
         try:

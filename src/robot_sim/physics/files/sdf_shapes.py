@@ -9,6 +9,7 @@ from robot_sim.physics.description import Color, DescriptionError, LimitExceeded
 from robot_sim.physics.files.elements import (
     files_named_by_a_model,
     numbers,
+    place,
     positive,
     shown,
     truth,
@@ -124,7 +125,9 @@ class ShapeReader:
                 pose = pose.compose(Pose((x, y, z)))
                 positive(size[:2], f"{where}, heightmap")
         elif solid.tag == "polyline":
-            kind, mesh = "mesh", make_mesh("polyline", *_outline(geometry, where))
+            outline = _outline(geometry, where)
+            with place(f"{where}, polyline"):
+                kind, mesh = "mesh", make_mesh("polyline", *outline)
         else:
             positive(size, f"{where}, {solid.tag}")
             if solid.tag == "ellipsoid":

@@ -7,7 +7,7 @@ that can't be read is left out of its link with a warning; a joint that can't be
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 from xml.etree.ElementTree import Element
 
 from robot_sim.physics.description import (
@@ -32,15 +32,13 @@ from robot_sim.physics.files.elements import (
     named,
     numbers,
     positive,
-    read_plugin,
     rename_lumped,
     shown,
 )
-from robot_sim.physics.files.extension_joints import add_extension_joints
 from robot_sim.physics.files.mechanisms import add_mechanisms
-from robot_sim.physics.files.motion import read_link_motion, read_spring, settle_kinematic
+from robot_sim.physics.files.motion import settle_kinematic
 from robot_sim.physics.files.reading import MeshFinder, Reading, Resources
-from robot_sim.physics.files.sdf_parts import read_sensors
+from robot_sim.physics.files.urdf_extensions import add_extension_joints, apply_extensions
 from robot_sim.physics.lumping import find_roots, lump_fixed_joints, unique
 from robot_sim.physics.pose import Pose, from_rpy
 
@@ -52,9 +50,6 @@ CHECKED = {  # elements that urdfdom reads with the joint, and their numbers
 }
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 Part = TypeVar("Part")
-YES = ("true", "yes", "1")
-NO = ("false", "no", "0")
-SURFACE = {"mu1": "mu", "maxVel": "max_vel", "laserRetro": "retro"}  # of shapes, by element
 
 
 def read_origin(element: Element, place: str) -> Pose:
@@ -272,78 +267,6 @@ def _rgba(material: Element, place: str) -> Color | None:
         return None
     r, g, b, a = read_numbers(color, "rgba", place, 4)
     return (r, g, b, a)
-
-
-def apply_extensions(model: ModelDescription, robot: Element) -> None:
-    """Applies the `<gazebo>` children of `robot` to `model`, before its joints are lumped.
-
-    They have plugins, friction, gravity, kept fixed joints (docs/contract/gazebo.md 2.4). A value is the
-    attribute `value`, or else the text. A reference to an unknown link or joint is a warning, as in Gazebo.
-    """
-    for block in robot.findall("gazebo"):
-        reference = block.get("reference")
-        if not reference:
-            _apply_to_model(model, block)
-        elif reference in model.links:
-            _apply_to_link(model, model.links[reference], block)
-        elif reference in model.joints:
-            _apply_to_joint(model, model.joints[reference], block)
-        else:
-            model.warnings.append(
-                f"<gazebo reference='{shown(reference)}'> refers to no link or joint"
-            )
-
-
-def _apply_to_model(model: ModelDescription, block: Element) -> None:
-    model.plugins += [read_plugin(element) for element in block.findall("plugin")]
-    for element in block:
-        if element.tag == "static":
-            model.static = model.static or _value(element) in YES
-        elif element.tag == "self_collide" and _value(element) in YES:
-            for link in model.links.values():
-                link.self_collide = True
-
-
-def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
-    model.sensors += read_sensors(block, link.name, model.warnings)
-    read_link_motion(link, block, model.warnings)
-    for element in block:
-        place = f"<gazebo reference='{shown(link.name)}'>, <{element.tag}>"
-        if element.tag in SURFACE:
-            number = finite(_value(element), place)
-            if number < 0.0 and element.tag != "laserRetro":
-                raise DescriptionError(f"{place}: {number} is negative")
-            changed: dict[str, Any] = {SURFACE[element.tag]: number}
-            link.collisions = [replace(shape, **changed) for shape in link.collisions]
-        elif element.tag in ("turnGravityOff", "gravity"):
-            # Anything else than "no" turns it off, also an empty element.
-            on = NO if element.tag == "turnGravityOff" else ("", *YES)
-            link.gravity, link.says_gravity = _value(element) in on, True
-        elif element.tag == "selfCollide":
-            link.self_collide = _value(element) in YES
-        elif element.tag == "plugin":
-            name = shown(element.get("filename", ""))
-            model.left_out.append(f"plugin {name} of link '{shown(link.name)}'")
-
-
-def _apply_to_joint(model: ModelDescription, joint: Joint, block: Element) -> None:
-    """Reads a joint's sensors and spring; keeps a fixed joint as it is, or as a hinge that can't turn."""
-    model.sensors += read_sensors(block, joint.child, model.warnings, joint=joint.name)
-    read_spring(joint, block)
-    if joint.kind != "fixed":
-        return
-    if _value(block.find("preserveFixedJoint")) in YES:
-        joint.kept = True
-    elif _value(block.find("disableFixedJointLumping")) in YES:
-        joint.kind, joint.axis = "revolute", (0.0, 0.0, 1.0)
-        joint.effort = joint.velocity = -1.0
-
-
-def _value(element: Element | None) -> str:
-    """Returns the value of an extension, stripped and in lower case."""
-    if element is None:
-        return ""
-    return (element.get("value", element.text) or "").strip().lower()
 
 
 def parse_urdf(

@@ -1,23 +1,27 @@
 """Reads SDF world files, and the models and lights of spawn requests, URDF or SDF."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
+from robot_sim.physics.actor import Script
 from robot_sim.physics.description import (
     DescriptionError,
+    Inertia,
     Light,
     LimitExceeded,
+    Link,
     ModelDescription,
     Plugin,
+    Shape,
 )
 from robot_sim.physics.files import elements
 from robot_sim.physics.files.element_table import without_effect
 from robot_sim.physics.files.elements import named, numbers, read_plugin, shown, truth
 from robot_sim.physics.files.own_models import own_models
-from robot_sim.physics.files.reading import LoadProgress, Reading, Resources
+from robot_sim.physics.files.reading import LoadProgress, MeshFinder, Reading, Resources
 from robot_sim.physics.files.saved_state import begin_as_saved
 from robot_sim.physics.files.sdf import (
     FileContext,
@@ -27,10 +31,10 @@ from robot_sim.physics.files.sdf import (
     renamed,
     sdf_version,
 )
-from robot_sim.physics.files.sdf_parts import read_color, read_pose, value
+from robot_sim.physics.files.sdf_parts import WORLD, Frames, read_color, read_pose, value
+from robot_sim.physics.files.sdf_shapes import ShapeReader
 from robot_sim.physics.files.urdf import read_urdf
-from robot_sim.physics.model import Model
-from robot_sim.physics.pose import Vector
+from robot_sim.physics.pose import Pose, Vector
 from robot_sim.physics.world import (
     GRAVITY,
     TIME_STEP,
@@ -50,12 +54,12 @@ SOLVER = {
     "contact_surface_layer": "constraints/contact_surface_layer",
 }
 """Elements of `<physics><ode>`."""
-NOT_SIMULATED = ("actor",)
+STOPGAP = 0.3  # [m]; sides of the box in place of an actor that can't be seen
 
 
 @dataclass
 class WorldDescription:
-    """The contents of a world file. `plugins` are the world's own, `left_out` names what isn't simulated."""
+    """The contents of a world file. `plugins` are the world's own."""
 
     name: str = "default"
     models: dict[str, ModelDescription] = field(default_factory=dict)
@@ -65,7 +69,6 @@ class WorldDescription:
     update_rate: float = UPDATE_RATE  # [Hz of wall time]; 0 means as fast as possible
     solver: SolverSettings = SolverSettings()
     warnings: list[str] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
     plugins: list[Plugin] = field(default_factory=list)
 
 
@@ -112,8 +115,9 @@ def _read(root: Element, context: FileContext) -> WorldDescription:
             _add(world, child, context)
         elif child.tag == "plugin":
             world.plugins.append(read_plugin(child))
-        elif child.tag in NOT_SIMULATED:
-            world.left_out.append(f"{child.tag} '{shown(child.get('name', ''))}'")
+    for child in element.findall("actor"):  # Gazebo lists them after the models
+        context.reading.begin()
+        _add(world, child, context)
     state = element.find("state")  # the first one
     if state is not None:
         for child in state.iterfind("insertions/*"):
@@ -147,25 +151,77 @@ def read_light(element: Element) -> Light:
     return light
 
 
+def _read_actor(element: Element, context: FileContext) -> ModelDescription:
+    """Returns an `<actor>` as a model that nothing moves or touches.
+
+    Its link, named as the first one of a skeleton in Gazebo, has the skin and all links' visuals.
+    """
+    name = named(element, "actor")
+    with elements.place(f"actor '{shown(name)}'"):
+        link = Link(f"{name}_pose", Inertia(1.0, ixx=1.0, iyy=1.0, izz=1.0))
+        model = ModelDescription(name, {link.name: link}, {}, link.name, world_joints=[WORLD])
+        model.initial_pose, _ = read_pose(element, "actor")
+        meshes = MeshFinder(context.resources, context.reading, context.folder, model.warnings)
+        for each in element.findall("skin"):
+            size = elements.positive((value(each, "scale", "skin", 1.0),) * 3, "skin")
+            mesh = meshes.find(each.findtext("filename") or "", "skin", needed=False)
+            link.visuals += [Shape("mesh", size, mesh=mesh[0])] if mesh else []
+        for each in element.findall("link"):
+            where = f"link '{shown(each.get('name', ''))}'"
+            pose, _ = read_pose(each, where)
+            shapes = ShapeReader(meshes, Frames()).read(each, "visual", where)
+            link.visuals += [replace(shape, pose=pose.compose(shape.pose)) for shape in shapes]
+        if not link.visuals:
+            link.visuals = [Shape("box", (STOPGAP,) * 3)]
+            why = "; ".join(model.warnings) or "it has no skin"
+            model.warnings[:] = [f"{why}; a box of {STOPGAP} m stands in for it"]
+        try:
+            model.script = _script(element, model.warnings)
+        except DescriptionError as error:
+            model.warnings.append(f"{error}; it stays at its pose")
+        return model
+
+
+def _script(actor: Element, warnings: list[str]) -> Script | None:
+    """Returns the script; None if it has no trajectory, or doesn't start."""
+    script = actor.find("script")
+    if script is None or not truth(script.findtext("auto_start"), default=True):
+        return None
+    delay = value(script, "delay_start", "script", 0.0)
+    points: list[tuple[float, Pose]] = []
+    for number, trajectory in enumerate(script.findall("trajectory")):
+        where = f"script, trajectory {number}"
+        given = [
+            (value(each, "time", where, 0.0), read_pose(each, f"{where}, waypoint")[0])
+            for each in trajectory.findall("waypoint")
+        ]
+        times = [time for time, _ in given]
+        if not times or min(delay, *times) < 0.0:
+            raise DescriptionError(f"{where}: it has no waypoint, or a negative time")
+        if times != sorted(set(times)):
+            warnings.append(f"{where}: its waypoints are taken in the order of their times")
+        (_, first), *others = sorted(dict(given).items())
+        # As in Gazebo, each trajectory begins at its first waypoint, whenever that is, as the last one ends.
+        start = points[-1][0] if points else 0.0
+        points += [(start, first), *((start + time, pose) for time, pose in others)]
+    loop = truth(script.findtext("loop"), default=True)
+    return Script(tuple(points), delay, loop) if points else None
+
+
 def _add(world: WorldDescription, element: Element, context: FileContext) -> None:
-    """Adds one model or light. If it is broken, it alone is left out."""
+    """Adds one model, light or actor. If it is broken, it alone is left out."""
     try:
         if element.tag == "include":
             element, context = open_include(element, context)
-        _keep(
-            world, read_light(element) if element.tag == "light" else read_model(element, context)
-        )
+        entity = _entity(element, context)
+        kept: dict[str, Any] = world.lights if isinstance(entity, Light) else world.models
+        if entity.name in kept:
+            raise DescriptionError(f"'{shown(entity.name)}' is there twice")
+        kept[entity.name] = entity
     except LimitExceeded:
         raise
     except DescriptionError as error:
         world.warnings.append(f"{error}; it is left out")
-
-
-def _keep(world: WorldDescription, entity: Light | ModelDescription) -> None:
-    kept: dict[str, Any] = world.lights if isinstance(entity, Light) else world.models
-    if entity.name in kept:
-        raise DescriptionError(f"'{shown(entity.name)}' is there twice")
-    kept[entity.name] = entity
 
 
 def _read_physics(world: WorldDescription, element: Element) -> None:
@@ -210,7 +266,7 @@ def fill(
         if isinstance(body, DescriptionError):
             yield name, body
         else:
-            world.admit(Model(name, description, body, description.initial_pose))
+            world.admit(name, description, body, description.initial_pose)
             yield name, None
 
 
@@ -239,12 +295,13 @@ def read_entity(
     if root.tag == "robot":
         with elements.place(f"model '{shown(name)}'"):
             return read_urdf(root, resources, reading)
-    return _read_sdf(root, name, FileContext(resources, reading, sdf_version(root)))
-
-
-def _read_sdf(root: Element, name: str, context: FileContext) -> ModelDescription | Light:
-    element = first_entity(root)
+    element, context = first_entity(root), FileContext(resources, reading, sdf_version(root))
     if element.tag == "include":
         element, context = open_include(element, context)
-    element = renamed(element, name)
-    return read_light(element) if element.tag == "light" else read_model(element, context)
+    return _entity(renamed(element, name), context)
+
+
+def _entity(element: Element, context: FileContext) -> ModelDescription | Light:
+    if element.tag == "light":
+        return read_light(element)
+    return (_read_actor if element.tag == "actor" else read_model)(element, context)

@@ -1,1 +1,1 @@
-"""Calls Gazebo's services, launches it, and spawns models."""
+"""Gazebo's services, launch and spawning."""

@@ -1,4 +1,4 @@
-"""Calls the simulator's services, and defines results with several values. Part of `ros_gazebo`."""
+"""Service calls to the simulator, and results with several values. Part of `ros_gazebo`."""
 
 import math
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""Starts and ends the simulator. Part of `ros_gazebo`."""
+"""Start and end of the simulator. Part of `ros_gazebo`."""
 
 import functools
 import os
@@ -12,13 +12,10 @@ from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import packages as _packages
 from ros_utils._internal import programs as _programs
 from ros_utils._internal import roslaunch as _roslaunch
-from ros_utils._internal.programs import CannotStart, Handle, Started, await_start, wait_for_world
+from ros_utils._internal.programs import CannotStart, Started, await_start, wait_for_world
 from ros_utils.readiness import Ready
 
-__all__ = [
-    "close_Gazebo",
-    "launch_Gazebo",
-]
+__all__ = ["close_Gazebo", "launch_Gazebo"]
 
 LABEL = "Gazebo"
 NODES = ("/gazebo", "/gazebo_gui")
@@ -59,59 +56,51 @@ def launch_Gazebo(
     process exits.
 
     Args:
-        paused: start with the simulation paused.
-        use_sim_time: let nodes use simulated time.
-        gui: with a window; without a display the simulation continues without one.
-        recording: record the state log.
-        debug: run the server in a debugger.
-        verbose: more messages from the server.
-        output: where the simulator's output goes, "screen" or "log".
-        custom_world_path: world file; wins over the package's.
-        custom_world_pkg, custom_world_name: world file ``<pkg>/worlds/<name>``.
-        respawn_gazebo: start the server again if it dies.
-        pub_clock_frequency: messages on /clock per second of simulated time [Hz]; 0 for one each
+        paused: Start with the simulation paused.
+        use_sim_time: Let nodes use simulated time.
+        gui: With a window; without a display the simulation continues without one.
+        recording: Record the state log.
+        debug: Run the server in a debugger.
+        verbose: More messages from the server.
+        output: Where the simulator's output goes, "screen" or "log".
+        custom_world_path: World file; wins over the package's.
+        custom_world_pkg, custom_world_name: World file ``<pkg>/worlds/<name>``.
+        respawn_gazebo: Start the server again if it dies.
+        pub_clock_frequency: Messages on /clock per second of simulated time [Hz]; 0 for one each
             step. At 1 kHz each rospy node spends a tenth of its time on them.
-        server_required: end the launch when the server ends.
-        gui_required: end the launch when the window ends.
-        launch_new_term: in an xterm, if there is a display and xterm; otherwise the output goes to
+        server_required: End the launch when the server ends.
+        gui_required: End the launch when the window ends.
+        launch_new_term: In an xterm, if there is a display and xterm; otherwise the output goes to
             a log file.
-        lockstep: time moves only on request (the stand-in's own argument; Gazebo has none).
-        seed: seed of the simulator (the stand-in's own argument).
-        timeout: limit of the wait [s].
-        extra_gazebo_args: further arguments for the server.
-        gazebo_ns: namespace of its services.
-        log_file: the file for its output; None for the terminal or one of its own.
-        env: variables in addition to this process's.
-        master_uri: the master to run under; None for this process's.
-        ready: for a world with models of its own; see `ros_launch.ros_launch_from_pkg`.
+        lockstep: Time moves only on request (the stand-in's own argument; Gazebo has none).
+        seed: Seed of the simulator (the stand-in's own argument).
+        timeout: Limit of the wait [s].
+        extra_gazebo_args: Further arguments for the server.
+        gazebo_ns: Namespace of its services.
+        log_file: The file for its output; None for the terminal or one of its own.
+        env: Variables in addition to this process's.
+        master_uri: The master to run under; None for this process's.
+        ready: For a world with models of its own; see `ros_launch.ros_launch_from_pkg`.
 
     Returns:
         A true handle once the simulator answers and everything in `ready` is there. False, with an
         error in the log, if package or world are missing, no master can be used, or the simulator
         ends, doesn't answer or isn't ready in time (it is ended then, if it was started here).
     """
-    switches = {
-        "paused": paused,
-        "use_sim_time": use_sim_time,
-        "gui": gui,
-        "recording": recording,
-        "debug": debug,
-        "verbose": verbose,
-        "output": output,
-        "respawn_gazebo": respawn_gazebo,
+    arguments: dict[str, object] = {
+        "paused": paused, "use_sim_time": use_sim_time, "gui": gui, "recording": recording, "debug": debug,
+        "verbose": verbose, "output": output, "respawn_gazebo": respawn_gazebo,
         "use_clock_frequency": True,  # the rate has no effect without it
-        "pub_clock_frequency": pub_clock_frequency,
-        "server_required": server_required,
+        "pub_clock_frequency": pub_clock_frequency, "server_required": server_required,
         "gui_required": gui_required,
-    }
+    }  # fmt: skip
     # A real gazebo_ros rejects unknown arguments, so only those asked for are passed.
     asked = {
         "lockstep": lockstep or None,
-        "seed": seed,  # 0 is one, too
+        "seed": seed,
         "extra_gazebo_args": extra_gazebo_args or None,
     }
-    switches |= {name: value for name, value in asked.items() if value is not None}
-    world = (custom_world_path, custom_world_pkg, custom_world_name)
+    arguments |= {name: value for name, value in asked.items() if value is not None}
     service = f"{gazebo_ns.rstrip('/')}/{READY}"
     answers = functools.partial(service_answers, service)
     with _master.using(master_uri):
@@ -120,31 +109,20 @@ def launch_Gazebo(
                 f"{LABEL} runs already under {_master.uri()}: using it (ros_kill_all_processes ends it)"
             )
             return wait_for_world(Started(), ready, time.monotonic() + timeout, timeout)
-        handle = _start(switches, world, launch_new_term, log_file, env)
-        return handle is not None and await_start(
+        try:
+            if path := _world(custom_world_path, custom_world_pkg, custom_world_name):
+                arguments["world_name"] = path
+            _packages.file("gazebo_ros", "launch", "empty_world.launch")
+            given = [f"{name}:={value}" for name, value in arguments.items()]
+            command = ["gazebo_ros", "empty_world.launch", *given]
+            screen = output == "screen" and not launch_new_term
+            handle = _roslaunch.start(command, LABEL, launch_new_term, screen, log_file, env)
+        except (_packages.NotFound, CannotStart, _master.MasterDown) as fault:
+            _log.error(f"launch_Gazebo: {fault}")
+            return False
+        return await_start(
             handle, answers, f"service {service} doesn't answer", timeout, ready, may_end=False
         )
-
-
-def _start(
-    switches: Mapping[str, object],
-    world: tuple[str | None, str | None, str | None],
-    window: bool,
-    log_file: str | None,
-    env: Mapping[str, str] | None,
-) -> Handle | None:
-    """Starts roslaunch; returns None, with an error in the log, if it can't be started."""
-    try:
-        path = _world(*world)
-        world_name = {} if path is None else {"world_name": path}
-        _packages.file("gazebo_ros", "launch", "empty_world.launch")
-        arguments = [f"{name}:={value}" for name, value in {**switches, **world_name}.items()]
-        command = ["gazebo_ros", "empty_world.launch", *arguments]
-        screen = switches["output"] == "screen" and not window
-        return _roslaunch.start(command, LABEL, window, screen, log_file, env)
-    except (_packages.NotFound, CannotStart, _master.MasterDown) as fault:
-        _log.error(f"launch_Gazebo: {fault}")
-        return None
 
 
 def close_Gazebo(*, master_uri: str | None = None) -> bool:
@@ -153,7 +131,7 @@ def close_Gazebo(*, master_uri: str | None = None) -> bool:
     A master that the launch brought up ends with it.
 
     Args:
-        master_uri: the simulator's master; None for this process's.
+        master_uri: The simulator's master; None for this process's.
 
     Returns:
         True if nothing of it is left.

@@ -1,4 +1,4 @@
-"""Reads and sets physics properties; pauses, steps and resets. Part of `ros_gazebo`."""
+"""Physics properties; pause, steps and resets. Part of `ros_gazebo`."""
 
 import math
 from collections.abc import Sequence
@@ -52,10 +52,7 @@ def gazebo_reset_sim(
 
     Args:
         retries: attempts.
-        timeout, gazebo_ns: see `ros_gazebo`.
-
-    Returns:
-        True if the simulator did it.
+        timeout, gazebo_ns: See `ros_gazebo`.
     """
     return empty_call("reset_simulation", retries, timeout, gazebo_ns)
 
@@ -87,9 +84,9 @@ def gazebo_step_physics(
     """Pauses the simulation and advances it by `steps` physics steps, as ``gz world -m`` does.
 
     Args:
-        steps: number of steps, at least 1.
-        timeout: limit for each 1000 steps [s].
-        gazebo_ns: the simulator's node.
+        steps: Number of steps, at least 1.
+        timeout: Limit for each 1000 steps [s].
+        gazebo_ns: The simulator's node.
 
     Returns:
         True once the steps are done.
@@ -145,14 +142,11 @@ def gazebo_set_physics_properties(
     """Changes the given properties; the others stay unchanged.
 
     Args:
-        time_step: of one physics step [s], above 0.
-        max_update_rate: steps per second of wall time [Hz]; 0 is as fast as possible.
-        gravity: x, y, z [m/s²].
-        ode_config: the solver's settings.
-        timeout, gazebo_ns: see `ros_gazebo`.
-
-    Returns:
-        True if the simulator did it.
+        time_step: Time step of one physics step [s], above 0.
+        max_update_rate: Steps per second of wall time [Hz]; 0 is as fast as possible.
+        gravity: X, y, z [m/s²].
+        ode_config: The solver's settings.
+        timeout, gazebo_ns: See `ros_gazebo`.
     """
     now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
     if now is None:
@@ -181,12 +175,9 @@ def gazebo_set_max_update_rate(
     """Sets how fast simulated time passes.
 
     Args:
-        max_update_rate: a FACTOR of real time, 1 for real time; 0 is as fast as possible. (The
+        max_update_rate: A FACTOR of real time, 1 for real time; 0 is as fast as possible. (The
             getter answers in Hz; `gazebo_set_physics_properties` takes Hz.)
-        timeout, gazebo_ns: see `ros_gazebo`.
-
-    Returns:
-        True if the simulator did it.
+        timeout, gazebo_ns: See `ros_gazebo`.
     """
     now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
     if now is None or not now.time_step:
@@ -204,11 +195,7 @@ def gazebo_get_max_update_rate(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZ
 def gazebo_set_time_step(
     new_time_step: float, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> bool:
-    """Sets the length of a physics step [s]; simulated time passes as fast as before.
-
-    Returns:
-        True if the simulator did it.
-    """
+    """Sets the length of a physics step [s]; simulated time passes as fast as before."""
     now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
     if now is None:
         return False
@@ -252,11 +239,7 @@ def gazebo_set_ODE_physics(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
 ) -> bool:
-    """Sets all solver settings; the arguments are the fields of gazebo_msgs/ODEPhysics.
-
-    Returns:
-        True if the simulator did it.
-    """
+    """Sets all solver settings; the arguments are the fields of gazebo_msgs/ODEPhysics."""
     config = ODEPhysics(
         auto_disable_bodies, sor_pgs_precon_iters, sor_pgs_iters, sor_pgs_w, sor_pgs_rms_error_tol,
         contact_surface_layer, contact_max_correcting_vel, cfm, erp, max_contacts,
@@ -271,10 +254,6 @@ def gazebo_get_ODE_physics(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO)
 
 
 def gazebo_set_default_properties(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> bool:
-    """Sets a step of 1 ms, real time, gravity of 9.81 m/s² and the solver's usual settings, at once.
-
-    Returns:
-        True if the simulator did it.
-    """
+    """Sets a step of 1 ms, real time, gravity of 9.81 m/s² and the solver's usual settings, at once."""
     usual = (TIME_STEP, 1.0 / TIME_STEP, GRAVITY, ODEPhysics(**ODE))
     return gazebo_set_physics_properties(*usual, timeout=timeout, gazebo_ns=gazebo_ns)

@@ -1,4 +1,4 @@
-"""Spawns models from URDF and SDF, and deletes them. Part of `ros_gazebo`."""
+"""Spawning of models from URDF and SDF, and their deletion. Part of `ros_gazebo`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -41,21 +41,10 @@ Pose = tuple[float, float, float, float, float, float, float]  # x, y, z [m] and
 
 
 def spawn(
-    kind: str,
-    xml: str,
-    name: str,
-    namespace: str,
-    frame: str,
-    pose: Pose,
-    timeout: float,
-    gazebo_ns: str,
-    verify: bool,
-) -> SpawnResult:
-    """Spawns a model from XML text; `kind` is "urdf" or "sdf".
-
-    Returns:
-        Whether it was spawned (and with `verify` is in the world's list), and if not, why.
-    """
+    kind: str, xml: str, name: str, namespace: str, frame: str, pose: Pose,
+    timeout: float, gazebo_ns: str, verify: bool,
+) -> SpawnResult:  # fmt: skip
+    """Spawns a model from XML text; `kind` is "urdf" or "sdf"."""
     service = f"{gazebo_ns.rstrip('/')}/spawn_{kind}_model"
     if fault := not_finite(f"spawn {name}: its pose", *pose):
         return _failed(fault)
@@ -72,16 +61,9 @@ def spawn(
 
 
 def spawn_param(
-    kind: str,
-    param_name: str,
-    name: str,
-    namespace: str,
-    frame: str,
-    pose: Pose,
-    timeout: float,
-    gazebo_ns: str,
-    verify: bool,
-) -> SpawnResult:
+    kind: str, param_name: str, name: str, namespace: str, frame: str, pose: Pose,
+    timeout: float, gazebo_ns: str, verify: bool,
+) -> SpawnResult:  # fmt: skip
     """Spawns a model from the text in parameter ``<namespace>/<param_name>``. See `spawn`."""
     full = rosgraph.names.ns_join(namespace or "/", param_name)
     try:
@@ -99,30 +81,27 @@ def gazebo_delete_model(
     """Deletes a model.
 
     Args:
-        model_name: the model's name.
-        timeout, gazebo_ns: see `ros_gazebo`.
-        verify: return only once the model is no longer in the world's list.
+        model_name: The model's name.
+        timeout, gazebo_ns: See `ros_gazebo`.
+        verify: Return only once the model is no longer in the world's list.
 
     Returns:
         True if the model existed and is gone.
     """
-    deleted = done(
-        "delete_model", srv.DeleteModel, model_name, timeout=timeout, gazebo_ns=gazebo_ns
-    )
+    kind = srv.DeleteModel
+    deleted = done("delete_model", kind, model_name, timeout=timeout, gazebo_ns=gazebo_ns)
     return deleted and (not verify or _appears(model_name, False, timeout, gazebo_ns))
 
 
 def _appears(name: str, wanted: bool, timeout: float, gazebo_ns: str) -> bool:
     """Waits until a model is in the world, or isn't; returns False after the timeout."""
 
-    def look() -> str | None:
+    def look() -> bool:
         kind = srv.GetWorldProperties
         answer = call("get_world_properties", kind, timeout=timeout, gazebo_ns=gazebo_ns)
-        if answer is None:
-            return "no answer"
-        return "as wanted" if (name in answer.model_names) is wanted else None
+        return answer is not None and (name in answer.model_names) is wanted
 
-    return wait_until(look, timeout, f"model {name}") == "as wanted"
+    return wait_until(look, timeout, f"model {name}")
 
 
 def _failed(text: str) -> SpawnResult:
@@ -143,8 +122,7 @@ def gazebo_spawn_urdf_path(
     xml = urdf_parse_from_path(model_path, args_xacro)
     if xml is None:
         return SpawnResult(False, f"{model_path}: can't be read or expanded")
-    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = (robot_namespace, reference_frame, pose)
+    place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     return spawn("urdf", xml, model_name, *place, timeout, gazebo_ns, verify)
 
 
@@ -162,8 +140,7 @@ def gazebo_spawn_urdf_pkg(
         return SpawnResult(
             False, f"{file_name} in package {pkg_name}: can't be found, read or expanded"
         )
-    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = (robot_namespace, reference_frame, pose)
+    place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     return spawn("urdf", xml, model_name, *place, timeout, gazebo_ns, verify)
 
 
@@ -177,21 +154,20 @@ def gazebo_spawn_urdf_string(
     """Spawns a model from URDF text.
 
     Args:
-        model_string: the URDF, with xacro already expanded.
-        model_name: name of the new model.
-        robot_namespace: namespace of its plugins, e.g. of its controller manager.
-        reference_frame: model or link that the pose refers to; "world" for the origin.
-        pos_x, pos_y, pos_z: position [m].
-        ori_x, ori_y, ori_z, ori_w: orientation, a quaternion.
-        timeout, gazebo_ns: see `ros_gazebo`.
-        verify: return only once the model is in the world's list.
+        model_string: The URDF, with xacro already expanded.
+        model_name: Name of the new model.
+        robot_namespace: Namespace of its plugins, e.g. of its controller manager.
+        reference_frame: Model or link that the pose refers to; "world" for the origin.
+        pos_x, pos_y, pos_z: Position [m].
+        ori_x, ori_y, ori_z, ori_w: Orientation, a quaternion.
+        timeout, gazebo_ns: See `ros_gazebo`.
+        verify: Return only once the model is in the world's list.
 
     Returns:
         Whether it was spawned, and the simulator's text or an earlier error: a pair that is false
         after a failure.
     """
-    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = (robot_namespace, reference_frame, pose)
+    place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     return spawn("urdf", model_string, model_name, *place, timeout, gazebo_ns, verify)
 
 
@@ -203,8 +179,7 @@ def gazebo_spawn_urdf_param(
     *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
 ) -> SpawnResult:  # fmt: skip
     """Spawns the URDF in parameter ``<robot_namespace>/<param_name>``. See `gazebo_spawn_urdf_string`."""
-    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = (robot_namespace, reference_frame, pose)
+    place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     return spawn_param("urdf", param_name, model_name, *place, timeout, gazebo_ns, verify)
 
 
@@ -221,8 +196,7 @@ def gazebo_spawn_sdf_path(
     except (_packages.NotFound, FileError) as fault:
         _log.error(f"sdf: {model_path}: {fault}")
         return False
-    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = (robot_namespace, reference_frame, pose)
+    place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     return spawn("sdf", xml, model_name, *place, timeout, gazebo_ns, verify).success
 
 
@@ -256,8 +230,7 @@ def gazebo_spawn_sdf_string(
     Returns:
         True if it was spawned; a single value, unlike the pair for a URDF.
     """
-    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = (robot_namespace, reference_frame, pose)
+    place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     return spawn("sdf", model_string, model_name, *place, timeout, gazebo_ns, verify).success
 
 
@@ -269,6 +242,5 @@ def gazebo_spawn_sdf_param(
     *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
 ) -> bool:  # fmt: skip
     """Spawns the SDF in parameter ``<robot_namespace>/<param_name>``. See `gazebo_spawn_sdf_string`."""
-    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = (robot_namespace, reference_frame, pose)
+    place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     return spawn_param("sdf", param_name, model_name, *place, timeout, gazebo_ns, verify).success

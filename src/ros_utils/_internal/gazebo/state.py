@@ -1,4 +1,4 @@
-"""Reads and sets the states of models, links and joints. Part of `ros_gazebo`."""
+"""States of models, links and joints. Part of `ros_gazebo`."""
 
 import time
 from collections.abc import Sequence
@@ -84,17 +84,14 @@ def gazebo_set_model_state(
     """Moves a model and keeps its joint positions. A zero twist also stops its joints.
 
     Args:
-        model_name: the model's name.
-        ref_frame: model or link that pose and twist refer to.
-        pos_x, pos_y, pos_z: position [m].
-        ori_x, ori_y, ori_z, ori_w: orientation, a quaternion; all zeros means no rotation.
+        model_name: The model's name.
+        ref_frame: Model or link that pose and twist refer to.
+        pos_x, pos_y, pos_z: Position [m].
+        ori_x, ori_y, ori_z, ori_w: Orientation, a quaternion; all zeros means no rotation.
         lin_vel_x, lin_vel_y, lin_vel_z: [m/s].
         ang_vel_x, ang_vel_y, ang_vel_z: [rad/s].
-        sleep_time: pause afterwards [s of wall time].
-        timeout, gazebo_ns: see `ros_gazebo`.
-
-    Returns:
-        True if the simulator did it.
+        sleep_time: Pause afterwards [s of wall time].
+        timeout, gazebo_ns: See `ros_gazebo`.
     """
     pose = make_pose(pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     linear, angular = (lin_vel_x, lin_vel_y, lin_vel_z), (ang_vel_x, ang_vel_y, ang_vel_z)
@@ -154,14 +151,11 @@ def gazebo_set_model_configuration(
     """Moves a model's joints to positions [rad, m] at once.
 
     Args:
-        model_name: the model's name.
-        joint_names: the joints to move.
-        joint_positions: one for each joint [rad, m].
-        urdf_param_name: parameter with its URDF; Gazebo doesn't use it.
-        timeout, gazebo_ns: see `ros_gazebo`.
-
-    Returns:
-        True if the simulator did it.
+        model_name: The model's name.
+        joint_names: The joints to move.
+        joint_positions: One for each joint [rad, m].
+        urdf_param_name: Parameter with its URDF; Gazebo doesn't use it.
+        timeout, gazebo_ns: See `ros_gazebo`.
     """
     request = (model_name, urdf_param_name, list(joint_names), list(joint_positions))
     service = "set_model_configuration"
@@ -196,9 +190,6 @@ def gazebo_apply_joint_effort(
     """Applies an effort [N m, N] to a joint, from `start_time` or now on [s of simulated time].
 
     It lasts for `duration` [s of simulated time]; a negative one is forever.
-
-    Returns:
-        True if the simulator does it.
     """
     if fault := not_finite(f"effort on {joint_name}", effort, duration, start_time):
         _log.error(fault)

@@ -13,6 +13,7 @@ import unittest
 
 import rospy
 import rostest
+from gazebo_msgs.msg import ModelStates
 from gazebo_msgs.srv import (
     DeleteLight,
     DeleteModel,
@@ -118,6 +119,13 @@ class WorldFile(unittest.TestCase):
         found = call("/gazebo/get_model_state", GetModelState, "shelf", "")
         self.assertAlmostEqual(found.pose.position.y, -8.0, delta=1e-6)
         self.assertAlmostEqual(found.pose.orientation.z, 0.0, delta=1e-6)
+
+    def test_an_actor_is_a_model_that_is_where_time_has_brought_it(self):
+        self.assertIn("walker", models())
+        states = rospy.wait_for_message("/gazebo/model_states", ModelStates, BOUND)
+        self.assertEqual(states.pose[states.name.index("walker")].position.x, -5.0)
+        found = call("/gazebo/get_model_state", GetModelState, "walker", "")
+        self.assertAlmostEqual(found.pose.position.y, found.header.stamp.to_sec() - 5.0, delta=1e-6)
 
     def test_physics_is_the_files(self):
         physics = call("/gazebo/get_physics_properties", GetPhysicsProperties)

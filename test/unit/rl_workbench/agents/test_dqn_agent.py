@@ -30,63 +30,10 @@ def fill(learner: DQNAgent, steps: int = 8, terminated: bool = False) -> list[tu
     return seen
 
 
-def the_documents_loss(learner: DQNAgent, seen: list[tuple], done: float, double: bool) -> float:
-    """One loss, written as the DQN tutorial's train_step and train_step_double_dqn write it."""
-    s, a, r, s_ = (torch.tensor(np.array(column)) for column in zip(*seen, strict=True))
-    q_pred = learner.q_net(s).gather(1, a.unsqueeze(1)).squeeze()
-    if double:
-        best_actions = learner.q_net(s_).argmax(1).unsqueeze(1)
-        q_next = learner.target_net(s_).gather(1, best_actions).squeeze()
-    else:
-        q_next = learner.target_net(s_).max(1)[0]
-    target = r.float() + 0.99 * q_next * (1 - done)
-    return nn.functional.mse_loss(q_pred, target).item()
-
-
-@pytest.mark.parametrize("double", [True, False])
-@pytest.mark.parametrize("dueling", [True, False])
-@pytest.mark.parametrize("terminated", [True, False])
-def test_the_loss_is_the_documents(double: bool, dueling: bool, terminated: bool) -> None:
-    learner = agent(loss="mse", double=double, dueling=dueling)
-    with torch.no_grad():
-        for parameter in learner.target_net.parameters():
-            parameter.mul_(1.5)  # another network than the one that chooses
-    seen = fill(learner, terminated=terminated)
-    wanted = the_documents_loss(learner, seen, float(terminated), double)
-    assert learner.learn().td_loss == pytest.approx(wanted, rel=1e-5)
-
-
 def test_a_truncated_episode_may_count_as_ended() -> None:
     learner = agent(bootstrap_truncated=False)
     fill(learner)
     assert not learner.buffer.state_dict()["discounts"].any()
-
-
-def test_huber_and_reward_scale() -> None:
-    plain, scaled = agent(), agent(reward_scale=0.5)
-    for learner in (plain, scaled):
-        learner.observe((np.ones(4, np.float32), 0, 3.0), np.ones(4, np.float32), True, False)
-    assert scaled.buffer.state_dict()["rewards"].tolist() == [1.5]
-    value = plain.q_net(torch.ones(1, 4))[0, 0].item()
-    assert plain.learn().td_loss == pytest.approx(abs(3 - value) - 0.5)
-
-
-def test_gradients_are_clipped() -> None:
-    learner = agent(max_grad_norm=1e-3, loss="mse")
-    fill(learner)
-    learner.learn()
-    norm = torch.cat([each.grad.reshape(-1) for each in learner.q_net.parameters()]).norm()
-    assert norm.item() == pytest.approx(1e-3, rel=1e-4)
-
-
-def test_the_target_follows_every_so_many_gradient_steps() -> None:
-    learner = agent(target_network_frequency=3)
-    fill(learner)
-    equal = []
-    for _ in range(6):
-        learner.learn()
-        equal.append(torch.equal(learner.q_net.net[0].weight, learner.target_net.net[0].weight))
-    assert equal == [False, False, True, False, False, True]
 
 
 def test_when_a_round_is_due() -> None:

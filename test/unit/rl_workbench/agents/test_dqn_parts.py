@@ -1,7 +1,5 @@
 """The parts of DQN against slow and obvious oracles: networks, replay, returns, schedules."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import torch
@@ -10,10 +8,8 @@ from torch import nn
 from rl_workbench.agents.dqn_agent import (
     DuelingQNetwork,
     Epsilon,
-    FlatParameters,
     QNetwork,
     fast_values,
-    learning_rate,
 )
 from rl_workbench.agents.normalisation import Normaliser
 from rl_workbench.agents.replay import NStepReturns, ReplayBuffer, Transition
@@ -47,41 +43,6 @@ def test_fast_values_follow_the_weights() -> None:
     net.load_state_dict({name: 2 * value for name, value in net.state_dict().items()})
     assert not np.allclose(fast(ones), before)
     assert np.array_equal(ones, np.ones(4)), "the observation is left alone"
-
-
-def test_dueling_is_v_plus_a_minus_its_mean() -> None:
-    net = network(DuelingQNetwork)
-    x = torch.randn(5, 4)
-    features = net.feature(x)
-    advantage = net.advantage(features)
-    assert torch.allclose(net(x).mean(1, keepdim=True), net.value(features), atol=1e-6)
-    assert torch.allclose(net(x).argmax(1), advantage.argmax(1))
-
-
-@pytest.mark.parametrize("kind", NETWORKS)
-def test_flat_parameters_learn_the_same_as_separate_ones(kind: type[nn.Module]) -> None:
-    plain, flat = network(kind), network(kind)
-    parameters = FlatParameters(flat)
-    optimizers = [torch.optim.Adam(plain.parameters(), 0.01),
-                  torch.optim.Adam([parameters.vector], 0.01, fused=True)]  # fmt: skip
-    x = torch.randn(16, 4)
-    for _ in range(5):
-        for net, optimizer in zip((plain, flat), optimizers, strict=True):
-            optimizer.zero_grad(set_to_none=False)
-            net(x).square().sum().backward()
-            optimizer.step()
-    for one, other in zip(plain.parameters(), flat.parameters(), strict=True):
-        assert torch.allclose(one, other, atol=1e-6)
-
-
-def test_following_hard_and_soft() -> None:
-    target, net = network(QNetwork), QNetwork(4, 3, (8, 9))
-    one, other = FlatParameters(target), FlatParameters(net)
-    halfway = (one.vector + other.vector) / 2
-    one.follow(other, 0.5)
-    assert torch.allclose(one.vector, halfway)
-    one.follow(other, 1.0)
-    assert torch.equal(target(torch.ones(1, 4)), net(torch.ones(1, 4)))
 
 
 def transition(number: int) -> Transition:
@@ -134,30 +95,6 @@ def test_replay_refuses_what_does_not_fit() -> None:
         ReplayBuffer(5, 3).load_state_dict(filled(5, 5).state_dict())
 
 
-def oracle(rewards: list[float], steps: int, gamma: float, terminated: bool) -> list[tuple]:
-    """Start, n-step reward, index of the following observation, discount; by definition."""
-    result, length = [], len(rewards)
-    for start in range(length):
-        end = min(start + steps, length)
-        total = sum(gamma**k * reward for k, reward in enumerate(rewards[start:end]))
-        discount = 0.0 if terminated and end == length else gamma ** (end - start)
-        result.append((start, pytest.approx(total), end, pytest.approx(discount)))
-    return result
-
-
-@pytest.mark.parametrize("steps", [1, 2, 3, 10])
-@pytest.mark.parametrize("terminated", [True, False])
-def test_n_step_returns(steps: int, terminated: bool) -> None:
-    rewards = [1.0, -2.0, 3.0, 0.5, 4.0]
-    returns, found = NStepReturns(steps, 0.9), []
-    for index, reward in enumerate(rewards):
-        ended = index == len(rewards) - 1
-        step = (np.array([index]), index, reward)
-        found += returns.add(step, np.array([index + 1]), ended, not (ended and terminated))
-    assert [(each.action, each.reward, each.next_observation[0], each.discount)
-            for each in found] == oracle(rewards, steps, 0.9, terminated)  # fmt: skip
-
-
 def test_n_step_returns_from_their_state() -> None:
     one, other = NStepReturns(3, 0.9), NStepReturns(3, 0.9)
     for index in range(2):
@@ -195,13 +132,6 @@ def test_epsilon_by_step_and_by_episode() -> None:
         by_episode.episode_done()
     assert by_step.value == 0.3
     assert f"{by_episode.value:.3f}" == "0.905", "the DQN tutorial's first line"
-
-
-def test_learning_rates() -> None:
-    constant = DQNSettings(total_timesteps=100, learning_rate=0.1)
-    assert learning_rate(constant, 99) == 0.1
-    falling = replace(constant, lr_schedule="linear")
-    assert [learning_rate(falling, steps) for steps in (0, 50, 100, 150)] == [0.1, 0.05, 0, 0]
 
 
 def test_the_normaliser_is_the_mean_and_the_deviation() -> None:

@@ -10,9 +10,6 @@ from torch import nn
 
 from rl_workbench.agents.document import (
     PolicyGradientAgent,
-    PolicyNetwork,
-    ValueNetwork,
-    discounted_returns,
 )
 from rl_workbench.agents.policy_gradient import Episode
 from rl_workbench.agents.settings import DocumentSettings
@@ -69,13 +66,6 @@ def weights(agent: PolicyGradientAgent) -> list[torch.Tensor]:
     return [p.detach().clone() for net in (agent.policy, agent.value) for p in net.parameters()]
 
 
-@pytest.mark.parametrize("length", [0, 1, 2, 37, 500])
-def test_returns_equal_the_documents_loop(length: int) -> None:
-    rewards = [random.Random(length).uniform(-10, 1) for _ in range(length)]
-    slow = [document_future_reward(rewards, index) for index in range(length)]
-    assert discounted_returns(rewards, 0.99) == pytest.approx(slow, rel=1e-12, abs=1e-12)
-
-
 @pytest.mark.parametrize("random_weights", [False, True])
 @pytest.mark.parametrize("length", [1, 5, 300])
 def test_updates_equal_the_documents(length: int, random_weights: bool) -> None:
@@ -126,14 +116,6 @@ def test_it_starts_from_a_uniform_policy_and_no_value() -> None:
     agent = PolicyGradientAgent(6)
     assert agent.probability_of_zero(observation) == 0.5
     assert agent.value(torch.from_numpy(observation).unsqueeze(0)).item() == 0.0
-
-
-def test_a_random_weights_is_torchs_own() -> None:
-    torch.manual_seed(6)
-    policy, value = PolicyNetwork(), ValueNetwork()
-    expected = [p for net in (policy, value) for p in net.parameters()]
-    drawn = weights(PolicyGradientAgent(6, RANDOM))
-    assert all(torch.equal(mine, its) for mine, its in zip(drawn, expected, strict=True))
 
 
 @pytest.mark.slow

@@ -51,22 +51,6 @@ def test_advantages_are_the_sums_of_the_paper(pairs, last, gae_lambda):
     assert found == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_terminated_episode_does_not_bootstrap_and_a_truncated_one_does():
-    agent = ReinforceAgent(0)
-    assert agent._values(an_episode(terminated=True))[-1] == 0.0
-    assert agent._values(an_episode(terminated=False))[-1] != 0.0
-
-
-def test_the_policy_starts_uniform_and_acting_agrees_with_the_network():
-    agent = ReinforceAgent(3, scale=(0.4, 1.0, 0.2, 2.0))
-    observation = np.array([0.1, -0.3, 0.05, 0.7], np.float32)
-    assert chances(agent, observation).tolist() == [0.5, 0.5]
-    agent.learn(an_episode())
-    scaled = torch.from_numpy(observation / np.array([0.4, 1.0, 0.2, 2.0], np.float32))
-    expected = agent.policy(scaled.unsqueeze(0))[0].tolist()
-    assert chances(agent, observation) == pytest.approx(expected, abs=1e-6)
-
-
 @pytest.mark.parametrize("hidden", [0, 7])
 @pytest.mark.parametrize("normalize", [False, True])
 @pytest.mark.parametrize(("size", "actions"), [(4, 2), (6, 3), (1, 5)])
@@ -87,29 +71,6 @@ def test_any_observations_and_actions(hidden, normalize, size, actions):
         [agent.draw(observation, agent.generator) for _ in range(4000)], minlength=actions
     )
     assert drawn / 4000 == pytest.approx(found, abs=0.04)
-
-
-def test_observations_are_normalised_by_what_was_seen_before():
-    agent = ReinforceAgent(0, settings=ReinforceSettings(normalize_observations=True))
-    episode = an_episode(200)
-    first = agent._seen(episode.observations)
-    assert torch.equal(first, torch.from_numpy(np.stack(episode.observations)))
-    episode.observations = [5.0 + 3.0 * each for each in episode.observations]
-    agent.learn(episode)
-    seen = agent._seen(episode.observations).numpy()
-    assert seen.mean(0) == pytest.approx([0.0] * 4, abs=1e-4)
-    assert seen.std(0) == pytest.approx([1.0] * 4, abs=1e-4)
-
-
-@pytest.mark.slow
-def test_entropy_draws_towards_a_uniform_policy():
-    likeliest = []
-    for weight in (0.0, 5.0):
-        agent = ReinforceAgent(0, settings=ReinforceSettings(entropy_coefficient=weight))
-        for _ in range(30):
-            agent.learn(an_episode())
-        likeliest.append(chances(agent, an_episode().observations[0]).max())
-    assert likeliest[1] < likeliest[0]
 
 
 @pytest.mark.parametrize("episodes", [1, 3])

@@ -18,7 +18,7 @@ from rl_workbench import cli
 from rl_workbench.agents.greedy import SeveralChoices, SingleChoice, Switches
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools import torchscript
-from rl_workbench.tools.policies import LearnedPolicy, load_learned
+from rl_workbench.tools.policies import Player, load_learned
 from rl_workbench.tools.runs import Run, open_run
 from rl_workbench.tools.torchscript import open_exported
 from rl_workbench.training.algorithms import ALGORITHMS
@@ -154,22 +154,6 @@ def test_how_far_scores_are_from_another_choice(kind, scores: list, margins: lis
     assert found.tolist() == margins
 
 
-def test_what_rounds_otherwise_is_told_by_its_size(
-    run: Path, tmp_path: Path, capsys, monkeypatch
-) -> None:
-    for numbers in ((1000, 0, 2.4e-7), (1000, 1000, 0.0), (1000, 998, 0.0)):
-        agreement = torchscript.Agreement(*numbers)
-        monkeypatch.setattr(torchscript, "export", lambda *_, found=agreement: (b"", found))
-        monkeypatch.setattr(torchscript, "open_exported", lambda path: None)
-        assert work("export", run, "--out", tmp_path / "policy.pt") == 0
-    first, second, third = capsys.readouterr().out.splitlines()
-    assert first.endswith(
-        "over 1000 observations its actions differ by at most 2e-07 of their range"
-    )
-    assert second.endswith("over 1000 observations its actions are the same")
-    assert third.endswith("its actions are the same, but for 2 where scores tie")
-
-
 @pytest.mark.slow
 def test_torch_alone_runs_it(run: Path, tmp_path: Path) -> None:
     """Without our package, from double precision, and many observations at once."""
@@ -234,9 +218,9 @@ def test_observations_in_parts(algorithm: str, actions: spaces.Space) -> None:
     env = Reach(actions)
     own = getattr(stable_baselines3, ALGORITHMS[algorithm].hyperparameters().library_class)
     model = own("MultiInputPolicy", env, seed=1)
-    policy = LearnedPolicy(
+    policy = Player(
         lambda seen: model.policy.predict(seen, deterministic=True)[0],
-        greedy_network(model, algorithm), env, Path("best.pt"), 10,
+        env, greedy_network(model, algorithm), Path("best.pt"), 10,
     )  # fmt: skip
     run = Run(Path(), algorithm, "a test", "Reach-v0", {}, 0, {})
     content, agreement = torchscript.export(run, policy, seed=3)
@@ -254,7 +238,7 @@ def test_parts_that_are_no_vectors_of_numbers() -> None:
     env = Reach(FAR)
     env.observation_space = spaces.Dict(camera=spaces.Box(0, 255, (9, 9, 3), np.uint8))
     network = torch.nn.Linear(1, 1)
-    policy = LearnedPolicy(lambda _: 0, network, env, Path("best.pt"), 10)
+    policy = Player(lambda _: 0, env, network, Path("best.pt"), 10)
     run = Run(Path(), "ppo", "a test", "Reach-v0", {}, 0, {})
     with pytest.raises(WorkbenchError, match=r"Reach-v0 can't be exported: part camera of its"):
         torchscript.export(run, policy, seed=0)
@@ -273,7 +257,7 @@ def test_a_file_that_acts_otherwise_is_not_written(
 
     monkeypatch.setattr(torchscript, "written", spoilt)
     line = refused(capsys, "export", run, "--out", tmp_path / "policy.pt")
-    assert "of 1000 observations the file acts otherwise" in line
+    assert "of 1000 observations the file's actions differ" in line
     assert not list(tmp_path.iterdir())
 
 

@@ -142,7 +142,7 @@ def test_a_node_that_does_not_see_the_folder_is_one_line(
     driver = subprocess.Popen(
         command, env={**os.environ, **QUIET}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )  # fmt: skip
-    assert f"doesn't see {tmp_path / 'a'}: --out has to be a folder that all" in finished(driver, 1)
+    assert f"doesn't see {tmp_path / 'a'}: --out must be a folder that all" in finished(driver, 1)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from support.pages.pictures import pixel
 
 import cartpole  # noqa: F401 - registers the environments
 from cartpole.environment import CAMERA
-from rl_workbench.tools.policies import RandomPolicy
+from rl_workbench.tools.policies import Player
 from rl_workbench.tools.record import _write_scene
 
 pytestmark = [
@@ -48,7 +48,7 @@ def test_a_browser_plays_it_without_any_network(tmp_path: Path):
     arguments = Namespace(
         out=path, size=None, checkpoint=["best"], seed=0, max_steps=31, no_captions=True
     )
-    _write_scene(arguments, {"best": RandomPolicy(right, env)}, 125.0)
+    _write_scene(arguments, {"best": Player(right, env)}, 125.0)
     env.close()
     with Browser(path.as_uri(), offline=True, size=(640, 400)) as page:
         wait_for(lambda: page.run(f"!!document.querySelector({SEEK!r})"), "player")

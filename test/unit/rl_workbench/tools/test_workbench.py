@@ -65,14 +65,6 @@ def test_eval_tells_every_episode_and_writes_json(
     assert len(found["lengths"]) == 3 and Path(found["checkpoint"]).exists()
 
 
-def test_eval_repeats_itself_and_its_seed_counts(runs: Path, capsys) -> None:
-    figures = []
-    for seed in (0, 0, 1):
-        work("eval", runs / "dqn_0", "--episodes", 4, "--seed", seed, "--json", "-")
-        figures.append(json.loads(capsys.readouterr().out)["returns"])
-    assert figures[0] == figures[1] != figures[2]
-
-
 def test_eval_of_random_actions_is_a_baseline(runs: Path, capsys) -> None:
     found = []
     for seed in (0, 0, 1):
@@ -87,13 +79,6 @@ def test_eval_of_random_actions_is_a_baseline(runs: Path, capsys) -> None:
     with pytest.raises(SystemExit, match="0"):
         work("eval", "--help")
     assert "or random actions" in " ".join(capsys.readouterr().out.split())
-
-
-@pytest.mark.parametrize("given", [["max_steps=3"], ["max_steps=3,noise=0.01"],
-                                   ["max_steps=3", "noise=0.01"]])  # fmt: skip
-def test_options_of_the_environment_reach_it(runs: Path, given: list[str], capsys) -> None:
-    work("eval", runs / "robot", "--episodes", 1, "--json", "-", "--env-kwargs", *given)
-    assert json.loads(capsys.readouterr().out)["lengths"] == [3]
 
 
 @pytest.mark.parametrize("name", ["dqn_0", "robot", "reinforce"])
@@ -199,7 +184,7 @@ def test_compare_has_every_run_in_its_table(runs: Path, tmp_path: Path, capsys) 
     }
     both = groups["dqn in CartPole-v1"]
     assert [row["seed"] for row in both["runs"]] == [0, 1] and both["statistics"]["n"] == 2
-    assert "needs two seeds" in told, "one seed alone has no interval"
+    assert told.count("| IQM [95 %] |") == 1
     assert Image.open(out).format == "PNG"
 
 
@@ -210,14 +195,14 @@ def test_a_failed_run_stays_in_the_table(runs: Path, tmp_path: Path, capsys) -> 
     told = capsys.readouterr().out
     row = next(line for line in told.splitlines() if "| 3 |" in line)
     assert "it has no checkpoint yet" in row
-    assert "2 of 3 (see faults)" in told
+    assert "(2 of 3)" in told
 
 
 def test_compare_by_training_needs_no_checkpoint(tmp_path: Path, capsys) -> None:
     for seed, value in enumerate((10.0, 20.0, 30.0, 400.0)):
         workbench_runs.record(tmp_path / f"run_{seed}", [value] * 5, seed=seed)
     assert work("compare", tmp_path, "--episodes", 0) == 0
-    assert "| 115.0 ± 190.2 | 25.0 | 25.0 |" in capsys.readouterr().out
+    assert "| 115.0 ± 190.2 | 25.0 | 25.0 [" in capsys.readouterr().out
 
 
 # Bad input: one line each, and an exit code.
@@ -260,15 +245,6 @@ def test_a_checkpoint_of_another_run_is_refused(runs: Path, own: Path, capsys) -
         assert "best.pt isn't a checkpoint of" in refused(capsys, "eval", own)
 
 
-def test_without_any_good_checkpoint(own: Path, capsys) -> None:
-    for path in own.rglob("*.pt"):
-        path.write_bytes(b"")
-    assert "none of its checkpoints can be read" in refused(capsys, "eval", own)
-    for path in own.rglob("*.pt"):
-        path.unlink()
-    assert "no checkpoint yet" in refused(capsys, "eval", own)
-
-
 def test_no_episodes_yet(tmp_path: Path, capsys) -> None:
     run = workbench_runs.record(tmp_path / "run", [])
     assert "no episode has ended yet" in refused(capsys, "plot", run, "--out", tmp_path / "a.png")
@@ -282,21 +258,6 @@ def test_a_line_that_is_only_half_written_is_left_out(tmp_path: Path) -> None:
     with (run / "scalars.csv").open("a") as file:
         file.write("30,charts/episodic_return,3")
     assert work("plot", run, "--out", tmp_path / "a.png") == 0
-
-
-def test_a_foreign_table(tmp_path: Path, capsys) -> None:
-    run = workbench_runs.record(tmp_path / "run", [1.0])
-    (run / "scalars.csv").write_text("a,b\n1,2\n")
-    line = refused(capsys, "plot", run, "--out", tmp_path / "a.png")
-    assert "isn't the table of a training" in line
-
-
-@pytest.mark.parametrize("name", ["evla", "reccord", "nonsense"])
-def test_an_unknown_command(name: str, capsys) -> None:
-    with pytest.raises(SystemExit) as ended:
-        work(name)
-    assert ended.value.code == 2
-    assert "unknown command" in capsys.readouterr().err
 
 
 def test_a_picture_or_a_video_of_another_format(runs: Path, tmp_path: Path, capsys) -> None:

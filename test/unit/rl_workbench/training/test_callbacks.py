@@ -10,8 +10,6 @@ from support.training.training_runs import rows, small, summary
 import rl_workbench
 from rl_workbench import Callback, WorkbenchError, cli
 from rl_workbench.starting import Interrupt
-from rl_workbench.training.callbacks import CallbackList
-from rl_workbench.training.pg import PolicyGradientTraining
 from rl_workbench.training.training import Training
 
 MODULE = """
@@ -100,26 +98,6 @@ def test_one_that_fails_ends_the_training_with_a_line(tmp_path: Path, module: st
     assert summary(folder)["complete"]
 
 
-class Stopping(Callback):
-    """Raises at one event."""
-
-    def __init__(self, event: str) -> None:
-        setattr(self, event, self._raise)
-
-    def _raise(self, *_: object) -> None:
-        raise ZeroDivisionError("no such luck")
-
-
-@pytest.mark.slow
-def test_all_hear_of_the_end_whatever_fails_there(tmp_path: Path, monkeypatch) -> None:
-    seen, folder = Recorder(), tmp_path / "run"
-    monkeypatch.setattr(PolicyGradientTraining, "export", lambda *_: (folder / "no/file").touch())
-    with pytest.raises(WorkbenchError, match="can't write .*no/file"):
-        run("reinforce", folder, Stopping("on_training_end"), seen)
-    assert seen.of("end") == [summary(folder)["steps"]]
-    assert "no/file" in summary(folder)["failure"]
-
-
 @pytest.mark.slow
 def test_a_loss_is_logged_at_the_step_at_which_one_fails(tmp_path: Path) -> None:
     class Late(Callback):
@@ -159,14 +137,3 @@ def test_a_training_from_python(tmp_path: Path) -> None:
     assert summary(folder)["episodes"] == 3 == len(seen.of("episode"))
     with pytest.raises(WorkbenchError, match="unknown parameter 'gama'; did you mean gamma"):
         rl_workbench.train("reinforce", gama=1)
-
-
-def test_the_first_of_several_failures_is_told() -> None:
-    class First(Stopping):
-        pass
-
-    users = CallbackList([], [First("on_step"), Stopping("on_step")])
-    with pytest.raises(WorkbenchError, match="First failed"):
-        users.call("on_step", None)
-    with pytest.raises(ZeroDivisionError):
-        CallbackList([First("on_step")], [Stopping("on_step")]).call("on_step", None)

@@ -85,14 +85,8 @@ def test_a_record_that_somebody_changed_is_refused(
 def test_other_versions_are_told(stopped: Path, capsys) -> None:
     change_record(stopped, "versions", "torch", "1.0")
     resume(stopped)
-    assert f"torch 1.0 is now {torch.__version__}: from here on" in capsys.readouterr().out
+    assert f"torch 1.0 is now {torch.__version__}: the bits may differ" in capsys.readouterr().out
     assert record(stopped)["versions"]["torch"] == "1.0", "those that it began with"
-
-
-def test_a_record_without_versions_resumes(stopped: Path) -> None:
-    content = record(stopped) | {"versions": None}
-    (stopped / "config.json").write_text(json.dumps(content))
-    assert summary(resume(stopped))["complete"]
 
 
 @pytest.mark.parametrize(
@@ -122,16 +116,6 @@ def test_figures_that_were_lost_cost_nothing_else(
     assert_same(checkpoint(run)["q_net"], checkpoint(short)["q_net"])
     assert set(rows(run)) < set(rows(short)) and rows(run)
     assert_no_doubles(run)
-
-
-@pytest.mark.parametrize("damage", ["3,charts/x\n", "3,charts/x,1.0,2.0"])
-def test_complete_rows_before_a_damaged_one_are_kept(stopped: Path, capsys, damage: str) -> None:
-    path = stopped / "scalars.csv"
-    *kept, _, _ = path.read_text().splitlines(keepends=True)
-    path.write_text("".join(kept) + damage)
-    resume(stopped)
-    assert "lacks rows that it had" in capsys.readouterr().out
-    assert path.read_text().startswith("".join(kept)) and damage not in path.read_text()
 
 
 def test_a_moved_run_goes_on_where_it_lies(short: Path, stopped: Path, tmp_path: Path) -> None:

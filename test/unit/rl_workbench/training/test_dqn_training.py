@@ -61,7 +61,7 @@ def test_an_environment_that_goes_another_way_costs_its_episode(tmp_path: Path, 
     content["environment"]["episode"]["observation"] += 1
     torch.save(content, run / "last.pt")
     resume(run)
-    assert "the episode under way is given up" in capsys.readouterr().err
+    assert "the current episode is abandoned" in capsys.readouterr().err
     assert summary(run)["complete"]
 
 

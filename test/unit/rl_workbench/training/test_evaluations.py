@@ -184,7 +184,7 @@ def test_where_a_robot_cannot_be_brought_back_the_episode_is_given_up(
     monkeypatch.setattr(gymnasium.registry[env_id], "nondeterministic", says_so)
     options = {"total_timesteps": 128, "eval_frequency": 25}
     result = summary(train(tmp_path, name, env_id=env_id, **options))
-    assert "the environment doesn't repeat itself: the episode" in capsys.readouterr().err
+    assert "the environment is not repeatable: the current episode" in capsys.readouterr().err
     assert result["complete"]
     evaluated = [25, 50, 75, 100, 125, 128] if name == "dqn" else [64, 128]  # between rollouts
     assert [step for step, _ in result["evaluations"]] == evaluated
@@ -241,7 +241,7 @@ def test_an_environment_of_which_there_can_be_only_one(
     plain = train(tmp_path / "plain", name, env_id=POLE, env_kwargs={"noise": 0.05})
     alone = train(tmp_path / "alone", name, env_id=env_id, env_kwargs=None)
     told = capsys.readouterr().out
-    assert "evaluated in the training's own environment, since a second one fails: " in told
+    assert "evaluating in the training's environment, because a second one can't be made: " in told
     assert "the port is taken" in told
     assert rows(plain) == rows(alone)
     with pytest.raises(WorkbenchError, match="the port is taken"):

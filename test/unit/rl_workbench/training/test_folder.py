@@ -1,7 +1,5 @@
 """Run folders: new each time, one training in each, nothing left of one that never began."""
 
-import fcntl
-import os
 from pathlib import Path
 
 import pytest
@@ -55,12 +53,6 @@ def test_one_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
         pass
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="/proc can't be written to by anybody")
-def test_one_that_cannot_be_written_to() -> None:
-    with pytest.raises(WorkbenchError, match="can't write to"), opened("/proc/run", *PLACE):
-        pass
-
-
 def test_one_that_is_in_use(tmp_path: Path) -> None:
     second = held(tmp_path)
     with held(tmp_path), pytest.raises(WorkbenchError, match="is running in"), second:
@@ -69,21 +61,3 @@ def test_one_that_is_in_use(tmp_path: Path) -> None:
         pass
     with pytest.raises(WorkbenchError, match="is not a run folder"), held(tmp_path / "none"):
         pass
-
-
-@pytest.mark.parametrize("again", [False, True])
-def test_one_that_its_last_holder_removes_meanwhile(
-    tmp_path: Path, monkeypatch, again: bool
-) -> None:
-    def removed(descriptor: int, how: int) -> None:
-        (tmp_path / "run").rmdir()
-        if again:  # somebody else's
-            (tmp_path / "run").mkdir()
-        lock(descriptor, how)
-
-    lock = fcntl.flock
-    monkeypatch.setattr(fcntl, "flock", removed)
-    (tmp_path / "run").mkdir()
-    with pytest.raises(WorkbenchError, match="is not a run folder"), held(tmp_path / "run"):
-        pass
-    assert (tmp_path / "run").exists() == again

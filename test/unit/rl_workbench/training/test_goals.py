@@ -1,6 +1,5 @@
 """Environments with goals: what every algorithm makes of them, hindsight, and how often they succeed."""
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 from support.training.goal_environments import REACH, Reach
-from support.training.learning_fakes import POLE, register_with
+from support.training.learning_fakes import register_with
 from support.training.training_runs import (
     checkpoint,
     options_of,
@@ -17,7 +16,6 @@ from support.training.training_runs import (
     rows,
     run,
     summary,
-    train,
 )
 
 from rl_workbench.errors import WorkbenchError
@@ -79,20 +77,6 @@ def test_successes_are_those_of_the_last_steps(tmp_path: Path) -> None:
         assert total > -20 or not success
     for success, total in zip(evaluation["successes"], evaluation["returns"], strict=True):
         assert total > -20 or not success
-
-
-@pytest.mark.parametrize("name", ["dqn", "reinforce"])
-def test_an_environment_that_says_nothing_of_successes(tmp_path: Path, name: str) -> None:
-    told = summary(train(tmp_path, name, env_id=POLE, env_kwargs=None))
-    assert told["successes"] == [] and told["success_rate_last_100"] is None
-    assert not [row for row in rows(tmp_path) if "success" in row[1]]
-
-
-def test_progress_and_summary_tell_the_rate(tmp_path: Path, capsys) -> None:
-    made(tmp_path, "reinforce", episodes=20)
-    told = capsys.readouterr()
-    assert re.search(r"Episode +20 .*\| success: \d+%", told.err)
-    assert re.search(r"greedy episodes: .*, success \d+%", told.out)
 
 
 @SB3

@@ -38,13 +38,6 @@ def test_while_modules_are_read_it_waits(interrupt: Interrupt) -> None:
         signal.raise_signal(signal.SIGINT)
 
 
-def test_after_training_it_ends_any_wait_again(interrupt: Interrupt) -> None:
-    interrupt.defer()
-    interrupt.at_once()
-    with pytest.raises(KeyboardInterrupt):
-        signal.raise_signal(signal.SIGINT)
-
-
 def test_one_that_was_deferred_is_not_forgotten(interrupt: Interrupt) -> None:
     interrupt.defer()
     signal.raise_signal(signal.SIGINT)

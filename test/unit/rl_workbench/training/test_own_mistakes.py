@@ -65,7 +65,7 @@ def test_a_mistake_in_an_environment_is_one_line_with_its_place(
     assert f"{env_id} failed in {where}(): {error}: " in line
     assert re.search(r"of( |\\n)mine", line) and f" ({__file__}:{PLACE}); " in line
     assert f"; the traceback is in {tmp_path / 'failure.txt'}; stopped after" in line
-    assert "what was learned is saved in" in line and "--resume" in line
+    assert "progress is saved in" in line and "--resume" in line
     text = (tmp_path / "failure.txt").read_text()
     assert text.startswith("Traceback") and "self._fail(" in text and error in text
     assert checkpoint(tmp_path)["steps"] <= summary(tmp_path)["steps"]

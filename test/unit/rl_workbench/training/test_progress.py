@@ -1,7 +1,6 @@
 """What the user sees while training: lines in a pipe, a bar on a terminal."""
 
 import io
-import sys
 import time
 from types import SimpleNamespace
 
@@ -9,7 +8,7 @@ import pytest
 
 from rl_workbench.training.callbacks import EpisodeResult
 from rl_workbench.training.history import History
-from rl_workbench.training.progress import Progress, tell
+from rl_workbench.training.progress import Progress
 
 
 class Terminal(io.StringIO):
@@ -61,30 +60,6 @@ def test_or_over_steps_which_ends_where_the_training_has_ended() -> None:
     bar.on_step(SimpleNamespace(steps=100))
     bar.close()
     assert "100/100" in stream.getvalue()
-
-
-@pytest.mark.parametrize("terminal", [False, True])
-def test_a_sign_that_the_output_cannot_write_costs_no_training(terminal: bool) -> None:
-    """Paths hold any bytes, and LC_ALL=C or PYTHONIOENCODING make any output ASCII."""
-    raw = io.BytesIO()
-    stream = io.TextIOWrapper(raw, encoding="ascii", errors="strict", write_through=True)
-    stream.isatty = lambda: terminal  # type: ignore[method-assign]
-    bar = Progress(5, "episode", 0, stream)
-    bar.say("runs/\u00fc\udcff: going on")
-    bar.close()
-    tell("runs/\u4e16\udcff", stream)
-    assert rb"runs/\xfc\udcff: going on" in raw.getvalue()
-    assert raw.getvalue().endswith(rb"runs/\u4e16\udcff" + b"\n")
-
-
-def test_without_a_standard_error_it_goes_nowhere(monkeypatch, capsys) -> None:
-    """As 2>&- starts a training."""
-    monkeypatch.setattr(sys, "stderr", None)
-    bar = Progress(100, "step", 0)
-    for count in range(1, 21):
-        show_episode(bar, [1.0] * count, 1)
-    bar.close()
-    assert capsys.readouterr().out == "", "standard output is for results"
 
 
 @pytest.mark.parametrize(

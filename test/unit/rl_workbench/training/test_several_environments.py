@@ -113,7 +113,7 @@ def test_the_one_that_fails_is_named(tmp_path: Path, monkeypatch) -> None:
     with pytest.raises(WorkbenchError) as raised:
         train(tmp_path / "broken", "reinforce", **options)
     assert str(raised.value).startswith("environment 2 of 3: its simulator has ended; ")
-    assert "what was learned is saved" in str(raised.value)
+    assert "progress is saved" in str(raised.value)
     whole = train(tmp_path / "whole", "reinforce", **options)  # those are not the second one
     assert_same(checkpoint(whole)["agent"], checkpoint(resume(tmp_path / "broken"))["agent"])
 
@@ -130,7 +130,7 @@ def test_a_round_that_nothing_can_be_learned_from_is_given_up_whole(
         raise WorkbenchError("the policy loss is nan")
 
     monkeypatch.setattr(ReinforceAgent, "_update", failing)
-    with pytest.raises(WorkbenchError, match="the policy loss is nan; .* 3 episodes, what was"):
+    with pytest.raises(WorkbenchError, match="the policy loss is nan; .* 3 episodes, progress"):
         train(broken, "reinforce", **MANY)
     assert_same_run(whole, resume(broken))
 

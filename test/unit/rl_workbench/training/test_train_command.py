@@ -141,14 +141,6 @@ def test_a_reader_that_goes_away_before_the_help(tmp_path: Path) -> None:
     os.close(writing)
 
 
-def test_help_names_all_algorithms_and_theirs_what_they_know(capsys) -> None:
-    code, told, _ = told_and_left(capsys, "--help")
-    names = "dqn, reinforce, reinforce-document, ppo, a2c, sac, td3, ddpg, dqn-sb3"
-    assert code == 0 and names in " ".join(told.split()) and "--algo NAME --help" in told
-    code, told, _ = told_and_left(capsys, "--algo=dqn", "--help")
-    assert code == 0 and "--dueling" in told
-
-
 def test_help_shows_the_flags_of_a_command_around_it(capsys) -> None:
     parent = argparse.ArgumentParser(add_help=False)
     parent.add_argument("--backend")
@@ -178,27 +170,9 @@ def test_an_environment_that_does_not_do_leaves_no_folder(
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize("algorithm", [DQN, ["--algo=reinforce-document"]])
-def test_continuous_actions_are_refused_with_what_takes_them(
-    capsys, tmp_path: Path, algorithm: list[str]
-) -> None:
-    line = failed(capsys, *algorithm, "--env-id=Pendulum-v1", "--run-dir=run")
-    assert "needs discrete actions, Discrete(n); Pendulum-v1 has Box" in line
-    assert (
-        "--algo reinforce, or Stable-Baselines3's ppo, a2c, sac, td3 or ddpg: these fit it" in line
-    )
-    assert not (tmp_path / "run").exists()
-
-
-def test_the_document_needs_its_own_observations(capsys) -> None:
-    line = failed(capsys, "--algo=reinforce-document", "--env-id=Acrobot-v1")
-    assert "is made for 4 observations and 2 actions; Acrobot-v1 has 6 and 3: --algo" in line
-
-
 def test_a_device_that_is_not_there(capsys) -> None:
-    said = failed(capsys, *DQN, "--device=cda")
-    assert (
-        "torch can't use the device 'cda' (Expected one of" in said and "); here it has cpu" in said
+    assert "torch can't use the device 'cda': Expected one of" in failed(
+        capsys, *DQN, "--device=cda"
     )
 
 

@@ -13,7 +13,6 @@ from support.training.training_runs import (
     checkpoint,
     files,
     points,
-    record,
     rows,
     small,
     summary,
@@ -22,7 +21,6 @@ from support.training.training_runs import (
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tensorboard.plugins.hparams import plugin_data_pb2
 
-from rl_workbench import errors
 from rl_workbench.errors import WorkbenchError
 
 FILES = {"last.pt", "best.pt", "checkpoints", "config.json", "scalars.csv", "summary.json",
@@ -68,22 +66,6 @@ def test_the_summary_tells_it_all(whole, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_the_record_says_what_was_trained_and_with_what(whole, name: str) -> None:
-    found, options = record(whole(name)), small(name)
-    assert found["algorithm"] == name
-    assert found["run"]["env_id"] == options.run.env_id
-    assert (found["run"]["seed"], found["run"]["exp_name"]) == (3, name)
-    assert set(found["hyperparameters"]) == set(options.record()["hyperparameters"])
-    assert found["began"] > 1e9
-    assert {"python", "numpy", "torch", "gymnasium", "machine", "command"} <= set(found["versions"])
-    assert (
-        checkpoint(whole(name))["config"]["hyperparameters"]
-        == (options.record()["hyperparameters"])
-    )
-    assert summary(whole(name))["hyperparameters"] == found["hyperparameters"]
-
-
-@pytest.mark.parametrize("name", ALL)
 def test_tensorboard_shows_what_the_csv_holds(whole, name: str) -> None:
     run, result = whole(name), summary(whole(name))
     assert set(points(run)) == TAGS | OWN_TAGS.get(name, OF_REINFORCE)
@@ -116,20 +98,6 @@ def test_hyper_parameters_stand_beside_the_result(whole, name: str) -> None:
     metrics = {each.name.tag for each in experiment.metric_infos}
     assert metrics == {"eval/mean_reward", "charts/episodic_return"}
     assert "hp_metric" not in points(whole(name))
-
-
-def test_the_user_is_told_of_begin_and_end(tmp_path: Path, capsys, monkeypatch) -> None:
-    monkeypatch.setattr(errors, "hints", errors.Hints())
-    result = summary(train(tmp_path, "reinforce", eval_episodes=20))
-    told = capsys.readouterr().out
-    assert f"training reinforce in CartPole-v1 with seed 3: {tmp_path}\n" in told
-    step, mean = result["best"]
-    assert f"trained 13 episodes, {result['steps']} steps in " in told
-    assert f"; best evaluation {mean:.1f} at step {step}" in told
-    assert "; the last one over 20 greedy episodes: length " in told
-    assert f"all results are in {tmp_path}\n" in told and "--resume" not in told
-    assert f"watch: {errors.hints.replaying(tmp_path)}\n" in told
-    assert f"curves: {errors.hints.watching(tmp_path)}\n" in told
 
 
 # The same seed and options: the same bits.

@@ -223,19 +223,3 @@ def test_goals_are_drawn_or_given() -> None:
     for wrong in ([3.0, 0.0, 0.0], [0.0], [float("nan")] * 3):
         with pytest.raises(ValueError, match="isn't one of ReachGoal's goals"):
             pilot.aim(wrong)
-
-
-def test_what_makes_no_sense_is_refused() -> None:
-    robot = arm("effort_controllers/JointGroupEffortController")
-    with pytest.raises(RobotEnvError, match="has no controller that takes commands"):
-        Pilot(Robot((FILES / "two_link_arm.urdf").read_text()), ReachGoal(), print, 0.01)
-    joints = {"shoulder": JointState(0.0, 0.0, 0.0), "elbow": JointState(0.0, 0.0, 0.0)}
-    for action in ([float("nan")] * 2, [2.0, 0.0], [0.0]):
-        pilot = Pilot(robot, ReachGoal(), lambda seen, action=action: action, 0.01)
-        pilot.begin(joints)
-        with pytest.raises(ValueError, match="an action is of Box"):
-            pilot.step(0.0, joints)
-    env = gymnasium.make("cartpole/Balance-v0").unwrapped
-    with pytest.raises(ValueError, match="BalanceTask has no goal"):
-        Pilot(env.scene.robots[0], env.task, print, PERIOD).aim([0.0])
-    env.close()

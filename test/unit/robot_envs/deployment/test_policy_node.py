@@ -225,10 +225,6 @@ def test_odometry_that_is_no_pose_is_a_fault(clock: SimpleNamespace) -> None:
     assert "the sensor 'odometry': pose and speed are (0.0, 0.0, 0.0, 0.0" in node._sensors.fault()
 
 
-def test_sensors_stamps_may_be_as_far_off_as_those_of_joints(furuta: PolicyNode) -> None:
-    assert furuta._sensors._off == furuta._joints._late == 1.0
-
-
 def test_reasons_that_change_fast_are_a_line_a_second(
     furuta: PolicyNode, clock: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -215,16 +215,3 @@ def test_pictures_show_the_goal_of_each_episode() -> None:
             assert after is not None and after[1] > before[1] + 3.0, "to the right"
     finally:
         env.close()
-
-
-def test_a_page_moves_the_goal(server: Any) -> None:
-    env: Any = gymnasium.make("robot_envs/Navigate-v0").unwrapped
-    try:
-        env.reset(seed=0)
-        shown = env.draw_on(server)
-        for seed in range(2):
-            env.reset(seed=seed)
-            shown()
-            assert tuple(shown.look().links[-1][:2]) == pytest.approx(env.task.goal)
-    finally:
-        env.close()

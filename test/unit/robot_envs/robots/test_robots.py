@@ -7,7 +7,6 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-import yaml
 
 import robot_envs.robots  # noqa: F401 - registers the environments
 from robot_envs.making import named
@@ -25,11 +24,6 @@ def test_registering_them_loads_neither_their_files_nor_a_physics_engine() -> No
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
-
-
-def test_each_has_options_to_train_it_with() -> None:
-    sections = yaml.safe_load((ROOT / "config/sb3.yaml").read_text(encoding="utf-8"))
-    assert sorted(each for each in sections if "robot_envs/" in each) == [f"sac {i}" for i in IDS]
 
 
 @pytest.mark.parametrize("identifier", IDS)

@@ -86,14 +86,6 @@ def test_a_variation_has_what_was_told():
     assert (variation.gains, variation.gravity) == (told["gains"], told["gravity"])
 
 
-def test_draws_are_spread_over_the_range():
-    rng, randomisation = np.random.default_rng(0), UniformRandomisation(SCENE, {"mass": 0.5})
-    drawn = np.array([list(randomisation.draw(rng)[1]["mass"].values()) for _ in range(4000)])
-    assert drawn.mean(axis=0) == pytest.approx([1.0] * 3, abs=0.02)
-    assert drawn.std(axis=0) == pytest.approx([1.0 / 12**0.5] * 3, rel=0.03)
-    assert abs(np.corrcoef(drawn.T)[0, 1]) < 0.05
-
-
 def test_options_may_be_what_a_command_line_makes_of_them():
     given = {"mass": [1, 2], "com": {"cart": np.array([0.0, 0.1])}, "gravity": np.float32(0.5)}
     meant = {"mass": (1.0, 2.0), "com": {"cart": (0.0, 0.1)}, "gravity": 0.5}
@@ -104,7 +96,6 @@ def test_options_may_be_what_a_command_line_makes_of_them():
     ("options", "text"),
     [
         ({"mas": 0.1}, "randomisation has no option 'mas'; did you mean 'mass'?"),
-        ({"colour": 0.1}, "no option 'colour'; there are mass, length, com, damping"),
         ({"mass": -0.1}, "randomisation of mass is one number: it must be >= 0, not -0.1"),
         ({"mass": 0.95}, "of mass from 0.05 to 1.95: it must lie within 0.1 and 10"),
         (
@@ -115,23 +106,13 @@ def test_options_may_be_what_a_command_line_makes_of_them():
             {"mass": (0.8, 1.0, 1.2)},
             "of mass is a number or a pair (low, high), not (0.8, 1.0, 1.2)",
         ),
-        ({"mass": "0.1"}, "of mass is a number or a pair"),
-        ({"mass": None}, "of mass is a number or a pair"),
-        ({"mass": True}, "of mass is a number or a pair"),
         ({"mass": float("nan")}, "of mass is a number or a pair"),
-        ({"damping": float("inf")}, "of damping is a number or a pair"),
         ({"damping": (-1.0, 1.0)}, "of damping from -1 to 1: it must lie within 0 and"),
-        ({"gravity": (-1.0, 1.0)}, "of gravity from -1 to 1: it must lie within 0 and 10"),
         ({"gravity": {"z": 0.1}}, "of gravity is one for the world"),
         (
             {"mass": {"kart": 0.1}},
             "of mass: there is no link 'kart' that moves and has a mass; did you mean 'cart'?",
         ),
-        (
-            {"mass": {"world": 0.1}},
-            "there is no link 'world' that moves and has a mass; there are weight,",
-        ),
-        ({"mass": {"cart": -1}}, "of mass of 'cart' is one number"),
         ({"damping": {"rial": 0.1}}, "there is no joint 'rial' that moves; did you mean 'rail'?"),
         (
             {"gains": {"motors": 0.1}},
@@ -162,14 +143,6 @@ def test_surfaces_are_those_of_links_with_a_collision():
 @pytest.mark.parametrize(
     ("pid", "text"),
     [
-        (
-            {"p": 9e4},
-            "p of servo_position/pid would be up to 108000, and dynamic_reconfigure takes 100000",
-        ),
-        (
-            {"p": 1, "d": -900},
-            "d of servo_position/pid would be up to -1080, and dynamic_reconfigure takes 1000",
-        ),
         ({"p": 1, "i_clamp": 2e5}, "i_max of servo_position/pid would be up to 200000"),
     ],
 )

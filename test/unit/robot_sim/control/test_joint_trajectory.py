@@ -8,7 +8,7 @@ import math
 import pytest
 from support.robots.trajectory_rig import GAINS, KINDS, MS, Rig, S, move
 
-from robot_sim.control.controllers import BUILT_IN
+from robot_sim.control.controllers import built_in
 from robot_sim.control.errors import ControlError
 from robot_sim.control.trajectory import Segment, Waypoint
 from robot_sim.control.trajectory_goals import (
@@ -68,7 +68,7 @@ def test_bad_parameters_are_refused(params, text):
 
 def test_a_robot_without_the_interface_is_refused():
     with pytest.raises(ControlError, match="has hardware_interface::EffortJointInterface"):
-        BUILT_IN["velocity_controllers/JointTrajectoryController"].create(
+        built_in()["velocity_controllers/JointTrajectoryController"].create(
             "arm", {"joints": ["shoulder"], "gains": GAINS}, Rig("Effort").hardware
         )
 

@@ -3,7 +3,7 @@
 import pytest
 from support.robots.worlds import add_robot, start
 
-from robot_sim.control.controllers import BUILT_IN
+from robot_sim.control.controllers import built_in
 from robot_sim.control.errors import ControlError
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.sensing import Sensing
@@ -126,12 +126,12 @@ def test_a_rate_of_0_publishes_nothing(bot):
 
 
 def test_what_is_missing_or_faulty_is_named(world, make_world):
-    create = BUILT_IN[IMU["type"]].create
+    create = built_in()[IMU["type"]].create
     with pytest.raises(ControlError, match="imu/publish_rate is missing"):
         create("imu", IMU, Bot(world).robot.hardware)
     faulty = Bot(make_world(), noise=-1)
     with pytest.raises(ControlError, match="'imu/data' can't be simulated.*stddev"):
         create("imu", {"publish_rate": 10}, faulty.robot.hardware)
-    faulty.robot.hardware.sensors[BUILT_IN[IMU["type"]].interface].clear()
+    faulty.robot.hardware.sensors[built_in()[IMU["type"]].interface].clear()
     with pytest.raises(ControlError, match='no <sensor type="imu">.*ImuSensorInterface'):
         create("imu", {"publish_rate": 10}, faulty.robot.hardware)

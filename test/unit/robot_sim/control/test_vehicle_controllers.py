@@ -10,7 +10,7 @@ import pytest
 from support.robots.vehicles import RADIUS, TRACK, WHEELBASE, bicycle, four_wheels, two_wheels
 from support.robots.worlds import add_robot, start
 
-from robot_sim.control.controllers import BUILT_IN
+from robot_sim.control.controllers import built_in
 from robot_sim.control.errors import ControlError
 from robot_sim.physics.pose import Pose, to_rpy
 from robot_sim.simulator import Simulator
@@ -191,12 +191,12 @@ def test_wrong_commands_are_refused(world):
 def test_wrong_parameters_are_named(sim, wrong, complaint):
     robot = add_robot(sim, "bot", two_wheels())
     with pytest.raises(ControlError, match=complaint):
-        BUILT_IN[DIFF["type"]].create("base", DIFF | wrong, robot.hardware)
+        built_in()[DIFF["type"]].create("base", DIFF | wrong, robot.hardware)
 
 
 def test_a_description_without_a_distance_is_refused(sim):
     robot = add_robot(sim, "bot", two_wheels())
-    description, create = robot.hardware.robot, BUILT_IN[DIFF["type"]].create
+    description, create = robot.hardware.robot, built_in()[DIFF["type"]].create
     description.find("joint[@name='left_joint']/origin").set("xyz", "nan 0 0")
     with pytest.raises(ControlError, match="base/wheel_separation must be above 0 and finite"):
         create("base", DIFF, robot.hardware)
@@ -227,7 +227,7 @@ FOUR = COVARIANCES | {
 def test_a_bicycle_of_no_length_is_refused(sim, key, value):
     robot = add_robot(sim, "bot", bicycle())
     with pytest.raises(ControlError, match=f"base/{key} must be above 0"):
-        BUILT_IN[ACKERMANN["type"]].create("base", ACKERMANN | {key: value}, robot.hardware)
+        built_in()[ACKERMANN["type"]].create("base", ACKERMANN | {key: value}, robot.hardware)
 
 
 def test_a_bicycle_follows_the_circle_of_its_fork(world):

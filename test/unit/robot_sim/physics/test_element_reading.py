@@ -22,7 +22,7 @@ from robot_sim.sensors.sensing import Mount, Sensing
 from robot_sim.sensors.sensor_readers import WITHOUT, measurements
 from robot_sim.simulator import Simulator
 
-NOT_YET = {"actor": [""], "world": ["actor"]}
+BY_KIND = {kind: each for each in measurements() if each.fields for kind in each.kinds}
 # The multi-camera's plugin reads it; it needs a picture; it needs another kind of noise.
 ELSEWHERE = [("camera", "@name"), ("geometry", "heightmap/pos"), ("ray", "noise/precision")]
 OF_SENSORS = ("sensor", "vector", "noise", "ray", "camera")
@@ -144,7 +144,7 @@ def is_seen(section: str, path: str, sim: Simulator) -> bool:
 
 
 def is_left_to_others(section: str, path: str) -> bool:
-    return (section, path) in ELSEWHERE or any(map(path.startswith, NOT_YET.get(section, ())))
+    return (section, path) in ELSEWHERE
 
 
 @pytest.mark.usefixtures("watched")

@@ -20,6 +20,8 @@ from support.mutations.mesh_files import (
 from support.robots.worlds import run
 
 from robot_sim.physics.description import DescriptionError
+from robot_sim.physics.engines import bullet_meshes
+from robot_sim.physics.engines.quiet_pybullet import pybullet
 from robot_sim.physics.files import mesh_program
 from robot_sim.physics.files.reading import Resources
 from robot_sim.physics.files.sdf import parse_sdf
@@ -116,20 +118,55 @@ def test_what_robots_refer_to_in_gazebo_plugins_has_the_right_size(name):
     assert sizes == pytest.approx(np.array(P3DX[name]), abs=2e-3)
 
 
+def static_mesh(path):
+    return (
+        '<sdf version="1.6"><model name="t"><static>1</static><link name="l"><collision name="c">'
+        f"<geometry><mesh><uri>{path}</uri></mesh></geometry></collision></link></model></sdf>"
+    )
+
+
 def test_a_static_mesh_is_hollow_where_it_is_hollow(sim, tmp_path):
     """A trough of two slopes: its convex hull would be full."""
     (tmp_path / "trough.obj").write_text(
         "v -1 -1 1\nv -1 1 1\nv 0 -1 0\nv 0 1 0\nv 1 -1 1\nv 1 1 1\n"
         "f 1 3 2\nf 2 3 4\nf 3 5 4\nf 4 5 6\n"
     )
-    mesh = f"<mesh><uri>{tmp_path}/trough.obj</uri></mesh>"
-    trough = parse_sdf(
-        '<sdf version="1.6"><model name="t"><static>1</static><link name="l"><collision name="c">'
-        f"<geometry>{mesh}</geometry></collision></link></model></sdf>"
-    )
-    sim.world.spawn("t", trough, Pose())
+    sim.world.spawn("t", parse_sdf(static_mesh(tmp_path / "trough.obj")), Pose())
     height = rest_height(sim.world, parse_sdf(BALL.format(0.1)), 0.6)
     assert height == pytest.approx(0.1 * 2**0.5, abs=0.03)
+
+
+def test_static_models_of_one_mesh_are_loaded_once_and_stand_by_themselves(sim, tmp_path):
+    (tmp_path / "cube.stl").write_bytes(binary_stl())
+    loaded = []
+    with pytest.MonkeyPatch.context() as patch:
+        write = bullet_meshes.write_mesh
+        patch.setattr(
+            bullet_meshes, "write_mesh", lambda *a, **k: loaded.append(1) or write(*a, **k)
+        )
+        for x in range(3):
+            model = parse_sdf(static_mesh(tmp_path / "cube.stl"))
+            sim.world.spawn(f"m{x}", model, Pose((5.0 * x, 0.0, 0.0)))
+    assert len(loaded) == 1
+    sim.world.delete("m0")
+    for x in range(3):
+        sim.world.spawn(f"b{x}", parse_sdf(BALL.format(0.1)), Pose((5.0 * x, 0.0, 1.5)))
+    run(sim.world, 1000)
+    heights = [sim.world.models[f"b{x}"].state()[0].position[2] for x in range(3)]
+    assert heights[0] < 0.0
+    assert heights[1:] == pytest.approx([1.1] * 2, abs=2e-3)
+
+
+def test_pybullet_keeps_no_meshes_to_draw(sim, tmp_path):
+    (tmp_path / "cube.stl").write_bytes(binary_stl())
+    text = urdf(tmp_path / "cube.stl")
+    for static, name in enumerate("ab"):
+        model = parse_urdf(
+            text.replace("</robot>", f"<gazebo><static>{static}</static></gazebo></robot>")
+        )
+        body = sim.world.spawn(name, model, Pose((0.0, 0.0, 3.0 + static))).body
+        drawn = pybullet.getVisualShapeData(body.id, physicsClientId=body._client)
+        assert [each[2] for each in drawn] == [pybullet.GEOM_SPHERE]
 
 
 def test_a_mesh_has_the_shape_that_it_had_on_disk_when_it_was_spawned(world, tmp_path):

@@ -155,6 +155,39 @@ NESTED = f"""<model name="m"><link name="l">{BODY}</link><model name="in"><pose>
     <child>in::l</child><axis><xyz>0 0 1</xyz></axis></joint></model>"""
 
 
+def test_loops_are_closed_in_the_state(begun):
+    """A parallelogram begins leaning; its last joint, which closes it, too."""
+    up, across = (
+        f"<inertial><pose>{pose} 0 0 0</pose></inertial>" for pose in ("0 0 .5", ".5 0 0")
+    )
+    bars = (
+        ("base", "0 0 0", ""),
+        ("left", "0 0 0", up),
+        ("right", "1 0 0", up),
+        ("top", "0 0 1", across),
+    )
+    links = "".join(
+        f'<link name="{n}"><pose>{at} 0 0 0</pose>{mass}</link>' for n, at, mass in bars
+    )
+    hinge = """<joint name="{0}" type="revolute"><pose>0 0 {3} 0 0 0</pose><parent>{1}</parent>
+        <child>{2}</child><axis><xyz>0 1 0</xyz></axis></joint>"""
+    joints = [("a", "base", "left", 0), ("b", "base", "right", 0), ("c", "left", "top", 0),
+              ("d", "top", "right", 1)]  # fmt: skip
+    foot = '<joint name="foot" type="fixed"><parent>world</parent><child>base</child></joint>'
+    model = (
+        f'<model name="m">{links}{foot}{"".join(hinge.format(*each) for each in joints)}</model>'
+    )
+    ends = {"left": f"0 0 0 0 {ANGLE} 0", "right": f"1 0 0 0 {ANGLE} 0",
+            "top": f"{sin(ANGLE)} 0 {cos(ANGLE)} 0 0 0"}  # fmt: skip
+    state = "".join(f'<link name="{n}"><pose>{pose}</pose></link>' for n, pose in ends.items())
+    sim = begun(model, f'<model name="m">{state}</model>')
+    m = sim.world.models["m"]
+    wanted = {"a": ANGLE, "b": ANGLE, "c": -ANGLE, "d": ANGLE}
+    assert {name: m.joint_state(name)[0] for name in wanted} == pytest.approx(wanted, abs=1e-6)
+    sim.step(10)
+    assert abs(m.joint_state("d")[1]) < 1.0  # nothing pulled it
+
+
 def test_nested_models_have_their_own_states(begun):
     state = """<model name="m"><pose>0 0 1 0 0 0</pose><link name="l"><pose>0 0 1 0 0 0</pose></link>
         <model name="in"><pose>1 0 1 0 0 0.5</pose><link name="l"><pose>1 0 1 0 0 0.5</pose></link>

@@ -106,6 +106,28 @@ def test_a_joint_moves_its_child_about_its_own_frame(spawn, parent, child, ancho
     assert same == pytest.approx(1.0, abs=1e-6)
 
 
+def test_a_joint_named_as_a_link_has_its_own_pose(spawn):
+    """Older SDF allows it: the name refers to the link."""
+    world, model = spawn(
+        sdf(link("a"), link("wheel", "1 0 0 0 0 0"),
+            joint("wheel", "revolute", "a", "wheel", pose="<pose>-1 0 0 0 0 0</pose>"))
+    )  # fmt: skip
+    model.set_joint_positions({"wheel": math.pi / 2})
+    assert model.link_state("wheel")[0].position == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
+
+
+def test_joints_to_the_world_are_listed_where_the_file_has_them(spawn):
+    world, model = spawn(
+        sdf(
+            link("a"),
+            link("b"),
+            joint("j", "revolute", "a", "b"),
+            joint("foot", "fixed", "world", "a"),
+        )
+    )
+    assert model.all_joints == ["j", "foot"]
+
+
 def test_a_link_off_its_joint_has_the_velocity_of_its_own_origin(spawn):
     world, model = spawn(
         sdf(link("a"), link("b", "2 0 0 0 0 0"), joint("w", "fixed", "world", "a"),

@@ -78,7 +78,7 @@ def test_a_convex_polyline_is_one_hull():
 @pytest.mark.parametrize(
     ("geometry", "fault"),
     [
-        (outline([(0, 0), (1, 0)]), "enclose no area"),
+        (outline([(0, 0), (1, 0)]), "collision 'c', polyline: its points enclose no area"),
         (outline(L_SHAPE, height=0), "sizes must be above 0"),
         ("<polyline><point>0</point></polyline>", "polyline: <point> must hold 2 numbers"),
         ("<capsule><radius>-1</radius></capsule>", "capsule: sizes must be above 0"),

@@ -36,7 +36,7 @@ def test_the_empty_world_has_gazebos_defaults():
     assert empty.solver == SolverSettings()
     assert empty.models.keys() == empty_world().models.keys()
     assert empty.lights == empty_world().lights
-    assert empty.warnings == empty.left_out == []
+    assert empty.warnings == []
 
 
 def test_models_includes_and_their_poses():
@@ -168,14 +168,14 @@ def test_a_faulty_model_is_left_out_alone_and_named():
     found = world(
         box("good"), '<model name="bad"><link name="l"><inertial><mass>x</mass></inertial></link></model>',
         box("good"), "<include><uri>model://nowhere</uri></include>",
-        '<actor name="walker"/><plugin name="p" filename="x.so"/>',
+        '<actor name="good"/><plugin name="p" filename="x.so"/>',
     )  # fmt: skip
     assert list(found.models) == ["good"]
-    assert len(found.warnings) == 3
+    assert len(found.warnings) == 4
     assert "model 'bad': link 'l', inertial: <mass>: 'x' is not a number" in found.warnings[0]
     assert "'good' is there twice" in found.warnings[1]
     assert "'model://nowhere' is not found" in found.warnings[2]
-    assert found.left_out == ["actor 'walker'"]
+    assert "'good' is there twice" in found.warnings[3]
     assert [each.name for each in found.plugins] == ["p"]
 
 

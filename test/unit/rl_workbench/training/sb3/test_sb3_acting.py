@@ -5,9 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.training.training_runs import options_of
 
-from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithm import load_policy
 from rl_workbench.training.checkpoints import read
 from rl_workbench.training.environments import make_environment
@@ -30,9 +28,3 @@ def test_a_policy_needs_no_environment_of_its_training(
     assert env.action_space.contains(policy.act(np.asarray(observation, np.float32)))
     env.step(policy.act(np.asarray(observation, np.float32)))  # it is still open
     env.close()
-
-
-@pytest.mark.parametrize("value", [float("inf"), float("nan")])
-def test_numbers_that_no_record_can_hold(value: float) -> None:
-    with pytest.raises(WorkbenchError, match="^target_kl has a value that JSON can't hold: "):
-        options_of("ppo", {"target_kl": value})

@@ -110,9 +110,7 @@ def test_what_does_not_repeat_itself_is_cut_off(
     told = capsys.readouterr().err
     lengths = [len(each["actions"]) for each in before["environment"]["episodes"]]
     lost = [length for length in lengths if length]
-    assert (
-        told.count("of 3 doesn't repeat itself: the episode under way is cut off") == len(lost) > 0
-    )
+    assert told.count("of 3 is not repeatable: the current episode is truncated") == len(lost) > 0
     after = summary(run)
     assert after["complete"] and after["steps"] >= 120
     if before["buffer"]:
