@@ -23,8 +23,6 @@ from robot_sim.state_dict import Shared
 GRAVITY: Vector = (0.0, 0.0, -9.8)  # [m/s²], Gazebo's default
 TIME_STEP = 0.001  # [s], Gazebo's default
 WORLD_FRAMES = ("", "world", "map", "/map")
-
-
 PROPERTIES = ("inertia or gravity of a link", "stop or damping of a joint", "damping of a joint by its gains",
               "friction of a link")  # fmt: skip
 """What `Model.properties` returns, in order."""
