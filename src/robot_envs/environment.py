@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import gymnasium
-import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import data_equivalence
 
@@ -16,13 +15,14 @@ from robot_envs.errors import SimulatorError
 from robot_envs.pictures.drawn import HEIGHT, WIDTH, DrawnEnv
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
+from robot_envs.snapshot import EnvSnapshot
 from robot_envs.task import GoalTask, Task, Unrewarded
 from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Noise, Sensor
 from robot_envs.variation.randomisation import UniformRandomisation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState, both, part_of
-from robot_sim.held_state import HeldState, UnknownState
 from robot_sim.pictures.camera import CameraLike
+from robot_sim.state_dict import StateError, load, state_of
 
 MOST_SEED = 2**32  # of the sensors' noise
 
@@ -34,19 +34,6 @@ class _Step(NamedTuple):
     action: Any  # checked
     arriving: Commands  # that reach the controllers
     sent: Commands | None  # that the state reports, where fewer arrive; None: the same
-
-
-class EnvSnapshot(NamedTuple):
-    """What `RobotEnv.save_state` returns."""
-
-    of: "RobotEnv"
-    variation: Variation
-    episode: tuple[WorldState, dict[str, Any], InitialState, int | None, np.random.Generator]
-    held: HeldState  # by the task, the imperfections, the randomisation and the generator
-    world: Any  # the backend's
-
-    def __reduce__(self) -> Any:
-        raise TypeError("a snapshot can't be copied or pickled; restore_state() may take it often")
 
 
 class RobotEnv(DrawnEnv):
@@ -355,11 +342,12 @@ class RobotEnv(DrawnEnv):
             raise gymnasium.error.ResetNeeded("a snapshot is taken after a reset() or a step()")
         episode = self._state, self._first, self._initial, self._steps, self.np_random
         try:
-            parts = self.task, self._sensor, self._actuator, self._randomisation, self.np_random
-            held = HeldState(parts)
-        except UnknownState as error:
+            parts = state_of(self.task), state_of(self._randomisation)
+        except StateError as error:
             raise SimulatorError(str(error)) from error
-        return EnvSnapshot(self, self._variation, episode, held, self.backend.save_state())
+        imperfect = [each and each.state_dict() for each in (self._sensor, self._actuator)]
+        states = [state_of(self.np_random), *imperfect, *parts]
+        return EnvSnapshot(self, self._variation, episode, states, self.backend.save_state())
 
     def restore_state(self, snapshot: EnvSnapshot) -> None:
         """Returns to a snapshot of this environment: the same actions lead to the same bits.
@@ -375,8 +363,12 @@ class RobotEnv(DrawnEnv):
         if snapshot.variation != self._variation:
             self._vary(snapshot.variation)
         self.backend.restore_state(snapshot.world)
-        snapshot.held.recall()
         self._state, self._first, self._initial, self._steps, self._np_random = snapshot.episode
+        parts = self._np_random, self._sensor, self._actuator, self.task, self._randomisation
+        try:
+            load(each for each in zip(parts, snapshot.states, strict=True) if each[0] is not None)
+        except StateError as error:  # all else is restored
+            raise SimulatorError(str(error)) from error
         self._show()
 
     def __reduce__(self) -> Any:

@@ -6,7 +6,7 @@ A task knows neither ROS nor a simulator nor a learner; every backend runs the s
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from robot_envs.files import Source
 from robot_envs.world_state import Commands, InitialState, Pose, StateQuery, WorldState
 from robot_sim.physics.pose import Vector
+from robot_sim.state_dict import Stateful
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Object:
     pose: Pose = Pose()
 
 
-class Task(ABC):
+class Task(Stateful, ABC):
     """One thing to learn.
 
     A subclass defines at least the spaces of actions and observations, what they mean, and the reward:
@@ -50,6 +51,7 @@ class Task(ABC):
     store data between calls, if `initial_state`, which begins an episode, resets it.
     """
 
+    non_persistent: ClassVar[tuple[str, ...]] = ("query", "reward_query", "objects", "world")
     max_steps: int | None = None
     query: StateQuery = StateQuery()
     reward_query: StateQuery = StateQuery()

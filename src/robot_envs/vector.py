@@ -12,7 +12,8 @@ from gymnasium.vector.utils import iterate
 from robot_envs.backends import LOCKSTEP, OWN, REALTIME
 from robot_envs.backends.backend import side_by_side
 from robot_envs.checks import action_reader
-from robot_envs.environment import EnvSnapshot, RobotEnv
+from robot_envs.environment import RobotEnv
+from robot_envs.snapshot import EnvSnapshot
 
 Results = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
 

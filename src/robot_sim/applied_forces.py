@@ -1,7 +1,9 @@
 """Efforts and wrenches that clients apply for some time (docs/contract/gazebo.md 2.18 and 2.19)."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import ZERO, Pose, Vector, add, cross, rotate
@@ -66,6 +68,18 @@ class AppliedForces:
         names = set(model.all_joints)
         self.wrenches = [each for each in self.wrenches if each.model is not model]
         self.efforts = [each for each in self.efforts if each.joint not in names]
+
+    def state_dict(self) -> dict[str, Any]:
+        """Returns what acts, each with its model's name."""
+        return {
+            "efforts": [(e.model.name, e.joint, e.effort, e.interval) for e in self.efforts],
+            "wrenches": [(w.model.name, w.link, w.wrench, w.interval) for w in self.wrenches],
+        }
+
+    def load_state_dict(self, state: Mapping[str, Any], models: Mapping[str, Model]) -> None:
+        """Takes back what `state_dict` has returned, in a world with these models."""
+        self.efforts = [AppliedEffort(models[name], *each) for name, *each in state["efforts"]]
+        self.wrenches = [AppliedWrench(models[name], *each) for name, *each in state["wrenches"]]
 
     def wrench_on(self, model: Model, link: str, now: int) -> Wrench:
         """Returns what acts on a link in the step that ends at `now` [ns]."""

@@ -6,7 +6,7 @@ A PID for a joint that follows another one, suction, and a hold on what opposing
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from robot_sim.control.hardware import drive_pid
 from robot_sim.control.limits import clamp
@@ -15,17 +15,20 @@ from robot_sim.physics.engine import Twist
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import ZERO, Pose, Vector, add, scale, subtract
 from robot_sim.physics.world import Attachment, World
+from robot_sim.state_dict import Stateful
 
 REACH = 0.05  # [m] from the suction's origin to that of a link: it is pulled
 TOUCH = 0.01  # [m]: it is held
 MOST_PULL = 20.0  # [N]
 
 
-class PidFollower:
+class PidFollower(Stateful):
     """Moves a joint that follows another one by a PID, instead of by a gear.
 
     Call `update` in each tick, and `moved` after something other than time has moved the model.
     """
+
+    non_persistent = ("_mimic",)
 
     def __init__(self, model: Model, joint: str, pid: Pid) -> None:
         self._model, self._joint, self._pid = model, joint, pid
@@ -55,7 +58,7 @@ def pid_followers(model: Model, gains: Mapping[str, object]) -> Iterator[PidFoll
             yield PidFollower(model, name, pid)
 
 
-class Suction:
+class Suction(Stateful):
     """Pulls links of other models to a link, and holds those that have come to it."""
 
     def __init__(self, world: World, model: Model, link: str) -> None:
@@ -78,6 +81,14 @@ class Suction:
             for link in model.link_names:
                 if not any(each.second == (model, link) for each in self._held):
                     self._pull(model, link, *own)
+
+    def state_dict(self) -> dict[str, Any]:
+        return {"on": self.on, "near": self._near, "held": [each.number for each in self._held]}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        self.on, self._near = state["on"], state["near"]
+        there = {each.number: each for each in self._world.attachments}
+        self._held = [there[number] for number in state["held"] if number in there]
 
     def holds(self) -> bool:
         """Returns whether something is near enough to be pulled or held."""
@@ -124,7 +135,7 @@ class GripRule(NamedTuple):
     release: float
 
 
-class GraspHold:
+class GraspHold(Stateful):
     """Fixes an object to the palm while fingers press on it from opposing sides."""
 
     def __init__(
@@ -134,6 +145,25 @@ class GraspHold:
         self._fingers, self._rule = tuple(fingers), rule
         self._counts: dict[tuple[Model, str], int] = {}
         self._held: dict[tuple[Model, str], tuple[Attachment, dict[str, Pose]]] = {}
+
+    def state_dict(self) -> dict[str, Any]:
+        return {
+            "counts": [(model.name, link, count) for (model, link), count in self._counts.items()],
+            "held": [
+                (model.name, link, made.number, dict(places))
+                for (model, link), (made, places) in self._held.items()
+            ],
+        }
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        models = self._world.models
+        self._counts = {(models[name], link): count for name, link, count in state["counts"]}
+        there = {each.number: each for each in self._world.attachments}
+        self._held = {
+            (models[name], link): (there[number], dict(places))
+            for name, link, number, places in state["held"]
+            if number in there
+        }
 
     def forget(self) -> None:
         """Counts anew what is gripped."""

@@ -1,13 +1,15 @@
 """A controlled robot: the seam between a model of the physics world and its ros_control hardware."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import ceil, isfinite
+from typing import Any
 
 from robot_sim.constants import NANOSECONDS
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import RobotHardware
 from robot_sim.control.manager import ControllerManager
+from robot_sim.control.pid import Gains
 from robot_sim.physics.description import Plugin
 from robot_sim.physics.engine import FURTHEST, STRONGEST
 from robot_sim.physics.model import Model
@@ -229,6 +231,30 @@ class ControlledRobot:
             for joint, _ in self._joints:
                 joint.effort = 0.0
         self.manager.joints_moved(now, relatch)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Returns the state of hardware and controllers."""
+        return {
+            "waited": self._waited, "efforts": self._efforts.copy(), "watch": self.watch.state_dict(),
+            "hardware": self.hardware.state_dict(), "manager": self.manager.state_dict(),
+        }  # fmt: skip
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Takes back what `state_dict` has returned, with the same controllers running."""
+        self._waited, self._read_ahead = state["waited"], False
+        self._efforts[:] = state["efforts"]
+        self.watch.load_state_dict(state["watch"])
+        before = self._gains()
+        self.hardware.load_state_dict(state["hardware"])
+        try:
+            self.manager.load_state_dict(state["manager"])
+        finally:
+            if self._gains() != before:
+                self.review_gains()
+
+    def _gains(self) -> list[Gains]:
+        loops = [loop for each in self.manager.loaded for loop in each.loops]
+        return [loop.pid.gains for loop in (*self.hardware.loops, *loops)]
 
     def emergency_stop(self, on: bool) -> None:
         """Releases all joints but those with a position interface, which it holds.

@@ -2,18 +2,18 @@
 
 import threading
 from collections.abc import Callable, Mapping
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from robot_sim.applied_forces import AppliedForces
 from robot_sim.constants import NANOSECONDS
-from robot_sim.held_state import HeldState
 from robot_sim.moves import Moves
 from robot_sim.physics.engine import Twist
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose
 from robot_sim.physics.projection import place_link
-from robot_sim.physics.world import SnapshotError, World, WorldSnapshot
+from robot_sim.physics.world import SnapshotError, World
 from robot_sim.robot import ControlledRobot
+from robot_sim.state_dict import Shared, StateError, load, state_of
 from robot_sim.timing import FairLock, Holds, Pacer
 
 STALL_CHECK = 100_000_000  # [ns]
@@ -35,17 +35,14 @@ class Snapshot(NamedTuple):
 
     of: "Simulator"
     layout: tuple[object, ...]
-    now: int  # [ns]
-    resets: int
-    world: WorldSnapshot
-    held: HeldState
+    state: dict[str, Any]  # plain data, by name
 
 
 class NotInLockstep(RuntimeError):
     """A client wants to step a world whose time runs by itself."""
 
 
-class Simulator:
+class Simulator(Shared):
     """Time, the world and its robots, under one lock that everybody holds who touches them.
 
     There are two modes. Either time runs by itself in run(), at most `max_update_rate` ticks a second of
@@ -82,8 +79,8 @@ class Simulator:
         # Called with `now` before each physics step, under the lock: topics, plugins and sensors.
         self.listeners: list[Callable[[int], None]] = []
         self.moves = Moves(world)
-        # Whose state snapshots save, beside that of robots and callbacks.
-        self.parts: list[object] = []
+        # Whose state snapshots save beside that of world and robots, by name.
+        self.parts: dict[str, Any] = {}
         self.restored: list[Callable[[], None]] = []  # called under the lock after a restore
         self.before_advance: list[Callable[[], None]] = []  # called under the lock
         self.resets = 0  # of the world or the simulation
@@ -299,12 +296,17 @@ class Simulator:
         """Returns all that decides the future; the caller holds the lock.
 
         Raises:
-            UnknownState: if the state of a user's controller or plugin can't be read.
+            StateError: if the state of a user's controller or plugin can't be saved.
         """
-        callbacks = (*self.listeners, *self.moves.listeners, *self.reseeded)
-        world = self.world.save_state()
-        held = HeldState((self.applied, *self.robots, *self.parts, *callbacks))
-        return Snapshot(self, self._layout, self.now, self.resets, world, held)
+        state = {
+            "robots": [robot.state_dict() for robot in self.robots],
+            "parts": {name: state_of(part) for name, part in self.parts.items()},
+            "applied": self.applied.state_dict(),
+            "now": self.now,
+            "resets": self.resets,
+            "world": self.world.state_dict(),
+        }
+        return Snapshot(self, self._layout, state)
 
     def restore_state(self, snapshot: Snapshot) -> None:
         """Returns to what `save_state` has returned: the same commands lead to the same bits.
@@ -314,19 +316,31 @@ class Simulator:
         Raises:
             SnapshotError: if it is another simulator's, or models, robots, running controllers or properties
                 aren't those of the snapshot; nothing changes then.
-            UnknownState: if a user's `restore_state` has raised; all else is restored then.
+            StateError: if a user's `load_state_dict` has raised; all else is restored then.
         """
         if snapshot.of is not self:
             raise SnapshotError("the snapshot is of another simulator")
         if snapshot.layout != self._layout:
             raise SnapshotError("models or controllers have come or gone, or been switched")
-        self.world.restore_state(snapshot.world)
-        self.now, self.resets = snapshot.now, snapshot.resets
-        snapshot.held.recall()
+        state = snapshot.state
+        self.world.check_state(state["world"])
+        self.world.load_state_dict(state["world"])
+        self.now, self.resets = state["now"], state["resets"]
+        self.applied.load_state_dict(state["applied"], self.world.models)
+        robots = zip(self.robots, state["robots"], strict=True)
+        parts = state["parts"]
+        there = [(part, parts[name]) for name, part in self.parts.items() if name in parts]
+        fault = None
+        try:
+            load([*robots, *there])
+        except StateError as error:  # the clocks go on, too
+            fault = error
         for robot in self.robots:
             robot.manager.restored()
         for listener in self.restored:
             listener()
+        if fault is not None:
+            raise fault
 
     @property
     def _layout(self) -> tuple[object, ...]:

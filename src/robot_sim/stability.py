@@ -22,6 +22,7 @@ from robot_sim.physics.description import is_control_plugin
 from robot_sim.physics.dynamics import mobility, most_inertias, poses_at_zero
 from robot_sim.physics.engine import Contact
 from robot_sim.physics.model import SOFTEST, Model
+from robot_sim.state_dict import Stateful
 
 Log = Callable[[int, str], None]
 """Logs a text at a level of `logging`."""
@@ -41,8 +42,10 @@ class OwnedLoop(NamedTuple):
     loop: Loop
 
 
-class StabilityWatch:
+class StabilityWatch(Stateful):
     """Checks a robot's gains whenever they or its controllers change, and logs each fault once."""
+
+    non_persistent = ("_manager", "_log", "_logged", "shares")
 
     def __init__(
         self, model: Model, hardware: RobotHardware, manager: ControllerManager, log: Log

@@ -7,6 +7,8 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from robot_sim.state_dict import Shared
+
 POLL = 0.2  # [s]
 MAX_LAG = 0.1  # [s]; a host that falls behind further than this isn't made up for
 
@@ -15,7 +17,7 @@ def _nothing() -> None:
     pass
 
 
-class FairLock:
+class FairLock(Shared):
     """A lock that serves its waiters in the order in which they came.
 
     The simulation releases and re-acquires its lock in a loop. With threading.Lock that keeps all other
@@ -24,9 +26,6 @@ class FairLock:
     Raises:
         RuntimeError: if the thread that holds it acquires it again: it would wait forever.
     """
-
-    # A snapshot of a plugin that refers to it keeps out of who holds it, and of the journal.
-    of_the_present = ("_waiting", "held", "holder", "turns", "taken", "leaving", "between")
 
     def __init__(self) -> None:
         self._guard = threading.Lock()

@@ -39,6 +39,7 @@ class CameraPlugin(ContextPlugin):
     )
     measurement: ClassVar = CameraSensor
     kind = "camera"  # of sensor
+    non_persistent = ("_sensor", "_is_heard", "_eyes")
     latch = False  # a new subscriber has a picture taken
 
     def __init__(self, context: PluginContext) -> None:

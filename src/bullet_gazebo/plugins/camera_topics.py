@@ -25,6 +25,7 @@ from bullet_gazebo.plugins.sensor_topics import (
 )
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.pinhole import CameraView, PinholeCamera, with_noise
+from robot_sim.state_dict import Shared
 
 QUEUE = 2
 IMAGER_RATE = Parameter("imager_rate", "double", 2.0, 1.0, 50.0)  # [Hz]
@@ -45,7 +46,7 @@ LUMINANCE = (0.299, 0.587, 0.114)
 OPTICAL = Pose(orientation=(-0.5, 0.5, -0.5, 0.5))  # x right, y down, z ahead
 
 
-class CameraTopics:
+class CameraTopics(Shared):
     """Image, JPEG and camera_info of one camera, all below `scope`.
 
     Args:

@@ -43,6 +43,7 @@ class DepthCameraPlugin(ContextPlugin):
         read=read_depth,
     )  # fmt: skip
     measurement: ClassVar = DepthSensor
+    non_persistent = ("_sensor", "_depth_info")
     is_organised = False  # whether a cloud has the picture's rows
 
     def __init__(self, context: PluginContext) -> None:

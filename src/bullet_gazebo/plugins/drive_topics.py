@@ -35,6 +35,7 @@ from robot_sim.drives.odometry import (
 )
 from robot_sim.physics.description import DescriptionError, Joint
 from robot_sim.physics.pose import to_rpy
+from robot_sim.state_dict import Shared
 
 REPEAT = 1.0  # [s] between two logs of the same complaint
 REST = (0.0, 0.0, 0.0)
@@ -242,7 +243,7 @@ class WheeledPlugin(DrivePlugin):
             self._encoder.restart()
 
 
-class Wheels:
+class Wheels(Shared):
     """Driven joints of a vehicle, each a motor with at most a torque [N m].
 
     Args:
@@ -284,7 +285,7 @@ def joint_of(context: PluginContext, tag: str, default: str) -> Joint:
     return context.model.description.joints[name]
 
 
-class LinkTransforms:
+class LinkTransforms(Shared):
     """Publishes where the links of joints are in their joints' parents.
 
     Args:

@@ -52,6 +52,7 @@ class MimicPlugin(ContextPlugin):
             raise DescriptionError(str(error)) from error
         with context.sim.lock:
             follower = PidFollower(context.model, name, pid)
+        self._follower = follower
         context.on_update(follower.update)
         context.on_move(follower.moved)
 

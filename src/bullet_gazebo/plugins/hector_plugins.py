@@ -51,6 +51,7 @@ MODEL = [
 class HectorPlugin(ContextPlugin):
     """One that publishes whether or not it is heard; subclasses call `begin`, and have `publish`."""
 
+    non_persistent = ("_errors",)
     default_rate = 0.0  # [Hz]; 0 is every step
 
     def __init__(self, context: PluginContext) -> None:

@@ -36,6 +36,7 @@ from robot_sim.sensors.imu import ImuSensor
 from robot_sim.sensors.laser import LaserSensor
 from robot_sim.sensors.sensing import Mount
 from robot_sim.sensors.sensor_readers import WITHOUT
+from robot_sim.state_dict import Stateful
 
 BUMPER = (0.01, 0.13)  # [m] above the base, where it is felt
 POSE = (0.1, 0.1, 1e6, 1e6, 1e6, 0.05)
@@ -64,7 +65,7 @@ class KobukiPlugin(DrivePlugin):
         self._imu.start()
         self._imu_data = advertised(context, below("sensors/imu_data"), Imu, 1)
         context.clock(self._imu.rate, self._turn)
-        _Senses(context, below)
+        self._senses = _Senses(context, below)
         for name, kind, receive in (
             ("motor_power", MotorPower, self._switch), ("reset_odometry", Empty, self._reset),
         ):  # fmt: skip
@@ -124,8 +125,10 @@ class KobukiPlugin(DrivePlugin):
             self._place.restart()
 
 
-class _Senses:
+class _Senses(Stateful):
     """Cliffs, bumpers and dropped wheels: an event for each change, and all of them in `sensors/core`."""
+
+    non_persistent = ("_events", "_down", "_bumper", "_wheels")
 
     def __init__(self, context: PluginContext, below: Callable[[str], str]) -> None:
         self._model = context.model

@@ -57,7 +57,7 @@ class PluginContext(Mount):
     given_namespace: str | None
     thinner: Thinner
     _shown: list[SceneSensor] = field(default_factory=list, repr=False)
-    _updates: list[Update] = field(default_factory=list, repr=False)
+    _updates: list[Callable[..., None]] = field(default_factory=list, repr=False)
     _clocks: list[SensorClock] = field(default_factory=list, repr=False)
     _closers: list[Callable[[], None]] = field(default_factory=list, repr=False)
     _is_made: threading.Event = field(default_factory=threading.Event, repr=False)
@@ -160,6 +160,21 @@ class PluginContext(Mount):
 
         with self.sim.lock:
             listener = self.sim.moves.on_move_of(self.model, guarded)
+        self._updates.append(listener)
+        self.closing(close)
+
+    def save(self, name: str, plugin: object) -> None:
+        """Lets snapshots save the clocks, and the plugin, if time or moves call it."""
+        parts, called = self.sim.parts, [plugin] if self._updates or self._clocks else []
+        with self.sim.lock:
+            own = {f"{name}.{number}": each for number, each in enumerate([*called, *self._clocks])}
+            parts.update(own)
+
+        def close() -> None:
+            with self.sim.lock:
+                for each in own:
+                    del parts[each]
+
         self.closing(close)
 
     def release(self) -> None:
@@ -240,6 +255,7 @@ class PluginRegistry:
             )  # fmt: skip
             try:
                 loaded.append((context, factory(context)))
+                context.save(f"{model.name}::plugin {len(loaded)}", loaded[-1][1])
                 context.made()
             except DescriptionError as error:
                 rospy.logerr(

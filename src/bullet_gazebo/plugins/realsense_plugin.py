@@ -18,6 +18,7 @@ from robot_sim.physics.description import DescriptionError, Sensor
 from robot_sim.physics.files.elements import truth
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.pinhole import PinholeCamera, camera_of
+from robot_sim.state_dict import Shared
 
 DEPTH = "depth"
 EYES = {  # by sensor: what its elements begin with, and its topic
@@ -45,7 +46,7 @@ class RealsensePlugin(ContextPlugin):
         ]
 
 
-class _Eye:
+class _Eye(Shared):
     """A camera of its own rate."""
 
     def __init__(self, context: PluginContext, name: str, sensor: Sensor) -> None:

@@ -14,6 +14,7 @@ from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.files.elements import shown
 from robot_sim.sensors.schedule import SensorClock
 from robot_sim.sensors.sensing import Measurement
+from robot_sim.state_dict import Shared, Stateful
 
 LOCKSTEP_QUEUE = 100  # messages of a sensor
 MOST_QUEUED = 32_000_000  # [bytes] of a topic
@@ -77,14 +78,14 @@ def offer_shared(
         context.closing(rospy.Service(name, kind, answer).shutdown)
 
 
-class ContextPlugin:
+class ContextPlugin(Stateful):
     """A plugin whose topics, services and clocks are the context's, which closes them."""
 
     def shutdown(self) -> None:
         """Nothing is left to be closed."""
 
 
-class Topic:
+class Topic(Shared):
     """A topic of a sensor; see `SensorTopics.advertise`."""
 
     def __init__(
@@ -147,7 +148,7 @@ class Newcomers(rospy.SubscribeListener):
         self._clock.look()
 
 
-class SensorTopics:
+class SensorTopics(Shared):
     """The topics of one sensor, which measures while one of them has subscribers.
 
     Args:
@@ -199,7 +200,7 @@ class SensorTopics:
         return any(topic.is_heard for topic in self._waking)
 
 
-class SensorTopic:
+class SensorTopic(Shared):
     """The only topic of a sensor, see `SensorTopics`; `measure` returns a message, or None for nothing."""
 
     def __init__(

@@ -10,10 +10,9 @@ from bullet_gazebo_msgs.srv import RestoreState, RestoreStateRequest, SaveState,
 from bullet_gazebo.services import ServiceRefused, offer
 from bullet_gazebo.services.step_service import StepService
 from file_access.text import did_you_mean
-from robot_sim.held_state import UnknownState
 from robot_sim.physics.world import SnapshotError
-from robot_sim.sensors.sensor_readers import SensorReaders
 from robot_sim.simulator import Simulator, Snapshot
+from robot_sim.state_dict import StateError
 
 MOST = 1000  # names
 
@@ -22,7 +21,7 @@ class KeptState(NamedTuple):
     """A snapshot, what the step service says of it, and the random numbers of the process."""
 
     snapshot: Snapshot
-    steps: tuple[bool, SensorReaders | None]
+    steps: dict[str, Any]
     python: Any
     numpy: Any
 
@@ -57,11 +56,11 @@ class SnapshotServices:
             self._sim.await_holds()
             try:
                 snapshot = self._sim.save_state()
-            except UnknownState as error:
+            except StateError as error:
                 raise ServiceRefused(str(error)) from error
             self._kept[request.name] = KeptState(
                 snapshot,
-                self._steps.save_state(),
+                self._steps.state_dict(),
                 random.getstate(),
                 np.random.get_state(legacy=False),
             )
@@ -78,9 +77,9 @@ class SnapshotServices:
             self._sim.await_holds()
             try:
                 self._sim.restore_state(kept.snapshot)
-            except (SnapshotError, UnknownState) as error:
+            except (SnapshotError, StateError) as error:
                 raise ServiceRefused(str(error)) from error
-            self._steps.restore_state(kept.steps)
+            self._steps.load_state_dict(kept.steps)
             random.setstate(kept.python)
             np.random.set_state(kept.numpy)
         return "RestoreState: state restored"

@@ -8,8 +8,9 @@
 
 import secrets
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
+from typing import Any
 
 import rospy
 from bullet_gazebo_msgs.srv import (
@@ -202,16 +203,25 @@ class StepService:
         if not self._is_reading:
             self._end_readers()
 
-    def save_state(self) -> tuple[bool, SensorReaders | None]:
+    def state_dict(self) -> dict[str, Any]:
         """Returns what a snapshot needs beside the simulator's state; the caller holds the lock."""
-        return self._knows_contacts, self._readers
+        readers = self._readers
+        return {
+            "knows_contacts": self._knows_contacts,
+            "sensors": readers.names if readers else (),
+            "readers": readers.state_dict() if readers else None,
+        }
 
-    def restore_state(self, state: tuple[bool, SensorReaders | None]) -> None:
-        """Takes back what `save_state` has returned, after the simulator's state; models are the same."""
-        self._end_readers()
-        self._knows_contacts, self._readers = state
-        if self._readers:
-            self._readers.go_on()
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Takes back what `state_dict` has returned, after the simulator's state; models are the same."""
+        self._knows_contacts = state["knows_contacts"]
+        if state["readers"] is None:
+            self._end_readers()
+            return
+        self._sense(state["sensors"])
+        assert self._readers is not None
+        self._readers.load_state_dict(state["readers"])
+        self._sensing.schedule.restored()
 
     def _end_readers(self) -> None:
         if self._readers:

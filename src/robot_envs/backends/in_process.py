@@ -37,7 +37,6 @@ from robot_sim.control.joint import JointHandle
 from robot_sim.control.manager import STRICT
 from robot_sim.control.pid import Gains
 from robot_sim.grippers import pid_followers
-from robot_sim.held_state import UnknownState
 from robot_sim.physics.description import DescriptionError, Inertia, is_control_plugin
 from robot_sim.physics.engines import make_engine
 from robot_sim.physics.files.urdf import parse_urdf
@@ -57,13 +56,14 @@ from robot_sim.sensors.sensing import Sensing
 from robot_sim.sensors.sensor_readers import SensorReaders, offer_sensors
 from robot_sim.simulator import Simulator
 from robot_sim.state import NOTHING, StateReader, UnknownName, find_link, find_model
+from robot_sim.state_dict import StateError
 
 
 @contextlib.contextmanager
 def _refusals() -> Iterator[None]:
     try:
         yield
-    except (SnapshotError, UnknownName, UnknownState) as error:
+    except (SnapshotError, StateError, UnknownName) as error:
         raise SimulatorError(str(error)) from error
 
 
@@ -124,7 +124,8 @@ class InProcessWorld(RobotBackend):
             namespace = f"/{robot.namespace.strip('/')}"
             controlled = ControlledRobot(model, hardware, manager, period, namespace)
             self._sim.add_robot(controlled)
-            for follower in pid_followers(model, robot.pid_gains):
+            for number, follower in enumerate(pid_followers(model, robot.pid_gains)):
+                self._sim.parts[f"{model.name}::follower {number}"] = follower
                 self._sim.listeners.append(follower.update)
                 self._sim.moves.on_move_of(model, follower.moved)
             manager.switch(loaded, [], STRICT)

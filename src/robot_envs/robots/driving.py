@@ -72,6 +72,7 @@ class DriveToGoal(Task):
         furthest: Largest distance of goals from the start [m].
     """
 
+    non_persistent = ("robot", "port", "floor")
     max_steps = 150
 
     def __init__(

@@ -126,6 +126,16 @@ class Sensor:
         self._seen: deque[WorldState] = deque(maxlen=steps("sensor_delay", delay, MOST_DELAY) + 1)
         self._before: dict[str, float] = {}  # measured positions of joints with encoder steps
 
+    def state_dict(self) -> dict[str, Any]:
+        """Returns what it remembers of the episode."""
+        return {"seen": [*self._seen], "before": {**self._before}, "readings": {**self._readings}}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Takes back what `state_dict` has returned."""
+        self._seen.clear()
+        self._seen.extend(state["seen"])
+        self._before, self._readings = {**state["before"]}, {**state["readings"]}
+
     @property
     def is_exact(self) -> bool:
         """Whether it measures the true state, without delay."""
@@ -258,6 +268,16 @@ class Actuator:
         self._sent: deque[Commands] = deque(maxlen=self._delay + 1)
         self._limited: Commands = {}
         self._reached: Commands = {}
+
+    def state_dict(self) -> dict[str, Any]:
+        """Returns what it remembers of the episode."""
+        return {"sent": [*self._sent], "limited": self._limited, "reached": self._reached}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Takes back what `state_dict` has returned."""
+        self._sent.clear()
+        self._sent.extend(state["sent"])
+        self._limited, self._reached = state["limited"], state["reached"]
 
     @property
     def is_ideal(self) -> bool:

@@ -10,6 +10,7 @@ from robot_envs.scene import Scene
 from robot_envs.variation.imperfections import by_name, is_number
 from robot_envs.variation.parts import Parts, check_tunable
 from robot_envs.variation.variation import LinkScale, Variation
+from robot_sim.state_dict import Shared
 
 
 class Kind(NamedTuple):
@@ -118,7 +119,7 @@ Drawn = dict[str, Any]
 """What was drawn: by option, and by the name of the link, joint or controller."""
 
 
-class UniformRandomisation:
+class UniformRandomisation(Shared):
     """Draws a robot for each episode, uniformly, within the bounds of its options.
 
     | option | of each | what differs | a number means |

@@ -17,6 +17,7 @@ from robot_sim.control.limits import (
 )
 from robot_sim.control.pid import Loop, Pid
 from robot_sim.control.transmissions import RobotDescription
+from robot_sim.state_dict import Shared, Stateful
 
 EFFORT = "EffortJointInterface"
 POSITION = "PositionJointInterface"
@@ -29,7 +30,7 @@ PUSHED, BACK = 1e-3, 1e-4  # [rad, m] off a motor's command: pushed away, and ba
 GAINS = "gazebo_ros_control/pid_gains"  # where, in the robot's namespace, gains of drives stand
 
 
-class Drive(ABC):
+class Drive(Stateful, ABC):
     """Moves one joint with a position or velocity interface (docs/contract/gazebo_ros_control.md 6.4).
 
     `pid` turns commands into efforts; without one, a motor drives the joint to the commanded state.
@@ -164,7 +165,7 @@ class VelocityDrive(Drive):
         return self.joint.command, self._most
 
 
-class SensorHandle:
+class SensorHandle(Stateful):
     """A sensor as the controller sees that has it. This one measures nothing, as where no topics are.
 
     Args:
@@ -188,7 +189,7 @@ class SensorHandle:
         """Measures no more."""
 
 
-class RobotHardware:
+class RobotHardware(Shared):
     """The joints that have a transmission (docs/contract/gazebo_ros_control.md 6.3 and 6.4).
 
     `joints` is in alphabetical order, the order of joint states. The commands of `effort_joints` are efforts,
@@ -234,6 +235,22 @@ class RobotHardware:
             for d in self.drives
             if d.pid is not None
         ]
+
+    def state_dict(self) -> dict[str, Any]:
+        """Returns the state of joints and drives; the robot saves it."""
+        return {
+            "halted": self.halted,
+            "joints": {name: joint.state_dict() for name, joint in self.joints.items()},
+            "drives": {drive.joint.name: drive.state_dict() for drive in self.drives},
+        }
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Takes back what `state_dict` has returned."""
+        self.halted = state["halted"]
+        for name, joint in self.joints.items():
+            joint.load_state_dict(state["joints"][name])
+        for drive in self.drives:
+            drive.load_state_dict(state["drives"][drive.joint.name])
 
     def at_their_limits(self) -> list[JointHandle]:
         """Returns the joints whose motors give all the effort they have."""

@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
+from robot_sim.state_dict import Shared, Stateful
+
 TURN = 2.0 * math.pi
 
 
@@ -54,13 +56,15 @@ class JointLimits:
 
 
 @dataclass(slots=True)
-class JointHandle:
+class JointHandle(Shared, Stateful):
     """One joint of the robot's hardware. `kind` is revolute, continuous or prismatic.
 
     `command` is a position, a velocity or an effort, depending on the joint's hardware interface. It
     remains until it is replaced, also when its controller stops (docs/contract/ros_control.md 1.6).
     `effort` is the effort [N m, N] applied in the last step.
     """
+
+    non_persistent = ("name", "kind", "limits")
 
     name: str
     kind: str

@@ -6,6 +6,7 @@ See docs/contract/ros_control.md 5 and docs/contract/gazebo_ros_control.md 6.5.
 from collections.abc import Callable
 
 from robot_sim.control.joint import JointHandle, JointLimits, SoftLimits
+from robot_sim.state_dict import Stateful
 
 Enforcer = Callable[[JointHandle], None]
 UNLIMITED = float("inf")
@@ -55,12 +56,14 @@ def _soft_effort(limits: JointLimits, soft: SoftLimits) -> Enforcer:
     return enforce
 
 
-class PositionLimiter:
+class PositionLimiter(Stateful):
     """Clips a position command to the joint's range, and its change in a step to the velocity limit.
 
     Upstream never forgets the last command. Here a reset forgets it: otherwise the joint would creep back
     from where the reset has put it.
     """
+
+    non_persistent = ("_limits",)
 
     def __init__(self, limits: JointLimits) -> None:
         self._limits = limits
@@ -88,8 +91,10 @@ class PositionLimiter:
         )
 
 
-class VelocityLimiter:
+class VelocityLimiter(Stateful):
     """Clips a velocity command to the velocity limit, and its change in a step to the acceleration limit."""
+
+    non_persistent = ("_limits",)
 
     def __init__(self, limits: JointLimits) -> None:
         self._limits = limits

@@ -1,12 +1,13 @@
 """The controller manager: loads, switches and updates controllers (docs/contract/ros_control.md 1)."""
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from robot_sim.control.controllers import built_in
 from robot_sim.control.controllers.base import Controller
 from robot_sim.control.errors import ControlError, faults
 from robot_sim.control.hardware import RobotHardware
+from robot_sim.state_dict import load, state_of
 
 BEST_EFFORT = 1
 STRICT = 2
@@ -171,6 +172,16 @@ class ControllerManager:
                 self._start(controller)
         self._running = [c for c in self._controllers.values() if c.state == RUNNING]
         self._tell(lambda controller: controller.joints_moved(now))
+
+    def state_dict(self) -> dict[str, Any]:
+        """Returns the state of the controllers, by name; the robot saves it."""
+        controllers = {name: state_of(each) for name, each in self._controllers.items()}
+        return {"now": self._now, "controllers": controllers}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Takes back what `state_dict` has returned, with the same controllers running."""
+        self._now = state["now"]
+        load((each, state["controllers"][name]) for name, each in self._controllers.items())
 
     def restored(self) -> None:
         """Tells the running controllers that the world has returned to a snapshot."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from robot_sim.control.errors import ControlError
+from robot_sim.state_dict import Stateful
 
 
 class PidSample(NamedTuple):
@@ -68,7 +69,7 @@ def one_listener() -> int:
     return 1
 
 
-class Pid:
+class Pid(Stateful):
     """Gains, and the state that they act on: one instance for each controlled joint.
 
     If `publish_state` is set, a ROS adapter sets `sink`, which takes a report of each computation, and
@@ -77,6 +78,7 @@ class Pid:
 
     __slots__ = ("d_error", "gains", "i_error", "last_error", "listeners", "output", "p_error",
                  "publish_state", "seeded", "sink")  # fmt: skip
+    non_persistent = ("listeners", "publish_state", "sink")
 
     def __init__(self, gains: Gains, publish_state: bool = False) -> None:
         self.gains = gains

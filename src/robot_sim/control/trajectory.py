@@ -4,12 +4,13 @@ See docs/contract/ros_control.md 3.5.
 """
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from robot_sim.constants import NANOSECONDS
 from robot_sim.control.joint import JointHandle, shortest_distance
 from robot_sim.control.pid import Pid
+from robot_sim.state_dict import Stateful, load
 
 Coefficients = tuple[float, float, float, float, float, float]
 
@@ -30,7 +31,7 @@ class State(NamedTuple):
     acceleration: float = 0.0
 
 
-class Segment:
+class Segment(Stateful):
     """A spline between two waypoints, each at its time [ns].
 
     It is linear for positions alone, a cubic if both have velocities, a quintic if both have accelerations.
@@ -105,16 +106,25 @@ def _spline(first: Waypoint, last: Waypoint, seconds: float) -> Coefficients:
     )
 
 
-class JointSpline:
+class JointSpline(Stateful):
     """The trajectory of a joint: segments in order of time, then rest. Times are uptime [ns]."""
 
     __slots__ = ("_segments", "_starts", "end")
+    non_persistent = ("_starts", "end")
 
     def __init__(self, segments: Sequence[Segment]) -> None:
         """`segments`: at least one."""
+        self._lay(segments)
+
+    def _lay(self, segments: Sequence[Segment]) -> None:
         self._segments = segments
         self._starts = [segment.start for segment in segments]
         self.end = segments[-1].end
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        made = [Segment.__new__(Segment) for _ in state["_segments"]]
+        load(zip(made, state["_segments"], strict=True))
+        self._lay(made)
 
     def at(self, time: int) -> State:
         """Returns the state at `time`."""
@@ -143,7 +153,7 @@ class JointSpline:
         return JointSpline(segments)
 
 
-class Axis:
+class Axis(Stateful):
     """Moves a joint along its spline. Errors are desired minus actual [rad, m] and [rad/s, m/s].
 
     Without a PID the command is a position; with one, a velocity or an effort.

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from robot_sim.constants import NANOSECONDS
+from robot_sim.state_dict import Stateful
 
 Triple = tuple[float, float, float]
 STRAIGHT = 1e-6  # [rad]; below it an arc is a line
@@ -32,7 +33,7 @@ class OdometrySample(NamedTuple):
     twist_covariance: Sequence[float]
 
 
-class DeadReckoning:
+class DeadReckoning(Stateful):
     """Adds up a vehicle's motions on a plane, from x = y = yaw = 0."""
 
     def __init__(self) -> None:
@@ -68,7 +69,7 @@ class DeadReckoning:
         return (0.0, 0.0, math.sin(0.5 * self.yaw), math.cos(0.5 * self.yaw))
 
 
-class WheelOdometry:
+class WheelOdometry(Stateful):
     """Dead reckoning of two wheels or sides, step by step.
 
     Args:
@@ -99,7 +100,7 @@ class WheelOdometry:
         )  # fmt: skip
 
 
-class RollingMean:
+class RollingMean(Stateful):
     """The mean of the newest values, at most `window` of them."""
 
     def __init__(self, window: int) -> None:
@@ -119,7 +120,7 @@ class RollingMean:
         self._sum = 0.0
 
 
-class Period:
+class Period(Stateful):
     """Says once a period that something is due.
 
     Args:

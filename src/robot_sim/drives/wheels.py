@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from robot_sim.state_dict import Stateful
+
 NEAR = 0.01  # [m/s]; of its target a wheel counts as there
 
 
@@ -19,7 +21,7 @@ def side_speeds(linear: float, angular: float, separation: float) -> tuple[float
     return linear - across, linear + across
 
 
-class Ramp:
+class Ramp(Stateful):
     """Lets the speeds of wheels change by no more than an acceleration [m/s²]; 0 is none."""
 
     def __init__(self, acceleration: float, wheels: int) -> None:

@@ -234,8 +234,8 @@ class Engine(ABC):
         """Returns the bodies in the order in which they were loaded: the solver's result may depend on it."""
 
     @abstractmethod
-    def fastened(self) -> Mapping[int, Any]:
-        """Returns what `fasten` has fixed, by number."""
+    def fastened(self) -> dict[int, Any]:
+        """Returns what `fasten` has fixed, by number, as plain data."""
 
     @abstractmethod
     def refasten(self, fastened: Mapping[int, Any]) -> None:

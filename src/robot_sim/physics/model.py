@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Collection, Mapping, Sequence
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any
 
 from robot_sim.physics.description import ModelDescription, SavedMotion, Shape
 from robot_sim.physics.dynamics import effective_inertias, poses_at_zero
@@ -14,6 +14,7 @@ from robot_sim.physics.pose import (
     ZERO,
     Pose,
 )
+from robot_sim.state_dict import Shared
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit
 GENTLEST = 0.5  # of the damping that would stop a joint in one step
@@ -24,21 +25,12 @@ logger = logging.getLogger(f"rosout.{__name__}")
 AT_REST: Twist = (ZERO, ZERO)
 
 
-class ModelState(NamedTuple):
-    """What `Model.save_state` returns; `motors` are speeds [rad/s, m/s] and efforts [N m, N] by joint."""
-
-    body: Body
-    motion: Any  # the engine's
-    properties: tuple[object, ...]
-    motors: dict[str, tuple[float, float]]
-    placed: Pose
-
-
-class Model:
+class Model(Shared):
     """A model. Its frame is the one that it was spawned in; the root link is in it at `root_pose`."""
 
     def __init__(self, name: str, description: ModelDescription, body: Body, pose: Pose) -> None:
         self.name = name
+        self.loads = 1  # of bodies with its description into the engine
         self.number = 0  # unique in the world, also among models that have had the same name
         self.description = description
         self.body = body
@@ -279,6 +271,7 @@ class Model:
         for index, (position, velocity) in enumerate(states):
             body.reset_joint(index, position, velocity)
         self.go_on_in(body)
+        self.loads += 1
 
     def go_on_in(self, body: Body) -> None:
         """Uses another body of the engine, which is in the same state already."""
@@ -302,22 +295,26 @@ class Model:
             {link: factor for link, factor in self._grip.items() if factor != 1.0},
         )
 
-    def save_state(self) -> ModelState:
-        """Returns where it is, how it moves, and its motors; from now on it moves as after a restore."""
+    def state_dict(self) -> dict[str, Any]:
+        """Returns where it is, how it moves, and its motors; from now on it moves as after a load."""
         motion = self.body.motion()
         self.body.move(motion)
-        return ModelState(self.body, motion, self.properties(), dict(self._motors), self.placed)
+        return {
+            "motion": motion, "motors": self._motors.copy(), "placed": self.placed, "loads": self.loads,
+            "properties": self.properties(),
+        }  # fmt: skip
 
-    def restore_state(self, state: ModelState) -> None:
-        """Returns to what `save_state` has returned; the properties are the same."""
-        self.body.move(state.motion)
-        self.placed = state.placed
-        for name in self._motors.keys() | state.motors.keys():
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Takes back what `state_dict` has returned; the properties are the same."""
+        self.body.move(state["motion"])
+        self.placed = state["placed"]
+        motors = state["motors"]
+        for name in self._motors.keys() | motors.keys():
             unset = (0.0, self.description.joints[name].friction)
-            motor = state.motors.get(name, unset)
+            motor = motors.get(name, unset)
             if motor != self._motors.get(name, unset):
                 self.body.set_motor(self._joints[name], *motor)
-        self._motors = dict(state.motors)
+        self._motors = dict(motors)
 
     def joint_states(self) -> list[tuple[float, float]]:
         """Returns position [rad, m] and velocity [rad/s, m/s] of each movable joint."""

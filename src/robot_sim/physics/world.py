@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from robot_sim.physics import passive_forces
 from robot_sim.physics.actor import Actor
@@ -14,16 +14,15 @@ from robot_sim.physics.description import (
     ModelDescription,
     Shape,
 )
-from robot_sim.physics.engine import Body, Contact, Engine, Twist
+from robot_sim.physics.engine import Body, Contact, Engine, Side, Twist
 from robot_sim.physics.entity_names import EntityNames
-from robot_sim.physics.model import AT_REST, Model, ModelState
+from robot_sim.physics.model import AT_REST, Model
 from robot_sim.physics.pose import Pose, Vector, conjugate, rotate, subtract
+from robot_sim.state_dict import Shared
 
 GRAVITY: Vector = (0.0, 0.0, -9.8)  # [m/s²], Gazebo's default
 TIME_STEP = 0.001  # [s], Gazebo's default
 WORLD_FRAMES = ("", "world", "map", "/map")
-
-
 PROPERTIES = ("inertia or gravity of a link", "stop or damping of a joint", "damping of a joint by its gains",
               "friction of a link")  # fmt: skip
 """What `Model.properties` returns, in order."""
@@ -62,17 +61,6 @@ class Attachment:
         return model in (self.first[0], self.second[0])
 
 
-class WorldSnapshot(NamedTuple):
-    """What `World.save_state` returns; `settings` are gravity, time step and solver."""
-
-    models: list[tuple[Model, ModelState]]
-    order: list[Model]  # in the engine
-    settings: tuple[object, ...]
-    attachments: list[Attachment]
-    fastened: Mapping[int, Any]  # the engine's
-    contacts: Sequence[Contact]
-
-
 class SnapshotError(ValueError):
     """A snapshot can't be restored; the text says why."""
 
@@ -81,7 +69,7 @@ class NameTaken(ValueError):
     """The world already has a model of that name."""
 
 
-class World:
+class World(Shared):
     """All models, and the engine that simulates them. Not thread-safe: its owner serialises access."""
 
     def __init__(
@@ -290,61 +278,89 @@ class World:
         for model in self.models.values():
             model.reset(joints)
 
-    def save_state(self) -> WorldSnapshot:
+    def state_dict(self) -> dict[str, Any]:
         """Returns all from which it steps on, but what services set once: properties and models.
 
-        Engines can't save contacts. So those begin anew, now and after each restore: the next step finds
+        Engines can't save contacts. So those begin anew, now and after each load: the next step finds
         them again, but the solver of PyBullet starts without the forces of the last one.
         """
         contacts, fastened = self.contacts(), self.engine.fastened()
-        self.engine.refasten(fastened)  # in the order that a restore leads to
-        snapshot = WorldSnapshot(
-            [(model, model.save_state()) for model in self.models.values()],
-            self._order(),
-            (self.gravity, self.time_step, self.solver),
-            list(self.attachments),
-            fastened,
-            contacts,
-        )
+        self.engine.refasten(fastened)  # in the order that a load leads to
+        names = {id(model.body): name for name, model in self.models.items()}
+        state = {
+            "models": {name: model.state_dict() for name, model in self.models.items()},
+            "order": self._order(),
+            "gravity": self.gravity,
+            "time_step": self.time_step,
+            "solver": vars(self.solver).copy(),
+            "attachments": [
+                ((a.first[0].name, a.first[1]), (a.second[0].name, a.second[1]), a.pose, a.number)
+                for a in self.attachments
+            ],
+            "fastened": fastened,
+            "contacts": [
+                (*each[:5], *((names[id(side.body)], *side[1:]) for side in each[5:]))
+                for each in contacts
+            ],
+        }
         self._recall(contacts)
-        return snapshot
+        return state
 
-    def _order(self) -> list[Model]:
-        models = {id(model.body): model for model in self.models.values()}
-        return [models[id(body)] for body in self.engine.order()]
+    def _order(self) -> list[str]:
+        """Returns the names of the models in the engine's order."""
+        names = {id(model.body): name for name, model in self.models.items()}
+        return [names[id(body)] for body in self.engine.order()]
 
     def _recall(self, contacts: Sequence[Contact]) -> None:
         self.engine.forget_contacts()
         self._recalled = contacts
 
-    def restore_state(self, snapshot: WorldSnapshot) -> None:
-        """Returns to what `save_state` has returned; no model has come or gone since.
+    def check_state(self, state: Mapping[str, Any]) -> None:
+        """Checks that it can take a state.
 
         Raises:
-            SnapshotError: if models have other properties now; nothing changes then.
+            SnapshotError: if models, or their properties, are others now.
         """
-        if (self.gravity, self.time_step, self.solver) != snapshot.settings:
+        settings = {
+            "gravity": self.gravity,
+            "time_step": self.time_step,
+            "solver": vars(self.solver),
+        }
+        if any(state[name] != value for name, value in settings.items()):
             raise SnapshotError("gravity, time step or solver have changed since the snapshot")
-        if self._order() != snapshot.order:
+        if self._order() != state["order"]:
             raise SnapshotError(
                 "links have been changed since the snapshot, and the engine takes the models in another order"
             )
-        for model, state in snapshot.models:
-            now = zip(PROPERTIES, model.properties(), state.properties, strict=True)
+        attached = {name for each in state["attachments"] for name, _ in each[:2]}
+        for name, own in state["models"].items():
+            model = self.models[name]
+            now = zip(PROPERTIES, model.properties(), own["properties"], strict=True)
             if changed := [name for name, one, other in now if one != other]:
                 raise SnapshotError(
-                    f"model '{model.name}' has another {' and '.join(changed)} than in the snapshot"
+                    f"model '{name}' has another {' and '.join(changed)} than in the snapshot"
                 )
-            attached = any(each.joins(model) for each in snapshot.attachments)
-            if attached and model.body is not state.body:
+            if name in attached and model.loads != own["loads"]:
                 raise SnapshotError(
-                    f"model '{model.name}' was attached, and its links have been changed since the snapshot"
+                    f"model '{name}' was attached, and its links have been changed since the snapshot"
                 )
-        self.engine.refasten(snapshot.fastened)
-        self.attachments = list(snapshot.attachments)
-        for model, state in snapshot.models:
-            model.restore_state(state)
-        self._recall(snapshot.contacts)
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Takes back what `state_dict` has returned, after `check_state`."""
+        models, known = self.models, {each.number: each for each in self.attachments}
+        self.engine.refasten(state["fastened"])
+        self.attachments = [
+            known.get(number) or Attachment((models[one], link), (models[two], its), pose, number)
+            for (one, link), (two, its), pose, number in state["attachments"]
+        ]
+        for name, own in state["models"].items():
+            models[name].load_state_dict(own)
+        self._recall(
+            [
+                Contact(*each[:5], *(Side(models[name].body, *rest) for name, *rest in each[5:]))
+                for each in state["contacts"]
+            ]
+        )
 
     def close(self) -> None:
         self.models.clear()

@@ -15,6 +15,7 @@ class ContactSensor(Measurement):
     """A sensor of the contacts of `<contact>`'s collisions."""
 
     kinds = ("contact",)
+    non_persistent = ("_collisions",)
     fields: ClassVar = {"contacts": Field("what its collisions touched in the last step")}
 
     def __init__(self, mount: Mount) -> None:

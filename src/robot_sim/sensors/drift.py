@@ -5,12 +5,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from robot_sim.sensors.noise import checked_deviation
+from robot_sim.state_dict import Stateful
 
 HOUR = 3600.0  # [s]
 AXES = 3
 
 
-class DriftingError:
+class DriftingError(Stateful):
     """Errors of three numbers. A drift is a random walk that returns to zero with its frequency.
 
     Args:

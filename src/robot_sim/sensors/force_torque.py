@@ -28,6 +28,7 @@ from robot_sim.physics.pose import (
 )
 from robot_sim.sensors.sensing import Measurement, Mount, sensor_of
 from robot_sim.simulator import Simulator
+from robot_sim.state_dict import Stateful
 
 NOTHING: Wrench = (ZERO, ZERO)
 
@@ -41,7 +42,7 @@ class _Look(NamedTuple):
     effort: float
 
 
-class LinkForces:
+class LinkForces(Stateful):
     """Force and torque on links of a model in the last step; torques are about the world's origin.
 
     `look` has to be called in each tick, before its physics step.
@@ -130,7 +131,7 @@ class LinkForces:
         ]
 
 
-class JointForces:
+class JointForces(Stateful):
     """What the child of a joint exerts on the parent, without the effort that drives a movable joint.
 
     Args:
@@ -141,6 +142,8 @@ class JointForces:
     Raises:
         DescriptionError: if the model doesn't have it.
     """
+
+    non_persistent = ("_joint",)
 
     def __init__(self, sim: Simulator, model: Model, name: str) -> None:
         self._sim = sim

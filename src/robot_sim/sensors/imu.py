@@ -24,6 +24,7 @@ from robot_sim.physics.pose import (
 )
 from robot_sim.sensors.noise import read_noise
 from robot_sim.sensors.sensing import Field, Measurement, Mount, sensor_of, slower
+from robot_sim.state_dict import Stateful
 
 HERE = Pose()
 LONGEST_STEP = 0.01  # [s]
@@ -53,7 +54,7 @@ def motion_of(model: Model, link: str, offset: Pose = HERE) -> LinkMotion:
     return LinkMotion(at, add(linear, cross(angular, lever)), angular)
 
 
-class Imu:
+class Imu(Stateful):
     """Derives accelerations from the velocities of two measurements.
 
     Args:
@@ -157,6 +158,7 @@ class ImuSensor(ModelImu):
     """
 
     kinds = ("imu",)
+    non_persistent = ("_noise",)
     libraries = ()
     interface = IMU
     feels_gravity = True

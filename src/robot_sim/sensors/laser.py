@@ -139,6 +139,7 @@ class LaserSensor(Measurement):
     """A laser on a model."""
 
     kinds: ClassVar[Sequence[str]] = KINDS
+    non_persistent = ("sensor", "laser", "_scene")
     fields: ClassVar = {
         "ranges": RANGES,
         "intensities": Field("(n,) of float32: the `laser_retro` of what each ray has met"),

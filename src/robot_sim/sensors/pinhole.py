@@ -157,6 +157,7 @@ def rate_of(mount: Mount, sensor: Sensor) -> float:
 class CameraSensor(Measurement):
     """A camera on a model."""
 
+    non_persistent = ("_sensor", "camera")
     kinds: ClassVar[Sequence[str]] = ("camera",)
     fields: ClassVar = {"image": Field("(height, width, 3) of uint8: red, green and blue", True)}
 

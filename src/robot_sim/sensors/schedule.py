@@ -15,6 +15,7 @@ from robot_sim.constants import NANOSECONDS
 from robot_sim.moves import Moved
 from robot_sim.physics.model import Model
 from robot_sim.simulator import Simulator
+from robot_sim.state_dict import Shared, Stateful
 
 Measure = Callable[[int], None]
 SLOWEST = 1e-9  # [Hz]
@@ -32,10 +33,10 @@ NEVER = Move(0, LONG_AGO)
 
 
 @dataclass(eq=False)
-class SensorClock:
-    """The clock of one sensor. `Schedule.begin` makes it."""
+class SensorClock(Stateful):
+    """The clock of one sensor, whose owner saves its state. `Schedule.begin` makes it."""
 
-    of_the_present = ("has_newcomer", "heard")
+    non_persistent = ("schedule", "measure", "listens", "at_once", "heard", "has_newcomer")
 
     schedule: "Schedule"
     model: Model
@@ -67,10 +68,10 @@ class SensorClock:
         self.due = self.begin + ((now - self.begin) // period + 1) * period
 
 
-class Schedule:
+class Schedule(Shared, Stateful):
     """The clocks of all sensors. Without listeners it costs a tick nothing."""
 
-    of_the_present = ("_clocks", "_is_looking")
+    non_persistent = ("_clocks", "_due", "_is_looking", "prepare")
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
@@ -80,14 +81,15 @@ class Schedule:
         self.moves = 0  # how often something other than time has moved bodies
         self.moved_at = LONG_AGO  # when it did so last [ns]
         self._last_reset = NEVER
-        self._moves_of: dict[Model, Move] = {}  # since then
+        self._moves_of: dict[str, Move] = {}  # since then, by names of models
         self.moves_before_seed = 0
         self._begins_anew = False  # with the next reset
         self.prepare: list[Callable[[], None]] = []  # called before the measurements of one time
         sim.moves.listeners.append(self._moved)
         sim.before_advance.append(self._catch_up)
         sim.reseeded.append(self._reseeded)
-        sim.restored.append(self._restored)
+        sim.restored.append(self.restored)
+        sim.parts["schedule"] = self
 
     def begin(
         self,
@@ -110,14 +112,7 @@ class Schedule:
         clock = SensorClock(self, model, measure, listens, at_once)
         clock.set_rate(rate, self._sim.now, self._sim.now)
         self._clocks.append(clock)
-        self._sim.parts.append(clock)
         return clock
-
-    def go_on(self, clocks: list[SensorClock]) -> None:
-        """Takes back clocks that have ended; the caller holds the simulator's lock."""
-        self._clocks += clocks
-        self._sim.parts += clocks
-        self._take_part()
 
     def end(self, clock: SensorClock) -> None:
         with self._sim.lock:
@@ -127,7 +122,6 @@ class Schedule:
         """Ends a clock, if it hasn't ended; the caller holds the simulator's lock."""
         if clock in self._clocks:
             self._clocks.remove(clock)
-            self._sim.parts.remove(clock)
             self._take_part()
 
     def look(self) -> None:
@@ -194,7 +188,7 @@ class Schedule:
     def _reseeded(self, seed: int) -> None:
         self.moves_before_seed, self._begins_anew = self.moves, True
 
-    def _restored(self) -> None:
+    def restored(self) -> None:
         """Goes on from a snapshot, for those who listen now."""
         now = self._sim.now
         for clock in self._clocks:
@@ -205,7 +199,7 @@ class Schedule:
 
     def last_move(self, model: Model) -> Move:
         """Returns the last move of a model by something other than time, resets included."""
-        return self._moves_of.get(model, self._last_reset)
+        return self._moves_of.get(model.name, self._last_reset)
 
     def _moved(self, moved: Moved) -> None:
         """Measures afresh what is heard: all after a reset of world or time, else what the models carry."""
@@ -217,9 +211,9 @@ class Schedule:
             self._last_reset, self._moves_of = move, {}
             anew, self._begins_anew = self._begins_anew, False
         else:
-            there = set(self._sim.world.models.values())
-            kept = {model: each for model, each in self._moves_of.items() if model in there}
-            self._moves_of = {**kept, **dict.fromkeys(moved, move)}
+            there = self._sim.world.models
+            kept = {name: each for name, each in self._moves_of.items() if name in there}
+            self._moves_of = {**kept, **dict.fromkeys([each.name for each in moved], move)}
         concerned = [each for each in self._clocks if moved is None or each.model in moved]
         for clock in concerned:
             if anew or now < clock.begin or (clock.last is not None and now < clock.last):

@@ -14,18 +14,21 @@ from robot_sim.sensors.noise import checked_deviation, generator
 from robot_sim.sensors.rays import RayScene
 from robot_sim.sensors.schedule import Schedule
 from robot_sim.simulator import Simulator
+from robot_sim.state_dict import Shared, Stateful
 
 FURTHEST = 1e9  # [m] that a sensor reaches
 LARGEST_NUMBER = 1e30  # number of a plugin: messages have 32-bit floats
 
 
-class Sensing:
+class Sensing(Shared, Stateful):
     """The sensors of a simulator.
 
     Args:
         sim: the simulator.
         seed: of the sensors' noise.
     """
+
+    non_persistent = ("collisions", "visuals")
 
     def __init__(self, sim: Simulator, seed: int = 0) -> None:
         self.schedule = Schedule(sim)
@@ -35,6 +38,7 @@ class Sensing:
         self._seed = seed
         self.seeds = 0  # how often it has got a seed since
         sim.reseeded.append(self._reseed)
+        sim.parts["sensing"] = self
 
     def _reseed(self, seed: int) -> None:
         """Draws the same noise from now on as after any other time with this seed."""
@@ -57,7 +61,7 @@ class Sensing:
 
 
 @dataclass(frozen=True)
-class Mount:
+class Mount(Shared):
     """A sensor's place in a model, and the plugin that says more about it.
 
     Attributes:
@@ -165,7 +169,7 @@ class Field(NamedTuple):
     is_noisy: bool = False  # whether an environment's `sensor_noise` can add to it
 
 
-class Measurement:
+class Measurement(Stateful):
     """A sensor on a model. Each module of this folder lists its own in `SENSORS`.
 
     Attributes:

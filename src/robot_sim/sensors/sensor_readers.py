@@ -19,6 +19,7 @@ from robot_sim.sensors.schedule import SensorClock
 from robot_sim.sensors.sensing import Measurement, Mount, Sensing
 from robot_sim.simulator import Simulator
 from robot_sim.state import SCOPE, UnknownName
+from robot_sim.state_dict import Stateful
 
 WITHOUT = Plugin("", "", Element("plugin"))
 
@@ -45,7 +46,7 @@ class Taken(NamedTuple):
     values: Mapping[str, Any]
 
 
-class SensorReaders:
+class SensorReaders(Stateful):
     """Sensors that measure by their own clocks, whether or not their topics are heard.
 
     The caller holds the simulator's lock.
@@ -59,22 +60,28 @@ class SensorReaders:
         UnknownName: if a name refers to none, or several, or to one that can't be read.
     """
 
+    non_persistent = ("names", "_schedule", "_parts", "_mounts")
+
     def __init__(self, sim: Simulator, sensing: Sensing, names: Sequence[str]) -> None:
         self.names = tuple(names)
         self._schedule = sensing.schedule
         self._taken: dict[str, Taken] = {}
         made = [(name, *find_sensor(sim, sensing, name)) for name in self.names]
         self._mounts = [mount for _, mount, _ in made]
-        self._clocks = []
+        self._clocks: list[SensorClock] = []
+        self._sensors: list[Measurement] = []
+        self._parts = sim.parts
         for name, mount, maker in made:
             try:
                 sensor = maker(mount)
             except DescriptionError as error:
                 self.end()
                 raise UnknownName(f"the sensor '{name}' can't be simulated: {error}") from error
+            self._sensors.append(sensor)
             take = self._taker(name, mount, sensor)
             self._clocks.append(self._schedule.begin(mount.model, sensor.rate, take, lambda: True))
         self._schedule.review()
+        self._parts["readers"] = self
 
     def serves(self, names: Sequence[str]) -> bool:
         """Returns whether these are the sensors, all on models that are there: then their clocks go on."""
@@ -103,10 +110,8 @@ class SensorReaders:
         """Ends the measurements."""
         for clock in self._clocks:
             self._schedule.fail(clock)
-
-    def go_on(self) -> None:
-        """Lets the clocks go on from where a snapshot has put them, also after an end."""
-        self._schedule.go_on(self._clocks)
+        if self._parts.get("readers") is self:
+            del self._parts["readers"]
 
 
 def _is_gone(mount: Mount) -> bool:
@@ -158,6 +163,8 @@ class MeasuringHandle(SensorHandle):
     Raises:
         ControlError: if it can't be simulated.
     """
+
+    non_persistent = ("_told",)
 
     def __init__(self, mount: Mount, kind: type[Measurement], frame: str) -> None:
         assert mount.sensor is not None

@@ -22,7 +22,7 @@ ROS = ("rospy", "rosgraph", "rosnode", "roslib", "rosparam", "roslaunch", "rosse
 LINTER = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
 LAYERS = [set(layer.split(" | ")) for layer in LINTER["contracts"][0]["layers"]]
 # What still names higher libraries.
-NAMING = {"robot_sim/held_state.py", "robot_sim/physics/engines/__init__.py"}
+NAMING = {"robot_sim/physics/engines/__init__.py"}
 WITHOUT_ROS = (
     "robot_sim.physics.world",
     "robot_sim.control.manager",

@@ -1,6 +1,8 @@
 """Snapshots of a simulator: the same commands lead to the same bits, or the snapshot is refused."""
 
-from dataclasses import replace
+import random
+from collections import deque
+from dataclasses import is_dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +13,9 @@ from support.robots.trajectory_rig import Listener
 from support.robots.worlds import add_robot, start
 
 from robot_sim.applied_forces import ActingTime, AppliedEffort, AppliedWrench
+from robot_sim.control.controllers.base import Output
+from robot_sim.control.controllers.forward import Forward
+from robot_sim.control.hardware import EFFORT
 from robot_sim.control.trajectory_goals import GoalRequest, Trajectory, TrajectoryPoint
 from robot_sim.physics.engines import make_engine
 from robot_sim.physics.files.urdf import parse_urdf
@@ -21,6 +26,7 @@ from robot_sim.sensors.schedule import Schedule
 from robot_sim.sensors.sensing import Sensing
 from robot_sim.sensors.sensor_readers import SensorReaders
 from robot_sim.simulator import Simulator
+from robot_sim.state_dict import StateError
 
 S = 1_000_000_000  # [ns]
 OFF_CENTRE = Pose((0.01, 0.0, 0.0))
@@ -49,10 +55,24 @@ def future(sim, ticks=150):
     return seen
 
 
+def check_plain(value):
+    """Checks that a state is plain data: numbers, texts, arrays, and containers and records of these."""
+    if isinstance(value, dict):
+        value = [*value, *value.values()]
+    elif is_dataclass(value):
+        value = [getattr(value, name) for name in value.__dataclass_fields__]
+    if isinstance(value, (list, tuple, deque)):
+        for each in value:
+            check_plain(each)
+    else:
+        assert isinstance(value, (type(None), bool, int, float, str, bytes, np.ndarray, np.generic))
+
+
 def check_branches(sim, between, act=lambda: None, ticks=150):
     """Checks that the future is the same after `between`, in which anything happens."""
     with sim.lock:
         snapshot = sim.save_state()
+    check_plain(snapshot.state)
     act()
     first = future(sim, ticks)
     for _ in range(2):
@@ -185,10 +205,10 @@ def test_a_link_that_is_another_one_to_the_engine_since_is_refused_while_attache
     *_, (model, link) = chain_of_cubes(sim)  # the engine takes it last then, too
     with sim.lock:
         snapshot = sim.save_state()
-    inertia = model.description.links[link].inertia
+    inertia, body = model.description.links[link].inertia, model.body
     sim.world.set_inertia(model, link, replace(inertia, com=OFF_CENTRE))
     sim.world.set_inertia(model, link, inertia)
-    is_loaded_again = model.body is not snapshot.world.models[-1][1].body
+    is_loaded_again = model.body is not body
     sim.reset_world()
     with sim.lock:
         if is_loaded_again:
@@ -342,6 +362,67 @@ def test_a_sensor_that_is_heard_only_since_measures_at_its_times(sim):
         schedule.review()
     future(sim, 300)
     assert seen == first == [3 * S // 10, 4 * S // 10, 5 * S // 10]
+
+
+class Counting(Forward):
+    """A user's controller, whose attributes are saved."""
+
+    interface = EFFORT
+
+    @classmethod
+    def create(cls, name, params, hardware):
+        return cls(name, [hardware.joints["stand_cart"]])
+
+    def __init__(self, name, joints):
+        super().__init__(name, joints)
+        self.seen, self.random, self.report = [], random.Random(3), Output("count", "Float64")
+
+    def update(self, now, dt):
+        self.seen.append(now)
+        self._joints[0].command = self.random.gauss(0.0, 0.1) * len(self.seen)
+
+
+class Faulty(Counting):
+    def state_dict(self):
+        return len(self.seen)
+
+    def load_state_dict(self, state):
+        raise ValueError(f"not {state}")
+
+
+def with_controller(sim, kind):
+    robot = add_robot(sim, "cartpole", cartpole_urdf())
+    robot.manager.types["own/Mine"] = kind
+    start(robot, {"mine": {"type": "own/Mine"}})
+    return robot.manager.get("mine")
+
+
+def test_a_users_controller_is_saved_by_its_attributes(sim):
+    mine = with_controller(sim, Counting)
+    future(sim, 10)
+    check_branches(sim, lambda: future(sim, 20))
+    mine.callback = lambda: 0
+    with (
+        sim.lock,
+        pytest.raises(StateError, match=r"^Counting.callback: .*state_dict\(\) and a load_"),
+    ):
+        sim.save_state()
+
+
+def test_all_else_is_restored_where_a_users_controller_cannot(sim):
+    with_controller(sim, Faulty)
+    future(sim, 10)
+    with sim.lock:
+        snapshot = sim.save_state()
+    model = sim.world.models["cartpole"]
+    before = sim.now, model.joint_states()
+    future(sim, 20)
+    with (
+        sim.lock,
+        pytest.raises(StateError, match=r"load_state_dict\(\) of Faulty raised .*not 10"),
+    ):
+        sim.restore_state(snapshot)
+    assert (sim.now, model.joint_states()) == before
 
 
 def test_another_world_is_refused_and_stays_as_it_is(sim, new_engine):

@@ -1,11 +1,9 @@
 """The lock serves its waiters in turn; held time goes on, whatever happens to its holder."""
 
 import threading
-from types import SimpleNamespace
 
 import pytest
 
-from robot_sim.held_state import HeldState
 from robot_sim.timing import FairLock, Holds
 
 BOUND = 60.0  # [s]
@@ -71,13 +69,3 @@ def test_a_busy_simulation_does_not_keep_others_out():
     done.set()
     thread.join(BOUND)
     assert not thread.is_alive()
-
-
-def test_a_snapshot_leaves_the_lock_and_its_holder_alone() -> None:
-    """A user's plugin may refer to the lock; in a replay, what is called between reads a bag."""
-    lock = FairLock()
-    lock.between = (each for each in ()).close
-    with lock:
-        held = HeldState([SimpleNamespace(lock=lock)])
-    held.recall()
-    assert not lock.held and lock.holder is None

@@ -9,10 +9,11 @@ from robot_sim.control.controllers.parameters import OneJoint, Parameters, numbe
 from robot_sim.control.hardware import RobotHardware
 from robot_sim.control.joint import JointHandle
 from robot_sim.control.pid import Loop, Pid, one_listener
+from robot_sim.state_dict import Shared, Stateful
 
 
 @dataclass(slots=True, eq=False)
-class Output:
+class Output(Shared):
     """A topic that a controller publishes.
 
     `topic` is relative to the controller's namespace, or to the manager's if `shared`. `kind` is a ROS
@@ -43,7 +44,7 @@ class Output:
 
 
 @dataclass(slots=True, eq=False)
-class Input:
+class Input(Shared):
     """A topic that a controller subscribes to when it is loaded.
 
     `kind` is Float64 (`receive` takes a number), Float64MultiArray (a sequence of numbers), Twist (what it
@@ -57,12 +58,13 @@ class Input:
     publishers: Callable[[], int] = one_listener
 
 
-class Controller(ABC):
+class Controller(Stateful, ABC):
     """A controller (docs/contract/ros_control.md 1 and 3). Times are in [ns], periods in [s].
 
     docs/controllers.md explains how to write one.
     """
 
+    non_persistent: ClassVar[tuple[str, ...]] = ("name", "claimed", "inputs", "outputs", "loops")
     type_name: ClassVar[str]
     interface: ClassVar[str]
     parameters: ClassVar[Sequence[type[Parameters]]] = ()  # that `create` reads

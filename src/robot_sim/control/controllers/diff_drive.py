@@ -13,6 +13,7 @@ from robot_sim.control.trajectory_goals import TrajectorySample
 from robot_sim.control.transmissions import distance, wheel_radius
 from robot_sim.drives.odometry import Triple
 from robot_sim.drives.wheels import side_speeds
+from robot_sim.state_dict import Stateful
 
 LEFT, RIGHT = "left_wheel_radius_multiplier", "right_wheel_radius_multiplier"
 SEPARATION = "wheel_separation_multiplier"
@@ -32,7 +33,7 @@ class DiffDriveParameters(VehicleParameters):
     )
 
 
-class Side:
+class Side(Stateful):
     """The wheels of one side, all of one radius [m]."""
 
     def __init__(self, joints: list[JointHandle], radius: float) -> None:

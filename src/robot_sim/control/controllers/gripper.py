@@ -54,7 +54,7 @@ class GripperActionController(Controller):
     """
 
     parameters = (GripperParameters, GripperGains)
-    of_the_present = ("_goal",)  # its client knows nothing of snapshots
+    non_persistent = ("_goal", "_settings")  # a goal's client knows nothing of snapshots
 
     def __init__(
         self, name: str, joint: JointHandle, settings: GripperParameters, pid: Pid | None = None

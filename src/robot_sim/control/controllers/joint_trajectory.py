@@ -111,7 +111,7 @@ class JointTrajectoryController(Controller):
     """
 
     parameters = (TrajectoryParameters, JointTolerances, JointGains)
-    of_the_present = ("_goal",)  # its client knows nothing of snapshots
+    non_persistent = ("_goal", "_settings")  # a goal's client knows nothing of snapshots
 
     def __init__(self, name: str, axes: list[Axis], settings: Settings) -> None:
         super().__init__(name)

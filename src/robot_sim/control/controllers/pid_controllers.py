@@ -17,6 +17,7 @@ from robot_sim.control.controllers.parameters import OneJoint, Parameters, SomeJ
 from robot_sim.control.hardware import EFFORT, VELOCITY, RobotHardware
 from robot_sim.control.joint import JointHandle
 from robot_sim.control.pid import Loop, Pid
+from robot_sim.state_dict import Stateful
 
 REPORT_EVERY = 10  # updates
 
@@ -46,10 +47,11 @@ class OwnPid(Parameters):
     pid: Pid = parameter("gains of its [PID](#pid)", read=Pid.from_params, key="<joint>/pid")
 
 
-class PositionLoop:
+class PositionLoop(Stateful):
     """A PID that holds a joint at its set-point [rad, m] (docs/contract/ros_control.md 3.2)."""
 
     __slots__ = ("joint", "pid", "set_point", "target")
+    non_persistent = ("pid",)  # its controller saves it
 
     def __init__(self, joint: JointHandle, pid: Pid) -> None:
         self.joint = joint
@@ -80,6 +82,7 @@ class PidJoint(Controller):
     """
 
     parameters = (JointPid,)
+    non_persistent = ("_pid",)  # one of its `pids`
     of_velocity: ClassVar[bool] = False  # whether the error is one of velocity
 
     def __init__(self, name: str, joint: JointHandle, pid: Pid) -> None:

@@ -129,6 +129,7 @@ class FourWheelSteeringController(SteeringController):
     """Four driven wheels on forks: front left, front right, rear left, rear right."""
 
     parameters = (FourWheelParameters,)
+    non_persistent = ("_geometry",)
     _angles: tuple[float, float] | None  # of the axles [rad], if they are commanded
 
     def __init__(

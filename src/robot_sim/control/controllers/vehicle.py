@@ -98,6 +98,8 @@ class VehicleController(Controller):
     origin, from where the wheels are then.
     """
 
+    non_persistent = ("options",)
+
     def __init__(self, name: str, options: VehicleParameters) -> None:
         super().__init__(name)
         self.options = options

@@ -192,12 +192,12 @@ class BulletClient:
         found = pybullet.getContactPoints(physicsClientId=self._client)
         return [_contact(each, self._sides) for each in found if each[9] > 0.0]
 
-    def refasten(self, fastened: Mapping[int, Fastening]) -> None:
+    def refasten(self, fastened: Mapping[int, Any]) -> None:
         """See `Engine.refasten`; the solver's result depends on the order of constraints."""
         for number in list(self.fastened):
             self.unfasten(number)
-        for number, fastening in fastened.items():
-            self._fix(number, fastening.made_of, fastening.apart)
+        for number, (made_of, apart) in fastened.items():
+            self._fix(number, made_of, apart)
 
     def forget_contacts(self) -> None:
         """See `Engine.forget_contacts`."""
@@ -311,10 +311,10 @@ class BulletEngine(Engine):
     def order(self) -> list[BulletBody]:
         return self._client.bodies
 
-    def fastened(self) -> dict[int, Fastening]:
-        return dict(self._client.fastened)
+    def fastened(self) -> dict[int, Any]:
+        return {n: (each.made_of, each.apart) for n, each in self._client.fastened.items()}
 
-    def refasten(self, fastened: Mapping[int, Fastening]) -> None:
+    def refasten(self, fastened: Mapping[int, Any]) -> None:
         self._client.refasten(fastened)
 
     def set_gravity(self, gravity: Vector) -> None:

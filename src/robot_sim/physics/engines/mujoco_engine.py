@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -126,12 +127,19 @@ class MujocoEngine(Engine):
     def order(self) -> list[MujocoBody]:
         return list(self._bodies.values())
 
-    def fastened(self) -> dict[int, Joined]:
-        return dict(self._fastened)
+    def fastened(self) -> dict[int, Any]:
+        keys = {id(body): key for key, body in self._bodies.items()}
+        return {
+            number: ((keys[id(one)], link), (keys[id(other)], its), pose)
+            for number, ((one, link), (other, its), pose) in self._fastened.items()
+        }
 
-    def refasten(self, fastened: Mapping[int, Joined]) -> None:
-        if fastened != self._fastened:
-            self._fastened = dict(fastened)
+    def refasten(self, fastened: Mapping[int, Any]) -> None:
+        if fastened != self.fastened():
+            self._fastened = {
+                number: ((self._bodies[one], link), (self._bodies[other], its), pose)
+                for number, ((one, link), (other, its), pose) in fastened.items()
+            }
             self._compile()
 
     def close(self) -> None:

@@ -164,10 +164,10 @@ def test_snapshots_and_engines_that_begin_anew(make_world):
     load = world.spawn("load", sdf(box("link", "0.2 0.2 0.2", False)), Pose((0.0, 0.0, 2.25)))
     model.place(model.state()[0], ((0.1, 0.0, 0.0), (0.0, 0.0, 0.2)))
     run(world, 300)
-    snapshot = world.save_state()
+    snapshot = world.state_dict()
     run(world, 100)
     first = model.state(), load.state()
-    world.restore_state(snapshot)
+    world.load_state_dict(snapshot)
     run(world, 100)
     assert (model.state(), load.state()) == first
     world.engine._most_waste = 0  # of PyBullet: it begins anew

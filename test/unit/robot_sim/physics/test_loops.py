@@ -240,9 +240,9 @@ def test_snapshots_and_new_worlds_repeat_to_the_bit(linkage):
         world, model = linkage()
         model.set_motor("drive", 3.0, 1e9)
         ends.append(future())
-        snapshot = world.save_state()
+        snapshot = world.state_dict()
         ends += [future()]
-        world.restore_state(snapshot)
+        world.load_state_dict(snapshot)
         assert future() == ends[-1]
     assert ends[:2] == ends[2:]
 

@@ -205,9 +205,9 @@ def test_it_stays_when_the_world_changes(make_world):
 def test_snapshots(world):
     model = spawned(world)
     run(world, 100)
-    snapshot = world.save_state()
+    snapshot = world.state_dict()
     first = positions(world, model, 100)
-    world.restore_state(snapshot)
+    world.load_state_dict(snapshot)
     assert positions(world, model, 100) == first
 
 

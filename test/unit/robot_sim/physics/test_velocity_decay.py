@@ -156,9 +156,9 @@ def test_snapshots(world):
     model = world.spawn("m", sdf(link("base", DECAY)), HIGH)
     model.place(HIGH, ((3.0, 0.0, 0.0), (5.0, 1.0, 0.0)))
     run(world, 10)
-    snapshot = world.save_state()
+    snapshot = world.state_dict()
     run(world, 50)
     first = model.state()
-    world.restore_state(snapshot)
+    world.load_state_dict(snapshot)
     run(world, 50)
     assert model.state() == first

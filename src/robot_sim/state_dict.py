@@ -1,0 +1,314 @@
+"""What decides the future of controllers, sensors, plugins and tasks, as plain data by name.
+
+Whatever lives through ticks has the pair that PyTorch's modules have:
+
+    state_dict()            returns it
+    load_state_dict(state)  takes it back
+
+A class without them is saved by its attributes: numbers, texts, bytes, NumPy arrays, random generators,
+objects with the two methods, and lists, tuples, deques, dictionaries and data classes of these. Attributes
+that its class, or one that it is derived from, names as `non_persistent` are left as they are:
+
+    non_persistent = ("publisher",)
+"""
+
+import copy
+import random
+from collections import deque
+from collections.abc import Hashable, Iterable, Mapping
+from functools import cache
+from typing import Any, ClassVar
+
+import numpy as np
+
+GENERATOR = "__generator__"  # the key of a generator's kind in its state
+GENERATORS = (np.random.Generator, random.Random)
+ATOMS = frozenset((type(None), bool, int, float, str, bytes))
+BIT_GENERATORS = ("PCG64", "PCG64DXSM", "Philox", "SFC64", "MT19937")
+
+
+class StateError(TypeError):
+    """A state can't be saved, or put back; the text names the class, and the attribute."""
+
+
+class Stateful:
+    """Has the two methods, by its attributes."""
+
+    __slots__ = ()
+    non_persistent: ClassVar[tuple[str, ...]] = ()
+
+    def state_dict(self) -> Any:
+        """Returns what decides its future, as plain data."""
+        return attributes_of(self)
+
+    def load_state_dict(self, state: Any) -> None:
+        """Takes back what `state_dict` has returned."""
+        put_attributes(self, state)
+
+
+class Shared:
+    """Has no state, or one that its owner saves: others that refer to it don't."""
+
+    __slots__ = ()
+
+
+def state_of(part: Any) -> Any:
+    """Returns the state of an object: by its own methods, or else by its attributes.
+
+    Raises:
+        StateError: if it can't be saved.
+    """
+    kind = type(part)
+    method = getattr(kind, "state_dict", None)
+    if isinstance(part, GENERATORS):
+        return _saved_as(part, kind, "state")
+    if method is None or not hasattr(kind, "load_state_dict"):
+        return {} if isinstance(part, Shared) else attributes_of(part)
+    if method is Stateful.state_dict:
+        return attributes_of(part)
+    try:
+        state = method(part)
+    except StateError:
+        raise
+    except Exception as error:  # a user's code
+        raise StateError(f"state_dict() of {kind.__qualname__} raised {error!r:.300}") from error
+    return _saved_as(state, kind, "state_dict()")
+
+
+def load(parts: Iterable[tuple[Any, Any]]) -> None:
+    """Puts states back into their objects, into all of them.
+
+    Raises:
+        StateError: if one can't take its state.
+    """
+    faults = []
+    for part, state in parts:
+        try:
+            if hasattr(type(part), "load_state_dict"):
+                part.load_state_dict(state)
+            elif isinstance(part, GENERATORS):
+                _put_generator(part, state)
+            elif not isinstance(part, Shared):
+                put_attributes(part, state)
+        except StateError as error:
+            faults.append(str(error))
+        except Exception as error:  # noqa: BLE001 - a user's code
+            faults.append(f"load_state_dict() of {type(part).__qualname__} raised {error!r:.300}")
+    if faults:
+        raise StateError("; ".join(faults))
+
+
+@cache
+def _layout(kind: Hashable) -> tuple[tuple[str, ...], frozenset[str]]:
+    """Returns the slots of a class, and the names of attributes that are left as they are."""
+    slots: list[str] = []
+    left: set[str] = set()
+    for each in kind.__mro__:  # type: ignore[attr-defined]
+        own = vars(each).get("__slots__", ())
+        for name in (own,) if isinstance(own, str) else own:
+            hidden = name.startswith("__") and not name.endswith("__")
+            slots.append(f"_{each.__name__.lstrip('_')}{name}" if hidden else name)
+        left.update(vars(each).get("non_persistent", ()))
+    return tuple(n for n in slots if n not in left | {"__dict__", "__weakref__"}), frozenset(left)
+
+
+def attributes_of(part: Any) -> dict[str, Any]:
+    """Returns the state of an object by its attributes.
+
+    Raises:
+        StateError: if one can't be saved.
+    """
+    kind: Any = type(part)
+    slots, left = _layout(kind)
+    state: dict[str, Any] = {}
+    held = {name: getattr(part, name) for name in slots if hasattr(part, name)} if slots else {}
+    if hasattr(part, "__dict__"):
+        held = {**held, **part.__dict__} if held else part.__dict__
+    for name, value in held.items():
+        if name in left:
+            continue
+        if type(value) in ATOMS:
+            state[name] = value
+        elif not isinstance(value, Shared):
+            state[name] = _saved_as(value, kind, name)
+    return state
+
+
+def put_attributes(part: Any, state: Mapping[str, Any]) -> None:
+    """Gives an object the attributes that `attributes_of` has returned; what has come since goes."""
+    kind: Any = type(part)
+    slots, left = _layout(kind)
+    own = getattr(part, "__dict__", {})
+    held = {**own, **{name: getattr(part, name, None) for name in slots}} if slots else own
+    faults = []
+    for name, saved in state.items():
+        value = saved
+        if type(saved) not in ATOMS:
+            try:
+                value = _loaded(held.get(name), saved)
+            except StateError as error:  # the rest is put back
+                faults.append(str(error))
+                continue
+        if name in slots:
+            object.__setattr__(part, name, value)
+        else:
+            own[name] = value
+    for name in [each for each in held if each not in state and each not in left]:
+        if isinstance(held[name], Shared):
+            continue
+        if name in own:
+            del own[name]
+        elif hasattr(part, name):
+            object.__delattr__(part, name)
+    if faults:
+        raise StateError("; ".join(faults))
+
+
+def _saved_as(value: Any, kind: type, name: str) -> Any:
+    try:
+        return _saved(value)
+    except _Unknown as error:
+        raise StateError(
+            f"{kind.__qualname__}.{name}: a snapshot can't save {error}; give {kind.__qualname__} a "
+            "state_dict() and a load_state_dict(), or name the attribute in `non_persistent`"
+        ) from None
+    except RecursionError:
+        raise StateError(f"{kind.__qualname__}.{name} refers to itself") from None
+
+
+class _Unknown(TypeError):
+    """Names what can't be saved."""
+
+
+def _saved(value: Any) -> Any:
+    kind: Any = type(value)
+    if kind in ATOMS:
+        return value
+    if kind is list:
+        return [_saved(each) for each in value]
+    if kind is tuple:
+        return tuple([_saved(each) for each in value])
+    if kind is dict:
+        return {_key(key): _saved(each) for key, each in value.items()}
+    if kind is deque:
+        return deque(map(_saved, value), value.maxlen)
+    if kind is np.ndarray and not value.dtype.hasobject:
+        return value.copy() if value.flags.writeable else value
+    if isinstance(value, np.generic) and not value.dtype.hasobject:
+        return value
+    if isinstance(value, Shared):
+        return None
+    if isinstance(value, GENERATORS) or _is_torchs(value):
+        return _of_generator(value)
+    if hasattr(kind, "state_dict") and hasattr(kind, "load_state_dict"):
+        return state_of(value)
+    if isinstance(value, tuple) and hasattr(kind, "_fields"):
+        return tuple.__new__(kind, map(_saved, value))
+    if hasattr(kind, "__dataclass_fields__"):
+        held = {name: getattr(value, name) for name in kind.__dataclass_fields__}
+        if kind.__dataclass_params__.frozen and ATOMS.issuperset(map(type, held.values())):
+            return value
+        made = copy.copy(value)
+        for name, each in held.items():
+            object.__setattr__(made, name, _saved(each))
+        return made
+    raise _Unknown(f"a {kind.__module__}.{kind.__qualname__}")
+
+
+def _key(key: Any) -> Any:
+    if type(key) is tuple:
+        return tuple([_key(each) for each in key])
+    if type(key) not in ATOMS:
+        raise _Unknown(f"a dictionary with a {type(key).__qualname__} as key")
+    return key
+
+
+def _is_torchs(value: Any) -> bool:
+    kind = type(value)
+    return kind.__name__ == "Generator" and kind.__module__.partition(".")[0] == "torch"
+
+
+def _of_generator(value: Any) -> dict[str, Any]:
+    if isinstance(value, random.Random) and not isinstance(value, random.SystemRandom):
+        return {GENERATOR: "Random", "state": value.getstate()}
+    if _is_torchs(value):
+        return {GENERATOR: "torch", "state": value.get_state().numpy().copy()}
+    bits = getattr(value, "bit_generator", value)
+    kind = type(bits).__name__
+    if kind not in BIT_GENERATORS:
+        raise _Unknown(f"a generator of type {kind}")
+    seeds, known = bits.seed_seq, None
+    if type(seeds) is np.random.SeedSequence:
+        known = [seeds.entropy, seeds.spawn_key, seeds.pool_size, seeds.n_children_spawned]
+    return {GENERATOR: kind, "state": _saved(bits.state), "seeds": known}
+
+
+def _nothing(part: Any, state: Any) -> None:
+    """Leaves what is shared to its owner."""
+
+
+@cache
+def _takes(kind: Hashable) -> Any:
+    """Returns how objects of a class take states back; None for plain data."""
+    return _nothing if issubclass(kind, Shared) else getattr(kind, "load_state_dict", None)  # type: ignore[arg-type]
+
+
+def _loaded(current: Any, saved: Any) -> Any:
+    """Returns what takes the place of `current`: `saved`, with the objects that are there already."""
+    kind: Any = type(current)
+    if (takes := _takes(kind)) is not None:
+        if takes is Stateful.load_state_dict:
+            put_attributes(current, saved)
+        elif takes is not _nothing:
+            load([(current, saved)])
+        return current
+    kind = type(saved)
+    if kind in ATOMS:
+        return saved
+    if kind is list or kind is tuple:
+        there = current if isinstance(current, (list, tuple)) else ()
+        if len(there) != len(saved):
+            there = [None] * len(saved)
+        return kind([_loaded(each, own) for each, own in zip(there, saved, strict=True)])
+    if kind is dict:
+        if GENERATOR in saved:
+            return _put_generator(current, saved)
+        known = current if type(current) is dict else {}
+        return {key: _loaded(known.get(key), each) for key, each in saved.items()}
+    if kind is np.ndarray:
+        return saved.copy() if saved.flags.writeable else saved
+    if kind is deque:
+        return deque([_loaded(None, each) for each in saved], saved.maxlen)
+    return _saved(saved)
+
+
+def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
+    """Puts a generator's state into the present one, or into a new one if that is of another kind."""
+    kind, state = saved[GENERATOR], saved["state"]
+    target: Any
+    if kind == "torch":
+        if not _is_torchs(current):
+            raise StateError("there is no torch.Generator for the state of one")
+        numbers = current.get_state()
+        numbers.numpy()[:] = state
+        current.set_state(numbers)
+        return current
+    if kind == "Random":
+        target = current if isinstance(current, random.Random) else random.Random()
+        target.setstate(state)
+        return target
+    is_same = isinstance(current, np.random.Generator) and (
+        type(current.bit_generator).__name__ == kind
+    )
+    target = current if is_same else np.random.Generator(getattr(np.random, kind)())
+    bits: Any = target.bit_generator
+    seeds = saved["seeds"]
+    if seeds is None or (is_same and seeds[-1] == bits.seed_seq.n_children_spawned):
+        bits.state = state
+        return target
+    entropy, spawn_key, pool_size, spawned = seeds
+    again = np.random.SeedSequence(
+        entropy, spawn_key=spawn_key, pool_size=pool_size, n_children_spawned=spawned
+    )
+    bits.__setstate__((state, again))
+    return target

@@ -1,0 +1,249 @@
+"""States of controllers, plugins and tasks: by their own methods, or by attributes that are plain data."""
+
+import io
+import random
+import threading
+from collections import deque
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from robot_sim.state_dict import Shared, StateError, Stateful, load, state_of
+
+
+class Part(Stateful):
+    """Whatever attributes a test wants."""
+
+    def __init__(self, **attributes):
+        vars(self).update(attributes)
+
+
+class Slotted(Stateful):
+    __slots__ = ("__hidden", "other", "size", "unset")
+    non_persistent = ("other",)
+
+    def __init__(self, size):
+        self.size, self.__hidden, self.other = size, size, object()
+
+    def grow(self):
+        self.size += 1
+        self.__hidden += 1
+
+    def hidden(self):
+        return self.__hidden
+
+
+@dataclass
+class Mutable:
+    items: list
+
+
+class Pair(NamedTuple):
+    first: object
+    second: object
+
+
+NUMBERS = (
+    st.integers()
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text()
+    | st.none()
+    | st.binary()
+)
+VALUES = st.recursive(
+    NUMBERS,
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner) | st.tuples(inner, inner),
+    max_leaves=20,
+)
+
+
+@settings(deadline=None, suppress_health_check=list(HealthCheck))  # a busy machine is slow
+@given(st.dictionaries(st.text(), VALUES), st.dictionaries(st.text(), VALUES))
+def test_attributes_are_again_what_they_were(before, after):
+    part = Part()
+    vars(part).update(before)  # any name, "self" too
+    state = state_of(part)
+    wanted = {name: repr(value) for name, value in before.items()}
+    for value in before.values():
+        if isinstance(value, list):
+            value.append(1)
+        if isinstance(value, dict):
+            value["more"] = 1
+    vars(part).update(after)
+    for _ in range(2):
+        load([(part, state)])
+        assert {name: repr(value) for name, value in vars(part).items()} == wanted
+        for value in vars(part).values():
+            if isinstance(value, list):
+                value.append(2)  # the state is not what the object holds
+        vars(part).clear()
+
+
+def test_parts_stay_the_same_objects_and_what_is_shared_is_left():
+    inner, shared = Part(x=1), Shared()
+    outer = Part(inner=inner, listed=[(inner, shared)], by_name={"a": inner}, shared=shared)
+    state = state_of(outer)
+    assert state == {
+        "inner": {"x": 1}, "listed": [({"x": 1}, None)], "by_name": {"a": {"x": 1}},
+    }  # fmt: skip
+    inner.x = 2
+    load([(outer, state)])
+    assert outer.inner is inner and inner.x == 1 and outer.shared is shared
+    assert outer.listed == [(inner, shared)] and outer.by_name == {"a": inner}
+
+
+def test_containers_keep_their_order_and_limits():
+    part = Part(
+        queue=deque([1, 2], maxlen=2), names={"b": 1, (1, "a"): 2}, array=np.arange(3.0),
+        slotted=Slotted(3), scalar=np.float32(0.1), pair=Pair([1], 2), mutable=Mutable([1]),
+    )  # fmt: skip
+    state = state_of(part)
+    part.queue.append(3)
+    part.names["b"] = part.names.pop("b") + 1
+    part.array[:] = 7.0
+    part.slotted.grow()
+    part.slotted.unset = 1
+    part.pair.first.append(5)
+    part.mutable.items.append(5)
+    load([(part, state)])
+    assert list(part.queue) == [1, 2] and part.queue.maxlen == 2
+    assert list(part.names.items()) == [("b", 1), ((1, "a"), 2)]
+    assert part.array.tolist() == [0.0, 1.0, 2.0] and part.scalar == np.float32(0.1)
+    assert part.pair == Pair([1], 2) and part.mutable == Mutable([1])
+    assert part.slotted.size == part.slotted.hidden() == 3 and not hasattr(part.slotted, "unset")
+
+
+GENERATORS = [np.random.default_rng(1), np.random.Generator(np.random.Philox(1)), random.Random(1)]
+
+
+@pytest.mark.parametrize("generator", GENERATORS, ids=("PCG64", "Philox", "Random"))
+def test_random_numbers_come_again(generator):
+    part = Part(generator=generator)
+    state = state_of(part)
+    drawn = [generator.random() for _ in range(5)]
+    load([(part, state)])
+    assert part.generator is generator
+    assert [generator.random() for _ in range(5)] == drawn
+    part.generator = None
+    load([(part, state)])
+    assert [part.generator.random() for _ in range(5)] == drawn
+
+
+@pytest.mark.extras("torch")
+def test_torchs_random_numbers_come_again():
+    import torch
+
+    part = Part(generator=torch.Generator())
+    state = state_of(part)
+    drawn = torch.rand(5, generator=part.generator).tolist()
+    load([(part, state)])
+    assert torch.rand(5, generator=part.generator).tolist() == drawn
+
+
+def test_a_generator_spawns_the_same_again():
+    generator = np.random.default_rng(np.random.SeedSequence(1, spawn_key=(2,), pool_size=8))
+    generator.spawn(1)
+    state = state_of(generator)
+    spawned = [each.random() for _ in range(2) for each in generator.spawn(2)]
+    for _ in range(2):
+        load([(generator, state)])
+        assert [each.random() for _ in range(2) for each in generator.spawn(2)] == spawned
+
+
+def test_a_class_may_say_itself_what_counts():
+    class Own:
+        def __init__(self):
+            self.file, self.counts = io.StringIO(), [1]
+
+        def state_dict(self):
+            return self.counts
+
+        def load_state_dict(self, state):
+            self.counts = state
+
+    part = Part(own=Own())
+    for state in (state_of(part), state_of(part.own)):
+        part.own.counts.append(2)  # the state is not what the object holds
+        load([(part.own, state["own"] if isinstance(state, dict) else state)])
+        assert part.own.counts == [1]
+
+
+def test_a_fault_of_its_own_is_named_and_the_rest_comes_back():
+    class Faulty:
+        def state_dict(self):
+            return 1
+
+        def load_state_dict(self, state):
+            raise ValueError("no")
+
+    class Worse(Faulty):
+        def state_dict(self):
+            raise ValueError("never")
+
+    class Odd(Faulty):
+        def state_dict(self):
+            return {"lock": threading.Lock()}
+
+    parts = [Faulty(), Part(x=1)]
+    states = [state_of(part) for part in parts]
+    parts[1].x = 2
+    with pytest.raises(StateError, match=r"load_state_dict\(\) of .*Faulty.*no"):
+        load(zip(parts, states, strict=True))
+    assert parts[1].x == 1
+    with pytest.raises(StateError, match=r"state_dict\(\) of .*Worse raised ValueError\('never'"):
+        state_of(Part(inner=Worse()))
+    with pytest.raises(
+        StateError, match=r"Odd.state_dict\(\): a snapshot can't save a _thread.lock"
+    ):
+        state_of(Odd())
+
+
+def test_attributes_that_are_not_persistent_stay_also_those_of_a_base():
+    class Listening:
+        non_persistent = ("heard",)
+
+    class Speaking(Listening):
+        non_persistent = ("said",)
+
+    part = Speaking()
+    part.heard, part.said, part.x = False, object(), 1
+    state = state_of(part)
+    part.heard, part.x, part.later = True, 2, 3
+    load([(part, state)])
+    assert part.heard and part.x == 1 and not hasattr(part, "later")
+
+
+@pytest.mark.parametrize(
+    ("odd", "name"),
+    [
+        ((each for each in "abc"), "builtins.generator"),
+        (io.StringIO(), "_io.StringIO"),
+        (lambda: 0, "builtins.function"),
+        (threading.Lock(), "_thread.lock"),
+        ({1}, "builtins.set"),
+        (random.SystemRandom(), "SystemRandom"),
+        (np.array([object()]), "numpy.ndarray"),
+        ({frozenset(): 1}, "frozenset as key"),
+        ([{"a": (object(),)}], "builtins.object"),
+    ],
+    ids=lambda each: each if isinstance(each, str) else "",
+)
+def test_what_cannot_be_saved_is_named_with_class_attribute_and_methods(odd, name):
+    with pytest.raises(
+        StateError, match=rf"^Part.item: .*{name}; give Part a state_dict\(\) and a load"
+    ):
+        state_of(Part(inner=Part(item=odd)))
+
+
+def test_circles_are_named():
+    part, items = Part(), []
+    part.me = part
+    with pytest.raises(StateError, match="Part.me refers to itself"):
+        state_of(part)
+    items.append(items)
+    with pytest.raises(StateError, match="Part.items refers to itself"):
+        state_of(Part(items=items))
