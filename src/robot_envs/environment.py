@@ -12,17 +12,16 @@ from robot_envs import checks
 from robot_envs.backends import LOCKSTEP, OWN, REALTIME, make_backend
 from robot_envs.backends.backend import RobotBackend, side_by_side
 from robot_envs.errors import SimulatorError
-from robot_envs.pictures.drawn import HEIGHT, WIDTH, DrawnEnv
+from robot_envs.pictures.drawn import HEIGHT, WIDTH
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.snapshot import EnvSnapshot
+from robot_envs.snapshot import SavedEnv
 from robot_envs.task import GoalTask, Task, Unrewarded
 from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Noise, Sensor
 from robot_envs.variation.randomisation import UniformRandomisation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState, both, part_of
 from robot_sim.pictures.camera import CameraLike
-from robot_sim.state_dict import StateError, load, state_of
 
 MOST_SEED = 2**32  # of the sensors' noise
 
@@ -36,7 +35,7 @@ class _Step(NamedTuple):
     sent: Commands | None  # that the state reports, where fewer arrive; None: the same
 
 
-class RobotEnv(DrawnEnv):
+class RobotEnv(SavedEnv):
     """A robot with a task, as a Gymnasium environment.
 
     Two attributes tell a training what to expect:
@@ -330,53 +329,9 @@ class RobotEnv(DrawnEnv):
         info = checks.checked(task, "info", evaluator.info(state), dict)
         return observation, reward, terminated, truncated, info
 
-    def save_state(self) -> EnvSnapshot:
-        """Returns all that decides the future: of world, episode, task and generators.
-
-        Raises:
-            gymnasium.error.ResetNeeded: Before the first episode.
-            SimulatorError: If the task holds something unreadable, or the world runs in real time.
-        """
-        self._check_open()
-        if self._state is None or self._begun is not None:
-            raise gymnasium.error.ResetNeeded("a snapshot is taken after a reset() or a step()")
-        episode = self._state, self._first, self._initial, self._steps, self.np_random
-        try:
-            parts = state_of(self.task), state_of(self._randomisation)
-        except StateError as error:
-            raise SimulatorError(str(error)) from error
-        imperfect = [each and each.state_dict() for each in (self._sensor, self._actuator)]
-        states = [state_of(self.np_random), *imperfect, *parts]
-        return EnvSnapshot(self, self._variation, episode, states, self.backend.save_state())
-
-    def restore_state(self, snapshot: EnvSnapshot) -> None:
-        """Returns to a snapshot of this environment: the same actions lead to the same bits.
-
-        Raises:
-            ValueError: If it is of another environment.
-            SimulatorError: If the world isn't that of the snapshot any more; a reset comes next.
-        """
-        self._check_open()
-        if getattr(snapshot, "of", None) is not self:
-            raise ValueError("the snapshot is of another environment; only that one can restore it")
-        self._steps = self._begun = None
-        if snapshot.variation != self._variation:
-            self._vary(snapshot.variation)
-        self.backend.restore_state(snapshot.world)
-        self._state, self._first, self._initial, self._steps, self._np_random = snapshot.episode
-        parts = self._np_random, self._sensor, self._actuator, self.task, self._randomisation
-        try:
-            load(each for each in zip(parts, snapshot.states, strict=True) if each[0] is not None)
-        except StateError as error:  # all else is restored
-            raise SimulatorError(str(error)) from error
-        self._show()
-
     def __reduce__(self) -> Any:
         raise TypeError("an environment can't be copied or pickled; save_state() takes a snapshot")
 
-    def _vary(self, variation: Variation) -> None:
-        self._variation = variation
-        self.backend.vary(variation)
 
     def close(self) -> None:
         """Closes the backend and the page; may be called twice."""

@@ -2,17 +2,20 @@
 
 import threading
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from robot_sim.applied_forces import AppliedForces
 from robot_sim.constants import NANOSECONDS
+from robot_sim.fingerprint import fingerprint, misfits
 from robot_sim.moves import Moves
 from robot_sim.physics.engine import Twist
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose
 from robot_sim.physics.projection import place_link
-from robot_sim.physics.world import SnapshotError, World
+from robot_sim.physics.world import World
+from robot_sim.plain_data import is_finite, misfit
 from robot_sim.robot import ControlledRobot
+from robot_sim.snapshot import Snapshot, SnapshotError
 from robot_sim.state_dict import Shared, StateError, load, state_of
 from robot_sim.timing import FairLock, Holds, Pacer
 
@@ -28,14 +31,6 @@ class Outbox(Protocol):
 
     def deliver(self) -> None:
         """Sends it. The caller doesn't hold the lock."""
-
-
-class Snapshot(NamedTuple):
-    """What `Simulator.save_state` returns."""
-
-    of: "Simulator"
-    layout: tuple[object, ...]
-    state: dict[str, Any]  # plain data, by name
 
 
 class NotInLockstep(RuntimeError):
@@ -89,6 +84,8 @@ class Simulator(Shared):
         # What sends messages after the ticks, and whether those who step the world call them.
         self.outboxes: list[Outbox] = []
         self.deliver_with_steps = False
+        self._fits: dict[str, Any] = {}
+        self._fits_version: tuple[object, ...] = ()
         self._period = round(world.time_step * NANOSECONDS)
         self.paused = False  # by `pause` and `unpause` alone
         self._flowing = threading.Event()  # set while time runs by itself
@@ -306,7 +303,7 @@ class Simulator(Shared):
             "resets": self.resets,
             "world": self.world.state_dict(),
         }
-        return Snapshot(self, self._layout, state)
+        return Snapshot(self.fits, state)
 
     def restore_state(self, snapshot: Snapshot) -> None:
         """Returns to what `save_state` has returned: the same commands lead to the same bits.
@@ -314,16 +311,29 @@ class Simulator(Shared):
         The caller holds the lock.
 
         Raises:
-            SnapshotError: if it is another simulator's, or models, robots, running controllers or properties
-                aren't those of the snapshot; nothing changes then.
+            SnapshotError: if engine, models, robots, running controllers or properties aren't those of the
+                snapshot, or a foreign one doesn't fit otherwise; nothing changes then.
             StateError: if a user's `load_state_dict` has raised; all else is restored then.
         """
-        if snapshot.of is not self:
-            raise SnapshotError("the snapshot is of another simulator")
-        if snapshot.layout != self._layout:
-            raise SnapshotError("models or controllers have come or gone, or been switched")
-        state = snapshot.state
-        self.world.check_state(state["world"])
+        if snapshot.fits is not self.fits and (fault := misfits(snapshot.fits, self.fits)):
+            raise SnapshotError(fault)
+        if not snapshot.is_foreign:
+            self.world.check_state(snapshot.state["world"])
+            self._load(snapshot.state)
+            return
+        before = self.save_state().state
+        try:
+            if fault := misfit(before, snapshot.state):
+                raise SnapshotError(fault)
+            if not all(is_finite(own["motion"]) for own in snapshot.state["world"]["models"].values()):
+                raise SnapshotError("positions or velocities aren't finite")
+            self.world.check_state(snapshot.state["world"])
+            self._load(snapshot.state)
+        except Exception as error:  # whatever a forged state leads to
+            self._load(before)
+            raise SnapshotError(f"the snapshot can't be restored: {error!s:.300}") from error
+
+    def _load(self, state: Mapping[str, Any]) -> None:
         self.world.load_state_dict(state["world"])
         self.now, self.resets = state["now"], state["resets"]
         self.applied.load_state_dict(state["applied"], self.world.models)
@@ -343,9 +353,12 @@ class Simulator(Shared):
             raise fault
 
     @property
-    def _layout(self) -> tuple[object, ...]:
-        running = [each for robot in self.robots for each in robot.manager.running]
-        return self.version, running
+    def fits(self) -> dict[str, Any]:
+        """What has to be the same where its snapshots are restored. The caller holds the lock."""
+        version = self.version, [robot.manager.running for robot in self.robots]
+        if self._fits_version != version:
+            self._fits_version, self._fits = version, fingerprint(self.world, self.robots)
+        return self._fits
 
     def reseed(self, seed: int) -> None:
         """Lets what draws random numbers start from `seed`; the caller holds the lock."""

@@ -24,6 +24,7 @@ import numpy as np
 GENERATOR = "__generator__"  # the key of a generator's kind in its state
 GENERATORS = (np.random.Generator, random.Random)
 ATOMS = frozenset((type(None), bool, int, float, str, bytes))
+LARGEST_POOL = 1024  # of a seed sequence; NumPy's has 4
 BIT_GENERATORS = ("PCG64", "PCG64DXSM", "Philox", "SFC64", "MT19937")
 
 
@@ -149,7 +150,9 @@ def put_attributes(part: Any, state: Mapping[str, Any]) -> None:
             except StateError as error:  # the rest is put back
                 faults.append(str(error))
                 continue
-        if name in slots:
+        if callable(getattr(kind, name, None)):
+            faults.append(f"{kind.__qualname__}.{name} is a method")
+        elif name in slots:
             object.__setattr__(part, name, value)
         else:
             own[name] = value
@@ -285,6 +288,8 @@ def _loaded(current: Any, saved: Any) -> Any:
 def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
     """Puts a generator's state into the present one, or into a new one if that is of another kind."""
     kind, state = saved[GENERATOR], saved["state"]
+    if kind not in ("torch", "Random", *BIT_GENERATORS):
+        raise StateError(f"there is no generator of type {kind!r:.100}")
     target: Any
     if kind == "torch":
         if not _is_torchs(current):
@@ -307,6 +312,8 @@ def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
         bits.state = state
         return target
     entropy, spawn_key, pool_size, spawned = seeds
+    if pool_size > LARGEST_POOL:
+        raise StateError(f"there is no seed sequence with a pool of {pool_size}")
     again = np.random.SeedSequence(
         entropy, spawn_key=spawn_key, pool_size=pool_size, n_children_spawned=spawned
     )

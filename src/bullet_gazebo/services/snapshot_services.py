@@ -2,28 +2,37 @@
 
 import random
 import threading
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
-from bullet_gazebo_msgs.srv import RestoreState, RestoreStateRequest, SaveState, SaveStateRequest
+from bullet_gazebo_msgs.srv import (
+    RestoreState,
+    RestoreStateRequest,
+    SaveState,
+    SaveStateRequest,
+    SaveStateResponse,
+)
 
 from bullet_gazebo.services import ServiceRefused, offer
 from bullet_gazebo.services.step_service import StepService
 from file_access.text import did_you_mean
-from robot_sim.physics.world import SnapshotError
-from robot_sim.simulator import Simulator, Snapshot
+from robot_sim.simulator import Simulator
+from robot_sim.snapshot import Snapshot, SnapshotError
 from robot_sim.state_dict import StateError
 
 MOST = 1000  # names
 
 
-class KeptState(NamedTuple):
-    """A snapshot, what the step service says of it, and the random numbers of the process."""
+class GlobalGenerators:
+    """The generators of `random` and of NumPy's legacy functions, which plugins may use."""
 
-    snapshot: Snapshot
-    steps: dict[str, Any]
-    python: Any
-    numpy: Any
+    def state_dict(self) -> dict[str, Any]:
+        return {"python": random.getstate(), "numpy": np.random.get_state(legacy=False)}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        random.setstate(state["python"])
+        np.random.set_state(state["numpy"])
 
 
 class SnapshotServices:
@@ -36,50 +45,57 @@ class SnapshotServices:
     """
 
     def __init__(self, sim: Simulator, steps: StepService, one_at_a_time: threading.Lock) -> None:
-        self._sim, self._steps, self._one_at_a_time = sim, steps, one_at_a_time
-        self._kept: dict[str, KeptState] = {}
+        self._sim, self._one_at_a_time = sim, one_at_a_time
+        sim.parts.update({"steps": steps, "random numbers": GlobalGenerators()})
+        self._kept: dict[str, Snapshot] = {}
         self._services = [
             offer("~save_state", SaveState, self._save),
             offer("~restore_state", RestoreState, self._restore),
         ]
 
-    def _save(self, request: SaveStateRequest) -> str:
+    def _save(self, request: SaveStateRequest) -> SaveStateResponse:
         with self._one_at_a_time, self._sim.lock:
             for name in request.forget:
                 self._kept.pop(name, None)
-            if not request.name:
-                return "SaveState: nothing saved, without a name"
-            if len(self._kept) >= MOST and request.name not in self._kept:
-                raise ServiceRefused(
-                    f"{MOST} states are kept already: name some that are to be forgotten"
-                )
-            self._sim.await_holds()
-            try:
-                snapshot = self._sim.save_state()
-            except StateError as error:
-                raise ServiceRefused(str(error)) from error
-            self._kept[request.name] = KeptState(
-                snapshot,
-                self._steps.state_dict(),
-                random.getstate(),
-                np.random.get_state(legacy=False),
+            done = "nothing saved, without a name"
+            if request.name:
+                self._sim.await_holds()
+                try:
+                    snapshot = self._sim.save_state()
+                except StateError as error:
+                    raise ServiceRefused(str(error)) from error
+                self._keep(request.name, snapshot)
+                done = "state saved"
+            read = self._find(request.read) if request.read else None
+        try:
+            data = b"" if read is None else read.to_bytes()
+        except StateError as error:
+            raise ServiceRefused(str(error)) from error
+        return SaveStateResponse(True, f"SaveState: {done}", data)
+
+    def _keep(self, name: str, snapshot: Snapshot) -> None:
+        if len(self._kept) >= MOST and name not in self._kept:
+            raise ServiceRefused(
+                f"{MOST} states are kept already: name some that are to be forgotten"
             )
-        return "SaveState: state saved"
+        self._kept[name] = snapshot
+
+    def _find(self, name: str) -> Snapshot:
+        if name not in self._kept:
+            raise ServiceRefused(
+                f"no state '{name}' is kept{did_you_mean(name, self._kept)}; it was forgotten, or never saved "
+                "in this simulator"
+            )
+        return self._kept[name]
 
     def _restore(self, request: RestoreStateRequest) -> str:
         with self._one_at_a_time, self._sim.lock:
-            kept = self._kept.get(request.name)
-            if kept is None:
-                raise ServiceRefused(
-                    f"no state '{request.name}' is kept{did_you_mean(request.name, self._kept)}; it was "
-                    "forgotten, or never saved in this simulator"
-                )
-            self._sim.await_holds()
             try:
-                self._sim.restore_state(kept.snapshot)
+                given = Snapshot.from_bytes(request.data) if request.data else self._find(request.name)
+                self._sim.await_holds()
+                self._sim.restore_state(given)
             except (SnapshotError, StateError) as error:
                 raise ServiceRefused(str(error)) from error
-            self._steps.load_state_dict(kept.steps)
-            random.setstate(kept.python)
-            np.random.set_state(kept.numpy)
+            if request.data and request.name:
+                self._keep(request.name, given)
         return "RestoreState: state restored"

@@ -10,8 +10,16 @@ from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
 from robot_sim.physics.pose import Pose
+from robot_sim.snapshot import Snapshot
 
 PHYSICS_STEP = 0.001  # [s]; Gazebo's default, and that of a world in this process
+
+
+class WorldSnapshot(Protocol):
+    """A world's part of a snapshot, wherever it is kept."""
+
+    def whole(self) -> Snapshot:
+        """Returns it, in this process; raises SimulatorError if its simulator has ended."""
 
 
 class RobotBackend(Protocol):
@@ -54,12 +62,12 @@ class RobotBackend(Protocol):
         """Changes properties of robots and world, see `Variation`; call it before a reset."""
         ...
 
-    def save_state(self) -> Any:
+    def save_state(self) -> WorldSnapshot:
         """Returns all that decides the world's future."""
         ...
 
-    def restore_state(self, state: Any) -> None:
-        """Returns to what `save_state` has returned; the same commands lead to the same bits."""
+    def restore_state(self, state: WorldSnapshot) -> None:
+        """Returns to what `save_state` of a backend has returned; the same commands lead to the same bits."""
         ...
 
     def poses(self, links: Sequence[str]) -> list[Pose]:

@@ -6,7 +6,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import starmap
 from typing import Any
 
-from robot_envs.backends.backend import PHYSICS_STEP, RobotBackend, ticks_per_action
+from robot_envs.backends.backend import (
+    PHYSICS_STEP,
+    RobotBackend,
+    WorldSnapshot,
+    ticks_per_action,
+)
 from robot_envs.backends.world_files import fill, loose_joints, spawn
 from robot_envs.controllers import Loaded, load
 from robot_envs.errors import RobotEnvError, SimulatorError
@@ -50,11 +55,12 @@ from robot_sim.physics.properties import (
     set_link_friction,
     set_link_properties,
 )
-from robot_sim.physics.world import NameTaken, SnapshotError, World
+from robot_sim.physics.world import NameTaken, World
 from robot_sim.robot import ControlledRobot, control_period_of
 from robot_sim.sensors.sensing import Sensing
 from robot_sim.sensors.sensor_readers import SensorReaders, offer_sensors
 from robot_sim.simulator import Simulator
+from robot_sim.snapshot import SnapshotError
 from robot_sim.state import NOTHING, StateReader, UnknownName, find_link, find_model
 from robot_sim.state_dict import StateError
 
@@ -224,15 +230,19 @@ class InProcessWorld(RobotBackend):
     def vary(self, variation: Variation) -> None:
         self._apply(variation)
 
-    def save_state(self) -> Any:
+    def save_state(self) -> WorldSnapshot:
         with _refusals():
-            return self._sim.save_state(), self._held, self._begin
+            snapshot = self._sim.save_state()
+        snapshot.state["episode"] = {"held": self._held, "begun": self._begin}
+        snapshot.state["parts"]["steps"] = {"knows_contacts": self._sim.now > self._begin}
+        return snapshot
 
-    def restore_state(self, state: Any) -> None:
-        snapshot, held, begin = state
+    def restore_state(self, state: WorldSnapshot) -> None:
+        snapshot = state.whole()
         with _refusals():
             self._sim.restore_state(snapshot)
-        self._held, self._begin = held, begin
+        episode = snapshot.state["episode"]
+        self._held, self._begin = episode["held"], episode["begun"]
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         with _refusals():

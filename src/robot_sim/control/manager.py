@@ -181,7 +181,11 @@ class ControllerManager:
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Takes back what `state_dict` has returned, with the same controllers running."""
         self._now = state["now"]
-        load((each, state["controllers"][name]) for name, each in self._controllers.items())
+        saved = state["controllers"]
+        for name, each in self._controllers.items():
+            if name not in saved and each in self._running:
+                each.joints_moved(self._now)
+        load((each, saved[name]) for name, each in self._controllers.items() if name in saved)
 
     def restored(self) -> None:
         """Tells the running controllers that the world has returned to a snapshot."""

@@ -18,6 +18,7 @@ from robot_sim.physics.engine import Body, Contact, Engine, Side, Twist
 from robot_sim.physics.entity_names import EntityNames
 from robot_sim.physics.model import AT_REST, Model
 from robot_sim.physics.pose import Pose, Vector, conjugate, rotate, subtract
+from robot_sim.snapshot import SnapshotError
 from robot_sim.state_dict import Shared
 
 GRAVITY: Vector = (0.0, 0.0, -9.8)  # [m/s²], Gazebo's default
@@ -59,10 +60,6 @@ class Attachment:
     def joins(self, model: Model) -> bool:
         """Returns whether one of the links is of that model."""
         return model in (self.first[0], self.second[0])
-
-
-class SnapshotError(ValueError):
-    """A snapshot can't be restored; the text says why."""
 
 
 class NameTaken(ValueError):
@@ -347,12 +344,14 @@ class World(Shared):
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Takes back what `state_dict` has returned, after `check_state`."""
-        models, known = self.models, {each.number: each for each in self.attachments}
+        models = self.models
+        known = {(a.first, a.second, a.pose, a.number): a for a in self.attachments}
         self.engine.refasten(state["fastened"])
-        self.attachments = [
-            known.get(number) or Attachment((models[one], link), (models[two], its), pose, number)
+        made_of = [
+            ((models[one], link), (models[two], its), pose, number)
             for (one, link), (two, its), pose, number in state["attachments"]
         ]
+        self.attachments = [known.get(each) or Attachment(*each) for each in made_of]
         for name, own in state["models"].items():
             models[name].load_state_dict(own)
         self._recall(

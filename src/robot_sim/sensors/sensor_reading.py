@@ -2,11 +2,13 @@
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Reading:
     """What a sensor measured last, an attribute for each of its fields. Arrays can't be written to.
 
@@ -18,10 +20,8 @@ class Reading:
         values: by attribute.
     """
 
-    __slots__ = ("time", "values")
-
-    def __init__(self, time: float, values: Mapping[str, Any]) -> None:
-        self.time, self.values = time, values
+    time: float
+    values: Mapping[str, Any]
 
     def __getattr__(self, name: str) -> Any:
         values: Mapping[str, Any] = object.__getattribute__(self, "values")

@@ -22,7 +22,7 @@ from geometry_msgs.msg import Pose as PoseMsg
 from geometry_msgs.msg import Twist as TwistMsg
 
 from bullet_gazebo.common.messages import from_contact_state
-from robot_envs.backends.backend import RobotBackend
+from robot_envs.backends.backend import RobotBackend, WorldSnapshot
 from robot_envs.backends.ros.bringup import full_name, ready
 from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.backends.ros.running import (
@@ -52,6 +52,7 @@ from robot_envs.world_state import (
     link_keys,
 )
 from robot_sim.physics.pose import Pose
+from robot_sim.snapshot import Snapshot
 from ros_calls.service import TIMEOUT
 from ros_utils.step_client import MOTION, PreparedSteps, StepAnswer, StepNames, StepRefused, time_of
 
@@ -62,8 +63,11 @@ class KeptSnapshot:
 
     of: "LockstepWorld"
     name: str
-    begun: int  # [ns], of the episode
-    held: dict[str, Any]
+    episode: dict[str, Any]  # when it has begun [ns], and what controllers were commanded
+
+    def whole(self) -> Snapshot:
+        """See `WorldSnapshot.whole`."""
+        return self.of.read(self)
 
 
 class LockstepWorld(RobotBackend):
@@ -248,25 +252,45 @@ class LockstepWorld(RobotBackend):
     def save_state(self) -> KeptSnapshot:
         """See `RobotBackend.save_state`; the simulator keeps it until nobody has it any more."""
         self._world.check_holder(self)
-        kept = KeptSnapshot(self, secrets.token_hex(8), self._begun, self._held)
+        episode = {"held": self._held, "begun": self._begun}
+        kept = KeptSnapshot(self, secrets.token_hex(8), episode)
         self._save_and_forget(kept.name, list(self._dropped))
         self._kept.add(kept.name)
         weakref.finalize(kept, self._dropped.append, kept.name).atexit = False
         return kept
 
     def _save_and_forget(self, name: str, forgotten: Sequence[str]) -> None:
-        self._succeed(self._save, SaveStateRequest(name, forgotten))
+        self._succeed(self._save, SaveStateRequest(name, forgotten, ""))
         self._kept.difference_update(forgotten)
         del self._dropped[: len(forgotten)]
 
-    def restore_state(self, state: KeptSnapshot) -> None:
-        self._world.check_holder(self)
-        self._drop()
-        self._succeed(self._restore, RestoreStateRequest(state.name))
-        self._begun, self._held = state.begun, state.held
+    def read(self, kept: KeptSnapshot) -> Snapshot:
+        """Returns a snapshot that the simulator keeps."""
+        answer = self._succeed(self._save, SaveStateRequest(read=kept.name))
+        whole = Snapshot.from_bytes(answer.data)
+        whole.state["episode"] = kept.episode
+        return whole
 
-    def _succeed(self, call: SimulatorService, request: Any) -> None:
-        check_success(self._call(call, request), call.name)
+    def restore_state(self, state: WorldSnapshot) -> None:
+        """See `RobotBackend.restore_state`; another simulator's goes there as bytes."""
+        self._drop()
+        if isinstance(state, KeptSnapshot) and state.of is self:
+            self._world.check_holder(self)
+            self._succeed(self._restore, RestoreStateRequest(name=state.name))
+            episode = state.episode
+        else:
+            whole = state.whole()
+            with self._simulator:
+                self._world.claim(self)
+            self._look(self._names)  # sensors that states have are read from now on
+            self._succeed(self._restore, RestoreStateRequest(data=whole.to_bytes()))
+            episode = whole.state["episode"]
+        self._begun, self._held = episode["begun"], episode["held"]
+
+    def _succeed(self, call: SimulatorService, request: Any) -> Any:
+        answer = self._call(call, request)
+        check_success(answer, call.name)
+        return answer
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         """See `RobotBackend.poses`; one call, however many there are."""

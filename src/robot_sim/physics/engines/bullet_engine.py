@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -74,7 +73,7 @@ class BulletClient:
         self._sizes: dict[int, int] = {}  # [bytes] by body, without shared meshes
         self._meshes = SharedMeshes(self._client)
         self.fastened: dict[int, Fastening] = {}
-        self._count = count()  # of what was fastened
+        self._last = 0  # number of what was fastened
         self.waste = 0
         self.apply(settings)
 
@@ -192,12 +191,25 @@ class BulletClient:
         found = pybullet.getContactPoints(physicsClientId=self._client)
         return [_contact(each, self._sides) for each in found if each[9] > 0.0]
 
+    def fastenings(self) -> dict[int, Any]:
+        """See `Engine.fastened`; bodies are named by their places in the order."""
+        places = {body: place for place, body in enumerate(self._bodies)}
+        fastened: dict[int, Any] = {}
+        for number, each in self.fastened.items():
+            one, link, other, *rest = each.made_of
+            pairs = [pair[2:] for pair in each.apart]
+            fastened[number] = (places[one], link, places[other], *rest), pairs
+        return fastened
+
     def refasten(self, fastened: Mapping[int, Any]) -> None:
         """See `Engine.refasten`; the solver's result depends on the order of constraints."""
         for number in list(self.fastened):
             self.unfasten(number)
-        for number, (made_of, apart) in fastened.items():
-            self._fix(number, made_of, apart)
+        ids = list(self._bodies)
+        for number, ((one, link, other, *rest), apart) in fastened.items():
+            one, other = ids[one], ids[other]
+            self._fix(number, (one, link, other, *rest), [(one, other, a, b) for a, b in apart])
+        self._last = max(self._last, *fastened, 0)
 
     def forget_contacts(self) -> None:
         """See `Engine.forget_contacts`."""
@@ -215,7 +227,7 @@ class BulletClient:
         place = wanted.relative_to(one.centre_of_mass(link))
         pairs = [(a, b) for a in one.pieces(link) for b in other.pieces(its)]
         made_of = weld_of((one.id, pairs[0][0]), (other.id, pairs[0][1]), place)
-        number = next(self._count)
+        number = self._last = self._last + 1
         self._fix(number, made_of, [(one.id, other.id, a, b) for a, b in pairs])
         return number
 
@@ -312,7 +324,7 @@ class BulletEngine(Engine):
         return self._client.bodies
 
     def fastened(self) -> dict[int, Any]:
-        return {n: (each.made_of, each.apart) for n, each in self._client.fastened.items()}
+        return self._client.fastenings()
 
     def refasten(self, fastened: Mapping[int, Any]) -> None:
         self._client.refasten(fastened)

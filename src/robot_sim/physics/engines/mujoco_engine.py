@@ -128,18 +128,20 @@ class MujocoEngine(Engine):
         return list(self._bodies.values())
 
     def fastened(self) -> dict[int, Any]:
-        keys = {id(body): key for key, body in self._bodies.items()}
+        places = {id(body): place for place, body in enumerate(self._bodies.values())}
         return {
-            number: ((keys[id(one)], link), (keys[id(other)], its), pose)
+            number: ((places[id(one)], link), (places[id(other)], its), pose)
             for number, ((one, link), (other, its), pose) in self._fastened.items()
         }
 
     def refasten(self, fastened: Mapping[int, Any]) -> None:
         if fastened != self.fastened():
+            bodies = self.order()
             self._fastened = {
-                number: ((self._bodies[one], link), (self._bodies[other], its), pose)
+                number: ((bodies[one], link), (bodies[other], its), pose)
                 for number, ((one, link), (other, its), pose) in fastened.items()
             }
+            self._keys = count(max([next(self._keys), *fastened]) + 1)
             self._compile()
 
     def close(self) -> None:

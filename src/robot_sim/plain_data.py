@@ -1,0 +1,188 @@
+"""MessagePack of plain data: numbers, texts, bytes, NumPy arrays, and containers and records of these.
+
+Records are named tuples and data classes, written with their class's name and their fields. Reading runs no
+code of theirs, and makes only classes that this process has imported already. What is read takes no more
+than some hundred times the memory of its bytes, and is nested at most `DEEPEST` times.
+"""
+
+import sys
+from collections import deque
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
+
+import msgpack
+import numpy as np
+
+from robot_sim.state_dict import StateError
+
+DEEPEST = 100
+TUPLE, ARRAY, SCALAR, RECORD, DEQUE, INTEGER = range(1, 7)  # codes of MessagePack's extensions
+LARGEST = 2**63  # what counts nanoseconds stays below
+LONGEST_INTEGER = 256  # [bytes]; states of generators have 16 to 64
+
+
+class Difference(NamedTuple):
+    """Where two states differ."""
+
+    place: str  # keys and indices, with slashes
+    first: Any
+    second: Any
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.first!r:.80} and {self.second!r:.80}"
+
+
+def pack(value: Any) -> bytes:
+    """Returns the bytes of plain data.
+
+    Raises:
+        StateError: if something isn't plain data.
+    """
+    try:
+        return bytes(msgpack.packb(value, default=_extension, strict_types=True))
+    except (ValueError, OverflowError) as error:  # too deep
+        raise StateError(f"it can't be written: {error}") from error
+
+
+def unpack(data: bytes) -> Any:
+    """Returns the plain data of bytes that `pack` has returned.
+
+    Raises:
+        StateError: if they are damaged, or refer to a class that isn't imported.
+    """
+    return _unpack(data, 0)
+
+
+def _extension(value: Any) -> msgpack.ExtType:
+    kind: Any = type(value)
+    if kind is tuple:
+        return msgpack.ExtType(TUPLE, pack(list(value)))
+    if kind is np.ndarray:
+        content = [value.dtype.str, list(value.shape), value.flags.writeable, value.tobytes()]
+        return msgpack.ExtType(ARRAY, pack(content))
+    if isinstance(value, np.generic):
+        return msgpack.ExtType(SCALAR, pack([value.dtype.str, value.tobytes()]))
+    if kind is int:
+        size = value.bit_length() // 8 + 1
+        return msgpack.ExtType(INTEGER, value.to_bytes(size, "little", signed=True))
+    if kind is deque:
+        return msgpack.ExtType(DEQUE, pack([value.maxlen, list(value)]))
+    if isinstance(value, dict):
+        fields: Any = dict(value)
+    elif hasattr(kind, "_fields"):
+        fields = list(value)
+    elif hasattr(kind, "__dataclass_fields__"):
+        fields = [getattr(value, name) for name in kind.__dataclass_fields__]
+    else:
+        raise StateError(f"a {kind.__qualname__} isn't plain data")
+    return msgpack.ExtType(RECORD, pack([kind.__module__, kind.__qualname__, fields]))
+
+
+def _unpack(data: bytes, depth: int) -> Any:
+    if depth > DEEPEST:
+        raise StateError("it is nested too deeply")
+
+    def extension(code: int, content: bytes) -> Any:
+        if code == INTEGER and len(content) <= LONGEST_INTEGER:
+            return int.from_bytes(content, "little", signed=True)
+        given = _unpack(content, depth + 1)
+        if code == TUPLE:
+            return tuple(given)
+        if code == ARRAY:
+            dtype, shape, is_writeable, numbers = given
+            content = bytearray(numbers) if is_writeable else numbers
+            return np.frombuffer(content, _dtype(dtype)).reshape(shape)
+        if code == SCALAR:
+            dtype, number = given
+            return np.frombuffer(number, _dtype(dtype), 1)[0]
+        if code == DEQUE:
+            most, entries = given
+            return deque(entries, most)
+        if code == RECORD:
+            return _record(*given)
+        raise StateError(f"it has an extension {code}")
+
+    try:
+        return msgpack.unpackb(data, ext_hook=extension, strict_map_key=False)
+    except (TypeError, ValueError, msgpack.exceptions.UnpackException) as error:
+        if isinstance(error, StateError):
+            raise
+        raise StateError(f"it is damaged: {error!r:.200}") from error
+
+
+def _dtype(name: Any) -> np.dtype[Any]:
+    dtype = np.dtype(name) if isinstance(name, str) and len(name) < 8 else None
+    if dtype is None or dtype.kind not in "biufSU" or dtype.str != name:
+        raise StateError(f"it has an array of type {name!r:.50}")
+    return dtype
+
+
+def _record(module: Any, name: Any, fields: Any) -> Any:
+    """Makes a record; no code of its class runs."""
+    kind: Any = sys.modules.get(module) if isinstance(module, str) else None
+    for part in name.split(".") if isinstance(name, str) else ():
+        kind = getattr(kind, "__dict__", {}).get(part)
+    if isinstance(kind, type) and (kind.__module__, kind.__qualname__) == (module, name):
+        if issubclass(kind, dict) and isinstance(fields, dict):
+            made = dict.__new__(kind)
+            dict.update(made, fields)
+            return made
+        names = getattr(kind, "_fields", None) or getattr(kind, "__dataclass_fields__", ())
+        if names and isinstance(fields, list) and len(fields) == len(names):
+            if issubclass(kind, tuple):
+                return tuple.__new__(kind, fields)
+            made = object.__new__(kind)
+            for each, value in zip(names, fields, strict=True):
+                object.__setattr__(made, each, value)
+            return made
+    raise StateError(f"it has a record of an unknown class {module!r:.100}, {name!r:.100}")
+
+
+def misfit(there: Any, given: Any, place: str = "") -> str:
+    """Returns where a state can't take the place of the one that is there, by its types; "" if it may."""
+    if there is None or given is None:
+        return ""
+    numbers = (int, float)
+    if type(there) in numbers and type(given) in numbers:
+        counts = isinstance(given, int) and abs(there) < LARGEST  # generators have larger numbers
+        return f"{place} is {given}" if counts and abs(given) >= LARGEST else ""
+    if type(there) is not type(given):
+        return f"{place} is a {type(given).__name__}, not a {type(there).__name__}"
+    if isinstance(there, np.ndarray) and (there.dtype, there.ndim) != (given.dtype, given.ndim):
+        return f"{place} is an array of {given.dtype}{list(given.shape)}"
+    pairs: Iterable[tuple[Any, Any, Any]] = ()
+    if isinstance(there, dict):
+        pairs = ((key, there[key], given[key]) for key in there if key in given)
+    elif isinstance(there, (list, tuple)) and len(there) == len(given):
+        pairs = zip(range(len(there)), there, given, strict=True)
+    elif hasattr(there, "__dataclass_fields__"):
+        names = there.__dataclass_fields__
+        pairs = ((name, getattr(there, name), getattr(given, name)) for name in names)
+    found = (misfit(one, other, f"{place}/{key}".lstrip("/")) for key, one, other in pairs)
+    return next(filter(None, found), "")
+
+
+def is_finite(value: Any) -> bool:
+    """Returns whether all numbers of plain data are finite."""
+    if isinstance(value, (list, tuple)):
+        return all(map(is_finite, value))
+    return not isinstance(value, (float, np.ndarray)) or bool(np.isfinite(value).all())
+
+
+def differences(first: Any, second: Any, place: str = "") -> Iterator[Difference]:
+    """Yields where two states differ, in order."""
+    if type(first) is not type(second):
+        yield Difference(place, first, second)
+    elif isinstance(first, dict):
+        for key in dict.fromkeys([*first, *second]):
+            yield from differences(first.get(key), second.get(key), f"{place}/{key}".lstrip("/"))
+    elif isinstance(first, (list, tuple, deque)) and len(first) == len(second):
+        names = getattr(first, "_fields", range(len(first)))
+        for name, one, other in zip(names, first, second, strict=True):
+            yield from differences(one, other, f"{place}/{name}".lstrip("/"))
+    elif hasattr(first, "__dataclass_fields__"):
+        for name in first.__dataclass_fields__:
+            one, other = getattr(first, name), getattr(second, name)
+            yield from differences(one, other, f"{place}/{name}".lstrip("/"))
+    elif pack(first) != pack(second):  # tells -0.0 from 0.0, and finds NaN equal to itself
+        yield Difference(place, first, second)

@@ -1,0 +1,89 @@
+"""The snapshot of a simulation: its state, what it fits, and its file."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from file_access.content import FileError, read_file
+from robot_sim.plain_data import pack, unpack
+from robot_sim.state_dict import StateError
+
+MAGIC = b"robot snapshot 1\n"
+DIGEST = 32  # [bytes], of SHA-256
+LARGEST = 256 * 2**20  # [bytes] of a file
+
+
+class SnapshotError(ValueError):
+    """A snapshot can't be read or restored; the text says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """All that decides the future of a simulation.
+
+    Attributes:
+        fits: what has to be the same where it is restored: engine, models, controllers that run.
+        state: the state of each part, by name: numbers, texts, bytes, arrays, lists and dictionaries.
+        is_foreign: whether it was read, so that nobody knows who has written it.
+    """
+
+    fits: dict[str, Any]
+    state: dict[str, Any]
+    is_foreign: bool = False
+
+    def whole(self) -> "Snapshot":
+        """Returns itself: it isn't kept elsewhere."""
+        return self
+
+    def to_bytes(self) -> bytes:
+        """Returns it as bytes, of this version of the format.
+
+        Raises:
+            StateError: if something in it isn't plain data.
+        """
+        content = pack([self.fits, self.state])
+        return MAGIC + hashlib.sha256(content).digest() + content
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """Returns the snapshot of bytes that `to_bytes` has returned, here or in another process.
+
+        Raises:
+            SnapshotError: if they are damaged, or of another version.
+        """
+        begin = len(MAGIC) + DIGEST
+        digest, content = data[len(MAGIC) : begin], data[begin:]
+        if not data.startswith(MAGIC):
+            raise SnapshotError("it is no snapshot, or one of another version")
+        if hashlib.sha256(content).digest() != digest:
+            raise SnapshotError("the snapshot is damaged or incomplete")
+        try:
+            fits, state = unpack(content)
+        except (StateError, TypeError, ValueError) as error:
+            raise SnapshotError(f"the snapshot can't be read: {error}") from error
+        if not (isinstance(fits, dict) and isinstance(state, dict)):
+            raise SnapshotError("the snapshot can't be read: it isn't made of names and states")
+        return cls(fits, state, is_foreign=True)
+
+    def save(self, path: Path | str) -> None:
+        """Writes it to a file.
+
+        Raises:
+            StateError: if something in it isn't plain data.
+            OSError: if the file can't be written.
+        """
+        Path(path).write_bytes(self.to_bytes())
+
+    @classmethod
+    def load(cls, path: Path | str) -> Self:
+        """Returns the snapshot of a file.
+
+        Raises:
+            SnapshotError: if it is damaged, too large, or of another version.
+            OSError: if it can't be read.
+        """
+        try:
+            return cls.from_bytes(read_file(Path(path), LARGEST))
+        except (FileError, SnapshotError) as error:
+            raise SnapshotError(f"{path}: {error}") from error
