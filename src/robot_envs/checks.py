@@ -3,7 +3,7 @@
 import math
 import operator
 import textwrap
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import gymnasium
@@ -12,11 +12,12 @@ import numpy as np
 from file_access.text import did_you_mean
 from robot_envs.errors import TaskError
 from robot_envs.robot import Robot
+from robot_envs.snapshot import EnvSnapshot
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
 FLAGS = (bool, np.bool_)
-RESET_OPTIONS = ("initial_state", "goal")
+RESET_OPTIONS = ("initial_state", "snapshot", "goal")
 WANTED: dict[Any, str] = {
     FLAGS: "True or False",
     dict: "a dict",
@@ -41,6 +42,10 @@ def reset_options(task: Task, options: dict[str, Any]) -> dict[str, Any]:
             raise ValueError(f"reset knows no option '{name}'{did_you_mean(name, RESET_OPTIONS)}")
     if "goal" in options and not isinstance(task, GoalTask):
         raise ValueError(f"{type(task).__name__} has no goal; only a GoalTask does")
+    if isinstance(options.get("snapshot"), Iterator):  # a vector's: one for each
+        options = {**options, "snapshot": next(options["snapshot"])}
+    if "snapshot" in options and not isinstance(options["snapshot"], EnvSnapshot):
+        raise ValueError(f"snapshot is what save_state() returns, not {options['snapshot']!r:.100}")
     if not isinstance(options.get("initial_state", InitialState()), InitialState):
         raise ValueError(f"initial_state is an InitialState, not {options['initial_state']!r}")
     return options

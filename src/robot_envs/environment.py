@@ -11,11 +11,10 @@ from gymnasium.utils.env_checker import data_equivalence
 from robot_envs import checks
 from robot_envs.backends import LOCKSTEP, OWN, REALTIME, make_backend
 from robot_envs.backends.backend import RobotBackend, side_by_side
-from robot_envs.errors import SimulatorError
 from robot_envs.pictures.drawn import HEIGHT, WIDTH
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.snapshot import SavedEnv
+from robot_envs.snapshot import EnvSnapshot, SavedEnv
 from robot_envs.task import GoalTask, Task, Unrewarded
 from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Noise, Sensor
@@ -50,8 +49,8 @@ class RobotEnv(SavedEnv):
     `side_by_side(count)` starts, and ends, their simulators at the same time.
 
     With a `GoalTask` it is a goal environment: observations are dicts, and it has `compute_reward`.
-    `reset(options={...})` takes "initial_state", an `InitialState` in place of the task's, and for a
-    `GoalTask` "goal".
+    `reset(options={...})` takes "initial_state", an `InitialState` in place of the task's, "snapshot", an
+    `EnvSnapshot` where the episode begins instead, and for a `GoalTask` "goal".
 
     Args:
         robot: The robot, or several that share a world.
@@ -215,7 +214,7 @@ class RobotEnv(SavedEnv):
 
         Args:
             seed: Restarts the stream of random numbers; None continues it.
-            options: "initial_state", and for a `GoalTask` "goal"; see the class.
+            options: "initial_state", "snapshot", and for a `GoalTask` "goal"; see the class.
 
         Raises:
             gymnasium.error.ClosedEnvironmentError: After `close()`.
@@ -232,13 +231,9 @@ class RobotEnv(SavedEnv):
             self._vary(variation)
         # Drawn even if it isn't used: streams stay the same.
         drawn = self.task.initial_state(self.np_random)
-        self._initial = initial = options.get("initial_state", drawn)
+        start = options.get("snapshot", options.get("initial_state", drawn))
         seed = int(self.np_random.integers(1, MOST_SEED)) if self._has_sensors else 0
-        state = self.backend.reset(initial, seed)
-        self._first = self.scene.commands(initial.commands)
-        if self._first:
-            state = state._replace(commands={**state.commands, **self._first})
-        self._state = state
+        self._state = state = self._begin(start, seed)
         if self._actuator is not None:
             self._actuator.begin(state.commands)
         if self._goal_task is not None:
@@ -252,6 +247,14 @@ class RobotEnv(SavedEnv):
             **checks.checked(self.task, "info", self._evaluator.info(state), dict),
             **info,
         }
+
+    def _begin(self, start: InitialState | EnvSnapshot, seed: int) -> WorldState:
+        if isinstance(start, EnvSnapshot):
+            return self._begin_at(start, seed)
+        self._initial = start
+        state = self.backend.reset(start, seed)
+        self._first = self.scene.commands(start.commands)
+        return state._replace(commands={**state.commands, **self._first}) if self._first else state
 
     def _shown(self, state: WorldState) -> WorldState:
         """Returns what `apply` and `observe` see of a state: as much as where the policy is deployed."""
@@ -332,14 +335,9 @@ class RobotEnv(SavedEnv):
     def __reduce__(self) -> Any:
         raise TypeError("an environment can't be copied or pickled; save_state() takes a snapshot")
 
-
     def close(self) -> None:
         """Closes the backend and the page; may be called twice."""
         self._closed = True
         self._steps = self._begun = None
         self._end_drawing()
         self.backend.close()
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise gymnasium.error.ClosedEnvironmentError("this environment is closed; make another")

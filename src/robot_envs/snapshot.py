@@ -13,7 +13,7 @@ from robot_envs.task import Task
 from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Sensor
 from robot_envs.world_state import InitialState, WorldState
-from robot_sim.plain_data import Difference, differences, misfit
+from robot_sim.plain_data import Difference, differences, misfit, resolve
 from robot_sim.snapshot import Snapshot, SnapshotError
 from robot_sim.state_dict import StateError, load, state_of
 
@@ -60,7 +60,7 @@ class EnvSnapshot:
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
-        """Returns the snapshot of a file; raises as `from_bytes`, and OSError if it can't be read."""
+        """Returns the snapshot of a file; raises as `from_bytes`."""
         return cls._parted(Snapshot.load(path))
 
     def _joined(self) -> Snapshot:
@@ -99,6 +99,7 @@ class SavedEnv(DrawnEnv):
     _first: dict[str, Any]  # commands that go along with an episode's first action
     _initial: InitialState
     _steps: int | None  # None: no episode is under way
+    _closed: bool
     _begun: Any  # the step that is under way
 
     def save_state(self) -> EnvSnapshot:
@@ -132,7 +133,9 @@ class SavedEnv(DrawnEnv):
         self._check_open()
         if not isinstance(snapshot, EnvSnapshot):
             raise ValueError(f"it isn't a snapshot of an environment: {snapshot!r:.100}")
-        if different := [name for name, own in self._fits.items() if snapshot.fits.get(name) != own]:
+        if different := [
+            name for name, own in self._fits.items() if snapshot.fits.get(name) != own
+        ]:
             theirs, own = snapshot.fits.get(different[0]), self._fits[different[0]]
             raise ValueError(
                 f"the snapshot is of another environment: its {different[0]} is {theirs!r:.100}, not {own!r}"
@@ -142,9 +145,10 @@ class SavedEnv(DrawnEnv):
             return
         before = None if self._state is None or self._begun is not None else self.save_state()
         try:
-            if before is not None and (fault := misfit(before.state, snapshot.state)):
+            state = resolve(snapshot.state)
+            if before and (fault := misfit({**before.state, "parts": None}, state)):
                 raise SimulatorError(f"the snapshot can't be restored: {fault}")
-            self._load(snapshot)
+            self._load(EnvSnapshot(snapshot.fits, state, snapshot.world))
         except Exception as error:  # whatever a forged state leads to
             if before is not None:
                 self._load(before)
@@ -166,6 +170,17 @@ class SavedEnv(DrawnEnv):
             raise SimulatorError(str(error)) from error
         self._show()
 
+    def _begin_at(self, snapshot: EnvSnapshot, seed: int) -> WorldState:
+        """Begins an episode in the snapshot's world; task, noise and random numbers are this one's own."""
+        variation = resolve(snapshot.state["variation"])
+        if variation != self._variation:
+            self._vary(variation)
+        self._initial, self._first = resolve(snapshot.state["initial"]), {}
+        try:
+            return self.backend.begin_at(snapshot.world, seed)
+        except SnapshotError as error:
+            raise SimulatorError(str(error)) from error
+
     def _parts(self) -> dict[str, Any]:
         """Returns all but the world that has a state, by name."""
         parts = {
@@ -178,7 +193,9 @@ class SavedEnv(DrawnEnv):
     def _fits(self) -> dict[str, Any]:
         """What has to be the same where its snapshots are restored."""
         kind = type(self.task)
-        imperfect = [each for each in ("sensor", "actuator", "randomisation") if each in self._parts()]
+        imperfect = [
+            each for each in ("sensor", "actuator", "randomisation") if each in self._parts()
+        ]
         return {
             "task": f"{kind.__module__}.{kind.__qualname__}", "control period": self.control_period,
             "imperfections": imperfect,
@@ -187,3 +204,7 @@ class SavedEnv(DrawnEnv):
     def _vary(self, variation: Variation) -> None:
         self._variation = variation
         self.backend.vary(variation)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise gymnasium.error.ClosedEnvironmentError("this environment is closed; make another")

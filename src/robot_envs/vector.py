@@ -1,7 +1,7 @@
 """Vector environments: what `gymnasium.make_vec` makes of every environment of this library."""
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -88,9 +88,18 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Starts an episode in each, or in those that `options["reset_mask"]` names; see `SyncVectorEnv`."""
-        of_all = options is None or "reset_mask" not in options
-        given = super().reset(seed=seed, options=None if options is None else dict(options))
+        """Starts an episode in each, or in those that `options["reset_mask"]` names; see `SyncVectorEnv`.
+
+        `options["snapshot"]` is one for all, or a list of one for each of them.
+        """
+        options = dict(options or {})
+        of_all = "reset_mask" not in options
+        if isinstance(snapshots := options.get("snapshot"), Sequence):
+            count = self.num_envs if of_all else int(np.sum(options["reset_mask"]))
+            if len(snapshots) != count:
+                raise ValueError(f"{len(snapshots)} snapshots for {count} environments")
+            options["snapshot"] = iter(snapshots)
+        given = super().reset(seed=seed, options=options or None)
         if of_all:
             self._interrupted = False
         return given
@@ -125,7 +134,7 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
     def restore_state(self, snapshot: VectorSnapshot) -> None:
         """Returns to a snapshot of this vector; see `RobotEnv.restore_state`."""
         if not isinstance(snapshot, VectorSnapshot) or len(snapshot.states) != self.num_envs:
-            raise ValueError("the snapshot is of another vector; only that one can restore it")
+            raise ValueError(f"it is no snapshot of a vector of {self.num_envs} environments")
         for robot, state in zip(self._robots, snapshot.states, strict=True):
             robot.restore_state(state)
         self._autoreset_envs = snapshot.ended.copy()

@@ -8,7 +8,6 @@ from typing import Any
 from xml.etree.ElementTree import Element
 
 from robot_sim.physics.description import Joint, Link, Mesh, ModelDescription, Shape
-from robot_sim.physics.pose import Pose
 from robot_sim.physics.world import World
 from robot_sim.robot import ControlledRobot
 
@@ -23,13 +22,15 @@ LEFT_OUT: Mapping[type, frozenset[str]] = {
 def fingerprint(world: World, robots: Sequence[ControlledRobot]) -> dict[str, Any]:
     """Returns what snapshots of a world fit, as plain data.
 
-    Controllers that claim no joint, such as those that publish, may differ.
+    Controllers that claim no joint, such as those that publish, may differ. So may planes: a world without
+    ROS has none where nothing reaches them.
     """
     return {
         "engine": type(world.engine).__name__.removesuffix("Engine"),
         "models": {
             name: _digest((model.description, model.initial_pose))
             for name, model in world.models.items()
+            if not model.description.is_plane
         },
         "robots": [
             {
@@ -59,7 +60,9 @@ def misfits(given: Mapping[str, Any], here: Mapping[str, Any]) -> str:
         there = sorted(map(str, models)) if isinstance(models, dict) else "?"
         return f"the snapshot has the models {there}, and here are {sorted(own)}"
     if others := [name for name in own if models[name] != own[name]]:
-        return f"the model '{others[0]}' has another description or initial pose than in the snapshot"
+        return (
+            f"the model '{others[0]}' has another description or initial pose than in the snapshot"
+        )
     if given.get("robots") != here["robots"]:
         return (
             "the controllers that run aren't those of the snapshot: "

@@ -1,10 +1,11 @@
 """MessagePack of plain data: numbers, texts, bytes, NumPy arrays, and containers and records of these.
 
-Records are named tuples and data classes, written with their class's name and their fields. Reading runs no
-code of theirs, and makes only classes that this process has imported already. What is read takes no more
-than some hundred times the memory of its bytes, and is nested at most `DEEPEST` times.
+Records are named tuples and data classes, written with their class's name and their fields. Reading imports
+nothing and runs no code of theirs: what this process doesn't know stays a `Record`. What is read takes no
+more than some hundred times the memory of its bytes, and is nested at most `DEEPEST` times.
 """
 
+import re
 import sys
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -32,6 +33,14 @@ class Difference(NamedTuple):
         return f"{self.place}: {self.first!r:.80} and {self.second!r:.80}"
 
 
+class Record(NamedTuple):
+    """A record whose class this process hasn't imported."""
+
+    module: str
+    name: str
+    fields: Any
+
+
 def pack(value: Any) -> bytes:
     """Returns the bytes of plain data.
 
@@ -53,6 +62,32 @@ def unpack(data: bytes) -> Any:
     return _unpack(data, 0)
 
 
+def resolve(value: Any) -> Any:
+    """Returns the same plain data, with the records of classes that have been imported since.
+
+    Raises:
+        StateError: if a class is still unknown.
+    """
+    resolved = unpack(pack(value))
+    if record := next(_unknown(resolved), None):
+        raise StateError(f"there is no class {record.module}.{record.name}"[:300])
+    return resolved
+
+
+def _unknown(value: Any) -> Iterator[Record]:
+    if isinstance(value, Record):
+        yield value
+    elif isinstance(value, dict):
+        for each in value.values():
+            yield from _unknown(each)
+    elif isinstance(value, (list, tuple, deque)):
+        for each in value:
+            yield from _unknown(each)
+    elif hasattr(value, "__dataclass_fields__"):
+        for name in value.__dataclass_fields__:
+            yield from _unknown(getattr(value, name))
+
+
 def _extension(value: Any) -> msgpack.ExtType:
     kind: Any = type(value)
     if kind is tuple:
@@ -67,6 +102,8 @@ def _extension(value: Any) -> msgpack.ExtType:
         return msgpack.ExtType(INTEGER, value.to_bytes(size, "little", signed=True))
     if kind is deque:
         return msgpack.ExtType(DEQUE, pack([value.maxlen, list(value)]))
+    if kind is Record:
+        return msgpack.ExtType(RECORD, pack(list(value)))
     if isinstance(value, dict):
         fields: Any = dict(value)
     elif hasattr(kind, "_fields"):
@@ -90,8 +127,8 @@ def _unpack(data: bytes, depth: int) -> Any:
             return tuple(given)
         if code == ARRAY:
             dtype, shape, is_writeable, numbers = given
-            content = bytearray(numbers) if is_writeable else numbers
-            return np.frombuffer(content, _dtype(dtype)).reshape(shape)
+            memory: Any = bytearray(numbers) if is_writeable else numbers
+            return np.frombuffer(memory, _dtype(dtype)).reshape(shape)
         if code == SCALAR:
             dtype, number = given
             return np.frombuffer(number, _dtype(dtype), 1)[0]
@@ -111,22 +148,25 @@ def _unpack(data: bytes, depth: int) -> Any:
 
 
 def _dtype(name: Any) -> np.dtype[Any]:
-    dtype = np.dtype(name) if isinstance(name, str) and len(name) < 8 else None
-    if dtype is None or dtype.kind not in "biufSU" or dtype.str != name:
+    if not (isinstance(name, str) and re.fullmatch(r"[<>|][biufSU]\d{1,4}", name)):
         raise StateError(f"it has an array of type {name!r:.50}")
-    return dtype
+    return np.dtype(name)
 
 
 def _record(module: Any, name: Any, fields: Any) -> Any:
     """Makes a record; no code of its class runs."""
-    kind: Any = sys.modules.get(module) if isinstance(module, str) else None
-    for part in name.split(".") if isinstance(name, str) else ():
+    if not (isinstance(module, str) and isinstance(name, str)):
+        raise StateError("it has a record without a class")
+    kind: Any = sys.modules.get(module)
+    for part in name.split("."):
         kind = getattr(kind, "__dict__", {}).get(part)
     if isinstance(kind, type) and (kind.__module__, kind.__qualname__) == (module, name):
+        if kind is Record:
+            raise StateError("it has a record of records")
         if issubclass(kind, dict) and isinstance(fields, dict):
-            made = dict.__new__(kind)
-            dict.update(made, fields)
-            return made
+            entries: dict[Any, Any] = dict.__new__(kind)
+            dict.update(entries, fields)
+            return entries
         names = getattr(kind, "_fields", None) or getattr(kind, "__dataclass_fields__", ())
         if names and isinstance(fields, list) and len(fields) == len(names):
             if issubclass(kind, tuple):
@@ -135,7 +175,8 @@ def _record(module: Any, name: Any, fields: Any) -> Any:
             for each, value in zip(names, fields, strict=True):
                 object.__setattr__(made, each, value)
             return made
-    raise StateError(f"it has a record of an unknown class {module!r:.100}, {name!r:.100}")
+        raise StateError(f"it has a wrong record of {module}.{name}"[:300])
+    return Record(module, name, fields)
 
 
 def misfit(there: Any, given: Any, place: str = "") -> str:
@@ -146,7 +187,8 @@ def misfit(there: Any, given: Any, place: str = "") -> str:
     if type(there) in numbers and type(given) in numbers:
         counts = isinstance(given, int) and abs(there) < LARGEST  # generators have larger numbers
         return f"{place} is {given}" if counts and abs(given) >= LARGEST else ""
-    if type(there) is not type(given):
+    both = type(there), type(given)
+    if both[0] is not both[1] and set(both) != {list, tuple}:
         return f"{place} is a {type(given).__name__}, not a {type(there).__name__}"
     if isinstance(there, np.ndarray) and (there.dtype, there.ndim) != (given.dtype, given.ndim):
         return f"{place} is an array of {given.dtype}{list(given.shape)}"

@@ -13,7 +13,7 @@ from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose
 from robot_sim.physics.projection import place_link
 from robot_sim.physics.world import World
-from robot_sim.plain_data import is_finite, misfit
+from robot_sim.plain_data import is_finite, misfit, resolve
 from robot_sim.robot import ControlledRobot
 from robot_sim.snapshot import Snapshot, SnapshotError
 from robot_sim.state_dict import Shared, StateError, load, state_of
@@ -323,12 +323,13 @@ class Simulator(Shared):
             return
         before = self.save_state().state
         try:
-            if fault := misfit(before, snapshot.state):
+            state = resolve(snapshot.state)
+            if fault := misfit(_checked(before), _checked(state)):
                 raise SnapshotError(fault)
-            if not all(is_finite(own["motion"]) for own in snapshot.state["world"]["models"].values()):
+            if not all(is_finite(own["motion"]) for own in state["world"]["models"].values()):
                 raise SnapshotError("positions or velocities aren't finite")
-            self.world.check_state(snapshot.state["world"])
-            self._load(snapshot.state)
+            self.world.check_state(state["world"])
+            self._load(state)
         except Exception as error:  # whatever a forged state leads to
             self._load(before)
             raise SnapshotError(f"the snapshot can't be restored: {error!s:.300}") from error
@@ -403,3 +404,9 @@ class Simulator(Shared):
         for robot in self.robots:
             robot.write(dt)
         self.world.step()
+
+
+def _checked(state: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns of a state what has the same types at all times, unlike what controllers and plugins hold."""
+    robots = [{**robot, "manager": None} for robot in state["robots"]]
+    return {**state, "robots": robots, "parts": None}

@@ -80,8 +80,7 @@ class Snapshot:
         """Returns the snapshot of a file.
 
         Raises:
-            SnapshotError: if it is damaged, too large, or of another version.
-            OSError: if it can't be read.
+            SnapshotError: if it can't be read, is damaged, too large, or of another version.
         """
         try:
             return cls.from_bytes(read_file(Path(path), LARGEST))

@@ -195,6 +195,10 @@ def _saved(value: Any) -> Any:
         return {_key(key): _saved(each) for key, each in value.items()}
     if kind is deque:
         return deque(map(_saved, value), value.maxlen)
+    if isinstance(value, dict) and not hasattr(value, "__dict__"):  # one with other texts
+        entries: dict[Any, Any] = dict.__new__(kind)
+        dict.update(entries, {_key(key): _saved(each) for key, each in value.items()})
+        return entries
     if kind is np.ndarray and not value.dtype.hasobject:
         return value.copy() if value.flags.writeable else value
     if isinstance(value, np.generic) and not value.dtype.hasobject:
@@ -240,10 +244,15 @@ def _of_generator(value: Any) -> dict[str, Any]:
     kind = type(bits).__name__
     if kind not in BIT_GENERATORS:
         raise _Unknown(f"a generator of type {kind}")
-    seeds, known = bits.seed_seq, None
-    if type(seeds) is np.random.SeedSequence:
-        known = [seeds.entropy, seeds.spawn_key, seeds.pool_size, seeds.n_children_spawned]
-    return {GENERATOR: kind, "state": _saved(bits.state), "seeds": known}
+    return {GENERATOR: kind, "state": _saved(bits.state), "seeds": _seeds(bits)}
+
+
+def _seeds(bits: Any) -> list[Any] | None:
+    """Returns what a generator spawns others from."""
+    seeds = bits.seed_seq
+    if type(seeds) is not np.random.SeedSequence:
+        return None
+    return [seeds.entropy, seeds.spawn_key, seeds.pool_size, seeds.n_children_spawned]
 
 
 def _nothing(part: Any, state: Any) -> None:
@@ -308,7 +317,7 @@ def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
     target = current if is_same else np.random.Generator(getattr(np.random, kind)())
     bits: Any = target.bit_generator
     seeds = saved["seeds"]
-    if seeds is None or (is_same and seeds[-1] == bits.seed_seq.n_children_spawned):
+    if seeds is None or seeds == _seeds(bits):
         bits.state = state
         return target
     entropy, spawn_key, pool_size, spawned = seeds

@@ -14,6 +14,7 @@ from bullet_gazebo_msgs.srv import (
     SaveStateResponse,
 )
 
+from bullet_gazebo.common.node_process import seed_random_numbers
 from bullet_gazebo.services import ServiceRefused, offer
 from bullet_gazebo.services.step_service import StepService
 from file_access.text import did_you_mean
@@ -83,17 +84,22 @@ class SnapshotServices:
     def _find(self, name: str) -> Snapshot:
         if name not in self._kept:
             raise ServiceRefused(
-                f"no state '{name}' is kept{did_you_mean(name, self._kept)}; it was forgotten, or never saved "
-                "in this simulator"
+                f"no state '{name}' is kept{did_you_mean(name, self._kept)}; it was forgotten, or never "
+                "saved in this simulator"
             )
         return self._kept[name]
 
     def _restore(self, request: RestoreStateRequest) -> str:
         with self._one_at_a_time, self._sim.lock:
             try:
-                given = Snapshot.from_bytes(request.data) if request.data else self._find(request.name)
+                given = (
+                    Snapshot.from_bytes(request.data) if request.data else self._find(request.name)
+                )
                 self._sim.await_holds()
                 self._sim.restore_state(given)
+                if request.seed:
+                    seed_random_numbers(request.seed, tell=False)
+                    self._sim.reseed(request.seed)
             except (SnapshotError, StateError) as error:
                 raise ServiceRefused(str(error)) from error
             if request.data and request.name:

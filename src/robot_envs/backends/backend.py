@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
@@ -68,6 +68,10 @@ class RobotBackend(Protocol):
 
     def restore_state(self, state: WorldSnapshot) -> None:
         """Returns to what `save_state` of a backend has returned; the same commands lead to the same bits."""
+        ...
+
+    def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
+        """Begins an episode where a snapshot is; returns the state reached. `seed` as in `reset`."""
         ...
 
     def poses(self, links: Sequence[str]) -> list[Pose]:

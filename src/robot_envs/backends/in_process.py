@@ -244,6 +244,13 @@ class InProcessWorld(RobotBackend):
         episode = snapshot.state["episode"]
         self._held, self._begin = episode["held"], episode["begun"]
 
+    def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
+        self.restore_state(state)
+        if seed:
+            self._sim.reseed(seed)
+        self._begin = self._sim.now
+        return self._state()
+
     def poses(self, links: Sequence[str]) -> list[Pose]:
         with _refusals():
             pairs = [find_link(self._sim.world, name) for name in links]

@@ -316,6 +316,12 @@ class ModelDescription:
         return self.static or bool(self.world_joints)
 
     @property
+    def is_plane(self) -> bool:
+        """Whether it is just a plane."""
+        shapes = [shape for link in self.links.values() for shape in link.collisions]
+        return len(self.links) == len(shapes) == 1 and shapes[0].kind == "plane"
+
+    @property
     def movable_joints(self) -> list[Joint]:
         return [joint for joint in self.joints.values() if joint.movable]
 

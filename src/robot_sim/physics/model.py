@@ -287,7 +287,8 @@ class Model(Shared):
 
     def properties(self) -> tuple[object, ...]:
         """Returns what services change of it: what a snapshot of the world doesn't bring back."""
-        links, joints = self.description.links, self.description.joints
+        links = {} if self.description.static else self.description.links
+        joints = self.description.joints
         return (
             tuple([(link.inertia, link.gravity) for link in links.values()]),
             tuple([(each.kind, each.lower, each.upper, each.damping) for each in joints.values()]),

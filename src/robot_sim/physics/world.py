@@ -304,9 +304,10 @@ class World(Shared):
         return state
 
     def _order(self) -> list[str]:
-        """Returns the names of the models in the engine's order."""
-        names = {id(model.body): name for name, model in self.models.items()}
-        return [names[id(body)] for body in self.engine.order()]
+        """Returns the names of the models in the engine's order, without planes (`fingerprint`)."""
+        solid = [model for model in self.models.values() if not model.description.is_plane]
+        names = {id(model.body): model.name for model in solid}
+        return [names[id(body)] for body in self.engine.order() if id(body) in names]
 
     def _recall(self, contacts: Sequence[Contact]) -> None:
         self.engine.forget_contacts()
@@ -330,7 +331,12 @@ class World(Shared):
                 "links have been changed since the snapshot, and the engine takes the models in another order"
             )
         attached = {name for each in state["attachments"] for name, _ in each[:2]}
+        touched = {side[0] for each in state["contacts"] for side in each[5:]}
+        if missing := sorted(touched - set(self.models)):
+            raise SnapshotError(f"something touches the model '{missing[0]}', which isn't here")
         for name, own in state["models"].items():
+            if name not in self.models:  # a plane
+                continue
             model = self.models[name]
             now = zip(PROPERTIES, model.properties(), own["properties"], strict=True)
             if changed := [name for name, one, other in now if one != other]:
@@ -353,7 +359,8 @@ class World(Shared):
         ]
         self.attachments = [known.get(each) or Attachment(*each) for each in made_of]
         for name, own in state["models"].items():
-            models[name].load_state_dict(own)
+            if name in models:
+                models[name].load_state_dict(own)
         self._recall(
             [
                 Contact(*each[:5], *(Side(models[name].body, *rest) for name, *rest in each[5:]))

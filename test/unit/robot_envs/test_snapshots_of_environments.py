@@ -2,15 +2,18 @@
 
 import copy
 import pickle
+from dataclasses import replace
 
 import gymnasium
+import numpy as np
 import pytest
 
 import cartpole  # noqa: F401 - registers the environments
 from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
-from robot_envs import RobotEnv, SimulatorError
+from robot_envs import EnvSnapshot, InitialStates, RobotEnv, SimulatorError, diff
 from robot_envs.variation import Variation
+from robot_sim.snapshot import SnapshotError
 
 
 class Remembering(BalanceTask):
@@ -153,16 +156,12 @@ def test_varied_robots_are_varied_as_they_were():
     env.close()
 
 
-def test_environments_and_snapshots_are_neither_copied_nor_pickled(made):
+def test_environments_are_neither_copied_nor_pickled(made):
     env = made()
     env.reset(seed=0)
-    for each, words in (
-        (env, "environment .* save_state"),
-        (env.save_state(), "snapshot .* restore"),
-    ):
-        for use in (copy.copy, copy.deepcopy, pickle.dumps):
-            with pytest.raises(TypeError, match=f"^an? {words}"):
-                use(each)
+    for use in (copy.copy, copy.deepcopy, pickle.dumps):
+        with pytest.raises(TypeError, match="^an environment can't be .* save_state"):
+            use(env)
     wrapped = gymnasium.make("cartpole/Balance-v0")
     with pytest.raises(TypeError, match="^an environment can't be copied or pickled"):
         copy.deepcopy(wrapped)
@@ -170,13 +169,25 @@ def test_environments_and_snapshots_are_neither_copied_nor_pickled(made):
 
 
 def test_refusals_name_the_reason(made):
-    env, other = made(), made()
+    env, other = made(), made(sensor_noise=0.1)
     with pytest.raises(gymnasium.error.ResetNeeded):
         env.save_state()
     env.reset(seed=1)
     other.reset(seed=1)
-    with pytest.raises(ValueError, match="another environment"):
-        other.restore_state(env.save_state())
+    snapshot = env.save_state()
+    with pytest.raises(ValueError, match=r"another environment: its imperfections .*\[\].*sensor"):
+        other.restore_state(snapshot)
+    with pytest.raises(ValueError, match="another environment: its task"):
+        made(Remembering).restore_state(snapshot)
+    with pytest.raises(ValueError, match="it isn't a snapshot"):
+        env.restore_state(snapshot.to_bytes())
+    mujoco = made(backend="mujoco")
+    with pytest.raises(SimulatorError, match="the engine Bullet, and here is Mujoco"):
+        mujoco.restore_state(snapshot)
+    arm = RobotEnv(replace(ROBOT, name="other"), BalanceTask())
+    with pytest.raises(SimulatorError, match=r"models \['cartpole'\], and here are \['other'\]"):
+        arm.restore_state(snapshot)
+    arm.close()
     env.begin_step(env.action_space.sample())
     with pytest.raises(gymnasium.error.ResetNeeded):
         env.save_state()
@@ -189,6 +200,78 @@ def test_refusals_name_the_reason(made):
     unreadable.reset(seed=1)
     with pytest.raises(SimulatorError, match="Reading.lines.*generator"):
         unreadable.save_state()
+
+
+def test_another_environment_goes_on_from_a_file(made, tmp_path):
+    env, other = made(sensor_noise=0.01, sensor_delay=2), made(sensor_noise=0.01, sensor_delay=2)
+    env.reset(seed=1)
+    returns(env, 7)
+    env.save_state().save(tmp_path / "hard.snapshot")
+    first = returns(env)
+    other.restore_state(EnvSnapshot.load(tmp_path / "hard.snapshot"))  # before any reset
+    assert returns(other) == first
+    other.reset(seed=5)
+    other.restore_state(EnvSnapshot.load(tmp_path / "hard.snapshot"))
+    assert returns(other) == first
+    with pytest.raises(SnapshotError, match=r"none\.snapshot: .*No such file"):
+        EnvSnapshot.load(tmp_path / "none.snapshot")
+
+
+def test_an_episode_begins_at_a_snapshot(made):
+    env = made(max_steps=5)
+    env.reset(seed=1)
+    returns(env, 3)
+    snapshot, there = env.save_state(), env.state
+    observation, info = env.reset(seed=7, options={"snapshot": snapshot})
+    assert env.state.time == 0.0 and env.state.joints == there.joints
+    np.testing.assert_array_equal(observation, env.task.observe(there))
+    assert isinstance(info, dict) and len(returns(env, 5)) == 5  # it has all its steps
+    assert env.state.time == pytest.approx(5 * env.control_period)
+    for wrong in (None, snapshot.to_bytes()):
+        with pytest.raises(ValueError, match="snapshot is what save_state"):
+            env.reset(options={"snapshot": wrong})
+
+
+class HardPlaces(BalanceTask):
+    """Begins where it has been saved."""
+
+    def __init__(self):
+        super().__init__()
+        self.places = None
+
+    def initial_state(self, rng):
+        return super().initial_state(rng) if self.places is None else self.places.draw(rng)
+
+
+def test_a_tasks_episodes_begin_at_saved_states(made, tmp_path):
+    env = made(HardPlaces)
+    seen = []
+    for number in range(3):
+        env.reset(seed=number)
+        returns(env, 3)
+        seen.append(env.state.joints)
+        env.save_state().save(tmp_path / f"{number}.snapshot")
+    with pytest.raises(ValueError, match="no snapshot"):
+        InitialStates(tmp_path / "nowhere")
+    env.task.places = InitialStates(tmp_path)
+    begun = []
+    for seed in range(20):
+        env.reset(seed=seed)
+        begun.append(env.state.joints)
+        assert env.reset(seed=seed)[0].tolist() == env.task.observe(env.state).tolist()
+    assert all(each in begun for each in seen) and all(each in seen for each in begun)
+
+
+def test_differences_are_named_with_their_values(made):
+    env = made()
+    env.reset(seed=1)
+    one = env.save_state()
+    assert diff(one, EnvSnapshot.from_bytes(one.to_bytes())) == []
+    env.step(1)
+    found = {each.place: each for each in diff(one, env.save_state())}
+    assert found["now"].second - found["now"].first == 8_000_000
+    assert str(found["environment/steps"]) == "environment/steps: 0 and 1"
+    assert any(place.startswith("world/models/cartpole/motion/joints") for place in found)
 
 
 def test_a_task_with_an_environment_among_what_is_saved_is_refused():

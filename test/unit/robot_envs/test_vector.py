@@ -155,7 +155,13 @@ def test_all_go_on_from_a_snapshot_with_the_ends_of_their_episodes(many):
         vector.restore_state(snapshot)
         again = [vector.step(row) for row in actions]
         assert all(same(a, b, exact=True) for a, b in zip(first, again, strict=True))
-    other = many(num_envs=COUNT).unwrapped
-    other.reset(seed=1)
-    with pytest.raises(ValueError, match="of another environment"):
+    other = many(num_envs=COUNT + 1).unwrapped
+    with pytest.raises(ValueError, match=f"of {COUNT + 1} environments"):
         other.restore_state(snapshot)
+    there = [each.state["state"].joints for each in snapshot.states]
+    other.reset(options={"snapshot": snapshot.states[0]})
+    assert [env.state.joints for env in other.envs] == [there[0]] * (COUNT + 1)
+    other.reset(options={"snapshot": [*snapshot.states, snapshot.states[1]]})
+    assert [env.state.joints for env in other.envs] == [*there, there[1]]
+    with pytest.raises(ValueError, match=f"2 snapshots for {COUNT + 1} environments"):
+        other.reset(options={"snapshot": snapshot.states[:2]})

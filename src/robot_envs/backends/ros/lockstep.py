@@ -271,21 +271,28 @@ class LockstepWorld(RobotBackend):
         whole.state["episode"] = kept.episode
         return whole
 
-    def restore_state(self, state: WorldSnapshot) -> None:
+    def restore_state(self, state: WorldSnapshot, seed: int = 0) -> None:
         """See `RobotBackend.restore_state`; another simulator's goes there as bytes."""
         self._drop()
         if isinstance(state, KeptSnapshot) and state.of is self:
             self._world.check_holder(self)
-            self._succeed(self._restore, RestoreStateRequest(name=state.name))
+            self._succeed(self._restore, RestoreStateRequest(name=state.name, seed=seed))
             episode = state.episode
         else:
             whole = state.whole()
             with self._simulator:
                 self._world.claim(self)
             self._look(self._names)  # sensors that states have are read from now on
-            self._succeed(self._restore, RestoreStateRequest(data=whole.to_bytes()))
+            request = RestoreStateRequest(data=whole.to_bytes(), seed=seed)
+            self._succeed(self._restore, request)
             episode = whole.state["episode"]
         self._begun, self._held = episode["begun"], episode["held"]
+
+    def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
+        self.restore_state(state, seed)
+        begun = self._look(self._names)
+        self._begun = begun.now
+        return self._state(begun)
 
     def _succeed(self, call: SimulatorService, request: Any) -> Any:
         answer = self._call(call, request)

@@ -4,10 +4,11 @@ import contextlib
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TypeVar
 
 from robot_envs.backends import backend
-from robot_envs.backends.backend import RobotBackend, ticks_per_action
+from robot_envs.backends.backend import RobotBackend, WorldSnapshot, ticks_per_action
 from robot_envs.backends.ros.bringup import bring_up
 from robot_envs.backends.ros.lockstep import KeptSnapshot, LockstepWorld
 from robot_envs.backends.ros.own_simulator import OwnSimulator, check_memory
@@ -19,6 +20,7 @@ from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
 from robot_sim.constants import NANOSECONDS
 from robot_sim.physics.pose import Pose
+from robot_sim.snapshot import Snapshot
 from ros_calls import master
 
 DEADLINE = (
@@ -29,6 +31,8 @@ SEED = 0  # of the simulator's own random numbers, as for the backend "ros"
 
 logger = logging.getLogger(f"rosout.{__name__}")
 Result = TypeVar("Result")
+Begin = Callable[[LockstepWorld], WorldState | None]
+"""Brings a simulator to where an episode begins; returns the state, if it knows."""
 
 
 @dataclass
@@ -36,15 +40,15 @@ class Journal:
     """What the simulator was asked since the episode began: enough to bring another one to the same state."""
 
     variation: Variation = field(default_factory=Variation)  # all that were applied, merged
-    initial: InitialState | None = None  # None: no episode has begun
-    commands: list[Commands] = field(default_factory=list)  # of each step
+    begin: Begin | None = None  # None: no episode has begun
+    begun: int = 0  # [ns] of the episode that had passed then
+    commands: list[Commands] = field(default_factory=list)  # of each step since
     saves: list[int] = field(default_factory=list)  # steps before each snapshot: it changes bits
     last: WorldState | None = None  # the state after them
-    seed: int = 0  # of the sensors' noise
 
     def forget_episode(self) -> None:
         """Forgets all but the variation."""
-        self.initial, self.commands, self.saves, self.last = None, [], [], None
+        self.begin, self.begun, self.commands, self.saves, self.last = None, 0, [], [], None
 
     def copied(self) -> "Journal":
         """Returns a copy, to which later steps don't come."""
@@ -62,15 +66,15 @@ class Journal:
         """
         if not self.variation.is_nominal:
             world.vary(self.variation)
-        if self.initial is None or self.last is None:
+        if self.begin is None:
             return
-        state = checked(world.reset(self.initial, self.seed), 0)
+        state = self.begin(world)
         self._save(world, 0)
         for count, commands in enumerate(self.commands, 1):
-            state = checked(world.act(commands), count * step)
+            state = checked(world.act(commands), self.begun + count * step)
             self._save(world, count)
-        if repr(state) == repr(self.last):  # shows all bits of a number, and tells -0.0 from 0.0
-            return
+        if state is None or self.last is None or repr(state) == repr(self.last):
+            return  # repr shows all bits of a number, and tells -0.0 from 0.0
         raise SimulatorFault(
             f"the same reset and {len(self.commands)} steps lead to another state, as where a plugin draws "
             f"random numbers: {_difference(state, self.last)}"
@@ -79,6 +83,19 @@ class Journal:
     def _save(self, world: LockstepWorld, count: int) -> None:
         for _ in range(self.saves.count(count)):
             world.save_state()
+
+
+@dataclass(frozen=True, eq=False)
+class JournalledSnapshot:
+    """A snapshot that a simulator keeps, and how another one comes to the same state."""
+
+    of: "OwnWorld"
+    kept: KeptSnapshot
+    journal: Journal
+
+    def whole(self) -> Snapshot:
+        """See `WorldSnapshot.whole`."""
+        return self.of.read(self.kept)
 
 
 def _difference(state: WorldState, last: WorldState) -> str:
@@ -182,10 +199,16 @@ class OwnWorld(RobotBackend):
 
     def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         """See `RobotBackend.reset`; the state reached is exactly the one asked for."""
+        return self._begin(lambda world: checked(world.reset(initial, seed), 0))
+
+    def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
+        whole = state.whole()
+        return self._begin(lambda world: checked(world.begin_at(whole, seed), 0))
+
+    def _begin(self, begin: Callable[[LockstepWorld], WorldState]) -> WorldState:
         self._journal.forget_episode()
-        state = self._perform(lambda world: checked(world.reset(initial, seed), 0))
-        journal = self._journal
-        journal.initial, journal.seed, journal.last = initial, seed, state
+        state = self._perform(begin)
+        self._journal.begin, self._journal.last = begin, state
         return state
 
     def begin(self, commands: Commands) -> None:
@@ -198,34 +221,49 @@ class OwnWorld(RobotBackend):
     def act(self, commands: Commands) -> WorldState:
         self._need_episode()
         journal = self._journal
-        then = (len(journal.commands) + 1) * self._step
+        then = journal.begun + (len(journal.commands) + 1) * self._step
         journal.last = self._perform(lambda world: checked(world.act(commands), then))
         journal.commands.append(commands)
         return journal.last
 
-    def save_state(self) -> tuple[KeptSnapshot, Journal]:
+    def save_state(self) -> "JournalledSnapshot":
         self._need_episode()
         kept = self._perform(lambda world: world.save_state())
         self._journal.saves.append(len(self._journal.commands))
-        return kept, self._journal.copied()
+        return JournalledSnapshot(self, kept, self._journal.copied())
 
-    def restore_state(self, state: tuple[KeptSnapshot, Journal]) -> None:
-        kept, journal = state
-        self._journal = journal.copied()
+    def restore_state(self, state: WorldSnapshot) -> None:
+        if isinstance(state, JournalledSnapshot) and state.of is self:
+            kept, journal = state.kept, state.journal.copied()
+        else:
+            whole = state.whole()
+            passed = whole.state["now"] - whole.state["episode"]["begun"]
+            begin = partial(LockstepWorld.restore_state, state=whole)
+            kept, journal = None, Journal(self._journal.variation, begin, passed)
 
         def restore(world: LockstepWorld) -> None:
-            if world is kept.of:
+            if kept is not None and world is kept.of:
                 world.restore_state(kept)
-            else:  # its simulator was replaced
+            else:  # another simulator's, or that one was replaced
                 journal.replay(world, self._step)
 
         self._perform(restore)
+        self._journal = journal
+
+    def read(self, kept: KeptSnapshot) -> Snapshot:
+        """Returns a snapshot that the simulator keeps; raises SimulatorError if it was replaced since."""
+        if self._world is not kept.of:
+            raise SimulatorError(
+                f"{self.simulator} has taken the place of the one that kept the snapshot"
+            )
+        with master.using(self.simulator.uri):
+            return kept.whole()
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         return self._perform(lambda world: world.poses(links))
 
     def _need_episode(self) -> None:
-        if self._journal.initial is None:
+        if self._journal.begin is None:
             raise SimulatorError(f"{self.simulator} has no episode; begin one with reset()")
 
     def _perform(self, action: Callable[[LockstepWorld], Result]) -> Result:

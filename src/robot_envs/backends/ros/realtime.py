@@ -15,7 +15,7 @@ from geometry_msgs.msg import Pose as PoseMsg
 from sensor_msgs.msg import JointState as JointStateMsg
 from std_srvs.srv import Empty
 
-from robot_envs.backends.backend import RobotBackend
+from robot_envs.backends.backend import RobotBackend, WorldSnapshot
 from robot_envs.backends.ros.bringup import command_publisher, full_name, ready
 from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.backends.ros.running import (
@@ -271,11 +271,14 @@ class RealtimeWorld(RobotBackend):
             self._world.claim(self)  # undoes what others have varied
         self._variation(variation)
 
-    def save_state(self) -> Any:
+    def save_state(self) -> WorldSnapshot:
         raise SimulatorError("a world in real time can't be saved; in lock-step it can")
 
-    def restore_state(self, state: Any) -> None:
+    def restore_state(self, state: WorldSnapshot) -> None:
         raise SimulatorError("a world in real time can't be restored; in lock-step it can")
+
+    def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
+        raise SimulatorError("a world in real time can't begin at a snapshot; in lock-step it can")
 
     def restore(self) -> None:
         """See `SharedBackend.restore`."""

@@ -9,7 +9,6 @@ from robot_sim.physics.description import DescriptionError, Inertia, Link, Model
 from robot_sim.physics.engine import FASTEST, FURTHEST, OVERLAP, STRONGEST, Body, Twist
 from robot_sim.physics.engines.bullet_constraints import add_gear, close_loop
 from robot_sim.physics.engines.bullet_contacts import Separation, groups_of
-from robot_sim.physics.engines.bullet_files import is_plane
 from robot_sim.physics.engines.quiet_pybullet import pybullet
 from robot_sim.physics.pose import ZERO, Pose, Vector, add, cross, subtract
 
@@ -65,7 +64,7 @@ class BulletBody(Body):
         dynamics = pybullet.getDynamicsInfo(body, BASE, client)
         self._check_meshes()
         self._com = Pose(dynamics[3], dynamics[4])  # the engine turns it onto the principal axes
-        if is_plane(description):
+        if description.is_plane:
             self._com = description.links[description.root].collisions[0].pose
         self._remove_defaults()
         self._states: Callable[[], Sequence[Sequence[float]]] = tuple  # of a body without joints
@@ -86,7 +85,7 @@ class BulletBody(Body):
         for helper in description.loops:
             close_loop(client, body, helper, self._links, offsets)
         self._base = pose.compose(self._com)  # where the centre of mass was put last
-        if not is_plane(description):
+        if not description.is_plane:
             self.reset_base(pose)
 
     def _map_names(self) -> None:

@@ -17,7 +17,7 @@ from robot_sim.physics.engine_form import at_joints, parents_first
 from robot_sim.physics.engines.bullet_body import BASE, BulletBody
 from robot_sim.physics.engines.bullet_constraints import add_weld, weld_of
 from robot_sim.physics.engines.bullet_contacts import Separation
-from robot_sim.physics.engines.bullet_files import is_plane, write_urdf
+from robot_sim.physics.engines.bullet_files import write_urdf
 from robot_sim.physics.engines.bullet_meshes import SharedMeshes, static_mesh
 from robot_sim.physics.engines.quiet_pybullet import pybullet
 from robot_sim.physics.pose import ZERO, Pose, Vector, add, scale
@@ -101,7 +101,7 @@ class BulletClient:
 
     def load(self, description: ModelDescription, pose: Pose) -> BulletBody:
         """See `Engine.load`."""
-        if is_plane(description):
+        if description.is_plane:
             return self._load_plane(description, pose)
         engine_form, offsets = at_joints(description)
         flags = (
@@ -207,8 +207,8 @@ class BulletClient:
             self.unfasten(number)
         ids = list(self._bodies)
         for number, ((one, link, other, *rest), apart) in fastened.items():
-            one, other = ids[one], ids[other]
-            self._fix(number, (one, link, other, *rest), [(one, other, a, b) for a, b in apart])
+            pair = ids[one], ids[other]
+            self._fix(number, (pair[0], link, pair[1], *rest), [(*pair, *links) for links in apart])
         self._last = max(self._last, *fastened, 0)
 
     def forget_contacts(self) -> None:

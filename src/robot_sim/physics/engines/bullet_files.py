@@ -148,9 +148,3 @@ def _write_origin(element: Element, pose: Pose) -> None:
 
 def _words(numbers: tuple[float, ...]) -> str:
     return " ".join(repr(float(number)) for number in numbers)
-
-
-def is_plane(description: ModelDescription) -> bool:
-    """Returns whether the model is just a plane, which needs no file."""
-    shapes = [shape for link in description.links.values() for shape in link.collisions]
-    return len(description.links) == len(shapes) == 1 and shapes[0].kind == "plane"

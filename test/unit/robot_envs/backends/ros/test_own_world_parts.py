@@ -49,7 +49,7 @@ def test_a_journal_brings_another_simulator_to_the_same_state_or_says_where_it_d
     varied, begun = Variation(gravity=0.5), InitialState()
     commands = [{"a": 0.1}, {"a": -0.0}, {}, {"b": (1e-300, 2.0), "a": 3.0}]
     last = state(4.0, 0.0, 0.0, time=0.032)
-    journal = Journal(varied, begun, commands, last=last, seed=7)
+    journal = Journal(varied, lambda world: world.reset(begun, 7), commands=commands, last=last)
     world = Replayed()
     journal.replay(world, 8_000_000)
     assert world.asked == [varied, begun, *commands] and world.seed == 7
@@ -66,8 +66,12 @@ def test_a_journal_brings_another_simulator_to_the_same_state_or_says_where_it_d
 
 def test_a_journal_takes_snapshots_again_where_they_were_taken() -> None:
     commands = [{"a": 0.1}, {"a": 0.2}]
+    last = state(2.0, 0.0, 0.0, time=0.016)
     journal = Journal(
-        Variation(), InitialState(), commands, [0, 2, 2], state(2.0, 0.0, 0.0, time=0.016)
+        begin=lambda world: world.reset(InitialState()),
+        commands=commands,
+        saves=[0, 2, 2],
+        last=last,
     )
     world = Replayed()
     journal.replay(world, 8_000_000)

@@ -1,0 +1,160 @@
+"""Plain data as bytes: what comes back, and what damaged, forged and endless input leads to."""
+
+import random
+import struct
+import subprocess
+import sys
+from collections import deque
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from robot_sim.physics.pose import Pose
+from robot_sim.plain_data import Record, differences, misfit, pack, resolve, unpack
+from robot_sim.state_dict import StateError
+
+
+class Named(NamedTuple):
+    number: float
+    name: str
+
+
+@dataclass(frozen=True)
+class Frozen:
+    inner: object
+    numbers: tuple = ()
+
+    def __post_init__(self):
+        raise AssertionError("no code of a class runs")
+
+
+ATOMS = (
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**200), 2**200)
+    | st.floats()
+    | st.text()
+    | st.binary()
+)
+ARRAYS = arrays.arrays(
+    st.sampled_from(["<f8", "<i4", "|u1", "|b1", "<f4"]), arrays.array_shapes(min_dims=0)
+)
+VALUES = st.recursive(
+    ATOMS | ARRAYS,
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.lists(inner, max_size=4).map(tuple)
+        | st.lists(inner, max_size=4).map(lambda each: deque(each, 5))
+        | st.dictionaries(
+            st.text() | st.integers(-(2**63), 2**63) | st.tuples(st.text()), inner, max_size=4
+        )
+        | st.builds(Named, st.floats(), st.text())
+    ),
+    max_leaves=20,
+)
+
+
+@given(VALUES)
+def test_the_same_comes_back_to_the_bit(value):
+    assert list(differences(value, unpack(pack(value)))) == []
+    assert misfit(value, unpack(pack(value))) == ""
+
+
+def test_records_are_made_without_their_classes_code():
+    frozen = object.__new__(Frozen)
+    object.__setattr__(frozen, "inner", Pose((1.0, 2.0, 3.0)))
+    object.__setattr__(frozen, "numbers", (1, -0.0))
+    back = unpack(pack(frozen))
+    assert type(back) is Frozen and back.inner == frozen.inner and repr(back.numbers) == "(1, -0.0)"
+
+
+def test_arrays_can_be_written_to_if_they_could():
+    one, other = np.zeros(2), np.zeros(2)
+    other.setflags(write=False)
+    flags = [each.flags.writeable for each in unpack(pack([one, other]))]
+    assert flags == [True, False]
+
+
+def test_a_class_that_is_not_imported_stays_a_record_until_it_is(tmp_path):
+    value = {"pose": [Record("some.module", "Class", [1, (2, 3)])]}
+    data = pack(value)
+    assert unpack(data) == value and "some" not in sys.modules
+    with pytest.raises(StateError, match=r"some\.module\.Class"):
+        resolve(unpack(data))
+
+
+@pytest.mark.parametrize(
+    "value", [{1, 2}, open, object(), lambda: 1, sys, {"a": [random.Random()]}]
+)
+def test_what_is_not_plain_is_refused(value):
+    with pytest.raises(StateError, match="isn't plain data"):
+        pack(value)
+
+
+FORGED = {
+    "a huge array": b"\xdd\xff\xff\xff\xff",
+    "a huge map": b"\xdf\xff\xff\xff\xff",
+    "a huge text": b"\xdb\xff\xff\xff\xff",
+    "no end": b"\x91" * 100_000,
+    "an object array": b"\xc7\x0b\x02\x94\xa2|O\x90\xc3\xc4\x00\xff\xff",
+}
+
+
+@pytest.mark.parametrize("data", FORGED.values(), ids=FORGED)
+def test_forged_input_is_one_error(data):
+    with pytest.raises(StateError) as error:
+        unpack(data)
+    assert "\n" not in str(error.value)
+
+
+def nested(depth):
+    value = b"\xc0"
+    for _ in range(depth):
+        value = b"\xc9" + struct.pack(">IB", len(value) + 1, 1) + b"\x91" + value
+    return value
+
+
+def test_nesting_has_an_end():
+    assert unpack(nested(50)) is not None
+    with pytest.raises(StateError):
+        unpack(nested(5000))
+
+
+def test_ten_thousand_damaged_inputs_are_read_or_refused():
+    """In a process of its own, whose memory is bounded: each is one error, or plain data."""
+    program = """
+import random, resource, sys
+import numpy as np
+from robot_sim.plain_data import pack, unpack
+from robot_sim.physics.pose import Pose
+from robot_sim.state_dict import StateError
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+modules, rng, read = set(sys.modules), random.Random(1), 0
+value = {"a": [1.5, (2, "x"), b"yz"], "p": Pose((1.0, 2.0, 3.0)), "n": np.arange(6.0).reshape(2, 3),
+         "g": 2**127, 3: None, "s": np.float32(1.0)}
+good = pack(value)
+for _ in range(10_000):
+    data = bytearray(good)
+    for _ in range(rng.randint(1, 4)):
+        kind, place = rng.randrange(3), rng.randrange(len(data))
+        if kind == 0: data[place] = rng.randrange(256)
+        elif kind == 1: del data[place:place + rng.randint(1, 9)]
+        else: data[place:place] = bytes(rng.randrange(256) for _ in range(rng.randint(1, 9)))
+        if not data: data = bytearray(b"x")
+    try:
+        unpack(bytes(data)); read += 1
+    except StateError:
+        pass
+assert set(sys.modules) == modules, set(sys.modules) - modules
+print(read)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert 0 < int(done.stdout) < 10_000
