@@ -12,9 +12,10 @@ from robot_envs import checks
 from robot_envs.backends import LOCKSTEP, OWN, REALTIME, make_backend
 from robot_envs.backends.backend import RobotBackend, side_by_side
 from robot_envs.pictures.drawn import HEIGHT, WIDTH
+from robot_envs.restoring import SavedEnv
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.snapshot import EnvSnapshot, SavedEnv
+from robot_envs.snapshot import EnvSnapshot
 from robot_envs.task import GoalTask, Task, Unrewarded
 from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Noise, Sensor

@@ -6,18 +6,16 @@ A task knows neither ROS nor a simulator nor a learner; every backend runs the s
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
 
 from robot_envs.files import Source
+from robot_envs.snapshot import EnvSnapshot
 from robot_envs.world_state import Commands, InitialState, Pose, StateQuery, WorldState
 from robot_sim.physics.pose import Vector
 from robot_sim.state_dict import Stateful
-
-if TYPE_CHECKING:
-    from robot_envs.snapshot import EnvSnapshot
 
 
 @dataclass(frozen=True)
@@ -69,7 +67,7 @@ class Task(Stateful, ABC):
     def observation_space(self) -> gymnasium.Space[Any]:
         """Makes the observation space."""
 
-    def initial_state(self, rng: np.random.Generator) -> "InitialState | EnvSnapshot":
+    def initial_state(self, rng: np.random.Generator) -> InitialState | EnvSnapshot:
         """Draws the state in which an episode begins; by default as spawned, with all joints at 0.
 
         It may be a snapshot of an environment with the same robots, such as one of `InitialStates`.

@@ -9,7 +9,10 @@ from xml.etree.ElementTree import Element
 
 from robot_sim.physics.description import Joint, Link, Mesh, ModelDescription, Shape
 from robot_sim.physics.world import World
+from robot_sim.plain_data import is_finite, misfit
 from robot_sim.robot import ControlledRobot
+from robot_sim.snapshot import SnapshotError
+from robot_sim.state_dict import Shared, Stateful
 
 # What has no effect on motion, or is compared by itself (`Model.properties`).
 LEFT_OUT: Mapping[type, frozenset[str]] = {
@@ -54,11 +57,11 @@ def misfits(given: Mapping[str, Any], here: Mapping[str, Any]) -> str:
         here: fingerprint of the world.
     """
     if given.get("engine") != here["engine"]:
-        return f"the snapshot is of the engine {given.get('engine')}, and here is {here['engine']}"
+        return f"the snapshot is of the engine {given.get('engine')!r:.50}, and here is {here['engine']!r}"
     models, own = given.get("models"), here["models"]
     if not isinstance(models, dict) or set(models) != set(own):
-        there = sorted(map(str, models)) if isinstance(models, dict) else "?"
-        return f"the snapshot has the models {there}, and here are {sorted(own)}"
+        there = sorted(map(str, models)) if isinstance(models, dict) else models
+        return f"the snapshot has the models {there!r:.300}, and here are {sorted(own)}"
     if others := [name for name in own if models[name] != own[name]]:
         return (
             f"the model '{others[0]}' has another description or initial pose than in the snapshot"
@@ -66,9 +69,42 @@ def misfits(given: Mapping[str, Any], here: Mapping[str, Any]) -> str:
     if given.get("robots") != here["robots"]:
         return (
             "the controllers that run aren't those of the snapshot: "
-            f"{given.get('robots')!s:.200} in it, and here {here['robots']!s:.200}"
+            f"{given.get('robots')!r:.200} in it, and here {here['robots']!r:.200}"
         )
     return ""
+
+
+def check_foreign(
+    robots: Sequence[ControlledRobot], parts: Mapping[str, Any], before: Any, state: Any
+) -> None:
+    """Checks that a state of unknown origin can take the place of the present one.
+
+    Values of controllers and plugins may still be wrong: then these fail, and nothing else.
+
+    Raises:
+        SnapshotError: if something is of another type, or a tick would fail.
+    """
+    faults = [misfit(before, state)]
+    if not all(is_finite(own["motion"]) for own in state["world"]["models"].values()):
+        faults.append("positions or velocities aren't finite")
+    there = set(state["world"]["models"])
+    faults += [f"it lacks '{each}'" for each in state["world"]["order"] if each not in there]
+    for robot, one, other in zip(robots, before["robots"], state["robots"], strict=True):
+        faults.append(misfit(_needed(one), _needed(other), robot.model.name, exactly=True))
+    for name, part in parts.items():
+        if name in state["parts"] and isinstance(part, (Shared, Stateful)):
+            own, given = (dict.fromkeys(each["parts"][name]) for each in (before, state))
+            faults.append(misfit(own, given, name, exactly=True))
+    if found := next(filter(None, faults), ""):
+        raise SnapshotError(found)
+
+
+def _needed(robot: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns of a robot's state what a tick can't do without."""
+    controllers = robot["manager"]["controllers"].items()
+    loops = {name: own.get("pids") for name, own in controllers if isinstance(own, dict)}
+    pids = {name: own for name, own in loops.items() if own}
+    return {"hardware": robot["hardware"], "efforts": robot["efforts"], "pids": pids}
 
 
 def _digest(value: Any) -> str:

@@ -179,8 +179,15 @@ def _record(module: Any, name: Any, fields: Any) -> Any:
     return Record(module, name, fields)
 
 
-def misfit(there: Any, given: Any, place: str = "") -> str:
-    """Returns where a state can't take the place of the one that is there, by its types; "" if it may."""
+def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) -> str:
+    """Returns where a state can't take the place of the one that is there, by its types; "" if it may.
+
+    Args:
+        there: the present state.
+        given: the other one.
+        place: of both in a larger state.
+        exactly: whether names and lengths have to be the same, too.
+    """
     if there is None or given is None:
         return ""
     numbers = (int, float)
@@ -192,6 +199,12 @@ def misfit(there: Any, given: Any, place: str = "") -> str:
         return f"{place} is a {type(given).__name__}, not a {type(there).__name__}"
     if isinstance(there, np.ndarray) and (there.dtype, there.ndim) != (given.dtype, given.ndim):
         return f"{place} is an array of {given.dtype}{list(given.shape)}"
+    if exactly and isinstance(there, (dict, list, tuple)):
+        keys, others = (
+            each if isinstance(each, dict) else range(len(each)) for each in (there, given)
+        )
+        if set(keys) != set(others):
+            return f"{place} has {list(others)!s:.200}, not {list(keys)!s:.200}"
     pairs: Iterable[tuple[Any, Any, Any]] = ()
     if isinstance(there, dict):
         pairs = ((key, there[key], given[key]) for key in there if key in given)
@@ -200,7 +213,10 @@ def misfit(there: Any, given: Any, place: str = "") -> str:
     elif hasattr(there, "__dataclass_fields__"):
         names = there.__dataclass_fields__
         pairs = ((name, getattr(there, name), getattr(given, name)) for name in names)
-    found = (misfit(one, other, f"{place}/{key}".lstrip("/")) for key, one, other in pairs)
+    found = (
+        misfit(one, other, f"{place}/{key}".lstrip("/"), exactly=exactly)
+        for key, one, other in pairs
+    )
     return next(filter(None, found), "")
 
 

@@ -6,14 +6,14 @@ from typing import Any, Protocol
 
 from robot_sim.applied_forces import AppliedForces
 from robot_sim.constants import NANOSECONDS
-from robot_sim.fingerprint import fingerprint, misfits
+from robot_sim.fingerprint import check_foreign, fingerprint, misfits
 from robot_sim.moves import Moves
 from robot_sim.physics.engine import Twist
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose
 from robot_sim.physics.projection import place_link
 from robot_sim.physics.world import World
-from robot_sim.plain_data import is_finite, misfit, resolve
+from robot_sim.plain_data import resolve
 from robot_sim.robot import ControlledRobot
 from robot_sim.snapshot import Snapshot, SnapshotError
 from robot_sim.state_dict import Shared, StateError, load, state_of
@@ -74,13 +74,11 @@ class Simulator(Shared):
         # Called with `now` before each physics step, under the lock: topics, plugins and sensors.
         self.listeners: list[Callable[[int], None]] = []
         self.moves = Moves(world)
-        # Whose state snapshots save beside that of world and robots, by name.
-        self.parts: dict[str, Any] = {}
+        self.parts: dict[str, Any] = {}  # whose state snapshots have, too, by name
         self.restored: list[Callable[[], None]] = []  # called under the lock after a restore
         self.before_advance: list[Callable[[], None]] = []  # called under the lock
         self.resets = 0  # of the world or the simulation
-        # Called under the lock with a seed from which all random numbers start again.
-        self.reseeded: list[Callable[[int], None]] = []
+        self.reseeded: list[Callable[[int], None]] = []  # called under the lock with a new seed
         # What sends messages after the ticks, and whether those who step the world call them.
         self.outboxes: list[Outbox] = []
         self.deliver_with_steps = False
@@ -311,8 +309,8 @@ class Simulator(Shared):
         The caller holds the lock.
 
         Raises:
-            SnapshotError: if engine, models, robots, running controllers or properties aren't those of the
-                snapshot, or a foreign one doesn't fit otherwise; nothing changes then.
+            SnapshotError: if engine, models, running controllers or properties aren't those of the
+                snapshot, or a foreign one is wrong; nothing changes then.
             StateError: if a user's `load_state_dict` has raised; all else is restored then.
         """
         if snapshot.fits is not self.fits and (fault := misfits(snapshot.fits, self.fits)):
@@ -324,10 +322,7 @@ class Simulator(Shared):
         before = self.save_state().state
         try:
             state = resolve(snapshot.state)
-            if fault := misfit(_checked(before), _checked(state)):
-                raise SnapshotError(fault)
-            if not all(is_finite(own["motion"]) for own in state["world"]["models"].values()):
-                raise SnapshotError("positions or velocities aren't finite")
+            check_foreign(self.robots, self.parts, before, state)
             self.world.check_state(state["world"])
             self._load(state)
         except Exception as error:  # whatever a forged state leads to
@@ -338,9 +333,8 @@ class Simulator(Shared):
         self.world.load_state_dict(state["world"])
         self.now, self.resets = state["now"], state["resets"]
         self.applied.load_state_dict(state["applied"], self.world.models)
-        robots = zip(self.robots, state["robots"], strict=True)
-        parts = state["parts"]
-        there = [(part, parts[name]) for name, part in self.parts.items() if name in parts]
+        robots, parts = zip(self.robots, state["robots"], strict=True), state["parts"]
+        there = ((part, parts[name]) for name, part in self.parts.items() if name in parts)
         fault = None
         try:
             load([*robots, *there])
@@ -404,9 +398,3 @@ class Simulator(Shared):
         for robot in self.robots:
             robot.write(dt)
         self.world.step()
-
-
-def _checked(state: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns of a state what has the same types at all times, unlike what controllers and plugins hold."""
-    robots = [{**robot, "manager": None} for robot in state["robots"]]
-    return {**state, "robots": robots, "parts": None}

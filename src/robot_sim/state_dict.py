@@ -150,7 +150,7 @@ def put_attributes(part: Any, state: Mapping[str, Any]) -> None:
             except StateError as error:  # the rest is put back
                 faults.append(str(error))
                 continue
-        if callable(getattr(kind, name, None)):
+        if name not in held and callable(getattr(kind, name, None)):
             faults.append(f"{kind.__qualname__}.{name} is a method")
         elif name in slots:
             object.__setattr__(part, name, value)

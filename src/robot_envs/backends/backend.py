@@ -7,19 +7,12 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 from robot_envs.scene import Scene
+from robot_envs.snapshot import WorldSnapshot
 from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
 from robot_sim.physics.pose import Pose
-from robot_sim.snapshot import Snapshot
 
 PHYSICS_STEP = 0.001  # [s]; Gazebo's default, and that of a world in this process
-
-
-class WorldSnapshot(Protocol):
-    """A world's part of a snapshot, wherever it is kept."""
-
-    def whole(self) -> Snapshot:
-        """Returns it, in this process; raises SimulatorError if its simulator has ended."""
 
 
 class RobotBackend(Protocol):

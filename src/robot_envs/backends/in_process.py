@@ -6,18 +6,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import starmap
 from typing import Any
 
-from robot_envs.backends.backend import (
-    PHYSICS_STEP,
-    RobotBackend,
-    WorldSnapshot,
-    ticks_per_action,
-)
+from robot_envs.backends.backend import PHYSICS_STEP, RobotBackend, ticks_per_action
 from robot_envs.backends.world_files import fill, loose_joints, spawn
 from robot_envs.controllers import Loaded, load
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.files import resources
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
+from robot_envs.snapshot import WorldSnapshot, episode_of
 from robot_envs.variation import Variation
 from robot_envs.variation.applying import Applier
 from robot_envs.variation.parts import RobotPart
@@ -239,10 +235,10 @@ class InProcessWorld(RobotBackend):
 
     def restore_state(self, state: WorldSnapshot) -> None:
         snapshot = state.whole()
+        begun, held = episode_of(snapshot)
         with _refusals():
             self._sim.restore_state(snapshot)
-        episode = snapshot.state["episode"]
-        self._held, self._begin = episode["held"], episode["begun"]
+        self._begin, self._held = begun, held
 
     def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
         self.restore_state(state)

@@ -11,6 +11,7 @@ from gymnasium.vector import SyncVectorEnv, VectorEnv
 
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import SimulatorError
+from robot_envs.snapshot import EnvSnapshot
 from robot_envs.testing.rollouts import Given, Subject, differences, expect_error, rollout, same
 
 WORLDS, SEED = 3, 11
@@ -78,6 +79,18 @@ def snapshots(subject: Subject) -> None:
                 if when == "after other actions":
                     env.reset(seed=round_)
                 _go_on(env, 5, round_)
+        if not env.backend.shared:
+            _in_another(subject, snapshot, first)
+
+
+def _in_another(subject: Subject, snapshot: EnvSnapshot, first: Given) -> None:
+    """Another environment takes the snapshot as bytes, before and after it has done something else."""
+    with subject.made() as other:
+        for when in ("at first", "after an episode"):
+            other.restore_state(EnvSnapshot.from_bytes(snapshot.to_bytes()))
+            given = _go_on(other, subject.steps, SEED)
+            _expect_same(first, given, f"from a snapshot in another environment, {when}")
+            other.reset(seed=SEED)
 
 
 def _go_on(env: RobotEnv, steps: int, seed: int) -> Given:

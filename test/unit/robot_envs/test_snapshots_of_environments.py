@@ -175,14 +175,14 @@ def test_refusals_name_the_reason(made):
     env.reset(seed=1)
     other.reset(seed=1)
     snapshot = env.save_state()
-    with pytest.raises(ValueError, match=r"another environment: its imperfections .*\[\].*sensor"):
+    with pytest.raises(ValueError, match=r"another environment: its imperfections .*\[\].*Sensor"):
         other.restore_state(snapshot)
     with pytest.raises(ValueError, match="another environment: its task"):
         made(Remembering).restore_state(snapshot)
     with pytest.raises(ValueError, match="it isn't a snapshot"):
         env.restore_state(snapshot.to_bytes())
     mujoco = made(backend="mujoco")
-    with pytest.raises(SimulatorError, match="the engine Bullet, and here is Mujoco"):
+    with pytest.raises(SimulatorError, match="the engine .Bullet., and here is .Mujoco."):
         mujoco.restore_state(snapshot)
     arm = RobotEnv(replace(ROBOT, name="other"), BalanceTask())
     with pytest.raises(SimulatorError, match=r"models \['cartpole'\], and here are \['other'\]"):

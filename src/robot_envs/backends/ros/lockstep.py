@@ -22,7 +22,7 @@ from geometry_msgs.msg import Pose as PoseMsg
 from geometry_msgs.msg import Twist as TwistMsg
 
 from bullet_gazebo.common.messages import from_contact_state
-from robot_envs.backends.backend import RobotBackend, WorldSnapshot
+from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.ros.bringup import full_name, ready
 from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.backends.ros.running import (
@@ -36,6 +36,7 @@ from robot_envs.backends.ros.running import (
 from robot_envs.backends.world_files import loose_joints
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
+from robot_envs.snapshot import WorldSnapshot, episode_of
 from robot_envs.variation import Variation
 from robot_envs.world_state import (
     Commands,
@@ -63,7 +64,8 @@ class KeptSnapshot:
 
     of: "LockstepWorld"
     name: str
-    episode: dict[str, Any]  # when it has begun [ns], and what controllers were commanded
+    begun: int  # [ns], of the episode
+    held: dict[str, Any]  # what controllers were commanded
 
     def whole(self) -> Snapshot:
         """See `WorldSnapshot.whole`."""
@@ -252,8 +254,7 @@ class LockstepWorld(RobotBackend):
     def save_state(self) -> KeptSnapshot:
         """See `RobotBackend.save_state`; the simulator keeps it until nobody has it any more."""
         self._world.check_holder(self)
-        episode = {"held": self._held, "begun": self._begun}
-        kept = KeptSnapshot(self, secrets.token_hex(8), episode)
+        kept = KeptSnapshot(self, secrets.token_hex(8), self._begun, self._held)
         self._save_and_forget(kept.name, list(self._dropped))
         self._kept.add(kept.name)
         weakref.finalize(kept, self._dropped.append, kept.name).atexit = False
@@ -268,7 +269,7 @@ class LockstepWorld(RobotBackend):
         """Returns a snapshot that the simulator keeps."""
         answer = self._succeed(self._save, SaveStateRequest(read=kept.name))
         whole = Snapshot.from_bytes(answer.data)
-        whole.state["episode"] = kept.episode
+        whole.state["episode"] = {"begun": kept.begun, "held": kept.held}
         return whole
 
     def restore_state(self, state: WorldSnapshot, seed: int = 0) -> None:
@@ -277,16 +278,16 @@ class LockstepWorld(RobotBackend):
         if isinstance(state, KeptSnapshot) and state.of is self:
             self._world.check_holder(self)
             self._succeed(self._restore, RestoreStateRequest(name=state.name, seed=seed))
-            episode = state.episode
+            begun, held = state.begun, state.held
         else:
             whole = state.whole()
+            begun, held = episode_of(whole)
             with self._simulator:
                 self._world.claim(self)
             self._look(self._names)  # sensors that states have are read from now on
             request = RestoreStateRequest(data=whole.to_bytes(), seed=seed)
             self._succeed(self._restore, request)
-            episode = whole.state["episode"]
-        self._begun, self._held = episode["begun"], episode["held"]
+        self._begun, self._held = begun, held
 
     def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
         self.restore_state(state, seed)

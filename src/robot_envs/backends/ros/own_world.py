@@ -8,7 +8,7 @@ from functools import partial
 from typing import TypeVar
 
 from robot_envs.backends import backend
-from robot_envs.backends.backend import RobotBackend, WorldSnapshot, ticks_per_action
+from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.ros.bringup import bring_up
 from robot_envs.backends.ros.lockstep import KeptSnapshot, LockstepWorld
 from robot_envs.backends.ros.own_simulator import OwnSimulator, check_memory
@@ -16,6 +16,7 @@ from robot_envs.backends.ros.running import SharedWorld, physics_step
 from robot_envs.backends.world_files import world_models
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, SimulatorHangs
 from robot_envs.scene import Scene
+from robot_envs.snapshot import WorldSnapshot, episode_of
 from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
 from robot_sim.constants import NANOSECONDS
@@ -237,7 +238,7 @@ class OwnWorld(RobotBackend):
             kept, journal = state.kept, state.journal.copied()
         else:
             whole = state.whole()
-            passed = whole.state["now"] - whole.state["episode"]["begun"]
+            passed = whole.state["now"] - episode_of(whole)[0]
             begin = partial(LockstepWorld.restore_state, state=whole)
             kept, journal = None, Journal(self._journal.variation, begin, passed)
 

@@ -15,7 +15,7 @@ from geometry_msgs.msg import Pose as PoseMsg
 from sensor_msgs.msg import JointState as JointStateMsg
 from std_srvs.srv import Empty
 
-from robot_envs.backends.backend import RobotBackend, WorldSnapshot
+from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.ros.bringup import command_publisher, full_name, ready
 from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.backends.ros.running import (
@@ -30,6 +30,7 @@ from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
+from robot_envs.snapshot import WorldSnapshot
 from robot_envs.variation import Variation
 from robot_envs.world_state import (
     ONLY_REWARDED,

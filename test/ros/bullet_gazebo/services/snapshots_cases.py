@@ -20,11 +20,11 @@ BOT = str(Path(rospkg.RosPack().get_path("cartpole"), "test/data/sensors/bot.sdf
 
 
 def save(name, forget=()):
-    return call("/gazebo/save_state", SaveState, name, list(forget))
+    return call("/gazebo/save_state", SaveState, name=name, forget=list(forget))
 
 
 def restore(name):
-    return call("/gazebo/restore_state", RestoreState, name)
+    return call("/gazebo/restore_state", RestoreState, name=name)
 
 
 def step(ticks, command=None):
@@ -54,6 +54,35 @@ class SnapshotsTest(unittest.TestCase):
         step(7, -0.3)
         self.assertTrue(restore("here").success)
         self.assertEqual(future(), first)
+
+    def test_states_go_and_come_as_bytes(self):
+        self.assertTrue(save("here").success)
+        first = future()
+        read = call("/gazebo/save_state", SaveState, read="here")
+        self.assertTrue(read.success and len(read.data) < 12_000)
+        save("", ["here"])
+        call("/gazebo/reset_world", Empty)
+        answer = call("/gazebo/restore_state", RestoreState, data=read.data, name="back")
+        self.assertTrue(answer.success, answer.status_message)
+        self.assertEqual(future(), first)
+        self.assertTrue(restore("back").success)
+        self.assertEqual(future(), first)
+        save("", ["back"])
+
+    def test_bytes_that_are_no_state_are_refused_and_change_nothing(self):
+        self.assertTrue(save("here").success)
+        data = call("/gazebo/save_state", SaveState, read="here").data
+        first = future()
+        restore("here")
+        for wrong in (b"x", data[:-1], data[:60] + bytes([data[60] ^ 1]) + data[61:], data + b"x"):
+            answer = call("/gazebo/restore_state", RestoreState, data=wrong)
+            self.assertFalse(answer.success)
+            self.assertNotIn("\n", answer.status_message)
+        self.assertEqual(future(), first)
+        self.assertIn(
+            "no state 'her'", call("/gazebo/save_state", SaveState, read="her").status_message
+        )
+        save("", ["here"])
 
     def test_a_name_stands_for_its_newest_state(self):
         save("there")

@@ -1,0 +1,144 @@
+"""Episodes of environments, saved and restored."""
+
+import contextlib
+from typing import Any
+
+import gymnasium
+
+from robot_envs.backends.backend import RobotBackend
+from robot_envs.errors import SimulatorError
+from robot_envs.pictures.drawn import DrawnEnv
+from robot_envs.snapshot import EnvSnapshot
+from robot_envs.task import Task
+from robot_envs.variation import Randomisation, Variation
+from robot_envs.variation.imperfections import Actuator, Sensor
+from robot_envs.world_state import InitialState, WorldState
+from robot_sim.plain_data import misfit, resolve
+from robot_sim.snapshot import SnapshotError
+from robot_sim.state_dict import StateError, load, state_of
+
+
+class SavedEnv(DrawnEnv):
+    """An environment whose episode can be saved and restored."""
+
+    task: Task
+    backend: RobotBackend
+    control_period: float  # [s]
+    _sensor: Sensor | None
+    _actuator: Actuator | None
+    _randomisation: Randomisation | None
+    _variation: Variation
+    _state: WorldState | None
+    _first: dict[str, Any]  # commands that go along with an episode's first action
+    _initial: InitialState
+    _steps: int | None  # None: no episode is under way
+    _closed: bool
+    _begun: Any  # the step that is under way
+
+    def save_state(self) -> EnvSnapshot:
+        """Returns all that decides the future: of world, episode, task and generators.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first episode.
+            SimulatorError: If the task holds something unreadable, or the world runs in real time.
+        """
+        self._check_open()
+        if self._state is None or self._begun is not None:
+            raise gymnasium.error.ResetNeeded("a snapshot is taken after a reset() or a step()")
+        try:
+            parts = {name: state_of(part) for name, part in self._parts().items()}
+        except StateError as error:
+            raise SimulatorError(str(error)) from error
+        state = {
+            "variation": self._variation, "state": self._state, "first": self._first,
+            "initial": self._initial, "steps": self._steps, "parts": parts,
+        }  # fmt: skip
+        return EnvSnapshot(self._fits, state, self.backend.save_state())
+
+    def restore_state(self, snapshot: EnvSnapshot) -> None:
+        """Returns to a snapshot of an environment like this: the same actions lead to the same bits.
+
+        Raises:
+            ValueError: If it is of an environment with another task, control period, or noise.
+            SimulatorError: If the world isn't that of the snapshot. Then nothing has changed, unless the
+                robots had to be varied: a reset comes next.
+        """
+        self._check_open()
+        if not isinstance(snapshot, EnvSnapshot):
+            raise ValueError(f"it isn't a snapshot of an environment: {snapshot!r:.100}")
+        here, given = self._fits, snapshot.fits
+        if given != here:
+            name = next((name for name in here if given.get(name) != here[name]), "description")
+            raise ValueError(
+                f"the snapshot is of another environment: its {name} is {given.get(name)!r:.100}, not "
+                f"{here.get(name)!r}"
+            )
+        if not snapshot.is_foreign:
+            self._load(snapshot)
+            return
+        before = None
+        with contextlib.suppress(SimulatorError, gymnasium.error.ResetNeeded):  # without an episode
+            before = self.save_state()
+        try:
+            state = resolve(snapshot.state)
+            if before and (fault := misfit(before.state, state)):
+                raise SimulatorError(f"the snapshot can't be restored: {fault}")
+            self._load(EnvSnapshot(snapshot.fits, state, snapshot.world))
+        except Exception as error:  # whatever a forged state leads to
+            if before is not None:
+                with contextlib.suppress(SimulatorError):  # a reset comes next
+                    self._load(before)
+            if isinstance(error, SimulatorError):
+                raise
+            raise SimulatorError(f"the snapshot can't be restored: {error!s:.300}") from error
+
+    def _load(self, snapshot: EnvSnapshot) -> None:
+        state = snapshot.state
+        self._steps = self._begun = None
+        if state["variation"] != self._variation:
+            self._vary(state["variation"])
+        self.backend.restore_state(snapshot.world)
+        self._state, self._first, self._initial = state["state"], state["first"], state["initial"]
+        self._steps, parts = state["steps"], state["parts"]
+        try:
+            load((part, parts[name]) for name, part in self._parts().items())
+        except StateError as error:  # all else is restored
+            raise SimulatorError(str(error)) from error
+        self._show()
+
+    def _begin_at(self, snapshot: EnvSnapshot, seed: int) -> WorldState:
+        """Begins an episode in the snapshot's world; task, noise and random numbers are this one's own."""
+        variation = resolve(snapshot.state["variation"])
+        if variation != self._variation:
+            self._vary(variation)
+        self._initial, self._first = resolve(snapshot.state["initial"]), {}
+        try:
+            return self.backend.begin_at(snapshot.world, seed)
+        except SnapshotError as error:
+            raise SimulatorError(str(error)) from error
+
+    def _parts(self) -> dict[str, Any]:
+        """Returns all but the world that has a state, by name."""
+        parts = {
+            "generator": self.np_random, "sensor": self._sensor, "actuator": self._actuator,
+            "task": self.task, "randomisation": self._randomisation,
+        }  # fmt: skip
+        return {name: part for name, part in parts.items() if part is not None}
+
+    @property
+    def _fits(self) -> dict[str, Any]:
+        """What has to be the same where its snapshots are restored."""
+        kind = type(self.task)
+        parts = (self._sensor, self._actuator, self._randomisation)
+        return {
+            "task": f"{kind.__module__}.{kind.__qualname__}", "control period": self.control_period,
+            "imperfections": [type(part).__name__ for part in parts if part is not None],
+        }  # fmt: skip
+
+    def _vary(self, variation: Variation) -> None:
+        self._variation = variation
+        self.backend.vary(variation)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise gymnasium.error.ClosedEnvironmentError("this environment is closed; make another")

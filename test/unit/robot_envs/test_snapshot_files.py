@@ -1,0 +1,166 @@
+"""Files of snapshots: in fresh processes, and where somebody has changed them."""
+
+import hashlib
+import os
+import random
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+
+import cartpole  # noqa: F401 - registers the environments
+import robot_envs.robots  # noqa: F401
+from robot_envs import EnvSnapshot, SimulatorError
+from robot_sim.plain_data import pack, unpack
+from robot_sim.snapshot import DIGEST, MAGIC, Snapshot, SnapshotError
+
+BEGIN = len(MAGIC) + DIGEST
+ODD = [
+    None, True, -1, 2**62, 2**70, float("nan"), 1e300, "x", b"abc", [], (), {}, [1] * 50, np.zeros(3),
+    np.zeros((0, 2)), {"__generator__": "seed", "state": 1, "seeds": None},
+    {"__generator__": "PCG64", "state": {}, "seeds": [1, [], 10**9, 0]},
+]  # fmt: skip
+
+PLAY = """
+import sys
+import gymnasium
+import cartpole, robot_envs.robots
+from robot_envs import EnvSnapshot
+from robot_sim.plain_data import pack
+
+def play(env, seed=5):
+    env.action_space.seed(seed)
+    given = []
+    for _ in range(20):
+        given.append(env.step(env.action_space.sample()))
+        if given[-1][2] or given[-1][3]:
+            given.append(env.reset())
+    return pack(given).hex()
+"""
+FRESH = """
+env = gymnasium.make(sys.argv[1], backend=sys.argv[2]).unwrapped
+env.restore_state(EnvSnapshot.load(sys.argv[3]))
+print("played", play(env))
+"""
+exec(PLAY)
+
+
+def begun(identifier, backend):
+    env = gymnasium.make(identifier, backend=backend).unwrapped
+    env.reset(seed=1)
+    env.action_space.seed(2)
+    for _ in range(5):
+        env.step(env.action_space.sample())
+    return env
+
+
+@pytest.mark.extras("mujoco")
+@pytest.mark.parametrize("backend", ["bullet", "mujoco"])
+@pytest.mark.parametrize("identifier", ["robot_envs/PickCube-v0", "robot_envs/Navigate-v0"])
+def test_a_fresh_process_goes_on_to_the_bit(identifier, backend, tmp_path):
+    env = begun(identifier, backend)
+    env.save_state().save(tmp_path / "there.snapshot")
+    first = play(env)  # noqa: F821
+    env.close()
+    done = subprocess.run(
+        [sys.executable, "-c", PLAY + FRESH, identifier, backend, str(tmp_path / "there.snapshot")],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.rpartition("played ")[2].strip() == first
+
+
+def places(value, place=()):
+    """All places of a state that can be replaced."""
+    if place:
+        yield place
+    entries = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    )
+    for key, each in entries:
+        yield from places(each, (*place, key))
+
+
+def forged(data, rng):
+    """The same with an odd value somewhere, or with other bytes; its digest is right."""
+    content = data[BEGIN:]
+    if rng.random() < 0.6:
+        state = unpack(content)
+        *way, last = rng.choice(list(places(state)))
+        target = state
+        for key in way:
+            target = target[key]
+        target[last] = rng.choice(ODD)
+        content = pack(state)
+    else:
+        changed = bytearray(content)
+        for _ in range(rng.randint(1, 3)):
+            changed[rng.randrange(len(changed))] = rng.randrange(256)
+        content = bytes(changed)
+    return MAGIC + hashlib.sha256(content).digest() + content
+
+
+def test_forged_files_run_no_code_and_are_one_error():
+    env = begun("cartpole/Balance-v0", "bullet")
+    good = env.save_state().to_bytes()
+    modules, rng, refused = set(sys.modules), random.Random(1), 0
+    for _ in range(300):
+        try:
+            env.restore_state(EnvSnapshot.from_bytes(forged(good, rng)))
+        except (SnapshotError, SimulatorError, ValueError) as error:
+            assert "\n" not in str(error)
+            refused += 1
+            env.restore_state(EnvSnapshot.from_bytes(good))
+        else:  # another state, as good as any
+            env.close()
+            env = begun("cartpole/Balance-v0", "bullet")
+    assert refused > 150 and set(sys.modules) == modules
+    env.close()
+
+
+def test_a_refused_one_changes_nothing():
+    env, same = (
+        begun("robot_envs/SixJointReach-v0", "bullet"),
+        begun("robot_envs/SixJointReach-v0", "bullet"),
+    )
+    state = unpack(env.save_state().to_bytes()[BEGIN:])
+    same.save_state()
+    for change in (
+        lambda fits, state: fits.update(engine="Ode"),
+        lambda fits, state: state["robots"].clear(),
+        lambda fits, state: state["robots"][0]["hardware"]["joints"].clear(),
+        lambda fits, state: state["environment"]["parts"].pop("task"),
+        lambda fits, state: state["world"].update(models={}),
+        lambda fits, state: state.pop("now"),
+    ):
+        fits, content = unpack(pack(state))
+        change(fits, content)
+        content = pack([fits, content])
+        data = MAGIC + hashlib.sha256(content).digest() + content
+        with pytest.raises(SimulatorError):
+            env.restore_state(EnvSnapshot.from_bytes(data))
+    assert play(env) == play(same)  # noqa: F821
+    env.close()
+    same.close()
+
+
+@pytest.mark.parametrize(
+    "make", [os.mkfifo, lambda path: path.mkdir(), lambda path: path.symlink_to("/dev/zero")]
+)
+def test_what_is_no_file_is_refused_at_once(make, tmp_path):
+    make(tmp_path / "odd.snapshot")
+    with pytest.raises(SnapshotError, match=r"odd\.snapshot"):
+        EnvSnapshot.load(tmp_path / "odd.snapshot")
+
+
+def test_a_simulators_snapshot_and_another_version_are_named():
+    with pytest.raises(SnapshotError, match="a simulator's, not an environment's"):
+        EnvSnapshot.from_bytes(Snapshot({}, {}).to_bytes())
+    with pytest.raises(SnapshotError, match="of another version"):
+        EnvSnapshot.from_bytes(b"robot snapshot 2\n" + bytes(50))
