@@ -22,7 +22,7 @@ from robot_sim.physics.files.element_table import without_effect
 from robot_sim.physics.files.elements import named, numbers, read_plugin, shown, truth
 from robot_sim.physics.files.own_models import own_models
 from robot_sim.physics.files.reading import LoadProgress, MeshFinder, Reading, Resources
-from robot_sim.physics.files.saved_state import begin_as_saved
+from robot_sim.physics.files.saved_state import begin_as_saved, saved_time
 from robot_sim.physics.files.sdf import (
     FileContext,
     first_entity,
@@ -65,6 +65,7 @@ class WorldDescription:
     models: dict[str, ModelDescription] = field(default_factory=dict)
     lights: dict[str, Light] = field(default_factory=dict)
     gravity: Vector = GRAVITY
+    start: int = 0  # [ns], of simulated time
     time_step: float = TIME_STEP  # [s]
     update_rate: float = UPDATE_RATE  # [Hz of wall time]; 0 means as fast as possible
     solver: SolverSettings = SolverSettings()
@@ -122,6 +123,7 @@ def _read(root: Element, context: FileContext) -> WorldDescription:
     if state is not None:
         for child in state.iterfind("insertions/*"):
             _add(world, child, context)
+        world.start = saved_time(state, world.warnings)
         world.warnings += begin_as_saved(state, world.models, world.lights)
         for name in [(each.text or "").strip() for each in state.iterfind("deletions/name")]:
             world.models.pop(name, None)
