@@ -28,7 +28,7 @@ LIMITS = Limits(processor_time=60, wall_time=120.0, memory=4 << 30, output=1 << 
 MOST_KEPT = 32  # files with their looks
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of STL
 MOST_BYTES = 200_000_000  # of a file: a million triangles as COLLADA writes them
-LARGE = 500_000  # [bytes] of a file that takes a tenth of a second
+LARGE = 50_000  # [bytes] of a file that is kept
 # Begin the names of what is kept; others when others would come out.
 KEPT, PIECES = "mesh-2", "v-hacd-1"
 
