@@ -44,7 +44,7 @@ def _offsets(population: Element) -> Iterator[Vector]:
     if kind == "uniform" and is_round:
         return (_on_disc(0.5 * x, (i + 0.5) / count, i * GOLDEN, 0.0) for i in range(count))
     if kind == "uniform":
-        columns = min(count, max(1, round(math.sqrt(count * x / y))))
+        columns = max(1, round(min(count, math.sqrt(count * x / y))))
         return _grid(count, columns, x / columns, y / -(-count // columns))
     if kind != "random":
         raise DescriptionError(f"<type>: '{shown(kind)}' is no distribution")

@@ -88,6 +88,11 @@ def test_a_uniform_population_has_its_count():
     assert min(nearest) > 0.3
 
 
+def test_a_uniform_population_of_a_region_without_width():
+    thin = "<box><size>1e200 1e-200 1</size></box>"
+    assert len(world(population("<type>uniform</type>", thin, 3)).models) == 3
+
+
 def test_the_region_is_turned_with_its_pose():
     (first, *_) = places("<type>linear-x</type>", BOX, 2, pose="10 20 30 0 0 1.570796326794897")
     assert first == pytest.approx((0.0, -2.0, 0.0))
