@@ -5,6 +5,7 @@ import os
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import combinations
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
@@ -77,6 +78,11 @@ class Mesh:
     def is_heightmap(self) -> bool:
         """Whether its vertices are a square grid: rows along x, the one at the lowest y first."""
         return not self.hulls
+
+    @cached_property
+    def reach(self) -> np.ndarray:
+        """The largest distance (3,) from the origin along each axis."""
+        return np.abs(self.vertices).max(axis=0)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Mesh) and self.digest == other.digest

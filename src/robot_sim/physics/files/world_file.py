@@ -21,6 +21,7 @@ from robot_sim.physics.files import elements
 from robot_sim.physics.files.element_table import without_effect
 from robot_sim.physics.files.elements import named, numbers, read_plugin, shown, truth
 from robot_sim.physics.files.own_models import own_models
+from robot_sim.physics.files.population import clones
 from robot_sim.physics.files.reading import LoadProgress, MeshFinder, Reading, Resources
 from robot_sim.physics.files.saved_state import begin_as_saved, saved_time
 from robot_sim.physics.files.sdf import (
@@ -128,6 +129,8 @@ def _read(root: Element, context: FileContext) -> WorldDescription:
         for name in [(each.text or "").strip() for each in state.iterfind("deletions/name")]:
             world.models.pop(name, None)
             world.lights.pop(name, None)
+    for child in element.findall("population"):  # once all else is there
+        _add(world, child, context)
     return world
 
 
@@ -211,19 +214,29 @@ def _script(actor: Element, warnings: list[str]) -> Script | None:
 
 
 def _add(world: WorldDescription, element: Element, context: FileContext) -> None:
-    """Adds one model, light or actor. If it is broken, it alone is left out."""
+    """Adds one model, light or actor, or a population. If it is broken, it alone is left out."""
     try:
-        if element.tag == "include":
-            element, context = open_include(element, context)
-        entity = _entity(element, context)
-        kept: dict[str, Any] = world.lights if isinstance(entity, Light) else world.models
-        if entity.name in kept:
-            raise DescriptionError(f"'{shown(entity.name)}' is there twice")
-        kept[entity.name] = entity
+        if element.tag == "population":
+            with elements.place(f"population '{shown(element.get('name', ''))}'"):
+                for clone in clones(element):
+                    context.reading.begin()
+                    _keep(world, clone, context)
+        elif element.tag == "include":
+            _keep(world, *open_include(element, context))
+        else:
+            _keep(world, element, context)
     except LimitExceeded:
         raise
     except DescriptionError as error:
         world.warnings.append(f"{error}; it is left out")
+
+
+def _keep(world: WorldDescription, element: Element, context: FileContext) -> None:
+    entity = _entity(element, context)
+    kept: dict[str, Any] = world.lights if isinstance(entity, Light) else world.models
+    if entity.name in kept:
+        raise DescriptionError(f"'{shown(entity.name)}' is there twice")
+    kept[entity.name] = entity
 
 
 def _read_physics(world: WorldDescription, element: Element) -> None:
