@@ -30,7 +30,7 @@ setup(
     packages=find_packages("src"),
     package_dir={"": "src"},
     package_data={
-        "robot_sim.physics.files": ["elements.toml", "models.sdf"],
+        "robot_sim.physics.files": ["elements.toml", "materials.toml", "models.sdf"],
         "package_writing": [
             "*.in",
             "drive/**/*",

@@ -24,6 +24,7 @@ from file_access.text import one_line
 
 STARTING = 30.0  # [s] beyond the time limit, for Python to start on a busy machine
 HEADER = struct.Struct("<cQ")  # of a message: its kind and its length [bytes]
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # more would wait for each other on a busy machine
 REQUEST, DONE, REFUSED = b"?", b"+", b"-"
 
 
@@ -106,8 +107,9 @@ class LimitedProcess:
         )
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-I", "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-            )
+                [sys.executable, "-I", "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                env=os.environ | ONE_THREAD,
+            )  # fmt: skip
         except OSError as error:
             raise ProcessDied(f"can't be started: {error.strerror}") from error
         self._parent = os.getpid()

@@ -30,8 +30,22 @@ from web_viewer.address import LOOPBACK, TOKEN_BYTES, Address, PortInUse, has_di
 
 Answer = Callable[[Any, Request], Response | None]
 LONGEST_PATH = 1000  # of a request [characters]
-HTML, EMPTY = "text/html", b'<div id="root">'
-LOADING = b"<p style='font-family: sans-serif; padding: 1em'>The page is loading ...</p>"
+HTML, BEFORE_PROGRAM = "text/html", b"</title>"  # the program that follows is most of the page
+# Words that go when the program has drawn something. On a telephone viser lays its panel over the scene: here
+# the panel stands below, and the scene has what is left.
+HEAD = b"""
+<style>
+body:has(#root > *) > #loading { display: none; }
+@media (max-width: 36em) {
+  :has(> .mantine-Paper-root > div > .mantine-ScrollArea-root) { flex-direction: column; }
+  .mantine-Paper-root:has(> div > .mantine-ScrollArea-root) {
+    position: static !important; width: 100% !important; max-height: 45% !important; flex-shrink: 0;
+  }
+  .mantine-ScrollArea-content > div { width: 100% !important; }
+}
+</style>
+<p id="loading" style="font-family: sans-serif; padding: 1em">The page is loading ...</p>
+"""
 LARGEST_INTEGER = 2.0**53  # integers that JavaScript has exactly
 LARGEST_SIDE = 2**14  # of a page [pixels]
 Point = tuple[float, float, float]  # [m]
@@ -78,7 +92,7 @@ class Gate:
             except (LookupError, ValueError, OSError):  # two hosts, a path that is no text, ...
                 return _said(http.HTTPStatus.BAD_REQUEST, "it is no browser's request")
             if response is not None and response.headers.get("Content-Type", "").startswith(HTML):
-                response = _with_words(response)
+                response = _with_head(response)
             if self._token and response is not None:
                 response.headers["Set-Cookie"] = (
                     f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
@@ -88,11 +102,11 @@ class Gate:
         return guarded
 
 
-def _with_words(response: Response) -> Response:
-    """Has viser's page say that it is loading, until its program has come and been unpacked."""
+def _with_head(response: Response) -> Response:
+    """Has viser's page say that it is loading until its program runs, and fit a telephone."""
     packed = response.headers.get("Content-Encoding") == "gzip"
     body = gzip.decompress(response.body) if packed else response.body
-    body = body.replace(EMPTY, EMPTY + LOADING, 1)
+    body = body.replace(BEFORE_PROGRAM, BEFORE_PROGRAM + HEAD, 1)
     body = gzip.compress(body, 1) if packed else body
     headers = Headers(response.headers)
     del headers["Content-Length"]

@@ -124,6 +124,13 @@ def documents(section: str, path: str, value: str) -> Iterator[Element]:
         for mesh in document.iter("submesh"):
             if mesh.find("name") is None:
                 SubElement(mesh, "name").text = "part"
+        for population in document.iter("population"):
+            if population.find("model") is None:
+                SubElement(population, "model", name="m_x")
+            if way[-1] in ("rows", "cols", "step"):
+                population[0].append(ElementTree.fromstring("<type>grid</type>"))
+            elif way[-2] not in ("box", "cylinder"):
+                SubElement(population, "box")
         for tag, attribute in NEEDED if root == "robot" else ():
             for element in document.iter(tag):
                 element.attrib.setdefault(attribute, SAMPLES.get(attribute, "0.5"))

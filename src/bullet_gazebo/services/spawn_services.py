@@ -185,11 +185,12 @@ def read_world(name: str, interrupted: Callable[[], bool]) -> WorldDescription:
 
 
 def fill_world(sim: Simulator, world: WorldDescription, interrupted: Callable[[], bool]) -> None:
-    """Sets gravity and step, and adds lights and models; a model that the engine refuses is left out.
+    """Sets time, gravity and step, and adds lights and models; a model that the engine refuses is left out.
 
     No more models are added once `interrupted` returns true.
     """
     with sim.lock:
+        sim.now = world.start
         sim.set_time_step(world.time_step)
         sim.max_update_rate = world.update_rate
         sim.world.set_gravity(world.gravity)

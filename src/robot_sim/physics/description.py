@@ -5,6 +5,7 @@ import os
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import combinations
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
@@ -77,6 +78,11 @@ class Mesh:
     def is_heightmap(self) -> bool:
         """Whether its vertices are a square grid: rows along x, the one at the lowest y first."""
         return not self.hulls
+
+    @cached_property
+    def reach(self) -> np.ndarray:
+        """The largest distance (3,) from the origin along each axis."""
+        return np.abs(self.vertices).max(axis=0)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Mesh) and self.digest == other.digest
@@ -284,6 +290,7 @@ class ModelDescription:
         left_out: plugins and the like, which nothing simulates.
         stand_ins: models of Gazebo's database that aren't installed, in whose place simpler ones stand.
         islands: links of a static model that no joint connects with the root, and their poses seen from it.
+        nested: models in it, by their names with all outer ones, and their poses in it.
         mimics: what makes joints follow others, by the follower's name, drivers before their followers.
         lumped: links that a fixed joint has made part of another one: that link, and their poses in it.
         initial_pose: where the file puts the model.
@@ -304,6 +311,7 @@ class ModelDescription:
     left_out: list[str] = field(default_factory=list)
     stand_ins: list[str] = field(default_factory=list)
     islands: dict[str, Pose] = field(default_factory=dict)
+    nested: dict[str, Pose] = field(default_factory=dict)
     mimics: dict[str, Mimic] = field(default_factory=dict)
     lumped: dict[str, tuple[str, Pose]] = field(default_factory=dict)
     initial_pose: Pose = Pose()

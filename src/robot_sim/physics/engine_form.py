@@ -57,7 +57,7 @@ def _check_link(link: Link, static: bool) -> None:
     for shape in link.collisions:
         if shape.solid is None:
             continue
-        reach = float((np.abs(shape.solid.vertices).max(axis=0) * np.abs(shape.size)).max())
+        reach = float((shape.solid.reach * np.abs(shape.size)).max())
         if not reach <= FURTHEST:
             raise DescriptionError(
                 f"link '{link.name}': mesh '{shape.mesh}' reaches to {reach:g} m, beyond {FURTHEST:g} m"

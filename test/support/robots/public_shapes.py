@@ -41,14 +41,18 @@ def mesh_arm(folder: Path, kind: str) -> str:
 
 def suspension() -> str:
     """URDF of a vehicle whose four wheels hang on prismatic joints with springs and dampers."""
-    hull = '<collision><geometry><box size="1 0.6 0.1"/></geometry></collision>'
+    shape = '<geometry><box size="1 0.6 0.1"/></geometry>'
+    hull = f"<collision>{shape}</collision><visual>{shape}</visual>"
     parts = [f'<link name="hull">{INERTIAL.format(MASS)}{hull}</link>']
-    wheel = f'<collision><geometry><sphere radius="{RADIUS}"/></geometry></collision>'
+    parts.append('<gazebo reference="hull"><material>Gazebo/Blue</material></gazebo>')
+    shape = f'<geometry><sphere radius="{RADIUS}"/></geometry>'
+    wheel = f"<collision>{shape}</collision><visual>{shape}</visual>"
+    strut = '<visual><geometry><box size="0.03 0.03 0.3"/></geometry></visual>'
     for front in (1, -1):
         for left in (1, -1):
             name = f"{'front' if front > 0 else 'rear'}_{'left' if left > 0 else 'right'}"
             parts.append(
-                f'<link name="{name}_strut">{INERTIAL.format(0.5)}</link>'
+                f'<link name="{name}_strut">{INERTIAL.format(0.5)}{strut}</link>'
                 f'<joint name="{name}_slide" type="prismatic"><parent link="hull"/>'
                 f'<child link="{name}_strut"/><origin xyz="{0.4 * front} {0.3 * left} {-DROP}"/>'
                 '<axis xyz="0 0 1"/><limit lower="-0.1" upper="0.1" effort="1000" velocity="10"/>'

@@ -127,18 +127,17 @@ class BulletClient:
         """Loads a model in the engine's form by way of files; returns PyBullet's number of the body."""
         size = PLANE
         try:
-            with scratch_folder() as folder:
-                if mesh := static_mesh(model):
-                    body = self._meshes.load(mesh, pose, folder)
-                else:
+            if mesh := static_mesh(model):
+                body = self._meshes.load(mesh, pose)
+            else:
+                with scratch_folder() as folder, _decimal_points():
                     path = folder / "model.urdf"
                     path.write_text(write_urdf(parents_first(model), folder), encoding="utf-8")
                     size = _size(folder)
-                    with _decimal_points():
-                        body = pybullet.loadURDF(
-                            str(path), pose.position, pose.orientation, flags=flags,
-                            useFixedBase=model.fixed_base, physicsClientId=self._client,
-                        )  # fmt: skip
+                    body = pybullet.loadURDF(
+                        str(path), pose.position, pose.orientation, flags=flags,
+                        useFixedBase=model.fixed_base, physicsClientId=self._client,
+                    )  # fmt: skip
         except pybullet.error as error:
             self.waste += size
             raise DescriptionError(f"the physics engine can't load the model: {error}") from error

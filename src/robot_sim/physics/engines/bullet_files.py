@@ -30,12 +30,13 @@ def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
     if path.exists():
         return str(path)
     if concave:
-        path.write_bytes(stl(mesh.vertices[mesh.faces]))
+        path.write_bytes(stl(mesh.vertices, mesh.faces))
     elif objects:
         path.write_text(_obj(mesh), encoding="ascii")
     else:
         points = np.concatenate(mesh.hulls)
-        path.write_bytes(stl(points[np.arange(-(-len(points) // 3) * 3) % len(points)]))
+        around = np.arange(-(-len(points) // 3) * 3) % len(points)
+        path.write_bytes(stl(points, around.reshape(-1, 3)))
     return str(path)
 
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from file_access.locks import scratch_folder
 from robot_sim.physics.description import ModelDescription, Shape
 from robot_sim.physics.engines.bullet_files import UNSEEN, write_mesh
 from robot_sim.physics.engines.quiet_pybullet import pybullet
@@ -39,17 +40,18 @@ class SharedMeshes:
         """Sum of the sizes of their files [bytes]."""
         return sum(size for _, size in self._meshes.values())
 
-    def load(self, shape: Shape, pose: Pose, folder: Path) -> int:
-        """Adds a body at `pose`; returns its number. A new mesh is written into `folder`."""
+    def load(self, shape: Shape, pose: Pose) -> int:
+        """Adds a body at `pose`; returns its number."""
         assert shape.solid is not None
         key = shape.solid.digest, shape.size
         if key not in self._meshes:
-            path = write_mesh(shape.solid, folder, concave=True, objects=False)
-            number = pybullet.createCollisionShape(
-                pybullet.GEOM_MESH, fileName=path, meshScale=shape.size,
-                flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH, physicsClientId=self._client,
-            )  # fmt: skip
-            self._meshes[key] = number, Path(path).stat().st_size
+            with scratch_folder() as folder:
+                path = write_mesh(shape.solid, folder, concave=True, objects=False)
+                number = pybullet.createCollisionShape(
+                    pybullet.GEOM_MESH, fileName=path, meshScale=shape.size,
+                    flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH, physicsClientId=self._client,
+                )  # fmt: skip
+                self._meshes[key] = number, Path(path).stat().st_size
         body: int = pybullet.createMultiBody(
             0.0, self._meshes[key][0], self._drawn, pose.position, pose.orientation,
             physicsClientId=self._client,

@@ -89,6 +89,13 @@ class WithoutEffect:
                 if text and not _is_foreign(name):
                     what, row = f"<{outer.tag} {name}>", rows.get(f"@{name}", rows.get("*"))
                     self._judge(what, row, text, outer, outside)
+            for name, row in rows.items():
+                if row.default[:1] == "." and outer.find(name) is None:
+                    other, _, value = row.default[1:].partition("/")
+                    given = outer.find(other)
+                    if given is not None and _value(given):
+                        what = f"<{other}> without <{name}>, which is {value},"
+                        self._judge(what, row, value, outer, outside)
             for child in outer:
                 row = rows.get(child.tag, rows.get("*"))
                 if _is_foreign(child.tag) or self._judge(

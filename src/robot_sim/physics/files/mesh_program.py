@@ -16,22 +16,19 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from file_access.content import FileError, read_file
+from file_access.content import FileError
 from robot_sim.physics.description import DescriptionError, Mesh
 from robot_sim.physics.files.elements import numbers, place, shown
 from robot_sim.physics.files.hull import convex_pieces, hull_points
-from robot_sim.physics.files.mesh_cache import kept, read_arrays, written
+from robot_sim.physics.files.mesh_cache import read_arrays, written
 from robot_sim.physics.files.mesh_looks import meters_of, parse_collada, read_glb, read_parts
-from robot_sim.physics.files.meshes import IMAGES, Selection, Submesh
+from robot_sim.physics.files.meshes import IMAGES, Selection, Submesh, read_content
 from robot_sim.physics.files.plain_obj import READ, plain_obj
 from robot_sim.physics.files.shape_meshes import MADE, heightmap
 
-MOST_BYTES = 200_000_000  # of a file: a million triangles as COLLADA writes them
 MOST_TRIANGLES = 1_000_000
 MOST_VERTICES = 3 * MOST_TRIANGLES
 MOST_PARTS = 256  # hulls of one mesh
-LARGE = 500_000  # [bytes] of a file that takes a tenth of a second
-KEPT = "mesh-2"  # begins the names of kept meshes; another one when others would come out
 LARGEST = 1e12  # of a coordinate, in the file's unit: 32-bit floats lose their digits beyond it
 MOST_NAMES = 10  # that an error lists
 
@@ -55,36 +52,17 @@ Part = tuple[np.ndarray, np.ndarray]
 def answer(request: bytes) -> bytes:
     """Answers a request of `meshes`: digest, vertices, faces and hulls of a file, its looks, or pieces."""
     head, _, data = request.partition(b"\n")
-    what, name, given, cache = json.loads(head)
+    what, name, given = json.loads(head)
     path = Path(name)
     if what == "glb":
         return read_glb(path)
-    arrays: Iterable[np.ndarray]
     if what == "parts":
-        arrays = read_parts(path)
-    elif what == "pieces":
-        arrays = convex_pieces(*read_arrays(data))
-    else:
-        if what in MADE:
-            return _as_bytes(_hashed(*MADE[what](*given)))
-        arrays = _load_once(
-            path, Submesh(*given) if isinstance(given, list) else given, Path(cache)
-        )
-    return written(arrays)
-
-
-def _load_once(path: Path, selection: Selection, cache: Path) -> list[np.ndarray]:
-    """Returns digest, vertices, faces and hulls; those of large files are kept by their content."""
-    data = _read(path)
-
-    def compute() -> bytes:
-        return _as_bytes(load(path, selection, data))
-
-    if len(data) < LARGE:
-        return read_arrays(compute())
-    content = hashlib.blake2b(data, digest_size=16, key=path.suffix.lower().encode())
-    content.update(repr(selection).encode())
-    return kept(cache / f"{KEPT}-{content.hexdigest()}", compute)
+        return written(read_parts(path))
+    if what == "pieces":
+        return written(convex_pieces(*read_arrays(data)))
+    if what in MADE:
+        return _as_bytes(_hashed(*MADE[what](*given)))
+    return _as_bytes(load(path, Submesh(*given) if isinstance(given, list) else given, data))
 
 
 def _as_bytes(mesh: Mesh) -> bytes:
@@ -92,21 +70,14 @@ def _as_bytes(mesh: Mesh) -> bytes:
     return written((digest, mesh.vertices, mesh.faces, *mesh.hulls))
 
 
-def _read(path: Path) -> bytes:
-    try:
-        return read_file(path, MOST_BYTES)
-    except FileError as error:
-        raise DescriptionError(str(error)) from error
-
-
-def load(path: Path, selection: Selection = None, data: bytes | None = None) -> Mesh:
+def load(path: Path, selection: Selection = None, data: bytes = b"") -> Mesh:
     """Returns the mesh of a file, or of one named part of it; `data` is its content if it is read already."""
     if path.suffix.lower() in IMAGES:
         return _hashed(*heightmap(path, selection))
     submesh = selection if isinstance(selection, Submesh) else None
     readers: dict[str, Callable[[bytes, str], list[Part]]]
     readers = {".stl": _read_stl, ".dae": _read_collada, ".obj": _read_obj}
-    data = _read(path) if data is None else data
+    data = data or read_content(path)
     with np.errstate(all="ignore"):  # what isn't finite is refused below
         try:
             parts = readers[path.suffix.lower()](data, submesh.name if submesh else "")

@@ -3,6 +3,7 @@
 A limited child process reads them (`mesh_program`, `mesh_looks`) and takes them apart (`hull`).
 """
 
+import hashlib
 import json
 from collections.abc import Iterable
 from contextlib import suppress
@@ -13,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from file_access.content import FileError, read_file
 from file_access.limited import LimitedProcess, Limits, RequestRefused
 from robot_sim.physics.description import Color, DescriptionError, Mesh
 from robot_sim.physics.files.elements import place
@@ -25,7 +27,10 @@ PLAIN = (".stl", *IMAGES)  # of files that have no materials
 LIMITS = Limits(processor_time=60, wall_time=120.0, memory=4 << 30, output=1 << 30)
 MOST_KEPT = 32  # files with their looks
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of STL
-PIECES = "v-hacd-1"  # begins the names of kept pieces; another one when others would come out
+MOST_BYTES = 200_000_000  # of a file: a million triangles as COLLADA writes them
+LARGE = 50_000  # [bytes] of a file that is kept
+# Begin the names of what is kept; others when others would come out.
+KEPT, PIECES = "mesh-2", "v-hacd-1"
 
 # It stays for further meshes: starting Python and importing trimesh takes longer than most files.
 _process = LimitedProcess("robot_sim.physics.files.mesh_program:answer", LIMITS)
@@ -88,8 +93,8 @@ class MeshLook:
         if self.path.suffix.lower() in PLAIN:
             return b""
         try:
-            return _process.ask(json.dumps([what, str(self.path), None, ""]).encode())
-        except RequestRefused:
+            return _asked(what, str(self.path), None)
+        except DescriptionError:
             return b""
 
 
@@ -101,25 +106,43 @@ def read_mesh(path: Path, selection: Selection = None) -> Mesh:
     """
     check_mesh(path, (*SUFFIXES, *IMAGES))
     with place(f"mesh '{path}'"):
-        return _asked("mesh", str(path), selection)
+        if path.stat().st_size < LARGE:
+            return _mesh(read_arrays(_asked("mesh", str(path), selection)))
+        data = read_content(path)
+        content = hashlib.blake2b(data, digest_size=16, key=path.suffix.lower().encode())
+        content.update(repr(selection).encode())
+        name = cache_folder() / f"{KEPT}-{content.hexdigest()}"
+        return _mesh(kept(name, lambda: _asked("mesh", str(path), selection, data)))
+
+
+def read_content(path: Path) -> bytes:
+    """Returns the content of a mesh file."""
+    try:
+        return read_file(path, MOST_BYTES)
+    except FileError as error:
+        raise DescriptionError(str(error)) from error
 
 
 def make_mesh(what: str, *given: object) -> tuple[str, Mesh]:
     """Returns a mesh that `shape_meshes` makes, and the file that it is kept in for whoever draws it."""
-    mesh = _asked(what, "", given)
+    mesh = _mesh(read_arrays(_asked(what, "", given)))
     path = cache_folder() / f"{what}-{mesh.digest}.stl"
     if not path.exists():
         with suppress(OSError):  # then it isn't drawn
-            keep(path, stl(mesh.vertices[mesh.faces]))
+            keep(path, stl(mesh.vertices, mesh.faces))
     return str(path), replace(mesh, in_pieces=len(mesh.hulls) > 1)
 
 
-def _asked(what: str, path: str, given: object) -> Mesh:
+def _asked(what: str, path: str, given: object, data: bytes = b"") -> bytes:
+    """Returns the child's answer."""
     try:
-        data = _process.ask(json.dumps([what, path, given, str(cache_folder())]).encode())
+        return _process.ask(json.dumps([what, path, given]).encode() + b"\n" + data)
     except RequestRefused as error:
         raise DescriptionError(str(error)) from error
-    digest, vertices, faces, *hulls = read_arrays(data)
+
+
+def _mesh(arrays: list[np.ndarray]) -> Mesh:
+    digest, vertices, faces, *hulls = arrays
     return Mesh(vertices, faces, tuple(hulls), digest.tobytes().decode())
 
 
@@ -134,15 +157,10 @@ def in_pieces(mesh: Mesh) -> Mesh:
     """
     if len(mesh.hulls) > 1:
         return _of_pieces(mesh, mesh.hulls) if all(map(is_solid, mesh.hulls)) else mesh
-    data = json.dumps(["pieces", "", None, ""]).encode() + b"\n"
-
-    def compute() -> bytes:
-        return _process.ask(data + written((mesh.vertices, mesh.faces)))
-
-    try:
-        pieces = kept(cache_folder() / f"{PIECES}-{mesh.digest}", compute)
-    except RequestRefused as error:
-        raise DescriptionError(str(error)) from error
+    pieces = kept(
+        cache_folder() / f"{PIECES}-{mesh.digest}",
+        lambda: _asked("pieces", "", None, written((mesh.vertices, mesh.faces))),
+    )
     return _of_pieces(mesh, pieces) if pieces else mesh
 
 
@@ -150,11 +168,11 @@ def _of_pieces(mesh: Mesh, pieces: Iterable[np.ndarray]) -> Mesh:
     return replace(mesh, hulls=tuple(pieces), digest=f"{mesh.digest}-pieces", in_pieces=True)
 
 
-def stl(corners: np.ndarray) -> bytes:
-    """Returns facets as binary STL, which PyBullet reads fastest, without normals."""
-    facets = np.zeros(corners.size // 9, FACET)
-    facets["corners"] = corners.reshape(-1, 3, 3)
-    return bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
+def stl(points: np.ndarray, faces: np.ndarray) -> bytes:
+    """Returns triangles as binary STL, which PyBullet reads fastest, without normals."""
+    facets = np.zeros(len(faces), FACET)
+    facets["corners"] = points.astype(np.float32)[faces]
+    return b"".join((bytes(80), np.uint32(len(facets)).tobytes(), facets.data))
 
 
 def read_look(path: str) -> MeshLook:

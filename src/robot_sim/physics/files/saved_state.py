@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
+from robot_sim.constants import NANOSECONDS
 from robot_sim.physics.description import (
     DescriptionError,
     Joint,
@@ -24,6 +25,8 @@ from robot_sim.physics.pose import ZERO, Pose, add, cross, rotate, scale, subtra
 
 SLACK = 0.01  # [m, rad]; so far solvers let links come apart
 MOST_NAMES = 5  # that a warning lists
+LONGEST = 2**31  # [s]; ROS's stamps end at 2^32
+STILL: Twist = (ZERO, ZERO)
 
 Saved = tuple[Pose, Twist]
 """Pose and velocity of a link in the world."""
@@ -50,6 +53,19 @@ def begin_as_saved(
         yield f"<state>: the world has no {', '.join(missing[:MOST_NAMES])}"
 
 
+def saved_time(state: Element, warnings: list[str]) -> int:
+    """Returns the simulated time [ns] of a state; 0, and a warning, if it is none."""
+    text = state.findtext("sim_time", "0 0")
+    try:
+        seconds, rest = numbers(text, "<state>: <sim_time>", 2)
+        if not (0.0 <= seconds <= LONGEST and 0.0 <= rest < NANOSECONDS):
+            raise DescriptionError(f"<state>: <sim_time> is {shown(text)}")
+    except DescriptionError as error:
+        warnings.append(f"{error}; time begins at 0")
+        return 0
+    return int(seconds) * NANOSECONDS + int(rest)
+
+
 def _pose(element: Element, where: str, default: Pose) -> Pose:
     if element.find("pose") is None:
         return default
@@ -63,11 +79,15 @@ def _pose(element: Element, where: str, default: Pose) -> Pose:
 def _links(
     model: Element, scope: str, where: str, rest: dict[str, Pose]
 ) -> Iterator[tuple[str, Saved]]:
-    """Yields the links of a model's state and of those nested in it."""
+    """Yields the links of a model's state and of those nested in it; in `rest` their names end in ::."""
     for element in model:
         name = scope + element.get("name", "")
         if element.tag == "model":
-            yield from _links(element, f"{name}::", where, rest)
+            frame = rest.get(f"{name}::", Pose())
+            move = _pose(element, where, frame).compose(frame.inverse())
+            inner = {n: move.compose(p) for n, p in rest.items() if n.startswith(f"{name}::")}
+            yield from ((each, (pose, STILL)) for each, pose in (inner or {name: frame}).items())
+            yield from _links(element, f"{name}::", where, inner)
         elif element.tag == "link":
             here = f"{where}, link '{shown(name)}'"
             text = element.findtext("velocity", "0 0 0 0 0 0")
@@ -80,27 +100,29 @@ def _links(
 
 def _begin(model: ModelDescription, element: Element, where: str) -> Iterator[str]:
     """Sets where a model begins; yields what can't be as in its state."""
-    base = _pose(element, where, model.initial_pose).compose(model.root_pose)
+    frame = _pose(element, where, model.initial_pose)
+    base = frame.compose(model.root_pose)
     at_zero = poses_at_zero(rigid(model) if model.static else model)
     rest = {name: base.compose(pose) for name, pose in at_zero.items()}
-    given = dict(_links(element, "", where, rest))
+    nested = {f"{name}::": frame.compose(pose) for name, pose in model.nested.items()}
+    given = dict(_links(element, "", where, rest | nested))
     whole = {name: link.owner for name, link in model.links.items()}  # of links that close loops
-    links = {name: given.get(whole[name], (pose, (ZERO, ZERO))) for name, pose in rest.items()}
-    unknown = [f"'{shown(name)}'" for name in given if name not in rest]
+    links = {name: given.get(whole[name], (pose, STILL)) for name, pose in rest.items()}
+    unknown = [f"'{shown(name)}'" for name in given if name not in rest and name not in nested]
     if unknown:
-        yield f"{where}: it has no link {', '.join(unknown[:MOST_NAMES])}"
+        yield f"{where}: it has no link or model {', '.join(unknown[:MOST_NAMES])}"
     if model.static:
         _lay_out(model, links)
-        model.start = SavedMotion(links[model.root][0], (ZERO, ZERO), {})
+        model.start = SavedMotion(links[model.root][0], STILL, {})
         return
     held = [each for each in model.joints.values() if each.parent == WORLD and each.child in given]
     if held:  # the model's frame has moved with its first link, the world hasn't
-        links[WORLD] = model.initial_pose.compose(model.root_pose), (ZERO, ZERO)
+        links[WORLD] = model.initial_pose.compose(model.root_pose), STILL
     joints = {name: _joint_state(joint, links) for name, joint in model.joints.items()}
     root, twist = links[model.root]
     for joint in held[:1]:  # where somebody has put it meanwhile
         root = links[joint.child][0].compose(_motion(joint, joints[joint.name][0]).inverse())
-    model.start = SavedMotion(root, (ZERO, ZERO) if model.fixed_base else twist, joints)
+    model.start = SavedMotion(root, STILL if model.fixed_base else twist, joints)
     apart = [
         f"'{shown(name)}'"
         for name, pose in _placed(model, model.start)

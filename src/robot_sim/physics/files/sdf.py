@@ -155,6 +155,7 @@ class _Parts:
 
     links: list[Link] = field(default_factory=list)
     poses: dict[str, Pose] = field(default_factory=dict)
+    nested: dict[str, Pose] = field(default_factory=dict)
     joints: list[Joint] = field(default_factory=list)
     plugins: list[Plugin] = field(default_factory=list)
     sensors: list[Sensor] = field(default_factory=list)
@@ -244,7 +245,7 @@ def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
         )
     model = ModelDescription(name, links, joints, roots[0], poses[roots[0]])
     model.islands = {root: poses[root].relative_to(poses[roots[0]]) for root in roots[1:]}
-    model.plugins, model.warnings = parts.plugins, parts.warnings
+    model.nested, model.plugins, model.warnings = parts.nested, parts.plugins, parts.warnings
     model.static, model.sensors, model.stand_ins = static, parts.sensors, parts.stand_ins
     detach_from_world(model)
     mend_moments(model)
@@ -277,6 +278,8 @@ def _read_parts(model: Element, context: FileContext, static: bool, depth: int) 
         read.self_collide = truth(element.findtext("self_collide"), default=collide)
         parts.links.append(read)
     for name, _, inner in nested:
+        parts.nested[name] = frame = frames.resolve(name)
+        parts.nested |= {f"{name}::{each}": frame.compose(p) for each, p in inner.nested.items()}
         _take_over(parts, inner, name)
     parts.poses = {link.name: frames.resolve(link.name) for link in parts.links}
     joints = JointReader(frames, context.version, parts.warnings)

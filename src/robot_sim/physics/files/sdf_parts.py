@@ -1,7 +1,10 @@
 """Poses, inertia, sensors and joints of SDF models (sdformat.org, specification 1.4 to 1.7)."""
 
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from robot_sim.physics.description import (
@@ -29,6 +32,7 @@ from robot_sim.physics.pose import (
     rotate,
 )
 
+MATERIALS = Path(__file__).with_name("materials.toml")
 MODEL = "__model__"
 WORLD = "world"
 KINDS = (
@@ -144,6 +148,22 @@ def read_color(text: str, where: str) -> Color:
     words = [*text.split(None, 4), "1"][:4]
     r, g, b, a = numbers(" ".join(words), where, 4)
     return (r, g, b, a)
+
+
+@cache
+def _material_colors() -> dict[str, Color]:
+    table = tomllib.loads(MATERIALS.read_text(encoding="utf-8"))
+    names = [(f"Gazebo/{name}", text) for text, listed in table.items() for name in listed.split()]
+    return {name: read_color(text, name) for name, text in names}
+
+
+def material_color(name: str, warnings: list[str]) -> Color | None:
+    """Returns the colour of one of Gazebo's materials; None, and a warning, for another one."""
+    found = _material_colors().get(name)
+    warning = f"the colour of material '{shown(name)}' is not known"
+    if found is None and name and warning not in warnings:
+        warnings.append(warning)
+    return found
 
 
 @dataclass(frozen=True)

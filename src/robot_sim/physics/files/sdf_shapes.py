@@ -17,7 +17,7 @@ from robot_sim.physics.files.elements import (
 from robot_sim.physics.files.meshes import IMAGES, Submesh, make_mesh
 from robot_sim.physics.files.own_models import model_of_mesh
 from robot_sim.physics.files.reading import MeshFile, MeshFinder
-from robot_sim.physics.files.sdf_parts import Frames, read_color, read_pose, value
+from robot_sim.physics.files.sdf_parts import Frames, material_color, read_color, read_pose, value
 from robot_sim.physics.pose import Pose, Quaternion, cross, normalized
 
 GEOMETRIES = (
@@ -132,7 +132,8 @@ class ShapeReader:
             positive(size, f"{where}, {solid.tag}")
             if solid.tag == "ellipsoid":
                 kind, mesh = "mesh", make_mesh("ellipsoid")
-        color, name = _color(element, where), element.get("name", "")
+        color = _color(element, where, self.meshes.warnings)
+        name = element.get("name", "")
         shape = Shape(kind, size, pose, mesh[0], color, name, solid=mesh[1] if collides else None)
         if not collides:
             return shape
@@ -208,8 +209,8 @@ def _onto_normal(plane: Element, where: str) -> Quaternion:
     return normalized((*axis, length + z))
 
 
-def _color(element: Element, where: str) -> Color | None:
-    text = element.findtext("material/diffuse")
-    if not (text or "").strip():
-        return None
-    return read_color(text or "", f"{where}: <diffuse>")
+def _color(element: Element, where: str, warnings: list[str]) -> Color | None:
+    text = element.findtext("material/diffuse") or ""
+    if text.strip():
+        return read_color(text, f"{where}: <diffuse>")
+    return material_color(element.findtext("material/script/name", "").strip(), warnings)

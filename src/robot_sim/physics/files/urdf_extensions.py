@@ -17,6 +17,7 @@ from robot_sim.physics.files.sdf_parts import (
     Frames,
     JointReader,
     joint_end,
+    material_color,
     read_pose,
     read_sensors,
 )
@@ -75,6 +76,9 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
             # Anything else than "no" turns it off, also an empty element.
             on = NO if element.tag == "turnGravityOff" else ("", *YES)
             link.gravity, link.says_gravity = _value(element) in on, True
+        elif element.tag == "material":
+            color = material_color(_text(element), model.warnings)
+            link.visuals = [replace(shape, rgba=color or shape.rgba) for shape in link.visuals]
         elif element.tag == "selfCollide":
             link.self_collide = _value(element) in YES
         elif element.tag == "plugin":
@@ -96,10 +100,12 @@ def _apply_to_joint(model: ModelDescription, joint: Joint, block: Element) -> No
 
 
 def _value(element: Element | None) -> str:
-    """Returns the value of an extension, stripped and in lower case."""
-    if element is None:
-        return ""
-    return (element.get("value", element.text) or "").strip().lower()
+    """Returns the value of an extension in lower case."""
+    return "" if element is None else _text(element).lower()
+
+
+def _text(element: Element) -> str:
+    return (element.get("value", element.text) or "").strip()
 
 
 def add_extension_joints(model: ModelDescription, robot: Element) -> None:

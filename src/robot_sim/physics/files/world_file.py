@@ -21,8 +21,9 @@ from robot_sim.physics.files import elements
 from robot_sim.physics.files.element_table import without_effect
 from robot_sim.physics.files.elements import named, numbers, read_plugin, shown, truth
 from robot_sim.physics.files.own_models import own_models
+from robot_sim.physics.files.population import clones
 from robot_sim.physics.files.reading import LoadProgress, MeshFinder, Reading, Resources
-from robot_sim.physics.files.saved_state import begin_as_saved
+from robot_sim.physics.files.saved_state import begin_as_saved, saved_time
 from robot_sim.physics.files.sdf import (
     FileContext,
     first_entity,
@@ -65,6 +66,7 @@ class WorldDescription:
     models: dict[str, ModelDescription] = field(default_factory=dict)
     lights: dict[str, Light] = field(default_factory=dict)
     gravity: Vector = GRAVITY
+    start: int = 0  # [ns], of simulated time
     time_step: float = TIME_STEP  # [s]
     update_rate: float = UPDATE_RATE  # [Hz of wall time]; 0 means as fast as possible
     solver: SolverSettings = SolverSettings()
@@ -122,10 +124,13 @@ def _read(root: Element, context: FileContext) -> WorldDescription:
     if state is not None:
         for child in state.iterfind("insertions/*"):
             _add(world, child, context)
+        world.start = saved_time(state, world.warnings)
         world.warnings += begin_as_saved(state, world.models, world.lights)
         for name in [(each.text or "").strip() for each in state.iterfind("deletions/name")]:
             world.models.pop(name, None)
             world.lights.pop(name, None)
+    for child in element.findall("population"):  # once all else is there
+        _add(world, child, context)
     return world
 
 
@@ -209,19 +214,29 @@ def _script(actor: Element, warnings: list[str]) -> Script | None:
 
 
 def _add(world: WorldDescription, element: Element, context: FileContext) -> None:
-    """Adds one model, light or actor. If it is broken, it alone is left out."""
+    """Adds one model, light or actor, or a population. If it is broken, it alone is left out."""
     try:
-        if element.tag == "include":
-            element, context = open_include(element, context)
-        entity = _entity(element, context)
-        kept: dict[str, Any] = world.lights if isinstance(entity, Light) else world.models
-        if entity.name in kept:
-            raise DescriptionError(f"'{shown(entity.name)}' is there twice")
-        kept[entity.name] = entity
+        if element.tag == "population":
+            with elements.place(f"population '{shown(element.get('name', ''))}'"):
+                for clone in clones(element):
+                    context.reading.begin()
+                    _keep(world, clone, context)
+        elif element.tag == "include":
+            _keep(world, *open_include(element, context))
+        else:
+            _keep(world, element, context)
     except LimitExceeded:
         raise
     except DescriptionError as error:
         world.warnings.append(f"{error}; it is left out")
+
+
+def _keep(world: WorldDescription, element: Element, context: FileContext) -> None:
+    entity = _entity(element, context)
+    kept: dict[str, Any] = world.lights if isinstance(entity, Light) else world.models
+    if entity.name in kept:
+        raise DescriptionError(f"'{shown(entity.name)}' is there twice")
+    kept[entity.name] = entity
 
 
 def _read_physics(world: WorldDescription, element: Element) -> None:

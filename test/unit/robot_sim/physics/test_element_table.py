@@ -199,6 +199,33 @@ def test_a_urdf_names_its_blocks():
     ]
 
 
+@pytest.mark.parametrize(
+    ("friction", "warned"),
+    [
+        ("<{0}>0.3</{0}>", ["no effect here: <{0}> without <mu2>, which is 1, of {1}"]),
+        ("<{0}>1.0</{0}>", []),
+        ("<{0}>0.3</{0}><mu2>0.3</mu2>", []),
+        ("<{0}>0.3</{0}><mu2>1</mu2>", ["no effect here: <mu2> of {1}"]),
+        ("", []),
+    ],
+)
+def test_a_friction_in_one_direction_alone_is_told(friction, warned):
+    """Gazebo's other direction has 1."""
+    box = '<geometry><box size="1 1 1"/></geometry>'
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+    urdf = parse_urdf(
+        f"""<robot name="r"><link name="l">{inertial}<collision>{box}</collision></link>
+        <gazebo reference="l">{friction.format("mu1")}</gazebo></robot>"""
+    )
+    shape = "<geometry><box><size>1 1 1</size></box></geometry>"
+    surface = f"<surface><friction><ode>{friction.format('mu')}</ode></friction></surface>"
+    link = f'<link name="l"><collision name="c">{shape}{surface}</collision></link>'
+    sdf = parse_sdf(f'<sdf version="1.6"><model name="m">{link}</model></sdf>')
+    for model, name, place in ((urdf, "mu1", "gazebo 'l'"), (sdf, "mu", "link 'l', collision 'c'")):
+        lines = [f"{each.format(name, place)} (docs/files.md)" for each in warned]
+        assert model.warnings == lines
+
+
 def test_names_of_other_namespaces_are_for_others():
     assert parse_sdf(MODEL.format("")).warnings == []
 

@@ -176,7 +176,7 @@ def test_a_file_has_bounds(tmp_path, monkeypatch, name):
     monkeypatch.setattr(mesh_program, "MOST_TRIANGLES", 11)
     with pytest.raises(DescriptionError, match="it has more than 11 triangles"):
         mesh_program.load(path)
-    monkeypatch.setattr(mesh_program, "MOST_BYTES", 100)
+    monkeypatch.setattr(meshes, "MOST_BYTES", 100)
     with pytest.raises(DescriptionError, match="it has more than 100 bytes"):
         mesh_program.load(path)
 

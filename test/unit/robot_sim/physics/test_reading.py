@@ -7,7 +7,7 @@ import pytest
 from support.mutations.mesh_files import obj
 
 from robot_sim.physics.description import DescriptionError, LimitExceeded
-from robot_sim.physics.files import mesh_cache, mesh_program
+from robot_sim.physics.files import mesh_cache, mesh_program, meshes
 from robot_sim.physics.files import reading as limits
 from robot_sim.physics.files.meshes import read_mesh
 from robot_sim.physics.files.reading import Reading, Resources
@@ -298,6 +298,13 @@ def test_a_large_mesh_is_read_once_by_its_content(large):
     other.write_bytes(path.read_bytes().replace(b"v -1", b"v -2", 1))
     assert read_mesh(other) != first
     assert len(list(cache.iterdir())) == 2
+
+
+def test_a_kept_mesh_is_read_without_the_child_process(large, monkeypatch):
+    path, _ = large
+    first = read_mesh(path)
+    monkeypatch.setattr(meshes, "_process", None)
+    assert read_mesh(path) == first
 
 
 @pytest.mark.parametrize("damage", [b"", b"nonsense", None])

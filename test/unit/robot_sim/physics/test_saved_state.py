@@ -197,6 +197,42 @@ def test_nested_models_have_their_own_states(begun):
     assert sim.world.models["m"].joint_state("j")[0] == pytest.approx(0.5)
 
 
+def test_a_nested_model_takes_its_links_along(begun):
+    """Also those of the models in it, and not those that the state names itself."""
+    inner = f'<model name="far"><pose>0 0 1 0 0 0</pose><link name="l">{BODY}</link></model>'
+    outer = f'<pose>1 0 0 0 0 0</pose><link name="l">{BODY}</link>{inner}'
+    models = f"""<model name="m"><static>1</static><link name="l">{BODY}</link>
+        <model name="in">{outer}</model><model name="listed">{outer}</model></model>"""
+    turned = "<pose>2 0 1 0 0 1.5707963</pose>"
+    state = f"""<model name="m"><pose>0 0 1 0 0 0</pose><model name="in">{turned}</model>
+        <model name="listed">{turned}<link name="l"><pose>5 0 1 0 0 0</pose></link>
+        <model name="far"><pose>7 0 0 0 0 0</pose></model></model></model>"""
+    sim = begun(models, state)
+    assert sim.warnings == []
+    near(place_of(sim, "m::l"), (0.0, 0.0, 1.0))
+    near(place_of(sim, "m::in::l"), (2.0, 0.0, 1.0), (0.0, 0.0, pi / 2.0))
+    near(place_of(sim, "m::in::far::l"), (2.0, 0.0, 2.0), (0.0, 0.0, pi / 2.0))
+    near(place_of(sim, "m::listed::l"), (5.0, 0.0, 1.0))
+    near(place_of(sim, "m::listed::far::l"), (7.0, 0.0, 0.0))
+
+
+def test_time_begins_as_saved_and_a_reset_sets_it_to_0(begun):
+    sim = begun(CRATE, "<sim_time>12 345000000</sim_time>")
+    assert (sim.now, sim.sim_time) == (12_345_000_000, 12.345)
+    sim.step(1)
+    assert sim.now == 12_346_000_000
+    sim.reset_simulation()
+    assert sim.now == 0
+
+
+@pytest.mark.parametrize("text", ["-1 0", "1", "soon", "5000000000 0", "nan 0", "0 -5"])
+def test_a_time_that_is_none_is_one_line(begun, text):
+    sim = begun(CRATE, f"<sim_time>{text}</sim_time>")
+    assert sim.now == 0
+    (warning,) = sim.warnings
+    assert warning.startswith("<state>: <sim_time>")
+
+
 def test_what_a_state_inserts_and_deletes(begun):
     state = f"""<insertions>{CRATE.replace('"crate"', '"new"')}</insertions>
         <deletions><name>wall</name><name>sun</name></deletions>
@@ -216,7 +252,9 @@ BEGINS = "it begins where the model says"
         ('<model name="ghost"><pose>1 2 3 0 0 0</pose></model><light name="moon"/>',
          "<state>: the world has no model 'ghost', light 'moon'"),
         ('<model name="wall"><link name="x"><pose>1 2 3 0 0 0</pose></link><link name="b"/></model>',
-         "<state>, model 'wall': it has no link 'x'"),
+         "<state>, model 'wall': it has no link or model 'x'"),
+        ('<model name="wall"><model name="in"><pose>1 2 3 0 0 0</pose></model></model>',
+         "<state>, model 'wall': it has no link or model 'in'"),
         ('<model name="wall"><pose>1 2 3 0 0</pose></model>',
          "<state>, model 'wall': <pose> must hold 6 numbers, not '1 2 3 0 0'; " + BEGINS),
         ('<model name="wall"><pose>1 2 inf 0 0 0</pose></model>',
