@@ -4,6 +4,7 @@
     ./ws python3 examples/plan_with_snapshots.py cart-pole                      # swings the pole up
     ./ws python3 examples/plan_with_snapshots.py rover                          # drives around a box
     ./ws python3 examples/plan_with_snapshots.py cart-pole --backend ros-own    # over ROS: the same bits
+    ./ws python3 examples/plan_with_snapshots.py cart-pole --processes 2        # in parallel: the same bits
 
 Nothing is learned. Random plans are tried from a snapshot of the present, and the first action of the best
 one is done; the next plans vary the rest of it (predictive sampling).
@@ -11,8 +12,10 @@ one is done; the next plans vary the rest of it (predictive sampling).
 
 import argparse
 import math
+import multiprocessing
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -21,7 +24,7 @@ import numpy as np
 import cartpole  # noqa: F401  registers cartpole/SwingUp-v0
 import robot_envs.robots  # noqa: F401  registers robot_envs/Navigate-v0
 from cartpole.tasks import ANGLE_LIMIT, CartPoleState
-from robot_envs import InitialState, Pose
+from robot_envs import EnvSnapshot, InitialState, Pose
 from robot_sim.physics.pose import from_rpy
 
 SECOND = 125  # steps of the cart-pole
@@ -73,7 +76,35 @@ def rewards(env: Any, actions: Iterable[np.ndarray]) -> Iterator[float]:
             return
 
 
-def planned(env: Any, problem: Problem, seed: int) -> Iterator[np.ndarray]:
+def tried(env: Any, snapshot: EnvSnapshot, plans: np.ndarray, repeat: int) -> list[float]:
+    """Returns the return of each plan, begun at the snapshot."""
+    returns = []
+    for plan in plans:
+        env.restore_state(snapshot)
+        returns.append(sum(rewards(env, plan.repeat(repeat, axis=0))))
+    return returns
+
+
+def work(pipe: Connection, problem: Problem) -> None:
+    """Tries plans in a process of its own: snapshots come as bytes."""
+    env: Any = gymnasium.make(problem.env_id).unwrapped
+    for snapshot, plans in iter(pipe.recv, None):
+        pipe.send(tried(env, EnvSnapshot.from_bytes(snapshot), plans, problem.repeat))
+    env.close()
+
+
+def in_parallel(
+    pipes: Sequence[Connection], snapshot: EnvSnapshot, plans: np.ndarray
+) -> list[float]:
+    """Returns the return of each plan, which as many processes have tried as there are pipes."""
+    for pipe, part in zip(pipes, np.array_split(plans, len(pipes)), strict=True):
+        pipe.send((snapshot.to_bytes(), part))
+    return [each for pipe in pipes for each in pipe.recv()]
+
+
+def planned(
+    env: Any, problem: Problem, seed: int, pipes: Sequence[Connection] = ()
+) -> Iterator[np.ndarray]:
     """Yields the next action again and again, each time with the environment as it was left."""
     rng = np.random.default_rng(seed)
     best = np.zeros((problem.horizon, *env.action_space.shape), np.float32)
@@ -83,10 +114,10 @@ def planned(env: Any, problem: Problem, seed: int) -> Iterator[np.ndarray]:
         for _ in range(problem.rounds):
             plans = best + spread * rng.standard_normal((problem.plans, *best.shape))
             plans = plans.clip(-1.0, 1.0).astype(np.float32)
-            returns = []
-            for plan in plans:
-                env.restore_state(now)
-                returns.append(sum(rewards(env, plan.repeat(problem.repeat, axis=0))))
+            if pipes:
+                returns = in_parallel(pipes, now, plans)
+            else:
+                returns = tried(env, now, plans, problem.repeat)
             best = plans[np.argmax(returns)]
         env.restore_state(now)
         yield from [best[0]] * problem.repeat
@@ -100,19 +131,27 @@ def main() -> None:
     parser.add_argument(
         "--backend", help='as "mujoco" or "ros-own"; PyBullet in-process by default'
     )
+    parser.add_argument("--processes", type=int, default=1, help="that try plans, in-process")
     args = parser.parse_args()
     problem = PROBLEMS[args.problem]
+    pipes = []
+    for _ in range(args.processes if args.processes > 1 else 0):
+        pipe, its = multiprocessing.Pipe()
+        multiprocessing.Process(target=work, args=(its, problem), daemon=True).start()
+        pipes.append(pipe)
     env: Any = gymnasium.make(problem.env_id, backend=args.backend).unwrapped
     problem.begin(env, args.seed)
     states, total, done, begin = [], 0.0, False, time.perf_counter()
-    for reward in rewards(env, planned(env, problem, args.seed)):
+    for reward in rewards(env, planned(env, problem, args.seed, pipes)):
         states.append(env.state)
         total += reward
         if done := problem.is_done(env.task.info(env.state), states):
             break
     simulated, took = len(states) * env.control_period, time.perf_counter() - begin
     print("done" if done else "not done", f"after {simulated:.2f} s, with a return of {total:.4f}")
-    print(f"it took {took:.0f} s")
+    print(f"it took {took:.1f} s")
+    for pipe in pipes:
+        pipe.send(None)
     env.close()
 
 

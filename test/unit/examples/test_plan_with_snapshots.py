@@ -30,6 +30,21 @@ def test_it_gets_there(
     assert capsys.readouterr().out.startswith("done after ")
 
 
+def test_processes_find_the_same(
+    example: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    quick = example.PROBLEMS["rover"]._replace(
+        plans=5, horizon=3, is_done=lambda _, states: len(states) > 5
+    )
+    monkeypatch.setitem(example.PROBLEMS, "rover", quick)
+    said = []
+    for count in ("1", "2"):
+        monkeypatch.setattr(sys, "argv", ["plan_with_snapshots.py", "rover", "--processes", count])
+        example.main()
+        said.append(capsys.readouterr().out.splitlines()[0])
+    assert said[0] == said[1] and "return of" in said[0]
+
+
 def test_straight_ahead_the_rover_meets_the_box(example: Any) -> None:
     env: Any = gymnasium.make(example.PROBLEMS["rover"].env_id).unwrapped
     example.face_the_box(env, 0)
