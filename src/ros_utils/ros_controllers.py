@@ -90,12 +90,9 @@ def _each(
 
 
 def load_controller_srv(
-    controller_name: str,
-    ns: str | None = None,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    controller_name: str, ns: str | None = None, max_retries: int = 5,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Loads a controller, with up to `max_retries` attempts.
 
     Returns:
@@ -107,12 +104,9 @@ def load_controller_srv(
 
 
 def load_controller_list_srv(
-    controller_list: Sequence[str],
-    ns: str | None = None,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> ListResult:
+    controller_list: Sequence[str], ns: str | None = None, max_retries: int = 5,
+    *, service_timeout: float = TIMEOUT,
+) -> ListResult:  # fmt: skip
     """Loads several controllers; one failure doesn't stop the others.
 
     Returns:
@@ -122,12 +116,9 @@ def load_controller_list_srv(
 
 
 def unload_controller_srv(
-    controller_name: str,
-    ns: str | None = None,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    controller_name: str, ns: str | None = None, max_retries: int = 5,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Unloads a controller that doesn't run, with up to `max_retries` attempts.
 
     Returns:
@@ -138,12 +129,9 @@ def unload_controller_srv(
 
 
 def unload_controller_list_srv(
-    controller_list: Sequence[str],
-    ns: str | None = None,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> ListResult:
+    controller_list: Sequence[str], ns: str | None = None, max_retries: int = 5,
+    *, service_timeout: float = TIMEOUT,
+) -> ListResult:  # fmt: skip
     """Unloads several controllers; one failure doesn't stop the others.
 
     Returns:
@@ -153,16 +141,10 @@ def unload_controller_list_srv(
 
 
 def switch_controllers_srv(
-    start_controllers: Sequence[str],
-    stop_controllers: Sequence[str],
-    ns: str | None = None,
-    strictness: int = 1,
-    start_asap: bool = False,
-    timeout: float = 3.0,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    start_controllers: Sequence[str], stop_controllers: Sequence[str],
+    ns: str | None = None, strictness: int = 1, start_asap: bool = False, timeout: float = 3.0,
+    max_retries: int = 5, *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Starts and stops controllers in one step, with up to `max_retries` attempts.
 
     Args:
@@ -187,13 +169,9 @@ def switch_controllers_srv(
 
 def start_controllers_srv(
     start_controllers: Sequence[str],
-    ns: str | None = None,
-    strictness: int = 1,
-    start_asap: bool = False,
-    timeout: float = 3.0,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    ns: str | None = None, strictness: int = 1, start_asap: bool = False, timeout: float = 3.0,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Starts loaded controllers. See `switch_controllers_srv`."""
     return switch_controllers_srv(
         start_controllers, [], ns, strictness, start_asap, timeout, service_timeout=service_timeout
@@ -202,13 +180,9 @@ def start_controllers_srv(
 
 def stop_controllers_srv(
     stop_controllers: Sequence[str],
-    ns: str | None = None,
-    strictness: int = 1,
-    start_asap: bool = False,
-    timeout: float = 3.0,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    ns: str | None = None, strictness: int = 1, start_asap: bool = False, timeout: float = 3.0,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Stops running controllers. See `switch_controllers_srv`."""
     return switch_controllers_srv(
         [], stop_controllers, ns, strictness, start_asap, timeout, service_timeout=service_timeout
@@ -216,15 +190,10 @@ def stop_controllers_srv(
 
 
 def reset_controllers_srv(
-    reset_controllers: Sequence[str],
-    max_retries: int = 10,
-    ns: str | None = None,
-    strictness: int = 1,
-    start_asap: bool = False,
-    timeout: float = 3.0,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    reset_controllers: Sequence[str], max_retries: int = 10,
+    ns: str | None = None, strictness: int = 1, start_asap: bool = False, timeout: float = 3.0,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Restarts controllers, with up to `max_retries` attempts to stop them; resets set-points and PID state.
 
     `max_retries` is the second argument here, not the last.
@@ -240,13 +209,9 @@ def reset_controllers_srv(
 
 def spawn_controllers_srv(
     spawn_controllers: Sequence[str],
-    ns: str | None = None,
-    strictness: int = 1,
-    start_asap: bool = False,
-    timeout: float = 3.0,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    ns: str | None = None, strictness: int = 1, start_asap: bool = False, timeout: float = 3.0,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Loads the controllers that aren't loaded yet, then starts all loaded ones of the list.
 
     Returns:
@@ -269,13 +234,9 @@ def spawn_controllers_srv(
 
 def kill_controllers_srv(
     kill_controllers: Sequence[str],
-    ns: str | None = None,
-    strictness: int = 1,
-    start_asap: bool = False,
-    timeout: float = 3.0,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    ns: str | None = None, strictness: int = 1, start_asap: bool = False, timeout: float = 3.0,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Stops controllers and, if that succeeded, unloads them.
 
     Returns:

@@ -19,23 +19,13 @@ from ros_utils.readiness import Ready
 
 
 def ros_node_from_pkg(
-    pkg_name: str,
-    node_name: str,
-    launch_master: bool = False,
-    launch_master_term: bool = True,
-    launch_new_term: bool = True,
-    name: str | None = None,
-    ns: str = "/",
-    output: str = "log",
+    pkg_name: str, node_name: str,
+    launch_master: bool = False, launch_master_term: bool = True, launch_new_term: bool = True,
+    name: str | None = None, ns: str = "/", output: str = "log",
     args: str | Sequence[str] | None = None,
-    *,
-    timeout: float = 30.0,
-    wait: bool = True,
-    log_file: str | None = None,
-    env: Mapping[str, str] | None = None,
-    master_uri: str | None = None,
-    ready: Ready | None = None,
-) -> Started | bool:
+    *, timeout: float = 30.0, wait: bool = True, log_file: str | None = None,
+    env: Mapping[str, str] | None = None, master_uri: str | None = None, ready: Ready | None = None,
+) -> Started | bool:  # fmt: skip
     """Starts a node, as rosrun does, and waits until it is registered at the master.
 
     Args:
