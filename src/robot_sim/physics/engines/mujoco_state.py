@@ -32,7 +32,6 @@ class MujocoState:
     speeds: dict[int, float] = field(default_factory=dict)  # of motors, by degree of freedom
     gears: dict[int, float] = field(default_factory=dict)  # lengths [rad, m] of tendons
     placed: bool = True  # whether bodies may have been put into each other
-    whole_steps: bool = False  # for integrators of several stages: contacts are MuJoCo's own then
 
     def __post_init__(self) -> None:
         self.replace(self.model)
@@ -51,7 +50,7 @@ class MujocoState:
     def step(self) -> None:
         """Integrates by one time step; efforts and wrenches end with it."""
         np.copyto(self._before, self._positions)
-        may_lift = not self.whole_steps and (self.placed or hypot(*self._speeds()) > SLOWEST)
+        may_lift = self.placed or hypot(*self._speeds()) > SLOWEST
         if may_lift or self.speeds or self.gears:
             mujoco.mj_step1(self.model, self.data)
             if self.speeds or self.gears:
