@@ -67,11 +67,7 @@ class ServiceClient:
     """
 
     def __init__(
-        self,
-        name: str,
-        kind: Any,
-        persistent: bool = False,
-        timeout: float = TIMEOUT,
+        self, name: str, kind: Any, persistent: bool = False, timeout: float = TIMEOUT
     ) -> None:
         self.name = str(rospy.resolve_name(name))
         self._kind = kind

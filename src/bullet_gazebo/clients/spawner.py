@@ -70,11 +70,7 @@ class ManagerClient:
         return bool(self._call("unload_controller", srv.UnloadController, name, timeout=timeout).ok)
 
     def switch(
-        self,
-        start: Sequence[str],
-        stop: Sequence[str],
-        strictness: int,
-        timeout: float = math.inf,
+        self, start: Sequence[str], stop: Sequence[str], strictness: int, timeout: float = math.inf
     ) -> bool:
         """Starts and stops controllers in one step; no time limit for the manager itself."""
         request = (list(start), list(stop), strictness, False, 0.0)

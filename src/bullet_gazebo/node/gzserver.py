@@ -36,11 +36,7 @@ from bullet_gazebo.common.rospy_internals import (
     free_polls_at_once,
     registered_together,
 )
-from bullet_gazebo.journal.interception import (
-    record_messages,
-    record_parameters,
-    record_services,
-)
+from bullet_gazebo.journal.interception import record_messages, record_parameters, record_services
 from bullet_gazebo.journal.journal import WorldJournal
 from bullet_gazebo.journal.journal_output import JournalOutput
 from bullet_gazebo.node.node_name import NameLoss, NodeNameTaken, refuse_twin
@@ -207,11 +203,7 @@ class GazeboNode:
         with spawning:  # once a model is there, clients use all other services without a wait
             spawner = SpawnServices(self.sim, plugins, spawning)
             answer_xmlrpc(SPAWNS, spawner.count)
-            self._services = [
-                *stepping,
-                spawner,
-                *advertise_world_services(self.sim),
-            ]
+            self._services = [*stepping, spawner, *advertise_world_services(self.sim)]
 
     def _end_journal(self) -> None:
         """Completes the journal's bag."""

@@ -60,11 +60,7 @@ class Replay:
     """Dispatches the entries in order, in one thread."""
 
     def __init__(
-        self,
-        recorded: RecordedJournal,
-        node: GazeboNode,
-        changes: Changes,
-        until: float,
+        self, recorded: RecordedJournal, node: GazeboNode, changes: Changes, until: float
     ) -> None:
         """
         Args:

@@ -134,7 +134,4 @@ def to_cloud(
     )
 
 
-LIBRARIES = {
-    "libgazebo_ros_depth_camera.so": DepthCameraPlugin,
-    KINECT: KinectPlugin,
-}
+LIBRARIES = {"libgazebo_ros_depth_camera.so": DepthCameraPlugin, KINECT: KinectPlugin}

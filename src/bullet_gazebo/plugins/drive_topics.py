@@ -25,14 +25,7 @@ from bullet_gazebo.plugins.sensor_topics import (
     topic_in,
 )
 from robot_sim.constants import NANOSECONDS
-from robot_sim.drives.odometry import (
-    POSE,
-    TWIST,
-    OdometrySample,
-    Period,
-    Triple,
-    WheelOdometry,
-)
+from robot_sim.drives.odometry import POSE, TWIST, OdometrySample, Period, Triple, WheelOdometry
 from robot_sim.physics.description import DescriptionError, Joint
 from robot_sim.physics.pose import to_rpy
 from robot_sim.state_dict import Shared

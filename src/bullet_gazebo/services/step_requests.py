@@ -10,12 +10,7 @@ from typing import NamedTuple, TypeVar
 import rospy
 from bullet_gazebo_msgs.srv import PrepareStepRequest, StepWorldRequest
 
-from bullet_gazebo.common.messages import (
-    bad_number,
-    check_numbers,
-    from_pose_msg,
-    from_twist_msg,
-)
+from bullet_gazebo.common.messages import bad_number, check_numbers, from_pose_msg, from_twist_msg
 from file_access.text import did_you_mean
 from robot_sim.control.controllers.base import Controller, Input
 from robot_sim.control.errors import ControlError, faults

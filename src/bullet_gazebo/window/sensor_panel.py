@@ -13,13 +13,7 @@ import rospy
 import viser
 from bullet_gazebo_msgs.msg import SceneSensor
 from PIL import Image
-from sensor_msgs.msg import (
-    CompressedImage,
-    LaserScan,
-    PointCloud,
-    PointCloud2,
-    Range,
-)
+from sensor_msgs.msg import CompressedImage, LaserScan, PointCloud, PointCloud2, Range
 from sensor_msgs.msg import Image as ImageMessage
 
 from bullet_gazebo.common.messages import from_pose_msg

@@ -10,10 +10,7 @@ from robot_sim.physics.dynamics import effective_inertias, poses_at_zero
 from robot_sim.physics.engine import FASTEST, Body, Twist
 from robot_sim.physics.loops import closed, in_loops
 from robot_sim.physics.lumping import WORLD
-from robot_sim.physics.pose import (
-    ZERO,
-    Pose,
-)
+from robot_sim.physics.pose import ZERO, Pose
 from robot_sim.state_dict import Shared
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit

@@ -48,11 +48,7 @@ class ShapeMaker:
     """
 
     def __init__(
-        self,
-        scene: viser.SceneApi,
-        batches: Batches,
-        singles: Singles,
-        warn: Callable[[str], None],
+        self, scene: viser.SceneApi, batches: Batches, singles: Singles, warn: Callable[[str], None]
     ) -> None:
         self._scene, self._batches, self._singles = scene, batches, singles
         self._warn = warn

@@ -16,16 +16,7 @@ from robot_sim.physics.loops import in_loops
 from robot_sim.physics.lumping import WORLD
 from robot_sim.physics.model import Model
 from robot_sim.physics.passive_forces import decay_wrench
-from robot_sim.physics.pose import (
-    ZERO,
-    Vector,
-    add,
-    conjugate,
-    cross,
-    rotate,
-    scale,
-    subtract,
-)
+from robot_sim.physics.pose import ZERO, Vector, add, conjugate, cross, rotate, scale, subtract
 from robot_sim.sensors.sensing import Measurement, Mount, sensor_of
 from robot_sim.simulator import Simulator
 from robot_sim.state_dict import Stateful

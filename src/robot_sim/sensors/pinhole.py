@@ -12,14 +12,7 @@ from robot_sim.physics.files.sdf_parts import read_pose, value
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.noise import Noise, read_noise
 from robot_sim.sensors.rays import RayScene, frames
-from robot_sim.sensors.sensing import (
-    FURTHEST,
-    Field,
-    Measurement,
-    Mount,
-    sensor_of,
-    slower,
-)
+from robot_sim.sensors.sensing import FURTHEST, Field, Measurement, Mount, sensor_of, slower
 from robot_sim.sensors.shading import colours
 
 KINECT = "libgazebo_ros_openni_kinect.so"

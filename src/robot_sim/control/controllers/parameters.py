@@ -20,10 +20,7 @@ class Declared(NamedTuple):
 
 
 def parameter(
-    about: str,
-    default: Any = MISSING,
-    read: Callable[[Any, str], Any] | None = None,
-    key: str = "",
+    about: str, default: Any = MISSING, read: Callable[[Any, str], Any] | None = None, key: str = ""
 ) -> Any:
     """Declares a parameter, the field of a class of `Parameters`.
 

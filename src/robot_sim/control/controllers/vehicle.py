@@ -17,13 +17,7 @@ from robot_sim.control.controllers.parameters import (
 )
 from robot_sim.control.errors import ControlError
 from robot_sim.control.transmissions import is_number
-from robot_sim.drives.odometry import (
-    DeadReckoning,
-    OdometrySample,
-    Period,
-    RollingMean,
-    Triple,
-)
+from robot_sim.drives.odometry import DeadReckoning, OdometrySample, Period, RollingMean, Triple
 from robot_sim.drives.wheels import SpeedLimits
 
 AXES = 6

@@ -13,11 +13,7 @@ from robot_sim.physics.description import (
     ModelDescription,
     Shape,
 )
-from robot_sim.physics.engine import (
-    STRONGEST,
-    Body,
-    Twist,
-)
+from robot_sim.physics.engine import STRONGEST, Body, Twist
 from robot_sim.physics.engines.mujoco_model import Elements, geoms_of, priority, wxyz, xyzw
 from robot_sim.physics.engines.mujoco_state import MujocoState
 from robot_sim.physics.pose import ZERO, Pose, Quaternion, Vector, conjugate, rotate
