@@ -59,7 +59,6 @@ class Simulator(Shared):
     ) -> None:
         """
         Args:
-            world: all models.
             lockstep: whether only advance() moves time.
             max_update_rate: ticks a second of wall time; 0 is as fast as possible.
             relatch: whether controllers start over when a service moves joints or resets the world.
@@ -157,14 +156,9 @@ class Simulator(Shared):
         self._stopping.set()
 
     def advance(self, ticks: int, until: Callable[[], bool] | None = None) -> int:
-        """Moves time by `ticks` physics steps. The caller holds the lock.
+        """Moves time by physics steps, at least one, or `until` that returns true after one of them.
 
-        Args:
-            ticks: at least 1.
-            until: called after each tick; it ends the advance when it returns true.
-
-        Returns:
-            The number of ticks that have passed.
+        The caller holds the lock. Returns the number of ticks that have passed.
 
         Raises:
             NotInLockstep: if time runs by itself.

@@ -38,12 +38,9 @@ State = tuple[Pose, Twist]
 
 
 def distance(shape: Shape, link: Pose, point: Vector) -> float:
-    """Returns the distance [m] of a point from a shape's surface, on either side of it.
+    """Returns the distance [m] of a point in the world from a shape's surface, on either side of it.
 
-    Args:
-        shape: a mesh counts as its bounding box.
-        link: the shape's link in the world.
-        point: in the world [m].
+    A mesh counts as its bounding box. `link` is the pose of the shape's link.
     """
     frame = link.compose(shape.pose)
     x, y, z = rotate(conjugate(frame.orientation), subtract(point, frame.position))
@@ -71,11 +68,7 @@ def _box(shape: Shape) -> tuple[Vector, Vector]:
 
 
 def _beyond(*excess: float) -> float:
-    """Returns the signed distance [m] of a point from a body, negative inside.
-
-    Args:
-        excess: by how much the point is beyond the body in directions at right angles [m].
-    """
+    """Returns the signed distance [m] of a point from a body, from those in directions at right angles."""
     outside = hypot(*(max(each, 0.0) for each in excess))
     return outside + min(max(excess), 0.0)
 
@@ -303,12 +296,7 @@ class StateReader:
         return self._version != self._world.version
 
     def read(self, stepped: bool = True) -> StateAnswer:
-        """Reads the world.
-
-        Args:
-            stepped: whether a step led to the present state. After a reset or a placing none has, and
-                there are no contacts yet.
-        """
+        """Reads the world; there are no contacts unless it was `stepped` since a reset or a placing."""
         if self.is_stale:
             self._resolve()
         contacts = contact_pairs(self._world, self._wanted) if self._touch and stepped else []

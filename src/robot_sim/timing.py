@@ -102,11 +102,7 @@ class Holds:
     """
 
     def __init__(self, lock: FairLock, changed: Callable[[], None]) -> None:
-        """
-        Args:
-            lock: the simulator's.
-            changed: called with the lock held, whenever holders have come or gone.
-        """
+        """`changed` is called with the simulator's lock held, whenever holders have come or gone."""
         self._lock = lock
         self._changed = changed
         self._holders: set[object] = set()

@@ -150,12 +150,8 @@ def switch_controllers_srv(
     Args:
         start_controllers: Names to start.
         stop_controllers: Names to stop.
-        ns: See the module.
-        strictness: See the module.
         start_asap: Start each as soon as its hardware is ready; makes no difference in simulation.
         timeout: The manager's own limit for the switch [s]; 0 for none.
-        max_retries: attempts.
-        service_timeout: See the module.
 
     Returns:
         True if the manager has switched; with BEST_EFFORT some controllers may still not run.

@@ -208,11 +208,9 @@ def check_numbers(what: str, values: Sequence[float]) -> None:
 
 
 def bad_number(message: genpy.Message, largest: float = LARGEST_NUMBER) -> str:
-    """Finds a number that the world can't take, before a request changes anything.
+    """Returns which number the world can't take, as "pose.position.x is nan; it must be finite".
 
-    Returns:
-        The field and what is wrong with it, as "pose.position.x is nan; it must be finite". Empty if all
-        numbers are finite and not beyond `largest`.
+    Empty if all are finite and not beyond `largest`.
     """
     for name, kind in zip(message.__slots__, message._slot_types, strict=True):
         fault = _fault(getattr(message, name), kind, largest)

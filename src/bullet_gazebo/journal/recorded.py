@@ -75,14 +75,9 @@ class RecordedJournal:
         return sorted(found)
 
     def check_changes(self, models: Iterable[str], parameters: Iterable[Mapping[str, Any]]) -> None:
-        """Checks that changes change something: a misspelt name would leave all as it was.
+        """Raises NoRecording if changes change nothing, as a misspelt name would.
 
-        Args:
-            models: names of those that are to be spawned from other files.
-            parameters: for each file, its values by full name.
-
-        Raises:
-            NoRecording: if no such model was spawned, or none of a file's parameters was read.
+        Every model must have been spawned, and of each file one of its parameters, by full name, been read.
         """
         spawned, read = set(), set()
         for entry in self.entries():
@@ -197,9 +192,7 @@ def _messages(path: str) -> list[bytes]:
 def first_difference(recorded: JournalEntry, now: JournalEntry, refusal: str) -> str:
     """Returns what a replay's entry has otherwise than the recorded one, in one line; empty if nothing.
 
-    Args:
-        recorded, now: the two entries.
-        refusal: the text with which the request failed now; empty if it didn't.
+    `refusal` is the text with which the request failed now, if it did.
     """
     at = f"at {recorded.ended / 1e9:g} s"
     if (recorded.kind, recorded.name) != (now.kind, now.name):

@@ -61,8 +61,6 @@ class DrivePlugin(ContextPlugin):
     Subclasses have `update` and `sample`, and call `begin` when they are made.
 
     Args:
-        context: the plugin's.
-        namespace: of its topics.
         rate: of its reports [Hz].
         late: see `Period`.
         base: the frame of the vehicle without `<robotBaseFrame>`.
@@ -180,11 +178,9 @@ class WheeledPlugin(DrivePlugin):
     _driven = 0  # [ns]
 
     def measure_by(self, separation: float, joints: Sequence[tuple[Joint, str]]) -> None:
-        """Reads the elements that choose what is reported.
+        """Reads the elements that choose what is reported, by wheels with a separation [m].
 
-        Args:
-            separation: of the wheels that measure [m].
-            joints: of the vehicle, each with the name of its child frame.
+        Each joint comes with the name of its child frame.
         """
         context = self.context
         source = context.text("odometrySource", "world")
@@ -237,13 +233,9 @@ class WheeledPlugin(DrivePlugin):
 
 
 class Wheels(Shared):
-    """Driven joints of a vehicle, each a motor with at most a torque [N m].
+    """Driven joints of a vehicle, each a motor with at most a torque [N m], and wheels of a diameter [m].
 
-    Args:
-        context: the plugin's.
-        joints: elements that name the joints, and the names without them.
-        diameter: of the wheels [m].
-        torque: of each motor [N m].
+    `joints` are elements that name them, and the names without them.
     """
 
     def __init__(
@@ -279,12 +271,7 @@ def joint_of(context: PluginContext, tag: str, default: str) -> Joint:
 
 
 class LinkTransforms(Shared):
-    """Publishes where the links of joints are in their joints' parents.
-
-    Args:
-        drive: whose tf and namespace they have.
-        joints: each with the name of its child frame.
-    """
+    """Publishes where the links of joints, each with the name of its frame, are in their joints' parents."""
 
     def __init__(self, drive: DrivePlugin, joints: Sequence[tuple[Joint, str]]) -> None:
         self._model = drive.model

@@ -95,14 +95,9 @@ class PluginContext(Mount):
     def show(
         self, topic: str, kind: type, link: str, pose: Pose, view: tuple[float, float] = (0.0, 0.0)
     ) -> None:
-        """Has windows offer to draw measurements.
+        """Has windows offer to draw a topic's measurements in axes at `pose` in a link.
 
-        Args:
-            topic: full name of theirs.
-            kind: type of its messages.
-            link: which they are taken from.
-            pose: of the axes that they are in, in the link.
-            view: of a camera, its horizontal field of view [rad] and its picture's width by height.
+        `view` is a camera's horizontal field of view [rad] and its picture's width by height.
         """
         name = kind._type  # type: ignore[attr-defined]
         shown = SceneSensor(topic, name, self.model.name, link, to_pose_msg(pose), *view)

@@ -22,12 +22,9 @@ MODEL = "<model>"  # where a namespace is the model's name
 
 
 def namespace_of(context: PluginContext, absent: str, empty: str) -> str:
-    """Returns a plugin's namespace.
+    """Returns a plugin's namespace: `absent` without `<robotNamespace>`, `empty` for an empty one.
 
-    Args:
-        context: the plugin's.
-        absent: the namespace without `<robotNamespace>`; `MODEL` is the model's name.
-        empty: the one of an empty element.
+    `MODEL` is the model's name.
     """
     given = context.given_namespace
     found = absent if given is None else given or empty
@@ -152,7 +149,6 @@ class SensorTopics(Shared):
     """The topics of one sensor, which measures while one of them has subscribers.
 
     Args:
-        context: the plugin's.
         rate: in Hz of simulated time; 0 is every step.
         measure: takes a measurement at the given time [ns] and publishes it.
         at_once: whether a new subscriber gets a measurement at once.

@@ -85,12 +85,7 @@ class Addresses:
         ]
 
     def commanded(self, controllers: Sequence[str], joints: Sequence[str]) -> Commanded:
-        """Finds the running controllers and the free joints of these names.
-
-        Args:
-            controllers: plain names, or /namespace/name.
-            joints: plain names, or model::joint.
-        """
+        """Finds running controllers, /namespace/name or plain, and free joints, model::joint or plain."""
         found: dict[int, Controller] = {}  # by identity: a user's class may not be hashable
         ports: list[tuple[Input, int | slice]] = []
         size = 0

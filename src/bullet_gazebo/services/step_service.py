@@ -113,12 +113,8 @@ class StepService:
         watchdog: AbstractContextManager[object],
         one_at_a_time: threading.Lock,
     ) -> None:
-        """
-        Args:
-            sim: the simulator, in lock-step.
-            sensing: its sensors.
-            watchdog: a fault in its block ends the node.
-            one_at_a_time: keeps the ticks of other requests out of a request's ticks.
+        """A fault in a block of `watchdog` ends the node; `one_at_a_time` keeps the ticks of other requests
+        out of a request's.
         """
         self._sim, self._sensing = sim, sensing
         self._watchdog = watchdog

@@ -272,11 +272,9 @@ class WorldControl:
         }
 
     def answer(self, *arguments: object) -> Answer:
-        """Runs a command; returns code (1 is success), text, ticks done.
+        """Runs a command, for "step" with a number of ticks; returns code (1 is success), text, ticks done.
 
-        Args:
-            arguments: the command; for "step" also the number of ticks, 1 by default. XML-RPC has no
-                signatures: any number of arguments may come, of any of its types.
+        XML-RPC has no signatures: any number of arguments may come, of any of its types.
         """
         if not 1 <= len(arguments) <= 2:
             return _refused(

@@ -150,12 +150,7 @@ def drawn_as(kind: str) -> tuple[type, Callable[[Any], Drawing]] | None:
 
 
 class SensorPanel:
-    """A checkbox for each topic. For one thread; viser and rospy only leave values and messages.
-
-    Args:
-        server: of the page; the caller's tab is open.
-        below: the scene node above all models.
-    """
+    """A checkbox for each topic, in the open tab. For one thread; viser and rospy only leave messages."""
 
     def __init__(self, server: viser.ViserServer, below: str) -> None:
         self._server, self._below = server, below

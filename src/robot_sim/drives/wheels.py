@@ -10,13 +10,7 @@ NEAR = 0.01  # [m/s]; of its target a wheel counts as there
 
 
 def side_speeds(linear: float, angular: float, separation: float) -> tuple[float, float]:
-    """Returns the speeds [m/s] of the left and right wheels.
-
-    Args:
-        linear: ahead [m/s].
-        angular: to the left [rad/s].
-        separation: of the wheels [m].
-    """
+    """Returns the speeds [m/s] of the left and right wheels for a velocity [m/s, rad/s], anticlockwise."""
     across = 0.5 * angular * separation
     return linear - across, linear + across
 
@@ -35,13 +29,7 @@ class Ramp(Stateful):
     def next(
         self, targets: Sequence[float], measured: Sequence[float], seconds: float
     ) -> list[float]:
-        """Returns the speeds [m/s] to issue.
-
-        Args:
-            targets: speeds of the wheels [m/s].
-            measured: their present speeds [m/s].
-            seconds: since the last call [s].
-        """
+        """Returns the speeds to issue, given the wanted and the measured ones [m/s], each some time [s]."""
         gaps = [target - speed for target, speed in zip(targets, measured, strict=True)]
         if self._acceleration <= 0.0 or any(abs(gap) < NEAR for gap in gaps):
             return list(targets)

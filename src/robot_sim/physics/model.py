@@ -245,11 +245,9 @@ class Model(Shared):
             self.apply_damping(self.time_step)
 
     def calm(self, kept: Mapping[str, float]) -> None:
-        """Calms a robot that has blown up.
+        """Calms a robot that has blown up: joints keep a share of their speed.
 
-        Args:
-            kept: the share of their speed that joints keep, by name. Joints beyond a stop are put onto it,
-                and a free base stops spinning.
+        Joints beyond a stop are put onto it, and a free base stops spinning.
         """
         states = self.joint_states()
         for name, share in kept.items():

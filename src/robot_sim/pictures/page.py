@@ -18,13 +18,7 @@ RED = (220, 30, 30)
 
 
 class Picture:
-    """Draws models. Not thread-safe.
-
-    Args:
-        server: of the page.
-        warn: takes a line that says what can't be shown.
-        below: the scene node above all models.
-    """
+    """Draws models below a scene node, and warns of what can't be shown. Not thread-safe."""
 
     def __init__(
         self, server: viser.ViserServer, warn: Callable[[str], None], below: str = ""

@@ -38,14 +38,7 @@ LINES, SHADOW = ((117, 135, 155), (102, 119, 138)), 0.4  # on the ground; how da
 
 
 class ShapeMaker:
-    """Draws shapes. A shape that can't be shown is reported once.
-
-    Args:
-        scene: of the page.
-        batches: receives most shapes.
-        singles: receives the others.
-        warn: takes a line that says what can't be shown.
-    """
+    """Draws shapes, most of them in batches. One that can't be shown is warned of once."""
 
     def __init__(
         self, scene: viser.SceneApi, batches: Batches, singles: Singles, warn: Callable[[str], None]

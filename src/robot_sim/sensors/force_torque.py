@@ -36,13 +36,7 @@ class _Look(NamedTuple):
 class LinkForces(Stateful):
     """Force and torque on links of a model in the last step; torques are about the world's origin.
 
-    `look` has to be called in each tick, before its physics step.
-
-    Args:
-        sim: the simulator.
-        model: the links' model.
-        links: their names.
-        joint: whose effort is noted.
+    `look` has to be called in each tick, before its physics step. The effort on `joint` is noted, too.
     """
 
     def __init__(self, sim: Simulator, model: Model, links: Sequence[str], joint: str = "") -> None:
@@ -57,11 +51,9 @@ class LinkForces(Stateful):
         self.effort = 0.0  # that clients apply to `joint`
 
     def look(self, now: int, moves: int) -> None:
-        """Takes down the state.
+        """Takes down the state at a tick's time [ns].
 
-        Args:
-            now: time of the tick [ns].
-            moves: counts what has moved bodies besides time: no force is known across such a move.
+        `moves` counts what has moved bodies besides time: no force is known across such a move.
         """
         last, self.net = self._last, None
         if moves != self._moves:  # the next tick sees the same state
@@ -124,11 +116,6 @@ class LinkForces(Stateful):
 
 class JointForces(Stateful):
     """What the child of a joint exerts on the parent, without the effort that drives a movable joint.
-
-    Args:
-        sim: the simulator.
-        model: the joint's model.
-        name: of the joint.
 
     Raises:
         DescriptionError: if the model doesn't have it.

@@ -35,16 +35,10 @@ class CameraView(NamedTuple):
 
 
 class PinholeCamera:
-    """A camera.
+    """A camera, made from a `<camera>`; `pose` is that of what holds it in `link`, `where` is for errors.
 
     Attributes:
         across, down: (width,), (height, 1): a pixel's point to the right and down, for each metre of depth.
-
-    Args:
-        element: a `<camera>`.
-        pose: of what holds it, in its link.
-        where: names it in errors.
-        link: what it is in.
 
     Raises:
         DescriptionError: if it can't be simulated.
@@ -78,13 +72,7 @@ class PinholeCamera:
         self.down = down[:, None]
 
     def picture(self, scene: RayScene, link: Pose, in_colour: bool = True) -> CameraView:
-        """Returns what the camera sees, without noise; black if not `in_colour`.
-
-        Args:
-            scene: the visuals.
-            link: pose of its link in the world.
-            in_colour: whether colours are wanted.
-        """
+        """Returns what the camera sees of visuals, without noise; black if not `in_colour`."""
         pose = link.compose(self.pose)
         shape = self.height, self.width
         seen = CameraView(np.zeros((*shape, 3), np.uint8), np.zeros(shape))

@@ -70,11 +70,9 @@ class Hits(NamedTuple):
 
 
 class RayScene:
-    """The shapes of a world's models, for rays. The caller holds the world's lock.
+    """The shapes of a world's models, for rays: collisions, or visuals as cameras see them.
 
-    Args:
-        world: whose models are met.
-        visuals: whether rays meet visuals, as those of cameras do, or collisions, as those of lasers.
+    The caller holds the world's lock.
     """
 
     def __init__(self, world: World, visuals: bool = False) -> None:

@@ -21,12 +21,7 @@ LARGEST_NUMBER = 1e30  # number of a plugin: messages have 32-bit floats
 
 
 class Sensing(Shared, Stateful):
-    """The sensors of a simulator.
-
-    Args:
-        sim: the simulator.
-        seed: of the sensors' noise.
-    """
+    """The sensors of a simulator; `seed` is that of their noise."""
 
     non_persistent = ("collisions", "visuals")
 
@@ -178,9 +173,6 @@ class Measurement(Stateful):
         interface: of ros_control by which controllers have it.
         fields: what `values` returns, by attribute of a `Reading`; without any, tasks can't see it.
         rate: of measurements [Hz of simulated time]; 0 is every step.
-
-    Args:
-        mount: Its place.
 
     Raises:
         DescriptionError: If it can't be simulated.

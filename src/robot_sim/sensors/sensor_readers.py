@@ -49,12 +49,7 @@ class Taken(NamedTuple):
 class SensorReaders(Stateful):
     """Sensors that measure by their own clocks, whether or not their topics are heard.
 
-    The caller holds the simulator's lock.
-
-    Args:
-        sim: the simulator.
-        sensing: its sensors.
-        names: of sensors, plain or model::sensor; of a model's IMU, the plugin's.
+    The caller holds the simulator's lock. Names are plain or model::sensor; of a model's IMU, the plugin's.
 
     Raises:
         UnknownName: if a name refers to none, or several, or to one that can't be read.
@@ -154,11 +149,6 @@ def _sensors(sim: Simulator, sensing: Sensing) -> Iterator[tuple[str, Mount, typ
 
 class MeasuringHandle(SensorHandle):
     """A sensor that measures by its own clock while a controller has begun it.
-
-    Args:
-        mount: its place.
-        kind: makes it.
-        frame: see `SensorHandle`.
 
     Raises:
         ControlError: if it can't be simulated.

@@ -27,10 +27,7 @@ class EngineError(ValueError):
 
 
 def make_engine(name: str = BULLET[0]) -> Engine:
-    """Returns a new, empty engine; MuJoCo, with a warning, where PyBullet can't be had.
-
-    Args:
-        name: one of `ENGINES`.
+    """Returns a new, empty engine of one of `ENGINES`; MuJoCo, with a warning, where PyBullet can't be had.
 
     Raises:
         EngineError: if it is unknown or not installed.

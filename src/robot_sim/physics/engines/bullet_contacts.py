@@ -56,10 +56,7 @@ class Separation:
     def add(self, body: int, model: ModelDescription, links: Mapping[str, int]) -> None:
         """Makes the contacts of a body compliant, but those of static and kinematic links.
 
-        Args:
-            body: PyBullet's number.
-            model: what it was loaded from.
-            links: PyBullet's indices of its links.
+        `body` and `links` are PyBullet's numbers.
         """
         # Python 3.12 sums floats up in another way than 3.11; their exact sum has the same bits in both.
         inertias = [link.inertia for link in model.links.values() if not link.kinematic]

@@ -47,10 +47,7 @@ CHUNK = 1000  # steps in one call
 
 
 def gazebo_reset_sim(retries: int = 5, **at: Unpack[At]) -> bool:
-    """Puts all models back to where they began, and sets the time to 0.
-
-    `retries` is the most attempts.
-    """
+    """Puts all models back to where they began, and sets the time to 0; tries `retries` times at most."""
     return empty_call("reset_simulation", retries, **at)
 
 

@@ -86,12 +86,7 @@ def spawn_param(
 def gazebo_delete_model(
     model_name: str, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False
 ) -> bool:
-    """Deletes a model.
-
-    Args:
-        model_name: The model's name.
-        timeout, gazebo_ns: See `ros_gazebo`.
-        verify: Return only once the model is no longer in the world's list.
+    """Deletes a model; with `verify`, returns only once it is no longer in the world's list.
 
     Returns:
         True if the model existed and is gone.

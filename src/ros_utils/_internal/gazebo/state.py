@@ -65,7 +65,6 @@ def gazebo_set_model_state(
     """Moves a model and keeps its joint positions. A zero twist also stops its joints.
 
     Args:
-        model_name: The model's name.
         ref_frame: Model or link that pose and twist refer to.
         pos_x, pos_y, pos_z: Position [m].
         ori_x, ori_y, ori_z, ori_w: Orientation, a quaternion; all zeros means no rotation.
@@ -122,8 +121,6 @@ def gazebo_set_model_configuration(
     """Moves a model's joints to positions [rad, m] at once.
 
     Args:
-        model_name: The model's name.
-        joint_names: The joints to move.
         joint_positions: One for each joint [rad, m].
         urdf_param_name: Parameter with its URDF; Gazebo doesn't use it.
     """
