@@ -158,11 +158,8 @@ class Simulator(Shared):
     def advance(self, ticks: int, until: Callable[[], bool] | None = None) -> int:
         """Moves time by physics steps, at least one, or `until` that returns true after one of them.
 
-        The caller holds the lock. Returns the number of ticks that have passed.
-
-        Raises:
-            NotInLockstep: if time runs by itself.
-            ValueError: for less than one tick.
+        The caller holds the lock. Returns the number of ticks that have passed. Raises NotInLockstep if time
+        runs by itself, ValueError for less than one tick.
         """
         if not self.lockstep:
             raise NotInLockstep(
@@ -289,8 +286,7 @@ class Simulator(Shared):
     def save_state(self) -> Snapshot:
         """Returns all that decides the future; the caller holds the lock.
 
-        Raises:
-            StateError: if the state of a user's controller or plugin can't be saved.
+        Raises StateError if the state of a user's controller or plugin can't be saved.
         """
         state = {
             "robots": [robot.state_dict() for robot in self.robots],

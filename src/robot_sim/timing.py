@@ -21,10 +21,8 @@ class FairLock(Shared):
     """A lock that serves its waiters in the order in which they came.
 
     The simulation releases and re-acquires its lock in a loop. With threading.Lock that keeps all other
-    threads out; here every waiter gets its turn after at most one tick.
-
-    Raises:
-        RuntimeError: if the thread that holds it acquires it again: it would wait forever.
+    threads out; here every waiter gets its turn after at most one tick. Raises RuntimeError if the thread
+    that holds it acquires it again: it would wait forever.
     """
 
     def __init__(self) -> None:

@@ -64,8 +64,7 @@ def one_at_a_time(name: str, bound: float = STARTING) -> Iterator[None]:
 def wait_for_master(name: str) -> None:
     """Waits until there is a master, for the node `name`; rospy's own wait can't be interrupted.
 
-    Raises:
-        rospy.ROSInterruptException: a signal came meanwhile.
+    Raises rospy.ROSInterruptException if a signal came meanwhile.
     """
     if not master.is_up():
         text = f"{name}: no ROS master at {master.uri()} yet; waiting for it"
@@ -76,8 +75,7 @@ def wait_for_master(name: str) -> None:
 def init_node(name: str, command_line: Sequence[str], anonymous: bool = True) -> None:
     """Initialises a node without rospy's signal handlers, once there is a master.
 
-    Raises:
-        rospy.ROSInterruptException: a signal came meanwhile.
+    Raises rospy.ROSInterruptException if a signal came meanwhile.
     """
     wait_for_master(name)
     rospy.init_node(name, anonymous=anonymous, argv=list(command_line), disable_signals=True)

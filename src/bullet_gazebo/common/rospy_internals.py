@@ -128,8 +128,7 @@ def divert_connections(node: str, sink: Sink) -> None:
 def deliver(topic: str, data: bytes, node: str) -> None:
     """Passes a message of a node to this process's subscribers, if there are any, in this thread.
 
-    Raises:
-        genpy.DeserializationError: if it can't be read.
+    Raises genpy.DeserializationError if it can't be read.
     """
     subscription: _SubscriberImpl | None = _topics().get_subscriber_impl(topic)
     if subscription is None:
@@ -211,10 +210,7 @@ def set_time(now: genpy.Time) -> None:
 def registered_together() -> Iterator[None]:
     """Registers the services that a block offers at its end, in one call of the master.
 
-    So a client that finds one of them finds the others.
-
-    Raises:
-        OSError: the master doesn't answer.
+    So a client that finds one of them finds the others. Raises OSError if the master doesn't answer.
     """
     proxy = rospy.core.xmlrpcapi(master.uri())
     calls, reg_added = xmlrpc.client.MultiCall(proxy), RegManager.reg_added

@@ -60,8 +60,7 @@ class ControllerAction(ABC):
     def pursue(self, key: str, goal: Any, listener: "ActionGoal") -> str:
         """Begins a goal, under the simulator's lock; returns a warning, or nothing.
 
-        Raises:
-            ControlError: if it is refused.
+        Raises ControlError if it is refused.
         """
 
     @abstractmethod

@@ -38,8 +38,7 @@ class RecordedJournal:
     def __init__(self, path: Path) -> None:
         """Reads the bag's messages; entries are made from them later.
 
-        Raises:
-            NoRecording: if it isn't a bag that can be replayed.
+        Raises NoRecording if it isn't a bag that can be replayed.
         """
         self._path = path
         # Behind the count of entries stands the number of the first one.
@@ -50,11 +49,7 @@ class RecordedJournal:
         self.facts: dict[str, Any] = json.loads(self.start.data)  # of the simulator's start
 
     def entries(self) -> Iterator[JournalEntry]:
-        """Returns the entries from the first one on.
-
-        Raises:
-            NoRecording: if some are missing.
-        """
+        """Returns the entries from the first one on; raises NoRecording if some are missing."""
         expected = 0
         for data in self._messages:
             for entry in Journal().deserialize(data).entries:
@@ -121,11 +116,7 @@ def _missing(expected: int) -> str:
 
 
 def _read(path: Path) -> list[bytes]:
-    """Returns a bag's messages, each checked.
-
-    Raises:
-        NoRecording: if it isn't a bag that can be replayed.
-    """
+    """Returns a bag's messages, each checked; raises NoRecording if it isn't a bag that can be replayed."""
     process = LimitedProcess(f"{__name__}:read_journal", LIMITS)
     try:
         open_file(path).close()

@@ -82,10 +82,8 @@ class Replay:
         """Repeats all; `difference` tells the first difference.
 
         A handler of a user's may wait for what only a later entry does, and so for ever; a thread of its own
-        keeps it from holding up the caller.
-
-        Raises:
-            NoRecording: entries are missing in the bag, or one is damaged.
+        keeps it from holding up the caller. Raises NoRecording if entries are missing in the bag, or one is
+        damaged.
         """
         outcome: Future[None] = Future()
 

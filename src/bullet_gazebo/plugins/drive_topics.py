@@ -261,8 +261,7 @@ class Wheels(Shared):
 def joint_of(context: PluginContext, tag: str, default: str) -> Joint:
     """Returns the joint that an element names.
 
-    Raises:
-        DescriptionError: if the model has no such movable joint.
+    Raises DescriptionError if the model has no such movable joint.
     """
     name = context.text(tag, default)
     if name not in context.model.joint_names:

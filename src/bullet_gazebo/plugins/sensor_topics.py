@@ -34,8 +34,7 @@ def namespace_of(context: PluginContext, absent: str, empty: str) -> str:
 def topic_in(namespace: str, name: str) -> str:
     """Returns a topic's full name; a name that begins with a slash ignores the namespace.
 
-    Raises:
-        DescriptionError: for what ROS takes for no name.
+    Raises DescriptionError for what ROS takes for no name.
     """
     full = rospy.names.ns_join(namespace, name) if namespace else name
     plain = "/".join(filter(None, full.split("/")))

@@ -185,8 +185,7 @@ class Controllers:
     def command(self, holder: Holder, joint: str, positions: dict[str, float]) -> None:
         """Sends `joint` to its position [rad, m] in `positions`, which has those of all other joints, too.
 
-        Raises:
-            ServiceFailed: the controller doesn't subscribe.
+        Raises ServiceFailed if the controller doesn't subscribe.
         """
         kind = KINDS.get(holder.kind)
         message = kind.message_type if kind else JointTrajectory

@@ -155,8 +155,7 @@ class Engine(ABC):
     def load(self, description: ModelDescription, pose: Pose) -> Body:
         """Adds a model with its root link's frame at `pose`, its joints at zero.
 
-        Raises:
-            DescriptionError: if the engine can't take it.
+        Raises DescriptionError if the engine can't take it.
         """
 
     def load_all(

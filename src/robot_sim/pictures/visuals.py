@@ -133,8 +133,7 @@ def solid_of(shape: Shape) -> Solid:
 def pieces_of(shape: Shape) -> list[Piece]:
     """Returns the triangles of a shape by colour and texture, in its own frame; a mesh file's own come first.
 
-    Raises:
-        DescriptionError: a mesh file can't be read.
+    Raises DescriptionError if a mesh file can't be read.
     """
     rgba = shape.rgba or GREY
     if shape.kind != "mesh" or shape.solid is not None:

@@ -117,8 +117,7 @@ class LinkForces(Stateful):
 class JointForces(Stateful):
     """What the child of a joint exerts on the parent, without the effort that drives a movable joint.
 
-    Raises:
-        DescriptionError: if the model doesn't have it.
+    Raises DescriptionError if the model doesn't have it.
     """
 
     non_persistent = ("_joint",)

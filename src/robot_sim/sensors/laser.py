@@ -54,11 +54,7 @@ class Fan(NamedTuple):
 
 
 class Laser:
-    """A laser scanner, of one of `KINDS`.
-
-    Raises:
-        DescriptionError: if it can't be simulated.
-    """
+    """A laser scanner, of one of `KINDS`; raises DescriptionError if it can't be simulated."""
 
     def __init__(self, sensor: Sensor) -> None:
         where = f"sensor '{sensor.name}'"

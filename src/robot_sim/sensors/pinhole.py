@@ -110,8 +110,7 @@ def noisy(
 def camera_of(sensor: Sensor) -> PinholeCamera:
     """Returns the only camera of a sensor.
 
-    Raises:
-        DescriptionError: if it has none, or it can't be simulated.
+    Raises DescriptionError if it has none, or it can't be simulated.
     """
     where = f"sensor '{sensor.name}'"
     element = sensor.element.find("camera")

@@ -118,10 +118,8 @@ class Mount(Shared):
     def link(self, tag: str, required: bool = True) -> str:
         """Returns the model's link that the element `tag` names.
 
-        Without the element it is the model's first one, unless it is `required`.
-
-        Raises:
-            DescriptionError: if there is none.
+        Without the element it is the model's first one, unless it is `required`. Raises DescriptionError if
+        there is none.
         """
         names = self.model.link_names
         if not self.text(tag, "") and not required:
@@ -139,8 +137,7 @@ class Mount(Shared):
     def link_in_world(self, tag: str) -> tuple[Model, str]:
         """Returns the link that the element `tag` names: of its own model, or else of the world.
 
-        Raises:
-            DescriptionError: if there is none.
+        Raises DescriptionError if there is none.
         """
         name, own = self.required(tag), self.among(tag, self.model.link_names)
         found = (self.model, own) if own else self.sim.world.link(name)
@@ -202,8 +199,7 @@ class Measurement(Stateful):
 def sensor_of(mount: Mount, kinds: Sequence[str]) -> Sensor:
     """Returns the sensor that a plugin belongs to.
 
-    Raises:
-        DescriptionError: if it has none, or one of another kind.
+    Raises DescriptionError if it has none, or one of another kind.
     """
     sensor = mount.sensor
     if sensor is None or sensor.kind not in kinds:

@@ -50,9 +50,7 @@ class SensorReaders(Stateful):
     """Sensors that measure by their own clocks, whether or not their topics are heard.
 
     The caller holds the simulator's lock. Names are plain or model::sensor; of a model's IMU, the plugin's.
-
-    Raises:
-        UnknownName: if a name refers to none, or several, or to one that can't be read.
+    Raises UnknownName if a name refers to none, or several, or to one that can't be read.
     """
 
     non_persistent = ("names", "_schedule", "_parts", "_mounts")
@@ -150,8 +148,7 @@ def _sensors(sim: Simulator, sensing: Sensing) -> Iterator[tuple[str, Mount, typ
 class MeasuringHandle(SensorHandle):
     """A sensor that measures by its own clock while a controller has begun it.
 
-    Raises:
-        ControlError: if it can't be simulated.
+    Raises ControlError if it can't be simulated.
     """
 
     non_persistent = ("_told",)

@@ -218,8 +218,7 @@ class JointTrajectoryController(Controller):
     def query(self, time: int) -> list[State]:
         """Returns the desired states of the joints at `time` [ns] of the clock, in order of joint_names.
 
-        Raises:
-            TrajectoryRefused: if the controller isn't running.
+        Raises TrajectoryRefused if the controller isn't running.
         """
         self._check_running("sample its trajectory")
         uptime = self._uptime + time - self._now

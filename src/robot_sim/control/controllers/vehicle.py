@@ -78,8 +78,7 @@ class VehicleParameters(Parameters):
     def length(self, key: str, name: str, look_up: Callable[[], float]) -> float:
         """Returns a length that is given [m], or what `look_up` finds in the robot's description.
 
-        Raises:
-            ControlError: if there is nothing above 0 to be found.
+        Raises ControlError if there is nothing above 0 to be found.
         """
         given: float | None = getattr(self, key)
         return length(look_up(), f"{name}/{key}") if given is None else given
@@ -137,11 +136,7 @@ class VehicleController(Controller):
         self._wanted, self._stamp = twist, self._now
 
     def check_command(self, numbers: tuple[float, ...]) -> None:
-        """Checks that a command can be followed.
-
-        Raises:
-            ControlError: if it can't.
-        """
+        """Checks that a command can be followed; raises ControlError if it can't."""
         if self.state != "running":
             raise ControlError(f"controller '{self.name}' is not running: the command is ignored")
         if not self.options.allow_multiple_cmd_vel_publishers and self.cmd_vel.publishers() > 1:

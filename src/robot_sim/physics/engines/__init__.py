@@ -29,8 +29,7 @@ class EngineError(ValueError):
 def make_engine(name: str = BULLET[0]) -> Engine:
     """Returns a new, empty engine of one of `ENGINES`; MuJoCo, with a warning, where PyBullet can't be had.
 
-    Raises:
-        EngineError: if it is unknown or not installed.
+    Raises EngineError if it is unknown or not installed.
     """
     if name not in ENGINES:
         raise EngineError(f"physics engine '{name}' is not known; there are {', '.join(ENGINES)}")
