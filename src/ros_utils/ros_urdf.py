@@ -16,13 +16,9 @@ __all__ = [
 
 
 def urdf_load_from_pkg(
-    pkg_name: str,
-    model_name: str,
-    param_name: str,
-    folder: str = "/urdf",
-    ns: str | None = None,
+    pkg_name: str, model_name: str, param_name: str, folder: str = "/urdf", ns: str | None = None,
     args_xacro: Sequence[str] | None = None,
-) -> bool:
+) -> bool:  # fmt: skip
     """Expands a package's URDF or xacro file and sets it as a parameter.
 
     Args:

@@ -69,13 +69,9 @@ class ControllerTopics:
     """Publishers and subscribers of one controller, and the reconfigure servers of its PIDs."""
 
     def __init__(
-        self,
-        sim: Simulator,
-        thinner: Thinner,
-        manager: ControllerManager,
-        controller: Controller,
+        self, sim: Simulator, thinner: Thinner, manager: ControllerManager, controller: Controller,
         namespace: str,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """`namespace` is the manager's; the controller's own is below it."""
         self._sim = sim
         self._manager = manager
@@ -202,13 +198,9 @@ class PidTopics:
     """
 
     def __init__(
-        self,
-        sim: Simulator,
-        thinner: Thinner,
-        pid: Pid,
-        namespace: str,
+        self, sim: Simulator, thinner: Thinner, pid: Pid, namespace: str,
         changed: Callable[[], None],
-    ) -> None:
+    ) -> None:  # fmt: skip
         """`changed` is called under the simulator's lock when the gains change."""
         self._sim = sim
         self._pid = pid

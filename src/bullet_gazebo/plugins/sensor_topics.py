@@ -85,13 +85,9 @@ class Topic(Shared):
     """A topic of a sensor; see `SensorTopics.advertise`."""
 
     def __init__(
-        self,
-        name: str,
-        kind: type,
-        queue: int,
-        latch: bool = False,
+        self, name: str, kind: type, queue: int, latch: bool = False,
         newcomers: "Newcomers | None" = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._publisher = rospy.Publisher(
             name,
             kind,
@@ -171,14 +167,9 @@ class SensorTopics(Shared):
         self._clock.look()
 
     def advertise(
-        self,
-        name: str,
-        kind: type,
-        queue: int = 1,
-        latch: bool = False,
-        wakes: bool = True,
+        self, name: str, kind: type, queue: int = 1, latch: bool = False, wakes: bool = True,
         content: int = 0,
-    ) -> Topic:
+    ) -> Topic:  # fmt: skip
         """Returns a topic; its subscribers start the measurements if it `wakes` the sensor.
 
         `content` is that of a large message [bytes].
@@ -199,14 +190,9 @@ class SensorTopic(Shared):
     """The only topic of a sensor, see `SensorTopics`; `measure` returns a message, or None for nothing."""
 
     def __init__(
-        self,
-        context: PluginContext,
-        name: str,
-        kind: type,
-        rate: float,
-        measure: Callable[[int], Any],
-        at_once: bool = True,
-    ) -> None:
+        self, context: PluginContext, name: str, kind: type, rate: float,
+        measure: Callable[[int], Any], at_once: bool = True,
+    ) -> None:  # fmt: skip
         self._measure = measure
         topics = SensorTopics(context, rate, self._send, at_once)
         self._topic = topics.advertise(name, kind)

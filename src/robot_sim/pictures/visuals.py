@@ -73,13 +73,9 @@ class Piece(NamedTuple):
 
 
 def visible_model(
-    description: ModelDescription,
-    number: int,
-    name: str,
-    links: Sequence[str],
-    joints: Sequence[str],
-    collisions: bool,
-) -> VisibleModel:
+    description: ModelDescription, number: int, name: str, links: Sequence[str],
+    joints: Sequence[str], collisions: bool,
+) -> VisibleModel:  # fmt: skip
     """Returns the visible parts of these links and joints, with collision shapes if `collisions`."""
     return VisibleModel(
         number,

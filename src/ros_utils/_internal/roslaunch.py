@@ -18,13 +18,9 @@ CORE = ("master", "rosout-1")  # roslaunch's names for its own master and rosout
 
 
 def start(
-    arguments: Sequence[str],
-    label: str,
-    window: bool,
-    screen: bool,
-    log_file: str | None = None,
+    arguments: Sequence[str], label: str, window: bool, screen: bool, log_file: str | None = None,
     env: Mapping[str, str] | None = None,
-) -> Handle:
+) -> Handle:  # fmt: skip
     """Starts roslaunch; raises CannotStart, or MasterDown if it couldn't start a master either."""
     _programs.end_orphans()  # else their ending master would pass for a lasting one
     _master.is_up_or_startable()
