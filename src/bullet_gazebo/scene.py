@@ -41,22 +41,6 @@ REPEAT = 1.0  # [s] between two logs of the same complaint
 NO_STOP = (1.0, 0.0)  # limits of a joint without any: the lower one above the upper one
 
 
-class SceneOffer:
-    """Opens the scene's service and topics once."""
-
-    def __init__(self, sim: Simulator, sensors: Sequence[SceneSensor]) -> None:
-        """`sensors` changes under the simulator's lock, and the world's version with it."""
-        self._sim, self._sensors = sim, sensors
-        self._one_at_a_time = threading.Lock()
-        self._opened: SceneServer | None = None
-
-    def show(self) -> None:
-        """Offers the scene, if it isn't offered yet."""
-        with self._one_at_a_time:
-            if self._opened is None:
-                self._opened = SceneServer(self._sim, self._sensors)
-
-
 class SceneServer:
     """Models and lights that a window doesn't know yet (~get_scene), ~scene_poses and ~scene_contacts.
 
@@ -66,11 +50,23 @@ class SceneServer:
     """
 
     def __init__(self, sim: Simulator, sensors: Sequence[SceneSensor]) -> None:
+        """`sensors` changes under the simulator's lock, and the world's version with it."""
         self._sim, self._sensors = sim, sensors
         # A window may outlive its simulator: the next one counts from another number.
         self._first = secrets.randbits(31)
         self._news = threading.Event()  # a subscriber comes or goes, or the end
         self._ending = threading.Event()
+        self._one_at_a_time = threading.Lock()
+        self._is_offered = False
+
+    def show(self) -> None:
+        """Offers the scene, if it isn't offered yet."""
+        with self._one_at_a_time:
+            if not self._is_offered:
+                self._is_offered = True
+                self._offer()
+
+    def _offer(self) -> None:
         self._poses = self._advertise("~scene_poses", ScenePoses)
         self._contacts = self._advertise("~scene_contacts", SceneContacts)
         self._service = rospy.Service("~get_scene", GetScene, self._get)

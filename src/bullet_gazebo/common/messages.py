@@ -166,16 +166,12 @@ def to_contact_state(pair: ContactPair) -> ContactState:
 
 def from_contact_state(state: ContactState) -> ContactPair:
     """Returns what a message says of a contact."""
-
-    def vector(message: Vector3) -> poses.Vector:
-        return (message.x, message.y, message.z)
-
     return ContactPair(
         state.collision1_name,
         state.collision2_name,
-        [vector(each) for each in state.contact_positions],
-        [vector(each) for each in state.contact_normals],
-        [(vector(each.force), vector(each.torque)) for each in state.wrenches],
+        [to_vector(each) for each in state.contact_positions],
+        [to_vector(each) for each in state.contact_normals],
+        [(to_vector(each.force), to_vector(each.torque)) for each in state.wrenches],
         list(state.depths),
     )
 

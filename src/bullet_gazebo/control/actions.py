@@ -124,7 +124,9 @@ class ControllerAction(ABC):
             kept, self._kept = self._kept, []
         for handle, news, last in kept:
             if last:
-                _settle(handle, news.kind, self.result(news), news.text)
+                settle = {SUCCEEDED: handle.set_succeeded, ABORTED: handle.set_aborted}
+                end = settle.get(news.kind, handle.set_canceled)
+                end(self.result(news), news.text)
             else:
                 handle.publish_feedback(self.feedback(news))
         if self._status_is_due():
@@ -167,15 +169,6 @@ class ActionGoal:
     def finished(self, outcome: Any) -> None:
         """Takes the outcome, with its `kind` and `text`."""
         self._action.note(self._handle, outcome, last=True)
-
-
-def _settle(handle: ServerGoalHandle, kind: str, result: Any, text: str) -> None:
-    if kind == SUCCEEDED:
-        handle.set_succeeded(result, text)
-    elif kind == ABORTED:
-        handle.set_aborted(result, text)
-    else:
-        handle.set_canceled(result, text)
 
 
 class SteadyActionServer(ActionServer):

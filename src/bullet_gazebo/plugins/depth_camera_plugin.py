@@ -69,12 +69,8 @@ class DepthCameraPlugin(ContextPlugin):
         self._cloud = topics.advertise(cloud, PointCloud2, content=POINT_STEP * pixels)
         for name, kind in ((depth, Image), (cloud, PointCloud2)):
             show_camera(context, name, kind, camera)
-        self._depth_info = topics.advertise(
-            named("depthImageCameraInfoTopicName", "depth/camera_info"),
-            CameraInfo,
-            QUEUE,
-            wakes=False,
-        )
+        info = named("depthImageCameraInfoTopicName", "depth/camera_info")
+        self._depth_info = topics.advertise(info, CameraInfo, QUEUE, wakes=False)
         self._in_millimetres = truth(context.text("useDepth16UC1Format", "false"))
 
     def _measure(self, now: int) -> None:

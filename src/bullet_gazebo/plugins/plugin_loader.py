@@ -74,19 +74,28 @@ class PluginContext(Mount):
         It begins when the plugin is made. See `Schedule.begin` for the arguments, and else `on_update`.
         """
 
-        def guarded(now: int) -> None:
-            try:
-                measure(now)
-            except BaseException:  # noqa: BLE001 - a user's code must not stop the world
-                self.report("measures no more, because it raised")
-                self.sensing.schedule.fail(clock)
-
+        fault = "measures no more, because it raised"
+        guarded = self._guarded(measure, fault, lambda: self.sensing.schedule.fail(clock))
         with self.sim.lock:
             clock = self.sensing.schedule.begin(
                 self.model, rate, guarded, lambda: self._is_made.is_set() and listens(), at_once
             )
         self._clocks.append(clock)
         return clock
+
+    def _guarded(
+        self, call: Callable[..., None], what: str, end: Callable[[], None]
+    ) -> Callable[..., None]:
+        """Returns `call` in a form that reports an exception, and ends further calls by `end`."""
+
+        def guarded(*args: int) -> None:
+            try:
+                call(*args)
+            except BaseException:  # noqa: BLE001 - a user's code must not stop the world
+                self.report(what)
+                end()
+
+        return guarded
 
     def closing(self, close: Callable[[], None]) -> None:
         """Calls `close` when the plugin ends, or can't be made; the last one first."""
@@ -125,13 +134,10 @@ class PluginContext(Mount):
         An update that raises is reported, and not called again. Updates end with the plugin.
         """
 
-        def guarded(now: int) -> None:
-            try:
-                update(now)
-            except BaseException:  # noqa: BLE001 - a user's code must not stop the world
-                self.report("is not called any more, because it raised")
-                self.sim.listeners = [each for each in self.sim.listeners if each is not guarded]
+        def end() -> None:
+            self.sim.listeners = [each for each in self.sim.listeners if each is not guarded]
 
+        guarded = self._guarded(update, "is not called any more, because it raised", end)
         self._updates.append(guarded)
         with self.sim.lock:
             # A new list: the old one may be in use by the tick that removes an update.
@@ -142,19 +148,16 @@ class PluginContext(Mount):
         to it, or reset world or time.
         """
 
-        def guarded() -> None:
-            try:
-                moved()
-            except BaseException:  # noqa: BLE001 - a user's code must not stop the world
-                self.report("is not told of moves any more, because it raised")
-                self.sim.moves.forget(listener)
+        def end() -> None:
+            self.sim.moves.forget(listener)
 
         def close() -> None:
             with self.sim.lock:
-                self.sim.moves.forget(listener)
+                end()
 
+        fault = "is not told of moves any more, because it raised"
         with self.sim.lock:
-            listener = self.sim.moves.on_move_of(self.model, guarded)
+            listener = self.sim.moves.on_move_of(self.model, self._guarded(moved, fault, end))
         self._updates.append(listener)
         self.closing(close)
 
@@ -228,7 +231,9 @@ class PluginRegistry:
         If a plugin waits for time to pass, the hold ends after a while.
         """
         patience = LOCKSTEP_LOADING_PATIENCE if self._sim.lockstep else LOADING_PATIENCE
-        return self._sim.holds.hold(patience, partial(_warn_late, models, patience))
+        text = f"The plugins of {models} have been starting or ending for {patience:g} s"
+        late = partial(rospy.logwarn, "%s; time passes from now on", text)
+        return self._sim.holds.hold(patience, late)
 
     def load(self, model: Model, robot_namespace: str) -> None:
         """Starts the plugins of `model`. An unknown one and one that fails is logged and left out
@@ -325,14 +330,6 @@ def _tell_missing_control(model: Model) -> None:
             "Model '%s': %s is not simulated: this robot has no control here (docs/plugins.md)",
             model.name, foreign,
         )  # fmt: skip
-
-
-def _warn_late(models: str, patience: float) -> None:
-    rospy.logwarn(
-        "The plugins of %s have been starting or ending for %g s; time passes from now on",
-        models,
-        patience,
-    )
 
 
 def _registered() -> dict[str, object]:

@@ -89,13 +89,8 @@ class Topic(Shared):
         newcomers: "Newcomers | None" = None,
     ) -> None:  # fmt: skip
         self._publisher = rospy.Publisher(
-            name,
-            kind,
-            subscriber_listener=newcomers,
-            queue_size=queue,
-            latch=latch,
-            tcp_nodelay=True,
-        )
+            name, kind, subscriber_listener=newcomers, tcp_nodelay=True, latch=latch, queue_size=queue
+        )  # fmt: skip
 
     @property
     def is_heard(self) -> bool:

@@ -185,7 +185,12 @@ class AdvanceService:
             elif request.physics == AdvanceWorldRequest.UNPAUSE_PHYSICS:
                 with self._journal.command("unpause"):
                     self._sim.unpause()
-            passed = self._advance_recorded(request.ticks) if request.ticks else self._advance(0)
+            if request.ticks:
+                with self._journal.command("advance") as entry:
+                    passed = self._advance(request.ticks)
+                    entry.data = b"%d" % passed  # repeated without the messages that ended it
+            else:
+                passed = self._advance(0)
             with self._sim.lock:
                 return AdvanceWorldResponse(
                     success=not faults,
@@ -207,12 +212,6 @@ class AdvanceService:
             except genpy.DeserializationError as fault:
                 faults.append(f"AdvanceWorld: a message on {message.topic} can't be read: {fault}")
         return faults
-
-    def _advance_recorded(self, ticks: int) -> int:
-        with self._journal.command("advance") as entry:
-            passed = self._advance(ticks)
-            entry.data = b"%d" % passed  # repeated without the messages that ended it
-        return passed
 
     def _advance(self, ticks: int) -> int:
         """Returns how many ticks have passed; after each slice services that wait get their turn."""
