@@ -4,6 +4,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar
 
 import rospy
@@ -193,19 +194,12 @@ class SteadyActionServer(ActionServer):
     def initialize(self) -> None:
         """Opens the five topics; called by start()."""
         self.status_list_timeout = NEVER
-        self.status_pub = rospy.Publisher(
-            f"{self.ns}/status", GoalStatusArray, latch=True, queue_size=QUEUE
-        )
-        self.result_pub = rospy.Publisher(f"{self.ns}/result", self.ActionResult, queue_size=QUEUE)
-        self.feedback_pub = rospy.Publisher(
-            f"{self.ns}/feedback", self.ActionFeedback, queue_size=QUEUE
-        )
-        self.goal_sub = rospy.Subscriber(
-            f"{self.ns}/goal", self.ActionGoal, self.internal_goal_callback
-        )
-        self.cancel_sub = rospy.Subscriber(
-            f"{self.ns}/cancel", GoalID, self.internal_cancel_callback
-        )
+        ns, advertise = self.ns, partial(rospy.Publisher, queue_size=QUEUE)
+        self.status_pub = advertise(f"{ns}/status", GoalStatusArray, latch=True)
+        self.result_pub = advertise(f"{ns}/result", self.ActionResult)
+        self.feedback_pub = advertise(f"{ns}/feedback", self.ActionFeedback)
+        self.goal_sub = rospy.Subscriber(f"{ns}/goal", self.ActionGoal, self.internal_goal_callback)
+        self.cancel_sub = rospy.Subscriber(f"{ns}/cancel", GoalID, self.internal_cancel_callback)
 
     def stop(self) -> None:
         """Closes the topics after the last result was sent."""

@@ -202,7 +202,11 @@ class RobotHardware(Shared):
         found = {name: j for group in self.interfaces.values() for name, j in group.items()}
         self.joints = {name: found[name] for name in sorted(found)}
         self.effort_joints = self._of(EFFORT)
-        self.drives = self._drives(gains or {})
+        gains = gains or {}
+        self.drives: list[Drive] = [
+            *(PositionDrive(j, drive_pid(gains, j.name)) for j in self._of(POSITION)),
+            *(VelocityDrive(j, drive_pid(gains, j.name)) for j in self._of(VELOCITY)),
+        ]
         self.halted = False
         # By interface, what makes a controller's handles; each raises ControlError for a faulty sensor.
         self.sensors: dict[str, list[Callable[[], SensorHandle]]] = {IMU: [], FORCE_TORQUE: []}
@@ -292,12 +296,6 @@ class RobotHardware(Shared):
     def _of(self, interface: str) -> list[JointHandle]:
         joints = self.interfaces.get(interface, {})
         return [joints[name] for name in sorted(joints)]
-
-    def _drives(self, gains: Mapping[str, object]) -> list[Drive]:
-        return [
-            *(PositionDrive(j, drive_pid(gains, j.name)) for j in self._of(POSITION)),
-            *(VelocityDrive(j, drive_pid(gains, j.name)) for j in self._of(VELOCITY)),
-        ]
 
 
 def drive_pid(gains: Mapping[str, object], joint: str) -> Pid | None:

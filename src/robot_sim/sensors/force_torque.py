@@ -150,17 +150,15 @@ class JointForces(Stateful):
         force, torque = _sum([forces.known, _times(forces.net, -1.0)])
         torque = subtract(torque, cross(frame.position, force))
         if joint.movable:
-            driven = scale(rotate(frame.orientation, joint.axis), self._effort())
+            robots = [robot for robot in self._sim.robots if robot.model is self._model]
+            effort = forces.effort + sum(robot.effort_on(joint.name) for robot in robots)
+            driven = scale(rotate(frame.orientation, joint.axis), effort)
             if joint.kind == "prismatic":
                 force = add(force, driven)
             else:
                 torque = add(torque, driven)
         back = conjugate(pose.orientation)
         return rotate(back, force), rotate(back, torque)
-
-    def _effort(self) -> float:
-        robots = [robot for robot in self._sim.robots if robot.model is self._model]
-        return self._forces.effort + sum(robot.effort_on(self._joint.name) for robot in robots)
 
 
 class ForceTorqueSensor(Measurement):

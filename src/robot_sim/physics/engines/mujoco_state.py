@@ -39,7 +39,10 @@ class MujocoState:
     def replace(self, model: mujoco.MjModel) -> None:
         """Uses another model; the bodies have to be bound to it."""
         self.model, self.data = model, mujoco.MjData(model)
-        self._watch()
+        # Each access to an attribute of MuJoCo makes a new array object.
+        self._positions, self._speeds = self.data.qpos, self.data.qvel.tolist
+        self._before = self._positions.copy()
+        self.set_time_step(model.opt.timestep)
         self.max_vel = np.full(model.ngeom, np.inf)  # [m/s], of each geom
         self.set_fastest_separation(np.inf)
         self.stale = self.placed = True
@@ -78,12 +81,6 @@ class MujocoState:
         free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
         self._fastest = np.where(alone & free, FASTEST, FURTHEST / dt)
         self._fast = FURTHEST / dt
-
-    def _watch(self) -> None:
-        # Each access to an attribute of MuJoCo makes a new array object.
-        self._positions, self._speeds = self.data.qpos, self.data.qvel.tolist
-        self._before = self._positions.copy()
-        self.set_time_step(self.model.opt.timestep)
 
     def set_fastest_separation(self, speed: float) -> None:
         """Bounds the speed [m/s] at which contacts end overlaps, in addition to the geoms' `max_vel`."""

@@ -24,23 +24,13 @@ from ros_utils._internal.gazebo.calls import (
 )
 
 __all__ = [
-    "gazebo_get_ODE_physics",
-    "gazebo_get_gravity",
-    "gazebo_get_max_update_rate",
-    "gazebo_get_physics_properties",
-    "gazebo_get_time_step",
-    "gazebo_pause_physics",
-    "gazebo_reset_sim",
-    "gazebo_reset_world",
-    "gazebo_set_ODE_physics",
-    "gazebo_set_default_properties",
-    "gazebo_set_gravity",
-    "gazebo_set_max_update_rate",
-    "gazebo_set_physics_properties",
-    "gazebo_set_time_step",
-    "gazebo_step_physics",
+    "gazebo_get_ODE_physics", "gazebo_get_gravity", "gazebo_get_max_update_rate",
+    "gazebo_get_physics_properties", "gazebo_get_time_step", "gazebo_pause_physics",
+    "gazebo_reset_sim", "gazebo_reset_world", "gazebo_set_ODE_physics",
+    "gazebo_set_default_properties", "gazebo_set_gravity", "gazebo_set_max_update_rate",
+    "gazebo_set_physics_properties", "gazebo_set_time_step", "gazebo_step_physics",
     "gazebo_unpause_physics",
-]
+]  # fmt: skip
 
 STEP = "gazeboWorld"  # XML-RPC method of the stand-in's node; Gazebo has no service for steps
 CHUNK = 1000  # steps in one call
@@ -97,18 +87,9 @@ def gazebo_step_physics(
 
 TIME_STEP = 0.001  # [s]
 GRAVITY = (0.0, 0.0, -9.81)  # [m/s²]
-ODE = {
-    "auto_disable_bodies": False,
-    "sor_pgs_precon_iters": 0,
-    "sor_pgs_iters": 50,
-    "sor_pgs_w": 1.3,
-    "sor_pgs_rms_error_tol": 0.0,
-    "contact_surface_layer": 0.001,
-    "contact_max_correcting_vel": 0.0,
-    "cfm": 0.0,
-    "erp": 0.2,
-    "max_contacts": 20,
-}
+ODE = ODEPhysics(
+    sor_pgs_iters=50, sor_pgs_w=1.3, contact_surface_layer=0.001, erp=0.2, max_contacts=20
+)
 
 
 def gazebo_get_physics_properties(**at: Unpack[At]) -> Any:
@@ -118,12 +99,9 @@ def gazebo_get_physics_properties(**at: Unpack[At]) -> Any:
 
 
 def gazebo_set_physics_properties(
-    time_step: float | None = None,
-    max_update_rate: float | None = None,
-    gravity: Sequence[float] | None = None,
-    ode_config: ODEPhysics | None = None,
-    **at: Unpack[At],
-) -> bool:
+    time_step: float | None = None, max_update_rate: float | None = None,
+    gravity: Sequence[float] | None = None, ode_config: ODEPhysics | None = None, **at: Unpack[At],
+) -> bool:  # fmt: skip
     """Changes the given properties; the others stay unchanged.
 
     Args:
@@ -221,5 +199,5 @@ def gazebo_get_ODE_physics(**at: Unpack[At]) -> ODEPhysics:
 
 def gazebo_set_default_properties(**at: Unpack[At]) -> bool:
     """Sets a step of 1 ms, real time, gravity of 9.81 m/s² and the solver's usual settings, at once."""
-    usual = (TIME_STEP, 1.0 / TIME_STEP, GRAVITY, ODEPhysics(**ODE))
+    usual = (TIME_STEP, 1.0 / TIME_STEP, GRAVITY, ODE)
     return gazebo_set_physics_properties(*usual, **at)

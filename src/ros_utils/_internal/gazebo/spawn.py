@@ -28,16 +28,10 @@ from ros_utils._internal.gazebo.calls import (
 from ros_utils._internal.packages import urdf_parse_from_path, urdf_parse_from_pkg
 
 __all__ = [
-    "gazebo_delete_model",
-    "gazebo_spawn_sdf_param",
-    "gazebo_spawn_sdf_path",
-    "gazebo_spawn_sdf_pkg",
-    "gazebo_spawn_sdf_string",
-    "gazebo_spawn_urdf_param",
-    "gazebo_spawn_urdf_path",
-    "gazebo_spawn_urdf_pkg",
-    "gazebo_spawn_urdf_string",
-]
+    "gazebo_delete_model", "gazebo_spawn_sdf_param", "gazebo_spawn_sdf_path",
+    "gazebo_spawn_sdf_pkg", "gazebo_spawn_sdf_string", "gazebo_spawn_urdf_param",
+    "gazebo_spawn_urdf_path", "gazebo_spawn_urdf_pkg", "gazebo_spawn_urdf_string",
+]  # fmt: skip
 
 Pose = tuple[float, float, float, float, float, float, float]  # x, y, z [m] and a quaternion
 
@@ -88,8 +82,7 @@ def gazebo_delete_model(
 ) -> bool:
     """Deletes a model; with `verify`, returns only once it is no longer in the world's list.
 
-    Returns:
-        True if the model existed and is gone.
+    Returns True if the model existed and is gone.
     """
     kind = srv.DeleteModel
     deleted = done("delete_model", kind, model_name, timeout=timeout, gazebo_ns=gazebo_ns)
@@ -228,8 +221,7 @@ def gazebo_spawn_sdf_string(
 ) -> bool:  # fmt: skip
     """Spawns a model from SDF text; the arguments are those of `gazebo_spawn_urdf_string`.
 
-    Returns:
-        True if it was spawned; a single value, unlike the pair for a URDF.
+    Returns True if it was spawned; a single value, unlike the pair for a URDF.
     """
     place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     return spawn("sdf", model_string, model_name, *place, **how).success

@@ -27,16 +27,10 @@ from ros_utils._internal.gazebo.calls import (
 )
 
 __all__ = [
-    "gazebo_apply_joint_effort",
-    "gazebo_get_joint_properties",
-    "gazebo_get_link_state",
-    "gazebo_get_model_names",
-    "gazebo_get_model_state",
-    "gazebo_get_world_properties",
-    "gazebo_set_link_state",
-    "gazebo_set_model_configuration",
-    "gazebo_set_model_state",
-]
+    "gazebo_apply_joint_effort", "gazebo_get_joint_properties", "gazebo_get_link_state",
+    "gazebo_get_model_names", "gazebo_get_model_state", "gazebo_get_world_properties",
+    "gazebo_set_link_state", "gazebo_set_model_configuration", "gazebo_set_model_state",
+]  # fmt: skip
 
 
 def gazebo_get_model_state(
@@ -44,8 +38,7 @@ def gazebo_get_model_state(
 ) -> ModelStateResult:
     """Reads a model's pose [m, quaternion] and twist [m/s, rad/s] relative to a model, link or "world".
 
-    Returns:
-        Header, pose, twist, and whether it succeeded; all zeros if not.
+    Returns header, pose, twist, and whether it succeeded; all zeros if not.
     """
     request = (model_name, relative_entity_name)
     answer = call("get_model_state", srv.GetModelState, *request, **at)
@@ -87,8 +80,7 @@ def gazebo_get_link_state(
 ) -> LinkStateResult:
     """Reads a link's pose [m, quaternion] and twist [m/s, rad/s]; best name it ``model::link``.
 
-    Returns:
-        Pose, twist, and whether it succeeded; all zeros if not.
+    Returns pose, twist, and whether it succeeded; all zeros if not.
     """
     request = (link_name, reference_frame)
     answer = call("get_link_state", srv.GetLinkState, *request, **at)
@@ -99,12 +91,9 @@ def gazebo_get_link_state(
 
 
 def gazebo_set_link_state(
-    link_name: str,
-    pose: Pose,
-    twist: Twist | None = None,
-    reference_frame: str = "world",
+    link_name: str, pose: Pose, twist: Twist | None = None, reference_frame: str = "world",
     **at: Unpack[At],
-) -> bool:
+) -> bool:  # fmt: skip
     """Moves a link; without `twist` it is then at rest. See `gazebo_get_link_state`."""
     numbers = pose_numbers(pose)
     state = LinkState(link_name, make_pose(*numbers), twist or Twist(), reference_frame)
@@ -112,12 +101,9 @@ def gazebo_set_link_state(
 
 
 def gazebo_set_model_configuration(
-    model_name: str,
-    joint_names: Sequence[str],
-    joint_positions: Sequence[float],
-    urdf_param_name: str = "robot_description",
-    **at: Unpack[At],
-) -> bool:
+    model_name: str, joint_names: Sequence[str], joint_positions: Sequence[float],
+    urdf_param_name: str = "robot_description", **at: Unpack[At],
+) -> bool:  # fmt: skip
     """Moves a model's joints to positions [rad, m] at once.
 
     Args:
@@ -131,8 +117,7 @@ def gazebo_set_model_configuration(
 def gazebo_get_joint_properties(joint_name: str, **at: Unpack[At]) -> JointPropertiesResult:
     """Reads a joint's position [rad, m] and velocity [rad/s, m/s].
 
-    Returns:
-        Position, velocity, and whether it succeeded; zeros if not.
+    Returns position, velocity, and whether it succeeded; zeros if not.
     """
     answer = call("get_joint_properties", srv.GetJointProperties, joint_name, **at)
     if not succeeded(answer):
@@ -158,8 +143,7 @@ def gazebo_apply_joint_effort(
 def gazebo_get_world_properties(**at: Unpack[At]) -> WorldPropertiesResult:
     """Reads the simulated time and the models in the world.
 
-    Returns:
-        Whether it succeeded, the simulated time [s], and the models' names.
+    Returns whether it succeeded, the simulated time [s], and the models' names.
     """
     answer = call("get_world_properties", srv.GetWorldProperties, **at)
     if answer is None:
@@ -174,12 +158,9 @@ def gazebo_get_model_names(**at: Unpack[At]) -> list[str]:
 
 
 def _set(
-    service: str,
-    kind: Any,
-    state: ModelState | LinkState,
-    numbers: Sequence[float],
+    service: str, kind: Any, state: ModelState | LinkState, numbers: Sequence[float],
     **at: Unpack[At],
-) -> bool:
+) -> bool:  # fmt: skip
     if fault := not_finite(service, *numbers):
         _log.error(fault)
         return False
