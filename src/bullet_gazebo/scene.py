@@ -142,13 +142,10 @@ class SceneServer:
 
         def publish() -> None:
             message = ScenePoses(
-                version=version,
-                now=to_time(now),
-                paused=paused,
-                lockstep=self._sim.lockstep,
+                version=version, now=to_time(now), paused=paused, lockstep=self._sim.lockstep,
                 poses=_singles((*pose.position, *pose.orientation) for pose in poses),
                 positions=_singles([position for position, _ in states] for states in joints),
-            )
+            )  # fmt: skip
             self._poses[0].publish(message)
 
         return publish
@@ -206,22 +203,16 @@ def from_model(message: SceneModel) -> VisibleModel:
 
 def to_light(light: Light) -> SceneLight:
     return SceneLight(
-        name=light.name,
-        kind=light.kind,
-        diffuse=ColorRGBA(*light.diffuse),
-        pose=to_pose_msg(light.pose),
-        direction=Vector3(*light.direction),
-    )
+        name=light.name, kind=light.kind, diffuse=ColorRGBA(*light.diffuse),
+        pose=to_pose_msg(light.pose), direction=Vector3(*light.direction),
+    )  # fmt: skip
 
 
 def from_light(message: SceneLight) -> Light:
     return Light(
-        message.name,
-        diffuse=_from_color(message.diffuse),
-        direction=to_vector(message.direction),
-        pose=from_pose_msg(message.pose),
-        kind=message.kind,
-    )
+        message.name, diffuse=_from_color(message.diffuse), direction=to_vector(message.direction),
+        pose=from_pose_msg(message.pose), kind=message.kind,
+    )  # fmt: skip
 
 
 def _to_joint(joint: Joint) -> SceneJoint:
@@ -232,15 +223,10 @@ def _to_joint(joint: Joint) -> SceneJoint:
 
 def _from_joint(message: SceneJoint) -> Joint:
     return Joint(
-        message.name,
-        message.kind,
-        parent="",
-        child=message.child,
-        anchor=from_pose_msg(message.frame),
-        axis=to_vector(message.axis),
-        lower=message.lower,
+        message.name, message.kind, parent="", child=message.child,
+        anchor=from_pose_msg(message.frame), axis=to_vector(message.axis), lower=message.lower,
         upper=message.upper,
-    )
+    )  # fmt: skip
 
 
 def _to_shapes(shapes: Iterable[Shape]) -> list[SceneShape]:
@@ -253,7 +239,7 @@ def _to_shapes(shapes: Iterable[Shape]) -> list[SceneShape]:
             mesh=shape.mesh,
             has_color=shape.rgba is not None,
             color=ColorRGBA(*(shape.rgba or (0.0, 0.0, 0.0, 0.0))),
-        )
+        )  # fmt: skip
         for shape in shapes
     ]
 
@@ -267,7 +253,7 @@ def _from_shapes(messages: Iterable[SceneShape]) -> list[Shape]:
             message.mesh,
             _from_color(message.color) if message.has_color else None,
             message.name,
-        )
+        )  # fmt: skip
         for message in messages
     ]
 

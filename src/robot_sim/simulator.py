@@ -287,11 +287,9 @@ class Simulator(Shared):
         state = {
             "robots": [robot.state_dict() for robot in self.robots],
             "parts": {name: state_of(part) for name, part in self.parts.items()},
-            "applied": self.applied.state_dict(),
-            "now": self.now,
-            "resets": self.resets,
+            "applied": self.applied.state_dict(), "now": self.now, "resets": self.resets,
             "world": self.world.state_dict(),
-        }
+        }  # fmt: skip
         return Snapshot(self, self._layout, state)
 
     def restore_state(self, snapshot: Snapshot) -> None:

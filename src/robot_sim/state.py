@@ -248,24 +248,14 @@ class LinkQuery(NamedTuple):
 
 @dataclass(frozen=True)
 class StateQuery:
-    """What to read. What isn't asked for costs nothing.
+    """What to read, by name: plain, or scoped by models. What isn't asked for costs nothing."""
 
-    Args:
-        models: names of models whose states are wanted.
-        all_models: whether the states of all models are wanted instead.
-        links: links whose states are wanted.
-        contacts_of: names of models, links or collisions, plain or scoped, whose contacts are wanted.
-        all_contacts: whether all contacts are wanted instead.
-        sensors: names of sensors whose last measurements are wanted, plain or model::sensor; see
-            `robot_sim.sensors.sensor_readers`, which reads them.
-    """
-
-    models: tuple[str, ...] = ()
-    all_models: bool = False
+    models: tuple[str, ...] = ()  # whose states are wanted
+    all_models: bool = False  # instead
     links: tuple[LinkQuery, ...] = ()
-    contacts_of: tuple[str, ...] = ()
-    all_contacts: bool = False
-    sensors: tuple[str, ...] = ()
+    contacts_of: tuple[str, ...] = ()  # models, links or collisions
+    all_contacts: bool = False  # instead
+    sensors: tuple[str, ...] = ()  # whose last measurements are wanted; `sensor_readers` reads them
 
 
 NOTHING = StateQuery()

@@ -168,8 +168,7 @@ class Pacer:
     def wait(self, period: float, longest: float = math.inf) -> bool:
         """Sleeps until `period` [s of wall time] after the previous due time; 0 never waits.
 
-        Returns:
-            False when that takes longer than `longest` [s]: call wait_on() until it is due.
+        Returns False when that takes longer than `longest` [s]: call wait_on() until it is due.
         """
         self._due += period
         if period <= 0.0 or self._due - time.perf_counter() < -MAX_LAG:

@@ -22,20 +22,11 @@ from ros_calls.waiting import TIMEOUT, wait_and_call
 from ros_utils._internal import log as _log
 
 __all__ = [
-    "ListResult",
-    "kill_controllers_srv",
-    "list_controller_types_srv",
-    "list_controllers_srv",
-    "load_controller_list_srv",
-    "load_controller_srv",
-    "reset_controllers_srv",
-    "spawn_controllers_srv",
-    "start_controllers_srv",
-    "stop_controllers_srv",
-    "switch_controllers_srv",
-    "unload_controller_list_srv",
-    "unload_controller_srv",
-]
+    "ListResult", "kill_controllers_srv", "list_controller_types_srv", "list_controllers_srv",
+    "load_controller_list_srv", "load_controller_srv", "reset_controllers_srv",
+    "spawn_controllers_srv", "start_controllers_srv", "stop_controllers_srv",
+    "switch_controllers_srv", "unload_controller_list_srv", "unload_controller_srv",
+]  # fmt: skip
 
 
 SERVICES = {
@@ -95,9 +86,8 @@ def load_controller_srv(
 ) -> bool:  # fmt: skip
     """Loads a controller, with up to `max_retries` attempts.
 
-    Returns:
-        True once the manager has loaded it. False if it refuses (already loaded, no parameters,
-        unknown type or joint) or doesn't answer.
+    Returns True once the manager has loaded it. False if it refuses (already loaded, no parameters, unknown
+    type or joint) or doesn't answer.
     """
     request = (controller_name,)
     return _until_ok(LoadController, request, controller_name, ns, max_retries, service_timeout)
@@ -109,8 +99,7 @@ def load_controller_list_srv(
 ) -> ListResult:  # fmt: skip
     """Loads several controllers; one failure doesn't stop the others.
 
-    Returns:
-        True if every one was loaded; its `failed` names those that were not.
+    Returns True if every one was loaded; its `failed` names those that were not.
     """
     return _each(load_controller_srv, controller_list, ns, max_retries, service_timeout)
 
@@ -121,8 +110,7 @@ def unload_controller_srv(
 ) -> bool:  # fmt: skip
     """Unloads a controller that doesn't run, with up to `max_retries` attempts.
 
-    Returns:
-        True once it is unloaded. False if it runs, is unknown, or the manager doesn't answer.
+    Returns True once it is unloaded. False if it runs, is unknown, or the manager doesn't answer.
     """
     request = (controller_name,)
     return _until_ok(UnloadController, request, controller_name, ns, max_retries, service_timeout)
@@ -134,8 +122,7 @@ def unload_controller_list_srv(
 ) -> ListResult:  # fmt: skip
     """Unloads several controllers; one failure doesn't stop the others.
 
-    Returns:
-        True if every one was unloaded; its `failed` names those that were not.
+    Returns True if every one was unloaded; its `failed` names those that were not.
     """
     return _each(unload_controller_srv, controller_list, ns, max_retries, service_timeout)
 
@@ -192,10 +179,7 @@ def reset_controllers_srv(
 ) -> bool:  # fmt: skip
     """Restarts controllers, with up to `max_retries` attempts to stop them; resets set-points and PID state.
 
-    `max_retries` is the second argument here, not the last.
-
-    Returns:
-        True if both steps succeeded.
+    `max_retries` is the second argument here, not the last. Returns True if both steps succeeded.
     """
     how = (ns, strictness, start_asap, timeout)
     return switch_controllers_srv(
@@ -210,9 +194,8 @@ def spawn_controllers_srv(
 ) -> bool:  # fmt: skip
     """Loads the controllers that aren't loaded yet, then starts all loaded ones of the list.
 
-    Returns:
-        True if all are loaded and the manager has started them. If one can't be loaded, the others
-        still start.
+    Returns True if all are loaded and the manager has started them. If one can't be loaded, the others still
+    start.
     """
     known = list_controllers_srv(ns, service_timeout=service_timeout)
     if known is None:
@@ -235,8 +218,7 @@ def kill_controllers_srv(
 ) -> bool:  # fmt: skip
     """Stops controllers and, if that succeeded, unloads them.
 
-    Returns:
-        True if all were stopped and unloaded.
+    Returns True if all were stopped and unloaded.
     """
     return stop_controllers_srv(
         kill_controllers, ns, strictness, start_asap, timeout, service_timeout=service_timeout

@@ -79,7 +79,6 @@ def ros_launch_from_path(
 def ros_kill_launch_process() -> bool:
     """Ends every launch that this toolkit started under this master, with all its nodes.
 
-    Returns:
-        True if none is left.
+    Returns True if none is left.
     """
     return _programs.end([entry for entry in _programs.started() if entry.kind == "launch"])

@@ -121,8 +121,7 @@ class WorldJournal:
     def listen(self, listener: Callable[[list[JournalEntry]], None]) -> list[JournalEntry] | None:
         """Makes a function a listener, if it isn't one.
 
-        Returns:
-            The finished entries before this call, or None if the first ones are gone.
+        Returns the finished entries before this call, or None if the first ones are gone.
         """
         with self._guard:
             if listener not in self.listeners:

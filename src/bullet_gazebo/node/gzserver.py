@@ -87,8 +87,7 @@ INTERRUPTED = 130
 def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     """Reads gzserver's options, in any order (docs/contract/gazebo_launch.md 4.2); ignores ROS's a:=b.
 
-    Returns:
-        world, paused, physics, lockstep, replace, seed, the video options, and `ignored`: the unknown ones.
+    They are world, paused, physics, lockstep, replace, seed, the video options, and `ignored`, the unknown.
     """
     parser = argparse.ArgumentParser(
         prog="gzserver",

@@ -11,14 +11,9 @@ from file_access.xml_text import decode
 
 HASHES = "PYTHONHASHSEED"  # decides the order of sets
 KINDS: dict[str, tuple[type, ...]] = {
-    "physics": (str,),
-    "paused": (bool,),
-    "seed": (int, type(None)),
-    "hashes": (str, type(None)),
-    "world": (str,),
-    "world_text": (str, type(None)),
-    "series": (int,),
-}
+    "physics": (str,), "paused": (bool,), "seed": (int, type(None)), "hashes": (str, type(None)),
+    "world": (str,), "world_text": (str, type(None)), "series": (int,),
+}  # fmt: skip
 
 
 def facts_of(args: argparse.Namespace, series: int) -> dict[str, Any]:
@@ -29,14 +24,11 @@ def facts_of(args: argparse.Namespace, series: int) -> dict[str, Any]:
     except FileError:  # the world is empty, and the log has said why
         text = None
     return {
-        "physics": args.physics,
-        "paused": args.paused,
-        "seed": args.seed,
+        "physics": args.physics, "paused": args.paused, "seed": args.seed,
         "hashes": os.environ.get(HASHES),
-        "world": str(args.world if path is None else path.absolute()),
-        "world_text": text,
+        "world": str(args.world if path is None else path.absolute()), "world_text": text,
         "series": series,
-    }
+    }  # fmt: skip
 
 
 def check_facts(facts: object) -> None:

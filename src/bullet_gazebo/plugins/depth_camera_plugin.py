@@ -119,15 +119,11 @@ def to_cloud(
     if not organised:
         height, width = 1, height * width
     return PointCloud2(
-        header=header,
-        height=height,
-        width=width,
+        header=header, height=height, width=width,
         fields=[PointField(name, at, PointField.FLOAT32, 1) for name, at in FIELDS.items()],
-        point_step=POINT_STEP,
-        row_step=POINT_STEP * width,
-        data=points.tobytes(),
+        point_step=POINT_STEP, row_step=POINT_STEP * width, data=points.tobytes(),
         is_dense=not bool(np.isnan(depths).any()),
-    )
+    )  # fmt: skip
 
 
 LIBRARIES = {"libgazebo_ros_depth_camera.so": DepthCameraPlugin, KINECT: KinectPlugin}

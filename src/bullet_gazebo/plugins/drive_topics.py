@@ -58,12 +58,8 @@ def length(context: PluginContext, tag: str, default: float) -> float:
 class DrivePlugin(ContextPlugin):
     """Keeps the newest command, and reports odometry after each period and at once after moves.
 
-    Subclasses have `update` and `sample`, and call `begin` when they are made.
-
-    Args:
-        rate: of its reports [Hz].
-        late: see `Period`.
-        base: the frame of the vehicle without `<robotBaseFrame>`.
+    Subclasses have `update` and `sample`, and call `begin` when they are made. `rate` is that of reports [Hz]
+    (`late`: see `Period`), `base` the frame of the vehicle without `<robotBaseFrame>`.
     """
 
     def __init__(

@@ -140,15 +140,9 @@ class VelodynePlugin(LaserPlugin):
         points["x"], points["y"], points["z"] = places.T
         points["intensity"], points["ring"] = intensities[seen], self._rings[seen]
         return PointCloud2(
-            header=self.header(now),
-            height=1,
-            width=len(points),
-            fields=FIELDS,
-            point_step=POINT.itemsize,
-            row_step=points.nbytes,
-            data=points.tobytes(),
-            is_dense=True,
-        )
+            header=self.header(now), height=1, width=len(points), fields=FIELDS,
+            point_step=POINT.itemsize, row_step=points.nbytes, data=points.tobytes(), is_dense=True,
+        )  # fmt: skip
 
     def _within(self, ranges: np.ndarray) -> np.ndarray:
         return (self._low < ranges) & (ranges < self._high)

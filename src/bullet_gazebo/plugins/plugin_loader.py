@@ -63,12 +63,9 @@ class PluginContext(Mount):
     _is_made: threading.Event = field(default_factory=threading.Event, repr=False)
 
     def clock(
-        self,
-        rate: float,
-        measure: Update,
-        listens: Callable[[], bool] = lambda: True,
+        self, rate: float, measure: Update, listens: Callable[[], bool] = lambda: True,
         at_once: bool = True,
-    ) -> SensorClock:
+    ) -> SensorClock:  # fmt: skip
         """Calls `measure` with the simulated time [ns], at a rate in Hz, while somebody listens.
 
         It begins when the plugin is made. See `Schedule.begin` for the arguments, and else `on_update`.
@@ -207,12 +204,9 @@ class PluginRegistry:
     """Starts and ends plugins by the file names of their libraries: built-in ones, then users'."""
 
     def __init__(
-        self,
-        sim: Simulator,
-        thinner: Thinner,
-        seed: int = 0,
+        self, sim: Simulator, thinner: Thinner, seed: int = 0,
         shown: list[SceneSensor] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """`seed` is that of the sensors' noise; to `shown` come the topics that windows can draw."""
         self._sim = sim
         self._shown = [] if shown is None else shown

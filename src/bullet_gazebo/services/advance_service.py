@@ -106,8 +106,7 @@ class Mailboxes:
     ) -> tuple[list[str], list[str]]:
         """Waits until a node is connected to its topics, as far as this process has them too.
 
-        Returns:
-            The subscriptions that this process publishes, and the publications that it subscribes to.
+        Returns the subscriptions that this process publishes, and the publications that it subscribes to.
         """
         deadline = time.monotonic() + CONNECTING
         ways = ((subscriptions, True), (publications, False))
@@ -193,15 +192,10 @@ class AdvanceService:
                 passed = self._advance(0)
             with self._sim.lock:
                 return AdvanceWorldResponse(
-                    success=not faults,
-                    status_message="; ".join(faults),
-                    paused=self._sim.paused,
-                    ticks=passed,
-                    now=to_time(self._sim.now),
-                    time_step=self._sim.world.time_step,
-                    messages=mailbox.take(),
-                    others=self._mailboxes.nodes_to_wake(),
-                )
+                    success=not faults, status_message="; ".join(faults), paused=self._sim.paused,
+                    ticks=passed, now=to_time(self._sim.now), time_step=self._sim.world.time_step,
+                    messages=mailbox.take(), others=self._mailboxes.nodes_to_wake(),
+                )  # fmt: skip
 
     def _deliver(self, request: AdvanceWorldRequest) -> list[str]:
         """Hands over what the node has published; a message that can't be read is left out, as by rospy."""

@@ -36,21 +36,13 @@ FAULTS = (
 
 
 class Drawing(NamedTuple):
-    """What a message shows, in its own axes.
+    """What a message shows, in its own axes. `faces` is what rays have passed."""
 
-    Attributes:
-        points: (n, 3) [m].
-        colours: (n, 3) of uint8, if the points have any.
-        faces: (m, 3) indices of 0, the origin, and of points counted from 1: what rays have passed.
-        picture: (height, width, 3) of uint8.
-        text: of a message that has no place in the scene.
-    """
-
-    points: np.ndarray
-    colours: np.ndarray | None = None
-    faces: np.ndarray | None = None
-    picture: np.ndarray | None = None
-    text: str = ""
+    points: np.ndarray  # (n, 3) [m]
+    colours: np.ndarray | None = None  # (n, 3) of uint8, if the points have any
+    faces: np.ndarray | None = None  # (m, 3) indices of 0, the origin, and of points counted from 1
+    picture: np.ndarray | None = None  # (height, width, 3) of uint8
+    text: str = ""  # of a message that has no place in the scene
 
 
 def draw_scan(message: LaserScan) -> Drawing:

@@ -49,14 +49,7 @@ class SpeedLimits:
     jerk: tuple[float, float] | None = None
 
     def limited(self, speed: float, last: float, before: float, dt: float) -> float:
-        """Returns the speed to command instead of `speed`.
-
-        Args:
-            speed: the wanted one.
-            last: the last one that was commanded.
-            before: the one before.
-            dt: time between two commands [s].
-        """
+        """Returns the speed to command instead of `speed`; `last` was `dt` [s] ago, `before` twice that."""
         if self.jerk is not None:
             low, high = self.jerk
             change = last - before
@@ -81,17 +74,11 @@ class Steering:
 
 @dataclass(frozen=True)
 class SteeredWheels:
-    """Four wheels that steer about pivots at the corners of a rectangle around the vehicle's centre [m].
+    """Four wheels that steer about pivots at the corners of a rectangle around the vehicle's centre."""
 
-    Args:
-        base: from the rear pivots to the front ones.
-        track: between the pivots of an axle.
-        offset: from a pivot to its wheel, outwards.
-    """
-
-    base: float
-    track: float
-    offset: float = 0.0
+    base: float  # [m] from the rear pivots to the front ones
+    track: float  # [m] between the pivots of an axle
+    offset: float = 0.0  # [m] from a pivot to its wheel, outwards
 
     @property
     def _pivots(self) -> list[tuple[float, float]]:

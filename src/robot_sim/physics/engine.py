@@ -11,7 +11,6 @@ from robot_sim.physics.pose import Pose, Vector
 Twist = tuple[Vector, Vector]
 """Linear [m/s] and angular [rad/s] velocity in world axes."""
 
-
 FURTHEST = math.pi
 """The largest motion [rad, m] in a step of a joint, or of a free base that carries joints. Beyond half a turn
 a rotation has no direction, and explicit terms, such as centrifugal forces, add energy."""

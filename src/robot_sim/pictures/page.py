@@ -155,10 +155,6 @@ class Picture:
                 self._contacts.visible = bool(len(points))
         elif len(points):
             self._contacts = self._server.scene.add_point_cloud(
-                f"{self._below}/contacts",
-                points,
-                RED,
-                point_size=CONTACT,
-                point_shape="circle",
+                f"{self._below}/contacts", points, RED, point_size=CONTACT, point_shape="circle",
                 precision="float32",
-            )
+            )  # fmt: skip

@@ -78,14 +78,11 @@ def visible_model(
 ) -> VisibleModel:  # fmt: skip
     """Returns the visible parts of these links and joints, with collision shapes if `collisions`."""
     return VisibleModel(
-        number,
-        name,
-        [_link(description, each, collisions) for each in links],
+        number, name, [_link(description, each, collisions) for each in links],
         [description.joints[each] for each in joints],
         links.index(description.root) if description.root in links else 0,
-        description.root_pose.inverse(),
-        description.static,
-    )
+        description.root_pose.inverse(), description.static,
+    )  # fmt: skip
 
 
 def _link(description: ModelDescription, name: str, collisions: bool) -> Link:

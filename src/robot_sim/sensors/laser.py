@@ -95,11 +95,8 @@ class Laser:
     ) -> Scan:
         """Measures from `pose` in the world, with the noise's bias [m].
 
-        The scene has collisions or visuals, see `sees_visuals`.
-
-        Returns:
-            Ranges within the limits; inf for nothing within reach, -inf for something nearer than the lower
-            limit.
+        The scene has collisions or visuals, see `sees_visuals`. Ranges are within the limits; inf for nothing
+        within reach, -inf for something nearer than the lower limit.
         """
         turns, places = frames([pose])
         directions = np.einsum("ij,kj->ki", turns[0], self._rays)

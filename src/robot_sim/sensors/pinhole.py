@@ -23,25 +23,17 @@ PIECE = 1 << 17  # pixels that are looked at together
 
 
 class CameraView(NamedTuple):
-    """What a camera sees.
+    """What a camera sees."""
 
-    Attributes:
-        colours: (height, width, 3) of uint8.
-        depths: (height, width) along the optical axis [m]; inf for nothing within the clips.
-    """
-
-    colours: np.ndarray
-    depths: np.ndarray
+    colours: np.ndarray  # (height, width, 3) of uint8
+    depths: np.ndarray  # (height, width) along the optical axis [m]; inf: nothing within the clips
 
 
 class PinholeCamera:
     """A camera, made from a `<camera>`; `pose` is that of what holds it in `link`, `where` is for errors.
 
-    Attributes:
-        across, down: (width,), (height, 1): a pixel's point to the right and down, for each metre of depth.
-
-    Raises:
-        DescriptionError: if it can't be simulated.
+    `across` (width,) and `down` (height, 1) are a pixel's point to the right and down, for each metre of
+    depth. Raises DescriptionError if it can't be simulated.
     """
 
     def __init__(self, element: Element, pose: Pose, where: str, link: str) -> None:

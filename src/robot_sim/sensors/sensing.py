@@ -57,18 +57,13 @@ class Sensing(Shared, Stateful):
 
 @dataclass(frozen=True)
 class Mount(Shared):
-    """A sensor's place in a model, and the plugin that says more about it.
-
-    Attributes:
-        plugin: of the sensor or the model.
-        sensor: the one that the plugin belongs to; None for a model's plugin.
-    """
+    """A sensor's place in a model, and the plugin that says more about it."""
 
     sim: Simulator
     model: Model
-    plugin: Plugin
+    plugin: Plugin  # of the sensor or the model
     sensing: Sensing
-    sensor: Sensor | None
+    sensor: Sensor | None  # the one that the plugin belongs to; None for a model's plugin
 
     @property
     def key(self) -> str:
@@ -162,24 +157,18 @@ class Field(NamedTuple):
 
 
 class Measurement(Stateful):
-    """A sensor on a model. Each module of this folder lists its own in `SENSORS`.
+    """A sensor on a model; raises DescriptionError if it can't be simulated.
 
-    Attributes:
-        kinds: of `<sensor>` that it measures.
-        libraries: of plugins, a sensor's or a model's, that it measures for, whatever the kind.
-        interface: of ros_control by which controllers have it.
-        fields: what `values` returns, by attribute of a `Reading`; without any, tasks can't see it.
-        rate: of measurements [Hz of simulated time]; 0 is every step.
-
-    Raises:
-        DescriptionError: If it can't be simulated.
+    Each module of this folder lists its own in `SENSORS`. `fields` are what `values` returns, by attribute of
+    a `Reading`; without any, tasks can't see it.
     """
 
-    kinds: ClassVar[Sequence[str]] = ()
+    kinds: ClassVar[Sequence[str]] = ()  # of `<sensor>` that it measures
+    # Of plugins, a sensor's or a model's, that it measures for, whatever the kind.
     libraries: ClassVar[Sequence[str]] = ()
-    interface: ClassVar[str] = ""
+    interface: ClassVar[str] = ""  # of ros_control by which controllers have it
     fields: ClassVar[Mapping[str, Field]] = {}
-    rate: float = 0.0
+    rate: float = 0.0  # of measurements [Hz of simulated time]; 0 is every step
 
     def __init__(self, mount: Mount) -> None:
         self.mount = mount

@@ -184,11 +184,8 @@ class JointTrajectoryController(Controller):
     def follow(self, trajectory: Trajectory) -> str:
         """Follows a trajectory of the topic `command`; one without points holds the joints.
 
-        Returns:
-            A warning for the log, empty if there is none.
-
-        Raises:
-            TrajectoryRefused: if it can't be followed; nothing changes then.
+        Returns a warning for the log, empty if there is none. Raises TrajectoryRefused if it can't be
+        followed; nothing changes then.
         """
         self._check_running("take a trajectory")
         if trajectory.points:

@@ -98,12 +98,9 @@ class Separation:
         self.placed = any((*alone.values(), *mutual.values()))
 
     def _ease_pair(
-        self,
-        contact: Sequence[Any],
-        time_step: float,
-        alone: dict[LinkIndex, float],
+        self, contact: Sequence[Any], time_step: float, alone: dict[LinkIndex, float],
         mutual: dict[LinkIndex, float],
-    ) -> None:
+    ) -> None:  # fmt: skip
         pair = (contact[1], contact[3]), (contact[2], contact[4])
         speed = min(self.fastest, *(self._links[link][1] for link in pair))
         share = min(speed * time_step / -contact[8], time_step / (time_step + RELAXATION))

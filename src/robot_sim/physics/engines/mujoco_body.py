@@ -52,12 +52,9 @@ class MujocoBody(Body):
     implicit_damping = True
 
     def __init__(
-        self,
-        state: MujocoState,
-        description: ModelDescription,
-        pose: Pose,
+        self, state: MujocoState, description: ModelDescription, pose: Pose,
         compile_anew: Callable[[], None],
-    ) -> None:
+    ) -> None:  # fmt: skip
         """`compile_anew` recompiles the world's model from its bodies' present settings."""
         self.description = description
         self.pose = pose  # of the root link; of one that is free, where it was loaded

@@ -197,19 +197,13 @@ class MujocoEngine(Engine):
             mujoco.mjtDisableBit.mjDSBL_WARMSTART | mujoco.mjtDisableBit.mjDSBL_AUTORESET
         )
         for reference in (
-            model.jnt_solref,
-            model.dof_solref,
-            model.geom_solref,
-            model.tendon_solref_fri,
+            model.jnt_solref, model.dof_solref, model.geom_solref, model.tendon_solref_fri,
             model.eq_solref,
-        ):
+        ):  # fmt: skip
             reference[:] = (STIFFEST * self._time_step, 1.0)
         model.geom_solref[:] = (max(CONTACT[0], STIFFEST * self._time_step), CONTACT[1])
         for impedance in (
-            model.jnt_solimp,
-            model.dof_solimp,
-            model.geom_solimp,
-            model.tendon_solimp_fri,
+            model.jnt_solimp, model.dof_solimp, model.geom_solimp, model.tendon_solimp_fri,
             model.eq_solimp,
-        ):
+        ):  # fmt: skip
             impedance[:] = IMPEDANCE
