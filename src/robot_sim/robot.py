@@ -42,9 +42,14 @@ class ControlledRobot:
     """Copies joint states into ros_control's handles, and commands back, once a tick."""
 
     def __init__(
-        self, model: Model, hardware: RobotHardware, manager: ControllerManager,
-        control_period: float = 0.0, namespace: str = "/", log: Log = logger.log,
-    ) -> None:  # fmt: skip
+        self,
+        model: Model,
+        hardware: RobotHardware,
+        manager: ControllerManager,
+        control_period: float = 0.0,
+        namespace: str = "/",
+        log: Log = logger.log,
+    ) -> None:
         """
         Args:
             model: the robot in the world.

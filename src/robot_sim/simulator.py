@@ -50,9 +50,13 @@ class Simulator(Shared):
     """
 
     def __init__(
-        self, world: World, *, lockstep: bool = False, max_update_rate: float = 1000.0,
+        self,
+        world: World,
+        *,
+        lockstep: bool = False,
+        max_update_rate: float = 1000.0,
         relatch: bool = True,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """
         Args:
             lockstep: whether only advance() moves time.

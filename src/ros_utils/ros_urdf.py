@@ -13,9 +13,13 @@ __all__ = [
 
 
 def urdf_load_from_pkg(
-    pkg_name: str, model_name: str, param_name: str, folder: str = "/urdf", ns: str | None = None,
+    pkg_name: str,
+    model_name: str,
+    param_name: str,
+    folder: str = "/urdf",
+    ns: str | None = None,
     args_xacro: Sequence[str] | None = None,
-) -> bool:  # fmt: skip
+) -> bool:
     """Expands a package's URDF or xacro file and sets it as a parameter.
 
     Args:

@@ -172,10 +172,15 @@ class StepClient:
         self._prepared = PreparedSteps(service, timeout)
 
     def step(
-        self, ticks: int, commands: Commands | None = None, *,
-        joint_commands: Mapping[str, float] | None = None, model_states: Some = False,
-        links: Sequence[str] | Mapping[str, str] = (), contacts: Some = False,
-    ) -> StepWorldResponse:  # fmt: skip
+        self,
+        ticks: int,
+        commands: Commands | None = None,
+        *,
+        joint_commands: Mapping[str, float] | None = None,
+        model_states: Some = False,
+        links: Sequence[str] | Mapping[str, str] = (),
+        contacts: Some = False,
+    ) -> StepWorldResponse:
         """Commands controllers and joints, lets `ticks` physics steps pass, and returns the new state.
 
         Besides the joints, the answer holds only what is asked for; the rest costs nothing.
@@ -211,12 +216,20 @@ class StepClient:
         return _response(answer)
 
     def reset(
-        self, positions: Mapping[str, float] | None = None,
-        velocities: Mapping[str, float] | None = None, *, seed: int = 0, everything: bool = False,
-        ticks: int = 0, commands: Commands | None = None, models: Mapping[str, Pose] | None = None,
-        twists: Mapping[str, Twist] | None = None, model_states: Some = False,
-        links: Sequence[str] | Mapping[str, str] = (), contacts: Some = False,
-    ) -> StepWorldResponse:  # fmt: skip
+        self,
+        positions: Mapping[str, float] | None = None,
+        velocities: Mapping[str, float] | None = None,
+        *,
+        seed: int = 0,
+        everything: bool = False,
+        ticks: int = 0,
+        commands: Commands | None = None,
+        models: Mapping[str, Pose] | None = None,
+        twists: Mapping[str, Twist] | None = None,
+        model_states: Some = False,
+        links: Sequence[str] | Mapping[str, str] = (),
+        contacts: Some = False,
+    ) -> StepWorldResponse:
         """Resets the world, begins an episode from a defined state, and returns that state.
 
         Args:

@@ -183,9 +183,13 @@ class SteadyActionServer(ActionServer):
     status_list: list[StatusTracker]
 
     def __init__(
-        self, name: str, action: type, on_goal: Callable[[ServerGoalHandle], None],
-        on_cancel: Callable[[ServerGoalHandle], None], clock: Callable[[], float],
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        action: type,
+        on_goal: Callable[[ServerGoalHandle], None],
+        on_cancel: Callable[[ServerGoalHandle], None],
+        clock: Callable[[], float],
+    ) -> None:
         """`clock` returns the time [s] for which statuses are kept."""
         self._clock = clock
         super().__init__(name, action, on_goal, on_cancel, auto_start=False)

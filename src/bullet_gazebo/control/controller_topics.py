@@ -72,9 +72,13 @@ class ControllerTopics:
     """Publishers and subscribers of one controller, and the reconfigure servers of its PIDs."""
 
     def __init__(
-        self, sim: Simulator, thinner: Thinner, manager: ControllerManager, controller: Controller,
+        self,
+        sim: Simulator,
+        thinner: Thinner,
+        manager: ControllerManager,
+        controller: Controller,
         namespace: str,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """`namespace` is the manager's; the controller's own is below it."""
         self._sim = sim
         self._manager = manager
@@ -201,9 +205,13 @@ class PidTopics:
     """
 
     def __init__(
-        self, sim: Simulator, thinner: Thinner, pid: Pid, namespace: str,
+        self,
+        sim: Simulator,
+        thinner: Thinner,
+        pid: Pid,
+        namespace: str,
         changed: Callable[[], None],
-    ) -> None:  # fmt: skip
+    ) -> None:
         """`changed` is called under the simulator's lock when the gains change."""
         self._sim = sim
         self._pid = pid

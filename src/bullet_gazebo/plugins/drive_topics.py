@@ -63,9 +63,13 @@ class DrivePlugin(ContextPlugin):
     """
 
     def __init__(
-        self, context: PluginContext, namespace: str, rate: float, late: bool = True,
+        self,
+        context: PluginContext,
+        namespace: str,
+        rate: float,
+        late: bool = True,
         base: str = "base_footprint",
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.context, self.sim, self.model = context, context.sim, context.model
         self.namespace = namespace
         self.command: Triple = REST  # ahead, to the left [m/s], turning [rad/s]

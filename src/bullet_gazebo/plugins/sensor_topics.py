@@ -85,9 +85,13 @@ class Topic(Shared):
     """A topic of a sensor; see `SensorTopics.advertise`."""
 
     def __init__(
-        self, name: str, kind: type, queue: int, latch: bool = False,
+        self,
+        name: str,
+        kind: type,
+        queue: int,
+        latch: bool = False,
         newcomers: "Newcomers | None" = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._publisher = rospy.Publisher(
             name, kind, subscriber_listener=newcomers, tcp_nodelay=True, latch=latch, queue_size=queue
         )  # fmt: skip
@@ -157,9 +161,14 @@ class SensorTopics(Shared):
         self._clock.look()
 
     def advertise(
-        self, name: str, kind: type, queue: int = 1, latch: bool = False, wakes: bool = True,
+        self,
+        name: str,
+        kind: type,
+        queue: int = 1,
+        latch: bool = False,
+        wakes: bool = True,
         content: int = 0,
-    ) -> Topic:  # fmt: skip
+    ) -> Topic:
         """Returns a topic; its subscribers start the measurements if it `wakes` the sensor.
 
         `content` is that of a large message [bytes].
@@ -180,9 +189,14 @@ class SensorTopic(Shared):
     """The only topic of a sensor, see `SensorTopics`; `measure` returns a message, or None for nothing."""
 
     def __init__(
-        self, context: PluginContext, name: str, kind: type, rate: float,
-        measure: Callable[[int], Any], at_once: bool = True,
-    ) -> None:  # fmt: skip
+        self,
+        context: PluginContext,
+        name: str,
+        kind: type,
+        rate: float,
+        measure: Callable[[int], Any],
+        at_once: bool = True,
+    ) -> None:
         self._measure = measure
         topics = SensorTopics(context, rate, self._send, at_once)
         self._topic = topics.advertise(name, kind)

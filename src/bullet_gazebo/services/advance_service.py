@@ -136,9 +136,14 @@ class AdvanceService:
     """Time for scripts that were written for a world in real time; in lock-step only (docs/lockstep.md)."""
 
     def __init__(
-        self, sim: Simulator, sensing: Sensing, watchdog: AbstractContextManager[object],
-        one_at_a_time: threading.Lock, thinner: Thinner, journal: WorldJournal,
-    ) -> None:  # fmt: skip
+        self,
+        sim: Simulator,
+        sensing: Sensing,
+        watchdog: AbstractContextManager[object],
+        one_at_a_time: threading.Lock,
+        thinner: Thinner,
+        journal: WorldJournal,
+    ) -> None:
         """A fault in a block of `watchdog` ends the node; with `one_at_a_time`, no one else's ticks come
         within a request's.
         """

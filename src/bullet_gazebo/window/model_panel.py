@@ -35,9 +35,14 @@ class ModelPanel:
     """
 
     def __init__(
-        self, server: viser.ViserServer, world: viser.FrameHandle, commands: Commands,
-        controllers: Controllers, attempt: Attempt, stands: Callable[[], bool],
-    ) -> None:  # fmt: skip
+        self,
+        server: viser.ViserServer,
+        world: viser.FrameHandle,
+        commands: Commands,
+        controllers: Controllers,
+        attempt: Attempt,
+        stands: Callable[[], bool],
+    ) -> None:
         self._server, self._world = server, world
         self._commands = commands
         self._controllers = controllers

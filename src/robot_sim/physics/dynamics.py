@@ -173,9 +173,13 @@ def _stretched(
 
 
 def jacobian(
-    model: ModelDescription, joints: list[Joint], base: int, poses: Mapping[str, Pose], link: str,
+    model: ModelDescription,
+    joints: list[Joint],
+    base: int,
+    poses: Mapping[str, Pose],
+    link: str,
     point: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """Returns linear velocity of `point` of `link`, and angular velocity, (3, base + joints) each."""
     linear, angular = np.zeros((2, 3, base + len(joints)))
     if base:

@@ -73,9 +73,13 @@ class Piece(NamedTuple):
 
 
 def visible_model(
-    description: ModelDescription, number: int, name: str, links: Sequence[str],
-    joints: Sequence[str], collisions: bool,
-) -> VisibleModel:  # fmt: skip
+    description: ModelDescription,
+    number: int,
+    name: str,
+    links: Sequence[str],
+    joints: Sequence[str],
+    collisions: bool,
+) -> VisibleModel:
     """Returns the visible parts of these links and joints, with collision shapes if `collisions`."""
     return VisibleModel(
         number, name, [_link(description, each, collisions) for each in links],

@@ -92,9 +92,13 @@ class Schedule(Shared, Stateful):
         sim.parts["schedule"] = self
 
     def begin(
-        self, model: Model, rate: float, measure: Measure, listens: Callable[[], bool],
+        self,
+        model: Model,
+        rate: float,
+        measure: Measure,
+        listens: Callable[[], bool],
         at_once: bool = True,
-    ) -> SensorClock:  # fmt: skip
+    ) -> SensorClock:
         """Returns a clock that calls `measure` with the time [ns]; the caller holds the simulator's lock.
 
         Args:

@@ -144,9 +144,15 @@ class Started(int):
 
 
 def start(
-    command: Sequence[str], kind: str, label: str, *, window: bool = False, screen: bool = False,
-    log_file: str | None = None, env: Mapping[str, str] | None = None,
-) -> Handle:  # fmt: skip
+    command: Sequence[str],
+    kind: str,
+    label: str,
+    *,
+    window: bool = False,
+    screen: bool = False,
+    log_file: str | None = None,
+    env: Mapping[str, str] | None = None,
+) -> Handle:
     """Starts a program in its own session; raises CannotStart if it or its log can't be opened.
 
     Args:
@@ -282,9 +288,13 @@ def _end_own() -> None:
 
 
 def await_start(
-    handle: Handle, is_there: Callable[[], bool], absent: str, timeout: float, ready: Ready | None,
+    handle: Handle,
+    is_there: Callable[[], bool],
+    absent: str,
+    timeout: float,
+    ready: Ready | None,
     may_end: bool = True,
-) -> Started | bool:  # fmt: skip
+) -> Started | bool:
     """Waits for a started program, then for its world; ends it and logs the reason if one isn't there.
 
     Args:

@@ -18,9 +18,13 @@ CORE = ("master", "rosout-1")  # roslaunch's names for its own master and rosout
 
 
 def start(
-    arguments: Sequence[str], label: str, window: bool, screen: bool, log_file: str | None = None,
+    arguments: Sequence[str],
+    label: str,
+    window: bool,
+    screen: bool,
+    log_file: str | None = None,
     env: Mapping[str, str] | None = None,
-) -> Handle:  # fmt: skip
+) -> Handle:
     """Starts roslaunch; raises CannotStart, or MasterDown if it couldn't start a master either."""
     _programs.end_orphans()  # else their ending master would pass for a lasting one
     _master.is_up_or_startable()

@@ -93,9 +93,14 @@ class FollowedNode:
     """
 
     def __init__(
-        self, name: str, package: str, executable: str, args: Sequence[str], hears: str,
+        self,
+        name: str,
+        package: str,
+        executable: str,
+        args: Sequence[str],
+        hears: str,
         commands: str,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.controller = commands.rpartition("/")[0] or commands
         self.name, self._hears, self._waiting = f"/{name}", hears, 0
         self._answers: queue.SimpleQueue[rospy.AnyMsg] = queue.SimpleQueue()

@@ -37,11 +37,18 @@ class RobotWorld(SteppedWorld):
         self._prismatic: set[str] = set()  # joints
 
     def spawn(
-        self, file: str, controllers: str | None = None, run: Sequence[str] = (), *,
-        name: str = "robot", ns: str = "/", xyz: Vector = (0.0, 0.0, 0.0),
-        rpy: Vector = (0.0, 0.0, 0.0), joints: Mapping[str, float] | None = None,
+        self,
+        file: str,
+        controllers: str | None = None,
+        run: Sequence[str] = (),
+        *,
+        name: str = "robot",
+        ns: str = "/",
+        xyz: Vector = (0.0, 0.0, 0.0),
+        rpy: Vector = (0.0, 0.0, 0.0),
+        joints: Mapping[str, float] | None = None,
         arguments: Sequence[str] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Spawns a robot or an object, and starts controllers.
 
         Args:
@@ -111,9 +118,15 @@ class RobotWorld(SteppedWorld):
         self.assert_that(look, f"{position:g} ± {within:g} {unit}", by, stays)
 
     def assert_link(
-        self, name: str, position: Sequence[float | None], *, within: float, by: float = 0.0,
-        stays: float = 0.0, frame: str = "",
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        position: Sequence[float | None],
+        *,
+        within: float,
+        by: float = 0.0,
+        stays: float = 0.0,
+        frame: str = "",
+    ) -> None:
         """Asserts that a link gets to a position x, y, z [m], give or take `within`; None: wherever."""
         __tracebackhide__ = True
         if len(position) != 3:
