@@ -20,7 +20,6 @@ from support.robots import engine_runs as runs
 
 from robot_sim.physics.engine import Engine
 from robot_sim.physics.engines import make_engine
-from robot_sim.physics.engines.mujoco_engine import MujocoEngine
 from robot_sim.physics.world import World
 from robot_sim.simulator import Simulator
 
@@ -28,7 +27,7 @@ NewEngine = Callable[[], Engine]
 ENGINES: dict[str, NewEngine] = {
     "PyBullet": make_engine,
     "MuJoCo": partial(make_engine, "mujoco"),
-    "MuJoCo, RK4": partial(MujocoEngine, runge_kutta=True),
+    "MuJoCo, RK4": runs.runge_kutta,
 }
 STEPS = (0.001, 0.0005)  # [s]
 SWING_TIME = 20.0  # [s]

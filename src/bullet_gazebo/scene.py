@@ -41,22 +41,6 @@ REPEAT = 1.0  # [s] between two logs of the same complaint
 NO_STOP = (1.0, 0.0)  # limits of a joint without any: the lower one above the upper one
 
 
-class SceneOffer:
-    """Opens the scene's service and topics once."""
-
-    def __init__(self, sim: Simulator, sensors: Sequence[SceneSensor]) -> None:
-        """`sensors` changes under the simulator's lock, and the world's version with it."""
-        self._sim, self._sensors = sim, sensors
-        self._one_at_a_time = threading.Lock()
-        self._opened: SceneServer | None = None
-
-    def show(self) -> None:
-        """Offers the scene, if it isn't offered yet."""
-        with self._one_at_a_time:
-            if self._opened is None:
-                self._opened = SceneServer(self._sim, self._sensors)
-
-
 class SceneServer:
     """Models and lights that a window doesn't know yet (~get_scene), ~scene_poses and ~scene_contacts.
 
@@ -66,11 +50,23 @@ class SceneServer:
     """
 
     def __init__(self, sim: Simulator, sensors: Sequence[SceneSensor]) -> None:
+        """`sensors` changes under the simulator's lock, and the world's version with it."""
         self._sim, self._sensors = sim, sensors
         # A window may outlive its simulator: the next one counts from another number.
         self._first = secrets.randbits(31)
         self._news = threading.Event()  # a subscriber comes or goes, or the end
         self._ending = threading.Event()
+        self._one_at_a_time = threading.Lock()
+        self._is_offered = False
+
+    def show(self) -> None:
+        """Offers the scene, if it isn't offered yet."""
+        with self._one_at_a_time:
+            if not self._is_offered:
+                self._is_offered = True
+                self._offer()
+
+    def _offer(self) -> None:
         self._poses = self._advertise("~scene_poses", ScenePoses)
         self._contacts = self._advertise("~scene_contacts", SceneContacts)
         self._service = rospy.Service("~get_scene", GetScene, self._get)
@@ -146,13 +142,10 @@ class SceneServer:
 
         def publish() -> None:
             message = ScenePoses(
-                version=version,
-                now=to_time(now),
-                paused=paused,
-                lockstep=self._sim.lockstep,
+                version=version, now=to_time(now), paused=paused, lockstep=self._sim.lockstep,
                 poses=_singles((*pose.position, *pose.orientation) for pose in poses),
                 positions=_singles([position for position, _ in states] for states in joints),
-            )
+            )  # fmt: skip
             self._poses[0].publish(message)
 
         return publish
@@ -210,22 +203,16 @@ def from_model(message: SceneModel) -> VisibleModel:
 
 def to_light(light: Light) -> SceneLight:
     return SceneLight(
-        name=light.name,
-        kind=light.kind,
-        diffuse=ColorRGBA(*light.diffuse),
-        pose=to_pose_msg(light.pose),
-        direction=Vector3(*light.direction),
-    )
+        name=light.name, kind=light.kind, diffuse=ColorRGBA(*light.diffuse),
+        pose=to_pose_msg(light.pose), direction=Vector3(*light.direction),
+    )  # fmt: skip
 
 
 def from_light(message: SceneLight) -> Light:
     return Light(
-        message.name,
-        diffuse=_from_color(message.diffuse),
-        direction=to_vector(message.direction),
-        pose=from_pose_msg(message.pose),
-        kind=message.kind,
-    )
+        message.name, diffuse=_from_color(message.diffuse), direction=to_vector(message.direction),
+        pose=from_pose_msg(message.pose), kind=message.kind,
+    )  # fmt: skip
 
 
 def _to_joint(joint: Joint) -> SceneJoint:
@@ -236,15 +223,10 @@ def _to_joint(joint: Joint) -> SceneJoint:
 
 def _from_joint(message: SceneJoint) -> Joint:
     return Joint(
-        message.name,
-        message.kind,
-        parent="",
-        child=message.child,
-        anchor=from_pose_msg(message.frame),
-        axis=to_vector(message.axis),
-        lower=message.lower,
+        message.name, message.kind, parent="", child=message.child,
+        anchor=from_pose_msg(message.frame), axis=to_vector(message.axis), lower=message.lower,
         upper=message.upper,
-    )
+    )  # fmt: skip
 
 
 def _to_shapes(shapes: Iterable[Shape]) -> list[SceneShape]:
@@ -257,7 +239,7 @@ def _to_shapes(shapes: Iterable[Shape]) -> list[SceneShape]:
             mesh=shape.mesh,
             has_color=shape.rgba is not None,
             color=ColorRGBA(*(shape.rgba or (0.0, 0.0, 0.0, 0.0))),
-        )
+        )  # fmt: skip
         for shape in shapes
     ]
 
@@ -271,7 +253,7 @@ def _from_shapes(messages: Iterable[SceneShape]) -> list[Shape]:
             message.mesh,
             _from_color(message.color) if message.has_color else None,
             message.name,
-        )
+        )  # fmt: skip
         for message in messages
     ]
 

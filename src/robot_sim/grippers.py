@@ -120,19 +120,12 @@ class Suction(Stateful):
 
 
 class GripRule(NamedTuple):
-    """When a `GraspHold` takes and releases an object.
+    """When a `GraspHold` takes and releases an object."""
 
-    Attributes:
-        angle: the least one between two forces that oppose each other [rad].
-        threshold: of the looks that found it gripped, less those that didn't; above it, it is taken.
-        most: up to which they are counted.
-        release: how far a finger may move, seen from the object [m].
-    """
-
-    angle: float
-    threshold: int
-    most: int
-    release: float
+    angle: float  # [rad]; the least one between two forces that oppose each other
+    threshold: int  # looks that found it gripped, less those that didn't; above, it is taken
+    most: int  # up to which they are counted
+    release: float  # [m] that a finger may move, seen from the object
 
 
 class GraspHold(Stateful):
@@ -179,7 +172,8 @@ class GraspHold(Stateful):
             self._counts.pop(key, None)
         forces = self._forces()
         for key in {*forces, *self._counts} - set(self._held):
-            gripped = self._oppose(forces.get(key, {}))
+            pairs = combinations(forces.get(key, {}).values(), 2)
+            gripped = any(_angle(a, b) >= self._rule.angle for a, b in pairs)
             count = self._counts.get(key, 0) + (1 if gripped else -1)
             self._counts[key] = max(0, min(self._rule.most, count))
             if gripped and count > self._rule.threshold:
@@ -203,9 +197,6 @@ class GraspHold(Stateful):
                 force = scale(contact.force, sign)
                 on_it[first.link] = add(on_it.get(first.link, ZERO), force)
         return found
-
-    def _oppose(self, forces: Mapping[str, Vector]) -> bool:
-        return any(_angle(a, b) >= self._rule.angle for a, b in combinations(forces.values(), 2))
 
     def _places(self, key: tuple[Model, str], fingers: Mapping[str, Vector]) -> dict[str, Pose]:
         """Returns where fingers are, seen from an object."""

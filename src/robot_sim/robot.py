@@ -26,8 +26,7 @@ logger = logging.getLogger(f"rosout.{__name__}")
 def control_period_of(plugin: Plugin) -> float:
     """Returns `<controlPeriod>` of a control plugin [s]; 0, which is each step, if there is none.
 
-    Raises:
-        ControlError: If it isn't a number from 0 to SLOWEST.
+    Raises ControlError if it isn't a number from 0 to SLOWEST.
     """
     text = (plugin.element.findtext("controlPeriod") or "").strip() or "0"
     try:

@@ -54,7 +54,6 @@ class Simulator(Shared):
     ) -> None:
         """
         Args:
-            world: all models.
             lockstep: whether only advance() moves time.
             max_update_rate: ticks a second of wall time; 0 is as fast as possible.
             relatch: whether controllers start over when a service moves joints or resets the world.
@@ -152,18 +151,10 @@ class Simulator(Shared):
         self._stopping.set()
 
     def advance(self, ticks: int, until: Callable[[], bool] | None = None) -> int:
-        """Moves time by `ticks` physics steps. The caller holds the lock.
+        """Moves time by physics steps, at least one, or `until` that returns true after one of them.
 
-        Args:
-            ticks: at least 1.
-            until: called after each tick; it ends the advance when it returns true.
-
-        Returns:
-            The number of ticks that have passed.
-
-        Raises:
-            NotInLockstep: if time runs by itself.
-            ValueError: for less than one tick.
+        The caller holds the lock. Returns the number of ticks that have passed. Raises NotInLockstep if time
+        runs by itself, ValueError for less than one tick.
         """
         if not self.lockstep:
             raise NotInLockstep(
@@ -290,17 +281,14 @@ class Simulator(Shared):
     def save_state(self) -> Snapshot:
         """Returns all that decides the future; the caller holds the lock.
 
-        Raises:
-            StateError: if the state of a user's controller or plugin can't be saved.
+        Raises StateError if the state of a user's controller or plugin can't be saved.
         """
         state = {
             "robots": [robot.state_dict() for robot in self.robots],
             "parts": {name: state_of(part) for name, part in self.parts.items()},
-            "applied": self.applied.state_dict(),
-            "now": self.now,
-            "resets": self.resets,
+            "applied": self.applied.state_dict(), "now": self.now, "resets": self.resets,
             "world": self.world.state_dict(),
-        }
+        }  # fmt: skip
         return Snapshot(self.fits, state)
 
     def restore_state(self, snapshot: Snapshot) -> None:

@@ -38,12 +38,9 @@ State = tuple[Pose, Twist]
 
 
 def distance(shape: Shape, link: Pose, point: Vector) -> float:
-    """Returns the distance [m] of a point from a shape's surface, on either side of it.
+    """Returns the distance [m] of a point in the world from a shape's surface, on either side of it.
 
-    Args:
-        shape: a mesh counts as its bounding box.
-        link: the shape's link in the world.
-        point: in the world [m].
+    A mesh counts as its bounding box. `link` is the pose of the shape's link.
     """
     frame = link.compose(shape.pose)
     x, y, z = rotate(conjugate(frame.orientation), subtract(point, frame.position))
@@ -71,11 +68,7 @@ def _box(shape: Shape) -> tuple[Vector, Vector]:
 
 
 def _beyond(*excess: float) -> float:
-    """Returns the signed distance [m] of a point from a body, negative inside.
-
-    Args:
-        excess: by how much the point is beyond the body in directions at right angles [m].
-    """
+    """Returns the signed distance [m] of a point from a body, from those in directions at right angles."""
     outside = hypot(*(max(each, 0.0) for each in excess))
     return outside + min(max(excess), 0.0)
 
@@ -255,24 +248,14 @@ class LinkQuery(NamedTuple):
 
 @dataclass(frozen=True)
 class StateQuery:
-    """What to read. What isn't asked for costs nothing.
+    """What to read, by name: plain, or scoped by models. What isn't asked for costs nothing."""
 
-    Args:
-        models: names of models whose states are wanted.
-        all_models: whether the states of all models are wanted instead.
-        links: links whose states are wanted.
-        contacts_of: names of models, links or collisions, plain or scoped, whose contacts are wanted.
-        all_contacts: whether all contacts are wanted instead.
-        sensors: names of sensors whose last measurements are wanted, plain or model::sensor; see
-            `robot_sim.sensors.sensor_readers`, which reads them.
-    """
-
-    models: tuple[str, ...] = ()
-    all_models: bool = False
+    models: tuple[str, ...] = ()  # whose states are wanted
+    all_models: bool = False  # instead
     links: tuple[LinkQuery, ...] = ()
-    contacts_of: tuple[str, ...] = ()
-    all_contacts: bool = False
-    sensors: tuple[str, ...] = ()
+    contacts_of: tuple[str, ...] = ()  # models, links or collisions
+    all_contacts: bool = False  # instead
+    sensors: tuple[str, ...] = ()  # whose last measurements are wanted; `sensor_readers` reads them
 
 
 NOTHING = StateQuery()
@@ -303,12 +286,7 @@ class StateReader:
         return self._version != self._world.version
 
     def read(self, stepped: bool = True) -> StateAnswer:
-        """Reads the world.
-
-        Args:
-            stepped: whether a step led to the present state. After a reset or a placing none has, and
-                there are no contacts yet.
-        """
+        """Reads the world; there are no contacts unless it was `stepped` since a reset or a placing."""
         if self.is_stale:
             self._resolve()
         contacts = contact_pairs(self._world, self._wanted) if self._touch and stepped else []

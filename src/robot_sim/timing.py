@@ -21,10 +21,8 @@ class FairLock(Shared):
     """A lock that serves its waiters in the order in which they came.
 
     The simulation releases and re-acquires its lock in a loop. With threading.Lock that keeps all other
-    threads out; here every waiter gets its turn after at most one tick.
-
-    Raises:
-        RuntimeError: if the thread that holds it acquires it again: it would wait forever.
+    threads out; here every waiter gets its turn after at most one tick. Raises RuntimeError if the thread
+    that holds it acquires it again: it would wait forever.
     """
 
     def __init__(self) -> None:
@@ -102,11 +100,7 @@ class Holds:
     """
 
     def __init__(self, lock: FairLock, changed: Callable[[], None]) -> None:
-        """
-        Args:
-            lock: the simulator's.
-            changed: called with the lock held, whenever holders have come or gone.
-        """
+        """`changed` is called with the simulator's lock held, whenever holders have come or gone."""
         self._lock = lock
         self._changed = changed
         self._holders: set[object] = set()
@@ -174,8 +168,7 @@ class Pacer:
     def wait(self, period: float, longest: float = math.inf) -> bool:
         """Sleeps until `period` [s of wall time] after the previous due time; 0 never waits.
 
-        Returns:
-            False when that takes longer than `longest` [s]: call wait_on() until it is due.
+        Returns False when that takes longer than `longest` [s]: call wait_on() until it is due.
         """
         self._due += period
         if period <= 0.0 or self._due - time.perf_counter() < -MAX_LAG:

@@ -50,7 +50,5 @@ def why_not_up(service: str) -> str:
 
 def spawns() -> list[int]:
     """Returns how many models are being spawned, and how many have been; nothing if no simulator says."""
-    try:
-        return list(master.call_node(master.call("lookupNode", "/gazebo"), SPAWNS))
-    except (NoAnswer, Refused):
-        return []
+    address = master.answer(master.uri(), "lookupNode", "/gazebo")
+    return list(master.answer(address, SPAWNS) or ()) if address else []

@@ -13,19 +13,12 @@ from typing import Any
 
 @dataclass(frozen=True)
 class CommandKind:
-    """A kind of command that consists of numbers.
+    """A kind of command that consists of numbers."""
 
-    Attributes:
-        message: Type of the topic's messages.
-        fields: Those with the numbers, in order.
-        topic: By which tasks and steps command a controller, in its namespace; "" for none.
-        listed: Whether the only field is a list, with a number for each joint.
-    """
-
-    message: str
-    fields: tuple[str, ...] = ("data",)
-    topic: str = "command"
-    listed: bool = False
+    message: str  # type of the topic's messages
+    fields: tuple[str, ...] = ("data",)  # those with the numbers, in order
+    topic: str = "command"  # by which tasks and steps command a controller; "" for none
+    listed: bool = False  # whether the only field is a list, with a number for each joint
 
     @property
     def single(self) -> bool:

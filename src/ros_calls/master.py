@@ -73,12 +73,8 @@ def call_plain(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> A
     except OSError as fault:
         raise NoAnswer(fault.strerror or str(fault)) from fault
     except (
-        http.client.HTTPException,
-        xmlrpc.client.Error,
-        ExpatError,
-        TypeError,
-        ValueError,
-    ) as fault:
+        http.client.HTTPException, xmlrpc.client.Error, ExpatError, TypeError, ValueError,
+    ) as fault:  # fmt: skip
         raise BadAnswer(f"an answer that is not ROS's: {type(fault).__name__}") from fault
     if code != 1:
         raise Refused(text)
@@ -207,11 +203,11 @@ def living_address(name: str, timeout: float = TIMEOUT) -> str | None:
         address = str(call("lookupNode", name))
     except Refused:
         return None
-    if _answer(address, "getPid", timeout) is None:
+    if answer(address, "getPid", timeout=timeout) is None:
         return None
     # Another node may have a dead node's port by now, even one of the same name at another master.
-    theirs = _answer(address, "getMasterUri", timeout)
-    if _answer(address, "getName", timeout) not in (None, name):
+    theirs = answer(address, "getMasterUri", timeout=timeout)
+    if answer(address, "getName", timeout=timeout) not in (None, name):
         return None
     return address if theirs is None or is_at(theirs) else None
 
@@ -224,9 +220,9 @@ def lives(name: str) -> bool:
         return False
 
 
-def _answer(address: str, question: str, timeout: float) -> Any:
-    """Returns a node's answer, or None; roscpp nodes answer only getPid."""
+def answer(address: str, method: str, *args: Any, timeout: float = TIMEOUT) -> Any:
+    """Returns the answer of a node or master, or None; roscpp nodes answer only getPid."""
     try:
-        return call_node(address, question, timeout=timeout)
+        return call_node(address, method, *args, timeout=timeout)
     except (NoAnswer, Refused):
         return None

@@ -67,11 +67,7 @@ class ServiceClient:
     """
 
     def __init__(
-        self,
-        name: str,
-        kind: Any,
-        persistent: bool = False,
-        timeout: float = TIMEOUT,
+        self, name: str, kind: Any, persistent: bool = False, timeout: float = TIMEOUT
     ) -> None:
         self.name = str(rospy.resolve_name(name))
         self._kind = kind
@@ -211,12 +207,9 @@ class Connection:
 
     def _shake_hands(self, name: str, deadline: float) -> None:
         header = {
-            "callerid": rospy.get_caller_id(),
-            "service": name,
-            "md5sum": self._kind._md5sum,
-            "type": self._kind._type,
-            "persistent": "1",
-        }
+            "callerid": rospy.get_caller_id(), "service": name, "md5sum": self._kind._md5sum,
+            "type": self._kind._type, "persistent": "1",
+        }  # fmt: skip
         rosgraph.network.write_ros_handshake_header(self._socket, header)
         self._await_data(deadline)
         answer = rosgraph.network.read_ros_handshake_header(self._socket, io.BytesIO(), CHUNK)

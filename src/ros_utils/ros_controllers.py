@@ -22,20 +22,11 @@ from ros_calls.waiting import TIMEOUT, wait_and_call
 from ros_utils._internal import log as _log
 
 __all__ = [
-    "ListResult",
-    "kill_controllers_srv",
-    "list_controller_types_srv",
-    "list_controllers_srv",
-    "load_controller_list_srv",
-    "load_controller_srv",
-    "reset_controllers_srv",
-    "spawn_controllers_srv",
-    "start_controllers_srv",
-    "stop_controllers_srv",
-    "switch_controllers_srv",
-    "unload_controller_list_srv",
-    "unload_controller_srv",
-]
+    "ListResult", "kill_controllers_srv", "list_controller_types_srv", "list_controllers_srv",
+    "load_controller_list_srv", "load_controller_srv", "reset_controllers_srv",
+    "spawn_controllers_srv", "start_controllers_srv", "stop_controllers_srv",
+    "switch_controllers_srv", "unload_controller_list_srv", "unload_controller_srv",
+]  # fmt: skip
 
 
 SERVICES = {
@@ -90,90 +81,64 @@ def _each(
 
 
 def load_controller_srv(
-    controller_name: str,
-    ns: str | None = None,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    controller_name: str, ns: str | None = None, max_retries: int = 5,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Loads a controller, with up to `max_retries` attempts.
 
-    Returns:
-        True once the manager has loaded it. False if it refuses (already loaded, no parameters,
-        unknown type or joint) or doesn't answer.
+    Returns True once the manager has loaded it. False if it refuses (already loaded, no parameters, unknown
+    type or joint) or doesn't answer.
     """
     request = (controller_name,)
     return _until_ok(LoadController, request, controller_name, ns, max_retries, service_timeout)
 
 
 def load_controller_list_srv(
-    controller_list: Sequence[str],
-    ns: str | None = None,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> ListResult:
+    controller_list: Sequence[str], ns: str | None = None, max_retries: int = 5,
+    *, service_timeout: float = TIMEOUT,
+) -> ListResult:  # fmt: skip
     """Loads several controllers; one failure doesn't stop the others.
 
-    Returns:
-        True if every one was loaded; its `failed` names those that were not.
+    Returns True if every one was loaded; its `failed` names those that were not.
     """
     return _each(load_controller_srv, controller_list, ns, max_retries, service_timeout)
 
 
 def unload_controller_srv(
-    controller_name: str,
-    ns: str | None = None,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    controller_name: str, ns: str | None = None, max_retries: int = 5,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Unloads a controller that doesn't run, with up to `max_retries` attempts.
 
-    Returns:
-        True once it is unloaded. False if it runs, is unknown, or the manager doesn't answer.
+    Returns True once it is unloaded. False if it runs, is unknown, or the manager doesn't answer.
     """
     request = (controller_name,)
     return _until_ok(UnloadController, request, controller_name, ns, max_retries, service_timeout)
 
 
 def unload_controller_list_srv(
-    controller_list: Sequence[str],
-    ns: str | None = None,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> ListResult:
+    controller_list: Sequence[str], ns: str | None = None, max_retries: int = 5,
+    *, service_timeout: float = TIMEOUT,
+) -> ListResult:  # fmt: skip
     """Unloads several controllers; one failure doesn't stop the others.
 
-    Returns:
-        True if every one was unloaded; its `failed` names those that were not.
+    Returns True if every one was unloaded; its `failed` names those that were not.
     """
     return _each(unload_controller_srv, controller_list, ns, max_retries, service_timeout)
 
 
 def switch_controllers_srv(
-    start_controllers: Sequence[str],
-    stop_controllers: Sequence[str],
-    ns: str | None = None,
-    strictness: int = 1,
-    start_asap: bool = False,
-    timeout: float = 3.0,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    start_controllers: Sequence[str], stop_controllers: Sequence[str],
+    ns: str | None = None, strictness: int = 1, start_asap: bool = False, timeout: float = 3.0,
+    max_retries: int = 5, *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Starts and stops controllers in one step, with up to `max_retries` attempts.
 
     Args:
         start_controllers: Names to start.
         stop_controllers: Names to stop.
-        ns: See the module.
-        strictness: See the module.
         start_asap: Start each as soon as its hardware is ready; makes no difference in simulation.
         timeout: The manager's own limit for the switch [s]; 0 for none.
-        max_retries: attempts.
-        service_timeout: See the module.
 
     Returns:
         True if the manager has switched; with BEST_EFFORT some controllers may still not run.
@@ -187,13 +152,9 @@ def switch_controllers_srv(
 
 def start_controllers_srv(
     start_controllers: Sequence[str],
-    ns: str | None = None,
-    strictness: int = 1,
-    start_asap: bool = False,
-    timeout: float = 3.0,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    ns: str | None = None, strictness: int = 1, start_asap: bool = False, timeout: float = 3.0,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Starts loaded controllers. See `switch_controllers_srv`."""
     return switch_controllers_srv(
         start_controllers, [], ns, strictness, start_asap, timeout, service_timeout=service_timeout
@@ -202,13 +163,9 @@ def start_controllers_srv(
 
 def stop_controllers_srv(
     stop_controllers: Sequence[str],
-    ns: str | None = None,
-    strictness: int = 1,
-    start_asap: bool = False,
-    timeout: float = 3.0,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    ns: str | None = None, strictness: int = 1, start_asap: bool = False, timeout: float = 3.0,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Stops running controllers. See `switch_controllers_srv`."""
     return switch_controllers_srv(
         [], stop_controllers, ns, strictness, start_asap, timeout, service_timeout=service_timeout
@@ -216,21 +173,13 @@ def stop_controllers_srv(
 
 
 def reset_controllers_srv(
-    reset_controllers: Sequence[str],
-    max_retries: int = 10,
-    ns: str | None = None,
-    strictness: int = 1,
-    start_asap: bool = False,
-    timeout: float = 3.0,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    reset_controllers: Sequence[str], max_retries: int = 10,
+    ns: str | None = None, strictness: int = 1, start_asap: bool = False, timeout: float = 3.0,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Restarts controllers, with up to `max_retries` attempts to stop them; resets set-points and PID state.
 
-    `max_retries` is the second argument here, not the last.
-
-    Returns:
-        True if both steps succeeded.
+    `max_retries` is the second argument here, not the last. Returns True if both steps succeeded.
     """
     how = (ns, strictness, start_asap, timeout)
     return switch_controllers_srv(
@@ -240,18 +189,13 @@ def reset_controllers_srv(
 
 def spawn_controllers_srv(
     spawn_controllers: Sequence[str],
-    ns: str | None = None,
-    strictness: int = 1,
-    start_asap: bool = False,
-    timeout: float = 3.0,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    ns: str | None = None, strictness: int = 1, start_asap: bool = False, timeout: float = 3.0,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Loads the controllers that aren't loaded yet, then starts all loaded ones of the list.
 
-    Returns:
-        True if all are loaded and the manager has started them. If one can't be loaded, the others
-        still start.
+    Returns True if all are loaded and the manager has started them. If one can't be loaded, the others still
+    start.
     """
     known = list_controllers_srv(ns, service_timeout=service_timeout)
     if known is None:
@@ -269,17 +213,12 @@ def spawn_controllers_srv(
 
 def kill_controllers_srv(
     kill_controllers: Sequence[str],
-    ns: str | None = None,
-    strictness: int = 1,
-    start_asap: bool = False,
-    timeout: float = 3.0,
-    *,
-    service_timeout: float = TIMEOUT,
-) -> bool:
+    ns: str | None = None, strictness: int = 1, start_asap: bool = False, timeout: float = 3.0,
+    *, service_timeout: float = TIMEOUT,
+) -> bool:  # fmt: skip
     """Stops controllers and, if that succeeded, unloads them.
 
-    Returns:
-        True if all were stopped and unloaded.
+    Returns True if all were stopped and unloaded.
     """
     return stop_controllers_srv(
         kill_controllers, ns, strictness, start_asap, timeout, service_timeout=service_timeout

@@ -13,19 +13,11 @@ from ros_utils.readiness import Ready
 
 
 def ros_launch_from_pkg(
-    pkg_name: str,
-    launch_file: str,
-    args: Sequence[str] | None = None,
-    launch_new_term: bool = True,
-    *,
-    timeout: float = 30.0,
-    output: str = "log",
-    wait: bool = True,
-    log_file: str | None = None,
-    env: Mapping[str, str] | None = None,
-    master_uri: str | None = None,
-    ready: Ready | None = None,
-) -> Started | bool:
+    pkg_name: str, launch_file: str,
+    args: Sequence[str] | None = None, launch_new_term: bool = True,
+    *, timeout: float = 30.0, output: str = "log", wait: bool = True, log_file: str | None = None,
+    env: Mapping[str, str] | None = None, master_uri: str | None = None, ready: Ready | None = None,
+) -> Started | bool:  # fmt: skip
     """Launches ``<pkg_name>/launch/<launch_file>``. Starts a master if there is none.
 
     Args:
@@ -62,18 +54,10 @@ def ros_launch_from_pkg(
 
 
 def ros_launch_from_path(
-    launch_file_path: str,
-    args: Sequence[str] | None = None,
-    launch_new_term: bool = True,
-    *,
-    timeout: float = 30.0,
-    output: str = "log",
-    wait: bool = True,
-    log_file: str | None = None,
-    env: Mapping[str, str] | None = None,
-    master_uri: str | None = None,
-    ready: Ready | None = None,
-) -> Started | bool:
+    launch_file_path: str, args: Sequence[str] | None = None, launch_new_term: bool = True,
+    *, timeout: float = 30.0, output: str = "log", wait: bool = True, log_file: str | None = None,
+    env: Mapping[str, str] | None = None, master_uri: str | None = None, ready: Ready | None = None,
+) -> Started | bool:  # fmt: skip
     """Launches a file by its path. See `ros_launch_from_pkg`."""
     label = f"roslaunch {os.path.basename(launch_file_path)}"
     with _master.using(master_uri):
@@ -95,7 +79,6 @@ def ros_launch_from_path(
 def ros_kill_launch_process() -> bool:
     """Ends every launch that this toolkit started under this master, with all its nodes.
 
-    Returns:
-        True if none is left.
+    Returns True if none is left.
     """
     return _programs.end([entry for entry in _programs.started() if entry.kind == "launch"])

@@ -19,23 +19,13 @@ from ros_utils.readiness import Ready
 
 
 def ros_node_from_pkg(
-    pkg_name: str,
-    node_name: str,
-    launch_master: bool = False,
-    launch_master_term: bool = True,
-    launch_new_term: bool = True,
-    name: str | None = None,
-    ns: str = "/",
-    output: str = "log",
+    pkg_name: str, node_name: str,
+    launch_master: bool = False, launch_master_term: bool = True, launch_new_term: bool = True,
+    name: str | None = None, ns: str = "/", output: str = "log",
     args: str | Sequence[str] | None = None,
-    *,
-    timeout: float = 30.0,
-    wait: bool = True,
-    log_file: str | None = None,
-    env: Mapping[str, str] | None = None,
-    master_uri: str | None = None,
-    ready: Ready | None = None,
-) -> Started | bool:
+    *, timeout: float = 30.0, wait: bool = True, log_file: str | None = None,
+    env: Mapping[str, str] | None = None, master_uri: str | None = None, ready: Ready | None = None,
+) -> Started | bool:  # fmt: skip
     """Starts a node, as rosrun does, and waits until it is registered at the master.
 
     Args:
@@ -93,8 +83,7 @@ def ros_node_from_pkg(
 def ros_kill_node(node_name: str) -> bool:
     """Asks a node to shut itself down, as rosnode kill does; refuses the caller's own node.
 
-    Returns:
-        True if no such node is registered afterwards.
+    Returns True if no such node is registered afterwards.
     """
     full_name = rospy.resolve_name(node_name)
     address = _nodes.node_uri(full_name)
@@ -110,8 +99,7 @@ def ros_kill_node(node_name: str) -> bool:
 def ros_kill_all_nodes() -> bool:
     """Asks every node of this master to shut itself down, except the caller's own and rosout.
 
-    Returns:
-        True if none is left.
+    Returns True if none is left.
     """
     return _shut_down(_nodes.node_uris())
 
@@ -119,10 +107,8 @@ def ros_kill_all_nodes() -> bool:
 def ros_kill_master() -> bool:
     """Shuts down all nodes of this master except the caller's own, and the master if this toolkit started it.
 
-    A master that another program started keeps running, with a warning.
-
-    Returns:
-        True if no master runs afterwards.
+    A master that another program started keeps running, with a warning. Returns True if no master runs
+    afterwards.
     """
     if not _master.is_up():
         return True
@@ -136,12 +122,9 @@ def ros_kill_master() -> bool:
 def ros_kill_all_processes() -> bool:
     """Ends all that this toolkit started under this master, from any process, and shuts down other nodes.
 
-    Nodes that another program started are only asked to shut down, as rosnode kill does; the caller's
-    own node and a master that another program started keep running, as do other masters and their
-    nodes. Returns at once without a master.
-
-    Returns:
-        True if nothing of them is left.
+    Nodes that another program started are only asked to shut down, as rosnode kill does; the caller's own
+    node and a master that another program started keep running, as do other masters and their nodes. Returns
+    at once without a master. Returns True if nothing of them is left.
     """
     nodes = _nodes.node_uris()  # asked first: the master may end with the processes
     gone = _programs.end(_programs.started())

@@ -40,31 +40,16 @@ def init_robot_state_pub(
 
 
 def spawn_model_in_gazebo(
-    pkg_name: str,
-    model_urdf_file: str,
-    controllers_file: str | None,
-    controllers_list: Sequence[str] = (),
-    model_urdf_folder: str = "/urdf",
-    ns: str = "/",
-    args_xacro: Sequence[str] | None = None,
-    max_pub_freq: float | None = None,
-    rob_st_term: bool = False,
-    gazebo_name: str = "robot1",
-    gaz_ref_frame: str = "world",
-    pos_x: float = 0.0,
-    pos_y: float = 0.0,
-    pos_z: float = 0.0,
-    ori_w: float = 0.0,
-    ori_x: float = 0.0,
-    ori_y: float = 0.0,
-    ori_z: float = 0.0,
-    *,
-    controllers_pkg: str | None = None,
-    timeout: float = ros_gazebo.TIMEOUT,
-    gazebo_ns: str = ros_gazebo.GAZEBO,
-    verify: bool = False,
-    ready: bool = False,
-) -> bool:
+    pkg_name: str, model_urdf_file: str,
+    controllers_file: str | None, controllers_list: Sequence[str] = (),
+    model_urdf_folder: str = "/urdf", ns: str = "/", args_xacro: Sequence[str] | None = None,
+    max_pub_freq: float | None = None, rob_st_term: bool = False,
+    gazebo_name: str = "robot1", gaz_ref_frame: str = "world",
+    pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
+    ori_w: float = 0.0, ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0,
+    *, controllers_pkg: str | None = None, timeout: float = ros_gazebo.TIMEOUT,
+    gazebo_ns: str = ros_gazebo.GAZEBO, verify: bool = False, ready: bool = False,
+) -> bool:  # fmt: skip
     """Loads a robot's description, starts its state publisher, spawns it, and starts its controllers.
 
     Args:
@@ -97,17 +82,9 @@ def spawn_model_in_gazebo(
     if not init_robot_state_pub(ns, max_pub_freq, rob_st_term):
         return False
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    spawned, _ = ros_gazebo.gazebo_spawn_urdf_param(
-        "robot_description",
-        gazebo_name,
-        ns,
-        gaz_ref_frame,
-        *pose,
-        timeout=timeout,
-        gazebo_ns=gazebo_ns,
-        verify=verify,
-    )
-    if not spawned:
+    place = ("robot_description", gazebo_name, ns, gaz_ref_frame, *pose)
+    at = ros_gazebo.At(timeout=timeout, gazebo_ns=gazebo_ns)
+    if not ros_gazebo.gazebo_spawn_urdf_param(*place, verify=verify, **at):
         return False
     running: Sequence[str] = ()
     if controllers_file is not None:

@@ -8,11 +8,8 @@ from ros_utils._internal import params as _params
 from ros_utils._internal.packages import urdf_parse_from_path, urdf_parse_from_pkg
 
 __all__ = [
-    "urdf_load_from_path",
-    "urdf_load_from_pkg",
-    "urdf_parse_from_path",
-    "urdf_parse_from_pkg",
-]
+    "urdf_load_from_path", "urdf_load_from_pkg", "urdf_parse_from_path", "urdf_parse_from_pkg",
+]  # fmt: skip
 
 
 def urdf_load_from_pkg(

@@ -10,10 +10,5 @@ from ros_calls.service import (
 )
 
 __all__ = [
-    "TIMEOUT",
-    "ServiceClient",
-    "ServiceFailed",
-    "ServiceGone",
-    "ServiceHangs",
-    "ServiceMissing",
-]
+    "TIMEOUT", "ServiceClient", "ServiceFailed", "ServiceGone", "ServiceHangs", "ServiceMissing",
+]  # fmt: skip

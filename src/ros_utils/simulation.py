@@ -98,8 +98,7 @@ class Simulation:
     def close(self) -> bool:
         """Ends the simulator, its master, and everything started under it; a second call does nothing.
 
-        Returns:
-            True if nothing is left.
+        Returns True if nothing is left.
         """
         if self._closed:  # another master may use the port by now
             return True

@@ -43,12 +43,7 @@ Container = viser.GuiTabHandle | viser.GuiFolderHandle
 
 
 class Curves:
-    """Charts in a tab or a folder of a page.
-
-    Args:
-        gui: Of the page.
-        container: The tab or folder.
-    """
+    """Charts in a tab or a folder of a page."""
 
     def __init__(self, gui: viser.GuiApi, container: Container) -> None:
         self._gui, self._container = gui, container

@@ -32,9 +32,7 @@ class Mp4Writer:
     def add(self, frame: np.ndarray) -> None:
         """Adds a frame (H, W, 3) of uint8, of the first frame's size.
 
-        Raises:
-            EncoderFailed: If ffmpeg has ended.
-            ValueError: For another size.
+        Raises EncoderFailed if ffmpeg has ended, ValueError for another size.
         """
         try:
             if self._frames is None:
@@ -59,11 +57,7 @@ class Mp4Writer:
         return frames
 
     def close(self) -> None:
-        """Completes the file; may be called twice.
-
-        Raises:
-            EncoderFailed: If the file can't be played.
-        """
+        """Completes the file; may be called twice; raises EncoderFailed if the file can't be played."""
         frames, self._frames = self._frames, None
         if frames is None:
             return

@@ -142,7 +142,10 @@ def _spawn(options: argparse.Namespace, xml: str, gazebo: str) -> None:
     namespace = options.robot_namespace
     if namespace is None:
         namespace = rospy.get_namespace()
-    if not spawn(options.model, xml, namespace, _pose(options), options.reference_frame, gazebo):
+    # -R, -P, -Y are rotations about the fixed x, y and z axis, in this order.
+    turn = Quaternion(*from_rpy(options.R, options.P, options.Y))
+    pose = Pose(Point(options.x, options.y, options.z), turn)
+    if not spawn(options.model, xml, namespace, pose, options.reference_frame, gazebo):
         raise CannotSpawn(f"'{options.model}' was not spawned")
 
 
@@ -223,9 +226,3 @@ def _prepared(text: str, package_to_model: bool) -> str:
             if name.startswith("package://"):
                 mesh.set("filename", "model://" + name.removeprefix("package://"))
     return ElementTree.tostring(root, encoding="unicode")
-
-
-def _pose(options: argparse.Namespace) -> Pose:
-    """Returns the pose; -R, -P, -Y are rotations about the fixed x, y and z axis, in this order."""
-    turn = Quaternion(*from_rpy(options.R, options.P, options.Y))
-    return Pose(Point(options.x, options.y, options.z), turn)

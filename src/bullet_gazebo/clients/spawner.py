@@ -47,14 +47,9 @@ class ManagerClient:
         )
 
     def wait(self, services: Sequence[str], timeout: float) -> str | None:
-        """Waits until all of the services are offered.
+        """Waits for the manager's services, each at most `timeout` [s of wall time], or infinity.
 
-        Args:
-            services: names relative to the manager's.
-            timeout: bound for each of them [wall-clock s], or infinity.
-
-        Returns:
-            The first one that isn't offered in time, or None.
+        Returns the first one that isn't offered in time, or None.
         """
         for service in services:
             name = str(rospy.resolve_name(f"{self._prefix}/{service}"))
@@ -70,11 +65,7 @@ class ManagerClient:
         return bool(self._call("unload_controller", srv.UnloadController, name, timeout=timeout).ok)
 
     def switch(
-        self,
-        start: Sequence[str],
-        stop: Sequence[str],
-        strictness: int,
-        timeout: float = math.inf,
+        self, start: Sequence[str], stop: Sequence[str], strictness: int, timeout: float = math.inf
     ) -> bool:
         """Starts and stops controllers in one step; no time limit for the manager itself."""
         request = (list(start), list(stop), strictness, False, 0.0)

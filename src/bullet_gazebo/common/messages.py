@@ -166,16 +166,12 @@ def to_contact_state(pair: ContactPair) -> ContactState:
 
 def from_contact_state(state: ContactState) -> ContactPair:
     """Returns what a message says of a contact."""
-
-    def vector(message: Vector3) -> poses.Vector:
-        return (message.x, message.y, message.z)
-
     return ContactPair(
         state.collision1_name,
         state.collision2_name,
-        [vector(each) for each in state.contact_positions],
-        [vector(each) for each in state.contact_normals],
-        [(vector(each.force), vector(each.torque)) for each in state.wrenches],
+        [to_vector(each) for each in state.contact_positions],
+        [to_vector(each) for each in state.contact_normals],
+        [(to_vector(each.force), to_vector(each.torque)) for each in state.wrenches],
         list(state.depths),
     )
 
@@ -208,11 +204,9 @@ def check_numbers(what: str, values: Sequence[float]) -> None:
 
 
 def bad_number(message: genpy.Message, largest: float = LARGEST_NUMBER) -> str:
-    """Finds a number that the world can't take, before a request changes anything.
+    """Returns which number the world can't take, as "pose.position.x is nan; it must be finite".
 
-    Returns:
-        The field and what is wrong with it, as "pose.position.x is nan; it must be finite". Empty if all
-        numbers are finite and not beyond `largest`.
+    Empty if all are finite and not beyond `largest`.
     """
     for name, kind in zip(message.__slots__, message._slot_types, strict=True):
         fault = _fault(getattr(message, name), kind, largest)

@@ -44,10 +44,7 @@ def one_at_a_time(name: str, bound: float = STARTING) -> Iterator[None]:
     """Lets one process of this machine at a time become a node of a name at the master's port.
 
     Two that register at once end each other: to the master, each one is news of another node of that name.
-
-    Args:
-        name: the node's.
-        bound: of the wait for others [s]; after it the block begins all the same.
+    After `bound` [s] the block begins all the same.
     """
     key = hashlib.sha256(f"{master.host_and_port()[1]} {name}".encode()).hexdigest()
     # An abstract socket's name ends with its process, and needs no folder that all users may write to.
@@ -67,8 +64,7 @@ def one_at_a_time(name: str, bound: float = STARTING) -> Iterator[None]:
 def wait_for_master(name: str) -> None:
     """Waits until there is a master, for the node `name`; rospy's own wait can't be interrupted.
 
-    Raises:
-        rospy.ROSInterruptException: a signal came meanwhile.
+    Raises rospy.ROSInterruptException if a signal came meanwhile.
     """
     if not master.is_up():
         text = f"{name}: no ROS master at {master.uri()} yet; waiting for it"
@@ -79,8 +75,7 @@ def wait_for_master(name: str) -> None:
 def init_node(name: str, command_line: Sequence[str], anonymous: bool = True) -> None:
     """Initialises a node without rospy's signal handlers, once there is a master.
 
-    Raises:
-        rospy.ROSInterruptException: a signal came meanwhile.
+    Raises rospy.ROSInterruptException if a signal came meanwhile.
     """
     wait_for_master(name)
     rospy.init_node(name, anonymous=anonymous, argv=list(command_line), disable_signals=True)
@@ -106,13 +101,9 @@ class SignalHandler:
         return not self._news.empty()
 
     def wait(self, over: Callable[[], bool] = lambda: False) -> bool:
-        """Waits for a signal or the node's shutdown, and returns once the node is down.
+        """Waits for a signal, the node's shutdown, or `over`; returns once the node is down.
 
-        Args:
-            over: called every 0.1 s; the node is also shut down when it returns true.
-
-        Returns:
-            False if the work of `run` came to its end.
+        Returns False if the work of `run` came to its end.
         """
         reason = "shut down"
         while not rospy.is_shutdown() and not over():
@@ -128,14 +119,9 @@ class SignalHandler:
         return reason != DONE
 
     def run(self, work: Callable[[], int], interrupted: int) -> int:
-        """Runs a program in a thread of its own, so that a signal finds the main thread free.
+        """Runs a program, from `init_node` on, in a thread of its own: a signal finds the main thread free.
 
-        Args:
-            work: the program, from `init_node` on; this raises what it raises.
-            interrupted: the exit code of a program that was ended before it was done.
-
-        Returns:
-            The exit code.
+        Returns the exit code, `interrupted` if it was ended before it was done; raises what it raises.
         """
         outcome: Future[int] = Future()
 

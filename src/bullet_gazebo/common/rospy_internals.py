@@ -54,8 +54,7 @@ def free_polls_at_once() -> None:
 def wait_until_sent(publisher: rospy.Publisher, bound: float = 1.0) -> None:
     """Waits until rospy's threads have written all messages, so that closing the topic loses none.
 
-    Args:
-        bound: of the wait [s of wall time], for a client that doesn't read.
+    A client that doesn't read is waited for until `bound` [s of wall time].
     """
     deadline = time.monotonic() + bound
     for connection in list(publisher.impl.connections):
@@ -75,11 +74,8 @@ def _has_sent(connection: Any) -> bool:
 def divert_messages(sink_of: Callable[[str], Sink | None]) -> None:
     """Passes messages for some nodes to a sink instead of their connections; once for a process.
 
-    A connection counts as connected once the topic's listeners know of it (`is_connected`).
-
-    Args:
-        sink_of: returns the sink of a node, or None if its messages are sent as usual; called for each new
-            connection. `divert_connections` is for the existing ones.
+    A connection counts as connected once the topic's listeners know of it (`is_connected`). `sink_of` returns
+    the sink of a node, or None, for each new connection; `divert_connections` is for the existing ones.
     """
     add_connection = _TopicImpl.add_connection
 
@@ -132,8 +128,7 @@ def divert_connections(node: str, sink: Sink) -> None:
 def deliver(topic: str, data: bytes, node: str) -> None:
     """Passes a message of a node to this process's subscribers, if there are any, in this thread.
 
-    Raises:
-        genpy.DeserializationError: if it can't be read.
+    Raises genpy.DeserializationError if it can't be read.
     """
     subscription: _SubscriberImpl | None = _topics().get_subscriber_impl(topic)
     if subscription is None:
@@ -146,12 +141,9 @@ def deliver(topic: str, data: bytes, node: str) -> None:
 
 
 def is_connected(topic: str, node: str, publishes: bool) -> bool | None:
-    """Returns whether a node is connected to a topic; None if this process doesn't have the topic.
+    """Returns whether a node is connected to a topic that this process `publishes`, or subscribes to.
 
-    Args:
-        topic: resolved name.
-        node: full name.
-        publishes: whether this process publishes and the node subscribes, or the other way round.
+    None if it doesn't have the topic.
     """
     if publishes:
         publication = _topics().get_publisher_impl(topic)
@@ -186,12 +178,9 @@ def _topics() -> Any:
 
 
 def answer_xmlrpc(method: str, answer: Callable[..., tuple[int, str, Any]]) -> None:
-    """Makes this process's node answer one XML-RPC call more.
+    """Makes this process's node answer one XML-RPC call more, by code (1 is success), text and value.
 
-    Args:
-        method: the call's name.
-        answer: called with the arguments behind the caller's name, of any number and type; returns code
-            (1 is success), text, value.
+    `answer` is called with the arguments behind the caller's name, of any number and type.
     """
 
     # rospy looks a call up among the methods of its one handler, which it makes itself.
@@ -221,10 +210,7 @@ def set_time(now: genpy.Time) -> None:
 def registered_together() -> Iterator[None]:
     """Registers the services that a block offers at its end, in one call of the master.
 
-    So a client that finds one of them finds the others.
-
-    Raises:
-        OSError: the master doesn't answer.
+    So a client that finds one of them finds the others. Raises OSError if the master doesn't answer.
     """
     proxy = rospy.core.xmlrpcapi(master.uri())
     calls, reg_added = xmlrpc.client.MultiCall(proxy), RegManager.reg_added

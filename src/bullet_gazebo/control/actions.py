@@ -4,6 +4,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar
 
 import rospy
@@ -60,8 +61,7 @@ class ControllerAction(ABC):
     def pursue(self, key: str, goal: Any, listener: "ActionGoal") -> str:
         """Begins a goal, under the simulator's lock; returns a warning, or nothing.
 
-        Raises:
-            ControlError: if it is refused.
+        Raises ControlError if it is refused.
         """
 
     @abstractmethod
@@ -125,7 +125,9 @@ class ControllerAction(ABC):
             kept, self._kept = self._kept, []
         for handle, news, last in kept:
             if last:
-                _settle(handle, news.kind, self.result(news), news.text)
+                settle = {SUCCEEDED: handle.set_succeeded, ABORTED: handle.set_aborted}
+                end = settle.get(news.kind, handle.set_canceled)
+                end(self.result(news), news.text)
             else:
                 handle.publish_feedback(self.feedback(news))
         if self._status_is_due():
@@ -170,15 +172,6 @@ class ActionGoal:
         self._action.note(self._handle, outcome, last=True)
 
 
-def _settle(handle: ServerGoalHandle, kind: str, result: Any, text: str) -> None:
-    if kind == SUCCEEDED:
-        handle.set_succeeded(result, text)
-    elif kind == ABORTED:
-        handle.set_aborted(result, text)
-    else:
-        handle.set_canceled(result, text)
-
-
 class SteadyActionServer(ActionServer):
     """An action server without a timer: its owner calls publish_status() now and then.
 
@@ -205,19 +198,12 @@ class SteadyActionServer(ActionServer):
     def initialize(self) -> None:
         """Opens the five topics; called by start()."""
         self.status_list_timeout = NEVER
-        self.status_pub = rospy.Publisher(
-            f"{self.ns}/status", GoalStatusArray, latch=True, queue_size=QUEUE
-        )
-        self.result_pub = rospy.Publisher(f"{self.ns}/result", self.ActionResult, queue_size=QUEUE)
-        self.feedback_pub = rospy.Publisher(
-            f"{self.ns}/feedback", self.ActionFeedback, queue_size=QUEUE
-        )
-        self.goal_sub = rospy.Subscriber(
-            f"{self.ns}/goal", self.ActionGoal, self.internal_goal_callback
-        )
-        self.cancel_sub = rospy.Subscriber(
-            f"{self.ns}/cancel", GoalID, self.internal_cancel_callback
-        )
+        ns, advertise = self.ns, partial(rospy.Publisher, queue_size=QUEUE)
+        self.status_pub = advertise(f"{ns}/status", GoalStatusArray, latch=True)
+        self.result_pub = advertise(f"{ns}/result", self.ActionResult)
+        self.feedback_pub = advertise(f"{ns}/feedback", self.ActionFeedback)
+        self.goal_sub = rospy.Subscriber(f"{ns}/goal", self.ActionGoal, self.internal_goal_callback)
+        self.cancel_sub = rospy.Subscriber(f"{ns}/cancel", GoalID, self.internal_cancel_callback)
 
     def stop(self) -> None:
         """Closes the topics after the last result was sent."""

@@ -29,8 +29,11 @@ from bullet_gazebo.common.messages import (
     to_twist_stamped,
 )
 from bullet_gazebo.common.publishing import ThinnedTopic, Thinner
-from bullet_gazebo.control.gripper_action import GripperAction
-from bullet_gazebo.control.trajectory_action import TrajectoryTopics, to_controller_state
+from bullet_gazebo.control.trajectory_action import (
+    GripperAction,
+    TrajectoryTopics,
+    to_controller_state,
+)
 from robot_sim.control.controllers.base import Controller, Input, Output
 from robot_sim.control.controllers.gripper import GripperActionController
 from robot_sim.control.controllers.joint_trajectory import JointTrajectoryController

@@ -1,4 +1,4 @@
-"""A trajectory controller's action, command topic and query service (docs/contract/ros_control.md 3.5)."""
+"""What controllers of trajectories and grippers serve (docs/contract/ros_control.md 3.5, sensors.md 13.1)."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -10,7 +10,13 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from bullet_gazebo.common.messages import to_time
 from bullet_gazebo.control.actions import ControllerAction
+from robot_sim.control.controllers.gripper import (
+    GripperActionController,
+    GripperOutcome,
+    GripperSample,
+)
 from robot_sim.control.controllers.joint_trajectory import JointTrajectoryController
+from robot_sim.control.errors import ControlError
 from robot_sim.control.trajectory_goals import (
     GoalObserver,
     GoalOutcome,
@@ -94,6 +100,27 @@ class TrajectoryAction(ControllerAction):
     def result(self, outcome: GoalOutcome | TrajectoryRefused) -> msg.FollowJointTrajectoryResult:
         text = outcome.text if isinstance(outcome, GoalOutcome) else str(outcome)
         return msg.FollowJointTrajectoryResult(outcome.code, text)
+
+
+class GripperAction(ControllerAction):
+    """The action `gripper_cmd`."""
+
+    action = msg.GripperCommandAction
+
+    def __init__(self, sim: Simulator, controller: GripperActionController, namespace: str) -> None:
+        super().__init__(sim, controller, namespace, "gripper_cmd")
+
+    def pursue(self, key: str, goal: msg.GripperCommandGoal, listener: GoalObserver) -> str:
+        self._controller.pursue(key, goal.command.position, goal.command.max_effort, listener)
+        return ""
+
+    def feedback(self, sample: GripperSample) -> msg.GripperCommandFeedback:
+        return msg.GripperCommandFeedback(*sample)
+
+    def result(self, outcome: GripperOutcome | ControlError) -> msg.GripperCommandResult:
+        if isinstance(outcome, ControlError):
+            return msg.GripperCommandResult()
+        return msg.GripperCommandResult(*outcome.sample)
 
 
 def to_controller_state(sample: TrajectorySample) -> msg.JointTrajectoryControllerState:

@@ -47,12 +47,7 @@ class WorldJournal:
     """Collects entries, and keeps them for listeners that come late."""
 
     def __init__(self, sim: Simulator, most_kept: int = MOST_KEPT) -> None:
-        """Begins with the entry START, which `start` completes; called by the thread that starts the node.
-
-        Args:
-            sim: the simulator, in lock-step.
-            most_kept: bound of what is kept [bytes].
-        """
+        """Begins with the entry START, which `start` completes; called by the thread that starts the node."""
         self._sim = sim
         self._most_kept = most_kept
         self._current = _Current()
@@ -126,8 +121,7 @@ class WorldJournal:
     def listen(self, listener: Callable[[list[JournalEntry]], None]) -> list[JournalEntry] | None:
         """Makes a function a listener, if it isn't one.
 
-        Returns:
-            The finished entries before this call, or None if the first ones are gone.
+        Returns the finished entries before this call, or None if the first ones are gone.
         """
         with self._guard:
             if listener not in self.listeners:

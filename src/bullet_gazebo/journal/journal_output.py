@@ -144,8 +144,7 @@ class JournalBag:
     def __init__(self, path: Path) -> None:
         """Opens it; an existing file stays, complete or not: the name gets a number.
 
-        Raises:
-            RecordingError: the file can't be written.
+        Raises RecordingError if the file can't be written.
         """
         import rosbag  # needed only here, and slow
 

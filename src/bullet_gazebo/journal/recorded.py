@@ -38,8 +38,7 @@ class RecordedJournal:
     def __init__(self, path: Path) -> None:
         """Reads the bag's messages; entries are made from them later.
 
-        Raises:
-            NoRecording: if it isn't a bag that can be replayed.
+        Raises NoRecording if it isn't a bag that can be replayed.
         """
         self._path = path
         # Behind the count of entries stands the number of the first one.
@@ -50,11 +49,7 @@ class RecordedJournal:
         self.facts: dict[str, Any] = json.loads(self.start.data)  # of the simulator's start
 
     def entries(self) -> Iterator[JournalEntry]:
-        """Returns the entries from the first one on.
-
-        Raises:
-            NoRecording: if some are missing.
-        """
+        """Returns the entries from the first one on; raises NoRecording if some are missing."""
         expected = 0
         for data in self._messages:
             for entry in Journal().deserialize(data).entries:
@@ -75,14 +70,9 @@ class RecordedJournal:
         return sorted(found)
 
     def check_changes(self, models: Iterable[str], parameters: Iterable[Mapping[str, Any]]) -> None:
-        """Checks that changes change something: a misspelt name would leave all as it was.
+        """Raises NoRecording if changes change nothing, as a misspelt name would.
 
-        Args:
-            models: names of those that are to be spawned from other files.
-            parameters: for each file, its values by full name.
-
-        Raises:
-            NoRecording: if no such model was spawned, or none of a file's parameters was read.
+        Every model must have been spawned, and of each file one of its parameters, by full name, been read.
         """
         spawned, read = set(), set()
         for entry in self.entries():
@@ -126,11 +116,7 @@ def _missing(expected: int) -> str:
 
 
 def _read(path: Path) -> list[bytes]:
-    """Returns a bag's messages, each checked.
-
-    Raises:
-        NoRecording: if it isn't a bag that can be replayed.
-    """
+    """Returns a bag's messages, each checked; raises NoRecording if it isn't a bag that can be replayed."""
     process = LimitedProcess(f"{__name__}:read_journal", LIMITS)
     try:
         open_file(path).close()
@@ -197,9 +183,7 @@ def _messages(path: str) -> list[bytes]:
 def first_difference(recorded: JournalEntry, now: JournalEntry, refusal: str) -> str:
     """Returns what a replay's entry has otherwise than the recorded one, in one line; empty if nothing.
 
-    Args:
-        recorded, now: the two entries.
-        refusal: the text with which the request failed now; empty if it didn't.
+    `refusal` is the text with which the request failed now, if it did.
     """
     at = f"at {recorded.ended / 1e9:g} s"
     if (recorded.kind, recorded.name) != (now.kind, now.name):

@@ -36,18 +36,14 @@ from bullet_gazebo.common.rospy_internals import (
     free_polls_at_once,
     registered_together,
 )
-from bullet_gazebo.journal.interception import (
-    record_messages,
-    record_parameters,
-    record_services,
-)
+from bullet_gazebo.journal.interception import record_messages, record_parameters, record_services
 from bullet_gazebo.journal.journal import WorldJournal
 from bullet_gazebo.journal.journal_output import JournalOutput
 from bullet_gazebo.node.node_name import NameLoss, NodeNameTaken, refuse_twin
 from bullet_gazebo.node.start import facts_of
 from bullet_gazebo.node.watchdog import Watchdog
 from bullet_gazebo.plugins.plugin_loader import PluginRegistry
-from bullet_gazebo.scene import SceneOffer
+from bullet_gazebo.scene import SceneServer
 from bullet_gazebo.services.advance_service import AdvanceService
 from bullet_gazebo.services.snapshot_services import SnapshotServices
 from bullet_gazebo.services.spawn_services import (
@@ -71,21 +67,12 @@ from ros_calls.service import WORK
 
 NAME = "gazebo"
 EMPTY_WORLD = "empty.world"
-INERT = {  # Gazebo options without effect here, and how many values follow each
-    ("-r", "--record"): 0,
-    ("-q", "--quiet"): 0,
-    ("--verbose",): 0,
-    ("--minimal_comms",): 0,
-    ("--record_resources",): 0,
-    ("-s", "--server-plugin"): 1,
-    ("-g", "--gui-plugin"): 1,
-    ("-i", "--iters"): 1,
-    ("-p", "--play"): 1,
-    ("--record_path",): 1,
-    ("--record_encoding",): 1,
-    ("--record_period",): 1,
-    ("--record_filter",): 1,
-}
+# Gazebo's options without effect here: those that stand alone, and those that a value follows.
+INERT = ("-r --record", "-q --quiet", "--verbose", "--minimal_comms", "--record_resources")
+INERT_WITH_VALUE = (
+    "-s --server-plugin", "-g --gui-plugin", "-i --iters", "-p --play", "--record_path",
+    "--record_encoding", "--record_period", "--record_filter",
+)  # fmt: skip
 MORE_ARGUMENTS = "GZSERVER_ARGS"  # environment variable, for a server that another program starts
 MOST_FREQUENT = 1e9  # [Hz]; time is counted in nanoseconds
 EXIT_TIMEOUT = 10.0  # [s] for what plugins have left to do at the end
@@ -100,8 +87,7 @@ INTERRUPTED = 130
 def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     """Reads gzserver's options, in any order (docs/contract/gazebo_launch.md 4.2); ignores ROS's a:=b.
 
-    Returns:
-        world, paused, physics, lockstep, replace, seed, the video options, and `ignored`: the unknown ones.
+    They are world, paused, physics, lockstep, replace, seed, the video options, and `ignored`, the unknown.
     """
     parser = argparse.ArgumentParser(
         prog="gzserver",
@@ -125,9 +111,10 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     option("--video-size", type=int, nargs=2, default=(640, 480), help="width, height [pixels]")
     option("--video-model", default="", help="keep this model in the middle; default: all movable")
     option("--seed", type=int, help="seed of Python's and NumPy's random numbers")
-    for names, values in INERT.items():
-        kind = {"nargs": values} if values else {"action": "store_const", "const": True}
-        option(*names, help="accepted, without effect", **kind)
+    for names in INERT:
+        option(*names.split(), action="store_true", help="accepted, without effect")
+    for names in INERT_WITH_VALUE:
+        option(*names.split(), nargs=1, help="accepted, without effect")
     args, left = parser.parse_known_args([argument for argument in argv if ":=" not in argument])
     worlds = [argument for argument in left if not argument.startswith("-")]
     if not worlds and args.profile and args.profile.endswith(".world"):
@@ -166,7 +153,7 @@ class GazeboNode:
 
     def _advertise(self, network: bool, args: argparse.Namespace, of_world: list[Plugin]) -> None:
         sensors: list[SceneSensor] = []
-        scene = SceneOffer(self.sim, sensors)
+        scene = SceneServer(self.sim, sensors)
         shown = {"show": scene.show, "end_journal": self._end_journal} if network else {}
         journal = self.journal if network else None  # without services there is nothing to record
         self.control = WorldControl(self.sim, self._watchdog, shown, journal)
@@ -207,11 +194,7 @@ class GazeboNode:
         with spawning:  # once a model is there, clients use all other services without a wait
             spawner = SpawnServices(self.sim, plugins, spawning)
             answer_xmlrpc(SPAWNS, spawner.count)
-            self._services = [
-                *stepping,
-                spawner,
-                *advertise_world_services(self.sim),
-            ]
+            self._services = [*stepping, spawner, *advertise_world_services(self.sim)]
 
     def _end_journal(self) -> None:
         """Completes the journal's bag."""

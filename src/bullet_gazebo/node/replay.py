@@ -33,11 +33,7 @@ class Changes:
     def __init__(
         self, models: Mapping[str, str], parameters: Sequence[tuple[dict[str, Any], str]]
     ) -> None:
-        """
-        Args:
-            models: URDF or SDF texts by model.
-            parameters: values by name, and their namespace.
-        """
+        """Takes URDF or SDF texts by model, and values of parameters by name, with their namespace."""
         self.models = models
         self._parameters = parameters
 
@@ -60,18 +56,11 @@ class Replay:
     """Dispatches the entries in order, in one thread."""
 
     def __init__(
-        self,
-        recorded: RecordedJournal,
-        node: GazeboNode,
-        changes: Changes,
-        until: float,
+        self, recorded: RecordedJournal, node: GazeboNode, changes: Changes, until: float
     ) -> None:
-        """
-        Args:
-            recorded: what to repeat.
-            node: the simulator, in lock-step and as it has started.
-            changes: what is to be otherwise.
-            until: stop after the entry with which that much time has passed [s].
+        """Repeats what was recorded until the entry with which that much time has passed [s].
+
+        `node` is a simulator in lock-step, as it has started.
         """
         assert node.journal is not None and node.steps is not None
         self._sim, self._journal, self._control = node.sim, node.journal, node.control
@@ -93,10 +82,8 @@ class Replay:
         """Repeats all; `difference` tells the first difference.
 
         A handler of a user's may wait for what only a later entry does, and so for ever; a thread of its own
-        keeps it from holding up the caller.
-
-        Raises:
-            NoRecording: entries are missing in the bag, or one is damaged.
+        keeps it from holding up the caller. Raises NoRecording if entries are missing in the bag, or one is
+        damaged.
         """
         outcome: Future[None] = Future()
 

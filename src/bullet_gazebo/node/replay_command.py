@@ -26,11 +26,7 @@ LOOPBACK = "127.0.0.1"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Replays a bag.
-
-    Returns:
-        0 if all was equal, 1 if something differs, 2 if it can't be replayed.
-    """
+    """Replays a bag; returns 0 if all was equal, 1 if something differs, 2 if it can't be replayed."""
     args = parse_args(argv)
     try:
         recorded = RecordedJournal(args.bag)
@@ -72,34 +68,25 @@ def parse_args(argv: Sequence[str] | None = None) -> argparse.Namespace:
         description="Repeats a run that lockstep.py --record or rosbag has recorded, in a simulator of its"
         " own, and names the first difference.",
     )
-    parser.add_argument("bag", type=Path, help="the recorded run")
-    parser.add_argument(
-        "--until",
-        type=float,
-        default=math.inf,
-        metavar="SECONDS",
+    option = parser.add_argument
+    option("bag", type=Path, help="the recorded run")
+    option(
+        "--until", type=float, default=math.inf, metavar="SECONDS",
         help="stop after the request with which that much simulated time has passed since the start",
-    )
-    parser.add_argument(
-        "--trust",
-        action="store_true",
+    )  # fmt: skip
+    option(
+        "--trust", action="store_true",
         help="import the plugins and controllers that the bag names, beside those that come along",
-    )
-    parser.add_argument(
-        "--gui", action="store_true", help="open the simulator's page where the replay stops"
-    )
+    )  # fmt: skip
+    option("--gui", action="store_true", help="open the simulator's page where the replay stops")
     for flag, what, text in (
         ("--model", "NAME=FILE", "spawn this model from a URDF, xacro or SDF file"),
         ("--params", "NAMESPACE=FILE", "put parameters of a YAML file in place of those recorded"),
     ):
-        parser.add_argument(
-            flag,
-            action="append",
-            default=[],
-            type=_pair,
-            metavar=what,
+        option(
+            flag, action="append", default=[], type=_pair, metavar=what,
             help=f"{text}; may be repeated",
-        )
+        )  # fmt: skip
     return parser.parse_args(argv)
 
 

@@ -11,37 +11,24 @@ from file_access.xml_text import decode
 
 HASHES = "PYTHONHASHSEED"  # decides the order of sets
 KINDS: dict[str, tuple[type, ...]] = {
-    "physics": (str,),
-    "paused": (bool,),
-    "seed": (int, type(None)),
-    "hashes": (str, type(None)),
-    "world": (str,),
-    "world_text": (str, type(None)),
-    "series": (int,),
-}
+    "physics": (str,), "paused": (bool,), "seed": (int, type(None)), "hashes": (str, type(None)),
+    "world": (str,), "world_text": (str, type(None)), "series": (int,),
+}  # fmt: skip
 
 
 def facts_of(args: argparse.Namespace, series: int) -> dict[str, Any]:
-    """Returns what a simulator was started with, for JSON.
-
-    Args:
-        args: of `parse_args`.
-        series: of the handles of prepared steps.
-    """
+    """Returns what a simulator was started with, for JSON; `series` is that of prepared steps' handles."""
     path = find_world(args.world)
     try:
         text = None if path is None else decode(read_file(path))
     except FileError:  # the world is empty, and the log has said why
         text = None
     return {
-        "physics": args.physics,
-        "paused": args.paused,
-        "seed": args.seed,
+        "physics": args.physics, "paused": args.paused, "seed": args.seed,
         "hashes": os.environ.get(HASHES),
-        "world": str(args.world if path is None else path.absolute()),
-        "world_text": text,
+        "world": str(args.world if path is None else path.absolute()), "world_text": text,
         "series": series,
-    }
+    }  # fmt: skip
 
 
 def check_facts(facts: object) -> None:
@@ -59,11 +46,8 @@ def check_facts(facts: object) -> None:
 def arguments_of(facts: dict[str, Any], folder: Path) -> list[str]:
     """Returns gzserver's arguments for a simulator that starts the same way.
 
-    No text of the facts can become an option: it stands behind a `=`, or is an absolute path.
-
-    Args:
-        facts: of `facts_of`, checked.
-        folder: for the world file, if it isn't where it was, or has changed.
+    No text of the facts can become an option: it stands behind a `=`, or is an absolute path. The world file
+    comes into `folder` if it isn't where it was, or has changed.
     """
     path, text = Path(facts["world"]), facts["world_text"]
     if text is None or not path.is_absolute() or not _has(path, text):

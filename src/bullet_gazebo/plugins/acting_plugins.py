@@ -25,7 +25,6 @@ from bullet_gazebo.plugins.sensor_topics import (
 from robot_sim.drives.odometry import Period
 from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.files.elements import shown
-from robot_sim.physics.model import Model
 from robot_sim.physics.pose import ZERO, Pose, Vector, rotate, scale, subtract
 
 WORLDS = ("", "world", "map")
@@ -182,15 +181,11 @@ class JointPoseTrajectoryPlugin(ContextPlugin):
             return
         self._model.set_joint_positions(self._held)
         if self._kept is not None:
-            _put_back(self._model, *self._kept)
+            link, pose = self._kept  # the whole model moves so that this link stays
+            found = self._model.link_state(link)[0]
+            self._model.place(pose.compose(self._model.state()[0].relative_to(found)))
         if not self._points and now >= self._end:
             self._stop()
-
-
-def _put_back(model: Model, link: str, pose: Pose) -> None:
-    """Moves a whole model so that a link is at `pose`."""
-    found = model.link_state(link)[0]
-    model.place(pose.compose(model.state()[0].relative_to(found)))
 
 
 class WheelSlipPlugin(ContextPlugin):

@@ -9,13 +9,7 @@ from bullet_gazebo.plugins.drive_topics import REST, DrivePlugin, choice
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import namespace_of
 from robot_sim.constants import NANOSECONDS
-from robot_sim.drives.odometry import (
-    POSE,
-    TWIST,
-    UNKNOWN,
-    DeadReckoning,
-    OdometrySample,
-)
+from robot_sim.drives.odometry import POSE, TWIST, UNKNOWN, DeadReckoning, OdometrySample
 from robot_sim.physics.pose import Vector, conjugate, rotate, to_rpy
 
 RATE = 20.0  # [Hz]

@@ -8,12 +8,7 @@ import rospy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Empty
 
-from bullet_gazebo.plugins.camera_topics import (
-    CameraTopics,
-    offer_rate,
-    read_image,
-    scope_of,
-)
+from bullet_gazebo.plugins.camera_topics import CameraTopics, offer_rate, read_image, scope_of
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import (
     MODEL,

@@ -50,10 +50,6 @@ class CameraTopics(Shared):
     """Image, JPEG and camera_info of one camera, all below `scope`.
 
     Args:
-        context: the plugin's.
-        camera: what sees.
-        topics: those of the sensor.
-        scope: full name that the topics are in.
         names: of the image and of its camera_info.
         baseline: [m] to the camera on the left.
         own: prefix of its service, if the plugin has several cameras.

@@ -93,14 +93,8 @@ class ControlPlugin:
         hardware = self._hardware(text)
         manager = ControllerManager(hardware)
         with self._sim.lock:
-            robot = ControlledRobot(
-                self._context.model,
-                hardware,
-                manager,
-                self._control_period(),
-                self._namespace,
-                _log,
-            )
+            model, period = self._context.model, self._control_period()
+            robot = ControlledRobot(model, hardware, manager, period, self._namespace, _log)
         thinner = self._context.thinner
         self._started.callback(self._offer(manager).shutdown)
         for place, pid in hardware.pids.items():

@@ -69,12 +69,8 @@ class DepthCameraPlugin(ContextPlugin):
         self._cloud = topics.advertise(cloud, PointCloud2, content=POINT_STEP * pixels)
         for name, kind in ((depth, Image), (cloud, PointCloud2)):
             show_camera(context, name, kind, camera)
-        self._depth_info = topics.advertise(
-            named("depthImageCameraInfoTopicName", "depth/camera_info"),
-            CameraInfo,
-            QUEUE,
-            wakes=False,
-        )
+        info = named("depthImageCameraInfoTopicName", "depth/camera_info")
+        self._depth_info = topics.advertise(info, CameraInfo, QUEUE, wakes=False)
         self._in_millimetres = truth(context.text("useDepth16UC1Format", "false"))
 
     def _measure(self, now: int) -> None:
@@ -123,18 +119,11 @@ def to_cloud(
     if not organised:
         height, width = 1, height * width
     return PointCloud2(
-        header=header,
-        height=height,
-        width=width,
+        header=header, height=height, width=width,
         fields=[PointField(name, at, PointField.FLOAT32, 1) for name, at in FIELDS.items()],
-        point_step=POINT_STEP,
-        row_step=POINT_STEP * width,
-        data=points.tobytes(),
+        point_step=POINT_STEP, row_step=POINT_STEP * width, data=points.tobytes(),
         is_dense=not bool(np.isnan(depths).any()),
-    )
+    )  # fmt: skip
 
 
-LIBRARIES = {
-    "libgazebo_ros_depth_camera.so": DepthCameraPlugin,
-    KINECT: KinectPlugin,
-}
+LIBRARIES = {"libgazebo_ros_depth_camera.so": DepthCameraPlugin, KINECT: KinectPlugin}

@@ -25,14 +25,7 @@ from bullet_gazebo.plugins.sensor_topics import (
     topic_in,
 )
 from robot_sim.constants import NANOSECONDS
-from robot_sim.drives.odometry import (
-    POSE,
-    TWIST,
-    OdometrySample,
-    Period,
-    Triple,
-    WheelOdometry,
-)
+from robot_sim.drives.odometry import POSE, TWIST, OdometrySample, Period, Triple, WheelOdometry
 from robot_sim.physics.description import DescriptionError, Joint
 from robot_sim.physics.pose import to_rpy
 from robot_sim.state_dict import Shared
@@ -65,14 +58,8 @@ def length(context: PluginContext, tag: str, default: float) -> float:
 class DrivePlugin(ContextPlugin):
     """Keeps the newest command, and reports odometry after each period and at once after moves.
 
-    Subclasses have `update` and `sample`, and call `begin` when they are made.
-
-    Args:
-        context: the plugin's.
-        namespace: of its topics.
-        rate: of its reports [Hz].
-        late: see `Period`.
-        base: the frame of the vehicle without `<robotBaseFrame>`.
+    Subclasses have `update` and `sample`, and call `begin` when they are made. `rate` is that of reports [Hz]
+    (`late`: see `Period`), `base` the frame of the vehicle without `<robotBaseFrame>`.
     """
 
     def __init__(
@@ -187,11 +174,9 @@ class WheeledPlugin(DrivePlugin):
     _driven = 0  # [ns]
 
     def measure_by(self, separation: float, joints: Sequence[tuple[Joint, str]]) -> None:
-        """Reads the elements that choose what is reported.
+        """Reads the elements that choose what is reported, by wheels with a separation [m].
 
-        Args:
-            separation: of the wheels that measure [m].
-            joints: of the vehicle, each with the name of its child frame.
+        Each joint comes with the name of its child frame.
         """
         context = self.context
         source = context.text("odometrySource", "world")
@@ -244,13 +229,9 @@ class WheeledPlugin(DrivePlugin):
 
 
 class Wheels(Shared):
-    """Driven joints of a vehicle, each a motor with at most a torque [N m].
+    """Driven joints of a vehicle, each a motor with at most a torque [N m], and wheels of a diameter [m].
 
-    Args:
-        context: the plugin's.
-        joints: elements that name the joints, and the names without them.
-        diameter: of the wheels [m].
-        torque: of each motor [N m].
+    `joints` are elements that name them, and the names without them.
     """
 
     def __init__(
@@ -276,8 +257,7 @@ class Wheels(Shared):
 def joint_of(context: PluginContext, tag: str, default: str) -> Joint:
     """Returns the joint that an element names.
 
-    Raises:
-        DescriptionError: if the model has no such movable joint.
+    Raises DescriptionError if the model has no such movable joint.
     """
     name = context.text(tag, default)
     if name not in context.model.joint_names:
@@ -286,12 +266,7 @@ def joint_of(context: PluginContext, tag: str, default: str) -> Joint:
 
 
 class LinkTransforms(Shared):
-    """Publishes where the links of joints are in their joints' parents.
-
-    Args:
-        drive: whose tf and namespace they have.
-        joints: each with the name of its child frame.
-    """
+    """Publishes where the links of joints, each with the name of its frame, are in their joints' parents."""
 
     def __init__(self, drive: DrivePlugin, joints: Sequence[tuple[Joint, str]]) -> None:
         self._model = drive.model

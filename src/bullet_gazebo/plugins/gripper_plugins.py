@@ -13,12 +13,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Empty, EmptyResponse
 
 from bullet_gazebo.plugins.plugin_loader import PluginContext
-from bullet_gazebo.plugins.sensor_topics import (
-    ContextPlugin,
-    SensorTopic,
-    namespace_of,
-    topic_in,
-)
+from bullet_gazebo.plugins.sensor_topics import ContextPlugin, SensorTopic, namespace_of, topic_in
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import GAINS
 from robot_sim.control.pid import Pid

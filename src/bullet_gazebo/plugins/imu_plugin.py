@@ -72,7 +72,4 @@ class ImuSensorPlugin(ImuPlugin):
         """It has none."""
 
 
-LIBRARIES = {
-    "libgazebo_ros_imu.so": ImuPlugin,
-    "libgazebo_ros_imu_sensor.so": ImuSensorPlugin,
-}
+LIBRARIES = {"libgazebo_ros_imu.so": ImuPlugin, "libgazebo_ros_imu_sensor.so": ImuSensorPlugin}

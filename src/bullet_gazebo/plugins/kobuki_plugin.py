@@ -10,13 +10,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Empty, Header
 
 from bullet_gazebo.common.messages import to_imu, to_time
-from bullet_gazebo.plugins.drive_topics import (
-    REST,
-    DrivePlugin,
-    Wheels,
-    choice,
-    length,
-)
+from bullet_gazebo.plugins.drive_topics import REST, DrivePlugin, Wheels, choice, length
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import (
     MODEL,

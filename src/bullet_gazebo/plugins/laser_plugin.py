@@ -5,14 +5,7 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Point32
-from sensor_msgs.msg import (
-    ChannelFloat32,
-    LaserScan,
-    PointCloud,
-    PointCloud2,
-    PointField,
-    Range,
-)
+from sensor_msgs.msg import ChannelFloat32, LaserScan, PointCloud, PointCloud2, PointField, Range
 from std_msgs.msg import Header
 
 from bullet_gazebo.common.messages import to_time
@@ -131,8 +124,7 @@ class VelodynePlugin(LaserPlugin):
         self._least = context.number("min_intensity", -math.inf)
         self._deviation = context.deviation()
         self._rings = np.broadcast_to(
-            np.arange(laser.vertical.readings),
-            (laser.horizontal.readings, laser.vertical.readings),
+            np.arange(laser.vertical.readings), (laser.horizontal.readings, laser.vertical.readings)
         )
 
     def measure(self, now: int) -> PointCloud2:
@@ -148,15 +140,9 @@ class VelodynePlugin(LaserPlugin):
         points["x"], points["y"], points["z"] = places.T
         points["intensity"], points["ring"] = intensities[seen], self._rings[seen]
         return PointCloud2(
-            header=self.header(now),
-            height=1,
-            width=len(points),
-            fields=FIELDS,
-            point_step=POINT.itemsize,
-            row_step=points.nbytes,
-            data=points.tobytes(),
-            is_dense=True,
-        )
+            header=self.header(now), height=1, width=len(points), fields=FIELDS,
+            point_step=POINT.itemsize, row_step=points.nbytes, data=points.tobytes(), is_dense=True,
+        )  # fmt: skip
 
     def _within(self, ranges: np.ndarray) -> np.ndarray:
         return (self._low < ranges) & (ranges < self._high)

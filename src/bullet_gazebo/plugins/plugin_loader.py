@@ -63,30 +63,36 @@ class PluginContext(Mount):
     _is_made: threading.Event = field(default_factory=threading.Event, repr=False)
 
     def clock(
-        self,
-        rate: float,
-        measure: Update,
-        listens: Callable[[], bool] = lambda: True,
+        self, rate: float, measure: Update, listens: Callable[[], bool] = lambda: True,
         at_once: bool = True,
-    ) -> SensorClock:
+    ) -> SensorClock:  # fmt: skip
         """Calls `measure` with the simulated time [ns], at a rate in Hz, while somebody listens.
 
         It begins when the plugin is made. See `Schedule.begin` for the arguments, and else `on_update`.
         """
 
-        def guarded(now: int) -> None:
-            try:
-                measure(now)
-            except BaseException:  # noqa: BLE001 - a user's code must not stop the world
-                self.report("measures no more, because it raised")
-                self.sensing.schedule.fail(clock)
-
+        fault = "measures no more, because it raised"
+        guarded = self._guarded(measure, fault, lambda: self.sensing.schedule.fail(clock))
         with self.sim.lock:
             clock = self.sensing.schedule.begin(
                 self.model, rate, guarded, lambda: self._is_made.is_set() and listens(), at_once
             )
         self._clocks.append(clock)
         return clock
+
+    def _guarded(
+        self, call: Callable[..., None], what: str, end: Callable[[], None]
+    ) -> Callable[..., None]:
+        """Returns `call` in a form that reports an exception, and ends further calls by `end`."""
+
+        def guarded(*args: int) -> None:
+            try:
+                call(*args)
+            except BaseException:  # noqa: BLE001 - a user's code must not stop the world
+                self.report(what)
+                end()
+
+        return guarded
 
     def closing(self, close: Callable[[], None]) -> None:
         """Calls `close` when the plugin ends, or can't be made; the last one first."""
@@ -95,14 +101,9 @@ class PluginContext(Mount):
     def show(
         self, topic: str, kind: type, link: str, pose: Pose, view: tuple[float, float] = (0.0, 0.0)
     ) -> None:
-        """Has windows offer to draw measurements.
+        """Has windows offer to draw a topic's measurements in axes at `pose` in a link.
 
-        Args:
-            topic: full name of theirs.
-            kind: type of its messages.
-            link: which they are taken from.
-            pose: of the axes that they are in, in the link.
-            view: of a camera, its horizontal field of view [rad] and its picture's width by height.
+        `view` is a camera's horizontal field of view [rad] and its picture's width by height.
         """
         name = kind._type  # type: ignore[attr-defined]
         shown = SceneSensor(topic, name, self.model.name, link, to_pose_msg(pose), *view)
@@ -130,13 +131,10 @@ class PluginContext(Mount):
         An update that raises is reported, and not called again. Updates end with the plugin.
         """
 
-        def guarded(now: int) -> None:
-            try:
-                update(now)
-            except BaseException:  # noqa: BLE001 - a user's code must not stop the world
-                self.report("is not called any more, because it raised")
-                self.sim.listeners = [each for each in self.sim.listeners if each is not guarded]
+        def end() -> None:
+            self.sim.listeners = [each for each in self.sim.listeners if each is not guarded]
 
+        guarded = self._guarded(update, "is not called any more, because it raised", end)
         self._updates.append(guarded)
         with self.sim.lock:
             # A new list: the old one may be in use by the tick that removes an update.
@@ -147,19 +145,16 @@ class PluginContext(Mount):
         to it, or reset world or time.
         """
 
-        def guarded() -> None:
-            try:
-                moved()
-            except BaseException:  # noqa: BLE001 - a user's code must not stop the world
-                self.report("is not told of moves any more, because it raised")
-                self.sim.moves.forget(listener)
+        def end() -> None:
+            self.sim.moves.forget(listener)
 
         def close() -> None:
             with self.sim.lock:
-                self.sim.moves.forget(listener)
+                end()
 
+        fault = "is not told of moves any more, because it raised"
         with self.sim.lock:
-            listener = self.sim.moves.on_move_of(self.model, guarded)
+            listener = self.sim.moves.on_move_of(self.model, self._guarded(moved, fault, end))
         self._updates.append(listener)
         self.closing(close)
 
@@ -209,12 +204,9 @@ class PluginRegistry:
     """Starts and ends plugins by the file names of their libraries: built-in ones, then users'."""
 
     def __init__(
-        self,
-        sim: Simulator,
-        thinner: Thinner,
-        seed: int = 0,
+        self, sim: Simulator, thinner: Thinner, seed: int = 0,
         shown: list[SceneSensor] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """`seed` is that of the sensors' noise; to `shown` come the topics that windows can draw."""
         self._sim = sim
         self._shown = [] if shown is None else shown
@@ -233,7 +225,9 @@ class PluginRegistry:
         If a plugin waits for time to pass, the hold ends after a while.
         """
         patience = LOCKSTEP_LOADING_PATIENCE if self._sim.lockstep else LOADING_PATIENCE
-        return self._sim.holds.hold(patience, partial(_warn_late, models, patience))
+        text = f"The plugins of {models} have been starting or ending for {patience:g} s"
+        late = partial(rospy.logwarn, "%s; time passes from now on", text)
+        return self._sim.holds.hold(patience, late)
 
     def load(self, model: Model, robot_namespace: str) -> None:
         """Starts the plugins of `model`. An unknown one and one that fails is logged and left out
@@ -330,14 +324,6 @@ def _tell_missing_control(model: Model) -> None:
             "Model '%s': %s is not simulated: this robot has no control here (docs/plugins.md)",
             model.name, foreign,
         )  # fmt: skip
-
-
-def _warn_late(models: str, patience: float) -> None:
-    rospy.logwarn(
-        "The plugins of %s have been starting or ending for %g s; time passes from now on",
-        models,
-        patience,
-    )
 
 
 def _registered() -> dict[str, object]:

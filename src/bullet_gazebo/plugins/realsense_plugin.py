@@ -8,12 +8,7 @@ from bullet_gazebo.common.messages import to_time
 from bullet_gazebo.plugins.camera_topics import QUEUE, CameraTopics, camera_info, show_camera
 from bullet_gazebo.plugins.depth_camera_plugin import to_cloud, to_depth_image
 from bullet_gazebo.plugins.plugin_loader import PluginContext
-from bullet_gazebo.plugins.sensor_topics import (
-    ContextPlugin,
-    SensorTopics,
-    frame_of,
-    topic_in,
-)
+from bullet_gazebo.plugins.sensor_topics import ContextPlugin, SensorTopics, frame_of, topic_in
 from robot_sim.physics.description import DescriptionError, Sensor
 from robot_sim.physics.files.elements import truth
 from robot_sim.physics.pose import Pose

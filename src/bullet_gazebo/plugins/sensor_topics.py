@@ -22,12 +22,9 @@ MODEL = "<model>"  # where a namespace is the model's name
 
 
 def namespace_of(context: PluginContext, absent: str, empty: str) -> str:
-    """Returns a plugin's namespace.
+    """Returns a plugin's namespace: `absent` without `<robotNamespace>`, `empty` for an empty one.
 
-    Args:
-        context: the plugin's.
-        absent: the namespace without `<robotNamespace>`; `MODEL` is the model's name.
-        empty: the one of an empty element.
+    `MODEL` is the model's name.
     """
     given = context.given_namespace
     found = absent if given is None else given or empty
@@ -37,8 +34,7 @@ def namespace_of(context: PluginContext, absent: str, empty: str) -> str:
 def topic_in(namespace: str, name: str) -> str:
     """Returns a topic's full name; a name that begins with a slash ignores the namespace.
 
-    Raises:
-        DescriptionError: for what ROS takes for no name.
+    Raises DescriptionError for what ROS takes for no name.
     """
     full = rospy.names.ns_join(namespace, name) if namespace else name
     plain = "/".join(filter(None, full.split("/")))
@@ -97,13 +93,8 @@ class Topic(Shared):
         newcomers: "Newcomers | None" = None,
     ) -> None:
         self._publisher = rospy.Publisher(
-            name,
-            kind,
-            subscriber_listener=newcomers,
-            queue_size=queue,
-            latch=latch,
-            tcp_nodelay=True,
-        )
+            name, kind, subscriber_listener=newcomers, tcp_nodelay=True, latch=latch, queue_size=queue
+        )  # fmt: skip
 
     @property
     def is_heard(self) -> bool:
@@ -151,20 +142,14 @@ class Newcomers(rospy.SubscribeListener):
 class SensorTopics(Shared):
     """The topics of one sensor, which measures while one of them has subscribers.
 
-    Args:
-        context: the plugin's.
-        rate: in Hz of simulated time; 0 is every step.
-        measure: takes a measurement at the given time [ns] and publishes it.
-        at_once: whether a new subscriber gets a measurement at once.
+    `rate` is in Hz of simulated time; 0 is every step. `measure` publishes a measurement at a time [ns]; with
+    `at_once` a new subscriber gets one at once.
     """
 
     def __init__(
-        self,
-        context: PluginContext,
-        rate: float,
-        measure: Callable[[int], None],
+        self, context: PluginContext, rate: float, measure: Callable[[int], None],
         at_once: bool = True,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._context = context
         self._waking: list[Topic] = []
         self._clock = context.clock(rate, measure, self.is_heard, at_once)
@@ -229,25 +214,16 @@ class SensorTopic(Shared):
 
 @dataclass(frozen=True)
 class TopicSource:
-    """Where the plugins of a library publish (docs/contract/sensors.md 0.2), and what they say there.
-
-    Attributes:
-        message: Type of the messages.
-        topic: Its name without the element `tag`; "" if that is required.
-        empty: The namespace of an empty `<robotNamespace>`; MODEL is the model's name.
-        absent: The one without the element.
-        tag: The element with the topic's name.
-        rate: The element with the plugin's own rate, and the rate without it [Hz].
-        read: Returns what a message says, by the fields of the measurement; raises ValueError for a message
-            that can't be read. None if tasks can't see it.
-    """
+    """Where the plugins of a library publish (docs/contract/sensors.md 0.2), and what they say there."""
 
     message: type
-    topic: str = ""
-    empty: str = "/"
-    absent: str = ""
-    tag: str = "topicName"
-    rate: tuple[str, float] = ("", 0.0)
+    topic: str = ""  # its name without the element `tag`; "" if that is required
+    empty: str = "/"  # the namespace of an empty `<robotNamespace>`; MODEL is the model's name
+    absent: str = ""  # the one without the element
+    tag: str = "topicName"  # the element with the topic's name
+    rate: tuple[str, float] = ("", 0.0)  # the element with the plugin's own rate; without it [Hz]
+    # Returns what a message says, by the fields of the measurement; raises ValueError for one that can't be
+    # read. None if tasks can't see it.
     read: Callable[[Any], Mapping[str, Any]] | None = None
 
 

@@ -7,13 +7,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from bullet_gazebo.common.messages import to_time
-from bullet_gazebo.plugins.drive_topics import (
-    DrivePlugin,
-    WheeledPlugin,
-    Wheels,
-    choice,
-    length,
-)
+from bullet_gazebo.plugins.drive_topics import DrivePlugin, WheeledPlugin, Wheels, choice, length
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import MODEL, namespace_of
 from robot_sim.drives.odometry import UNKNOWN, OdometrySample

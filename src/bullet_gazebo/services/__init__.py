@@ -28,11 +28,8 @@ def existing(found: Found | None, fault: str) -> Found:
 def offer(name: str, kind: Any, act: Callable[[Any], str | genpy.Message]) -> rospy.Service:
     """Offers a service whose answer has `success` and `status_message`.
 
-    Args:
-        name: of the service.
-        kind: its type; the name of the type begins the text of a refusal.
-        act: carries out a request and returns the answer, or the text of one that has only that; or raises
-            ServiceRefused.
+    `act` carries out a request and returns the answer, or the text of one that has only that; or raises
+    ServiceRefused, whose text follows the name of the service's type.
     """
 
     def handle(request: genpy.Message) -> genpy.Message:

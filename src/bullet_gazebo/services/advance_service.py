@@ -106,8 +106,7 @@ class Mailboxes:
     ) -> tuple[list[str], list[str]]:
         """Waits until a node is connected to its topics, as far as this process has them too.
 
-        Returns:
-            The subscriptions that this process publishes, and the publications that it subscribes to.
+        Returns the subscriptions that this process publishes, and the publications that it subscribes to.
         """
         deadline = time.monotonic() + CONNECTING
         ways = ((subscriptions, True), (publications, False))
@@ -190,18 +189,18 @@ class AdvanceService:
             elif request.physics == AdvanceWorldRequest.UNPAUSE_PHYSICS:
                 with self._journal.command("unpause"):
                     self._sim.unpause()
-            passed = self._advance_recorded(request.ticks) if request.ticks else self._advance(0)
+            if request.ticks:
+                with self._journal.command("advance") as entry:
+                    passed = self._advance(request.ticks)
+                    entry.data = b"%d" % passed  # repeated without the messages that ended it
+            else:
+                passed = self._advance(0)
             with self._sim.lock:
                 return AdvanceWorldResponse(
-                    success=not faults,
-                    status_message="; ".join(faults),
-                    paused=self._sim.paused,
-                    ticks=passed,
-                    now=to_time(self._sim.now),
-                    time_step=self._sim.world.time_step,
-                    messages=mailbox.take(),
-                    others=self._mailboxes.nodes_to_wake(),
-                )
+                    success=not faults, status_message="; ".join(faults), paused=self._sim.paused,
+                    ticks=passed, now=to_time(self._sim.now), time_step=self._sim.world.time_step,
+                    messages=mailbox.take(), others=self._mailboxes.nodes_to_wake(),
+                )  # fmt: skip
 
     def _deliver(self, request: AdvanceWorldRequest) -> list[str]:
         """Hands over what the node has published; a message that can't be read is left out, as by rospy."""
@@ -212,12 +211,6 @@ class AdvanceService:
             except genpy.DeserializationError as fault:
                 faults.append(f"AdvanceWorld: a message on {message.topic} can't be read: {fault}")
         return faults
-
-    def _advance_recorded(self, ticks: int) -> int:
-        with self._journal.command("advance") as entry:
-            passed = self._advance(ticks)
-            entry.data = b"%d" % passed  # repeated without the messages that ended it
-        return passed
 
     def _advance(self, ticks: int) -> int:
         """Returns how many ticks have passed; after each slice services that wait get their turn."""

@@ -21,12 +21,7 @@ from bullet_gazebo.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.services import NO_MODEL, existing, offer
 from file_access.content import MAX_BYTES, FileError, read_file
 from file_access.xml_text import decode, parse
-from robot_sim.physics.description import (
-    DescriptionError,
-    Light,
-    ModelDescription,
-    Plugin,
-)
+from robot_sim.physics.description import DescriptionError, Light, ModelDescription, Plugin
 from robot_sim.physics.files.elements import shown
 from robot_sim.physics.files.reading import LoadProgress, Reading, Resources
 from robot_sim.physics.files.world_file import (

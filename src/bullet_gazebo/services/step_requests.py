@@ -10,12 +10,7 @@ from typing import NamedTuple, TypeVar
 import rospy
 from bullet_gazebo_msgs.srv import PrepareStepRequest, StepWorldRequest
 
-from bullet_gazebo.common.messages import (
-    bad_number,
-    check_numbers,
-    from_pose_msg,
-    from_twist_msg,
-)
+from bullet_gazebo.common.messages import bad_number, check_numbers, from_pose_msg, from_twist_msg
 from file_access.text import did_you_mean
 from robot_sim.control.controllers.base import Controller, Input
 from robot_sim.control.errors import ControlError, faults
@@ -90,12 +85,7 @@ class Addresses:
         ]
 
     def commanded(self, controllers: Sequence[str], joints: Sequence[str]) -> Commanded:
-        """Finds the running controllers and the free joints of these names.
-
-        Args:
-            controllers: plain names, or /namespace/name.
-            joints: plain names, or model::joint.
-        """
+        """Finds running controllers, /namespace/name or plain, and free joints, model::joint or plain."""
         found: dict[int, Controller] = {}  # by identity: a user's class may not be hashable
         ports: list[tuple[Input, int | slice]] = []
         size = 0

@@ -13,19 +13,7 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 import rospy
-from bullet_gazebo_msgs.srv import (
-    PreparedStep,
-    PreparedStepRequest,
-    PreparedStepResponse,
-    PrepareStep,
-    PrepareStepRequest,
-    PrepareStepResponse,
-    SetLinkFriction,
-    SetLinkFrictionRequest,
-    StepWorld,
-    StepWorldRequest,
-    StepWorldResponse,
-)
+from bullet_gazebo_msgs import srv
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
@@ -62,8 +50,9 @@ class _Prepared:
     """What a handle stands for."""
 
     def __init__(
-        self, sim: Simulator, sensing: Sensing, addresses: Addresses, request: PrepareStepRequest
-    ) -> None:
+        self, sim: Simulator, sensing: Sensing, addresses: Addresses,
+        request: srv.PrepareStepRequest,
+    ) -> None:  # fmt: skip
         query = query_of(request)
         for name in request.sensors:
             find_sensor(sim, sensing, name)
@@ -73,7 +62,7 @@ class _Prepared:
         self.models = list(self.reader.read(stepped=False).models)
         self.sensors = tuple(request.sensors)
 
-    def check(self, request: PreparedStepRequest) -> None:
+    def check(self, request: srv.PreparedStepRequest) -> None:
         """Raises ControlError if the request doesn't fit the prepared names."""
         commanded, commands = self.commanded, request.commands
         if not 0 <= request.ticks <= MAX_TICKS:
@@ -107,18 +96,11 @@ class StepService:
     """Offers the services; a request is checked as a whole before anything is done."""
 
     def __init__(
-        self,
-        sim: Simulator,
-        sensing: Sensing,
-        watchdog: AbstractContextManager[object],
+        self, sim: Simulator, sensing: Sensing, watchdog: AbstractContextManager[object],
         one_at_a_time: threading.Lock,
-    ) -> None:
-        """
-        Args:
-            sim: the simulator, in lock-step.
-            sensing: its sensors.
-            watchdog: a fault in its block ends the node.
-            one_at_a_time: keeps the ticks of other requests out of a request's ticks.
+    ) -> None:  # fmt: skip
+        """A fault in a block of `watchdog` ends the node; `one_at_a_time` keeps the ticks of other requests
+        out of a request's.
         """
         self._sim, self._sensing = sim, sensing
         self._watchdog = watchdog
@@ -136,31 +118,31 @@ class StepService:
         # Contacts are those of the last tick, until a reset or a placing makes them void.
         self._knows_contacts = False
         self._services = [
-            rospy.Service("~prepare_step", PrepareStep, self._prepare),
-            rospy.Service("~prepared_step", PreparedStep, self._step_prepared),
-            rospy.Service("~step_world", StepWorld, self._step),
-            offer("~set_link_friction", SetLinkFriction, self._set_friction),
+            rospy.Service("~prepare_step", srv.PrepareStep, self._prepare),
+            rospy.Service("~prepared_step", srv.PreparedStep, self._step_prepared),
+            rospy.Service("~step_world", srv.StepWorld, self._step),
+            offer("~set_link_friction", srv.SetLinkFriction, self._set_friction),
         ]
 
-    def _prepare(self, request: PrepareStepRequest) -> PrepareStepResponse:
+    def _prepare(self, request: srv.PrepareStepRequest) -> srv.PrepareStepResponse:
         with self._sim.lock:
             try:
                 prepared = _Prepared(self._sim, self._sensing, self._addresses(), request)
             except (ControlError, UnknownName) as error:
-                return PrepareStepResponse(status_message=f"PrepareStep: {error}")
+                return srv.PrepareStepResponse(status_message=f"PrepareStep: {error}")
             if len(self._prepared) >= MOST_HANDLES:
                 del self._prepared[next(iter(self._prepared))]
             self._count += 1
             handle = self.series << COUNTED | self._count % 2**COUNTED
             self._prepared[handle] = prepared
-            return PrepareStepResponse(
+            return srv.PrepareStepResponse(
                 success=True,
                 handle=handle,
                 joints=prepared.addresses.joint_names,
                 models=prepared.models,
             )
 
-    def _step_prepared(self, request: PreparedStepRequest) -> PreparedStepResponse:
+    def _step_prepared(self, request: srv.PreparedStepRequest) -> srv.PreparedStepResponse:
         sim = self._sim
         with self._one_at_a_time, sim.lock:
             sim.await_holds()
@@ -169,7 +151,8 @@ class StepService:
                 del self._prepared[request.handle]  # it would keep deleted models
                 prepared = None
             if prepared is None or not prepared.commanded.is_ready:
-                return PreparedStepResponse(False, True, sim.now, "PreparedStep: stale", [], [], [])
+                stale = "PreparedStep: stale"
+                return srv.PreparedStepResponse(stale=True, now=sim.now, status_message=stale)
             commanded = prepared.commanded
             try:
                 prepared.check(request)
@@ -189,7 +172,7 @@ class StepService:
                 return self._refused(f"the ticks are done, but meanwhile {error}")
             readers = self._readers if prepared.sensors else None
             sensors = [to_reading(*taken) for taken in readers.read()] if readers else []
-            return PreparedStepResponse(True, False, sim.now, "", numbers, contacts, sensors)
+            return srv.PreparedStepResponse(True, False, sim.now, "", numbers, contacts, sensors)
 
     def _sense(self, names: tuple[str, ...]) -> None:
         """Lets these sensors measure from now on, and no others."""
@@ -240,12 +223,11 @@ class StepService:
         ):
             raise UnknownName("robots or models have come or gone")
 
-    def _refused(self, fault: str) -> PreparedStepResponse:
-        return PreparedStepResponse(
-            False, False, self._sim.now, f"PreparedStep: {fault}", [], [], []
-        )
+    def _refused(self, fault: str) -> srv.PreparedStepResponse:
+        text = f"PreparedStep: {fault}"
+        return srv.PreparedStepResponse(now=self._sim.now, status_message=text)
 
-    def _step(self, request: StepWorldRequest) -> StepWorldResponse:
+    def _step(self, request: srv.StepWorldRequest) -> srv.StepWorldResponse:
         with self._one_at_a_time, self._sim.lock:
             self._sim.await_holds()
             try:
@@ -279,22 +261,22 @@ class StepService:
             self._current = Addresses(self._sim)
         return self._current
 
-    def _begin(self, request: StepWorldRequest, plan: StepPlan) -> None:
+    def _begin(self, request: srv.StepWorldRequest, plan: StepPlan) -> None:
         sim = self._sim
-        if request.reset != StepWorldRequest.NONE or plan.placed_models or plan.placed_joints:
+        if request.reset != srv.StepWorldRequest.NONE or plan.placed_models or plan.placed_joints:
             self._knows_contacts = False
             with sim.moves.as_one():
                 self._place(request, plan)
         plan.commanded.send(list(request.commands))
         plan.commanded.hold(request.joint_commands)
 
-    def _place(self, request: StepWorldRequest, plan: StepPlan) -> None:
+    def _place(self, request: srv.StepWorldRequest, plan: StepPlan) -> None:
         sim = self._sim
-        if request.reset != StepWorldRequest.NONE:
+        if request.reset != srv.StepWorldRequest.NONE:
             if request.seed:
                 seed_random_numbers(request.seed, tell=False)
                 sim.reseed(request.seed)
-            sim.reset(everything=request.reset == StepWorldRequest.SIMULATION)
+            sim.reset(everything=request.reset == srv.StepWorldRequest.SIMULATION)
         for model, pose, twist in plan.placed_models:
             sim.place_model(model, pose, twist)
         for model, (positions, velocities) in plan.placed_joints.items():
@@ -329,10 +311,10 @@ class StepService:
         commanded.hold(of_joints)
         self._sim.advance(ticks, hold_on)
 
-    def _answer(self, **fields: object) -> StepWorldResponse:
+    def _answer(self, **fields: object) -> srv.StepWorldResponse:
         sim, addresses = self._sim, self._addresses()
         joints = addresses.joints
-        return StepWorldResponse(
+        return srv.StepWorldResponse(
             sim_time=sim.sim_time,
             joint_states=JointState(
                 header=Header(stamp=to_time(sim.now)),
@@ -344,7 +326,7 @@ class StepService:
             **fields,
         )
 
-    def _set_friction(self, request: SetLinkFrictionRequest) -> str:
+    def _set_friction(self, request: srv.SetLinkFrictionRequest) -> str:
         with self._sim.lock:
             found = existing(self._sim.world.link(request.link_name), NO_LINK)
             try:

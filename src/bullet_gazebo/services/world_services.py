@@ -27,16 +27,12 @@ from robot_sim.simulator import Simulator
 
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 10.0  # [s]; time is counted in nanoseconds
 FIELDS = {  # ODEPhysics: our name
-    "auto_disable_bodies": "auto_disable_bodies",
-    "sor_pgs_precon_iters": "precon_iterations",
-    "sor_pgs_iters": "iterations",
-    "sor_pgs_w": "sor",
+    "auto_disable_bodies": "auto_disable_bodies", "sor_pgs_precon_iters": "precon_iterations",
+    "sor_pgs_iters": "iterations", "sor_pgs_w": "sor",
     "contact_surface_layer": "contact_surface_layer",
-    "contact_max_correcting_vel": "contact_max_correcting_vel",
-    "cfm": "cfm",
-    "erp": "erp",
+    "contact_max_correcting_vel": "contact_max_correcting_vel", "cfm": "cfm", "erp": "erp",
     "max_contacts": "max_contacts",
-}
+}  # fmt: skip
 PARAMETERS = [
     Parameter("time_step", "double", 0.001, 0.0, 10.0),
     Parameter("max_update_rate", "double", 60.0, 0.0, 1000.0),
@@ -250,12 +246,9 @@ class WorldControl:
     """
 
     def __init__(
-        self,
-        sim: Simulator,
-        watchdog: AbstractContextManager[object],
-        more: Mapping[str, Callable[[], None]],
-        journal: WorldJournal | None = None,
-    ) -> None:
+        self, sim: Simulator, watchdog: AbstractContextManager[object],
+        more: Mapping[str, Callable[[], None]], journal: WorldJournal | None = None,
+    ) -> None:  # fmt: skip
         """A fault in a block of `watchdog` ends the node. `journal` records the commands, but for those of
         `more`, which don't touch the world.
         """
@@ -263,20 +256,14 @@ class WorldControl:
         self._sim = sim
         self._watchdog = watchdog
         self._commands = {
-            "pause": sim.pause,
-            "unpause": sim.unpause,
-            "reset": sim.reset_simulation,
-            "reset_models": sim.reset_world,
-            "reset_time": sim.reset_time,
-            **more,
-        }
+            "pause": sim.pause, "unpause": sim.unpause, "reset": sim.reset_simulation,
+            "reset_models": sim.reset_world, "reset_time": sim.reset_time, **more,
+        }  # fmt: skip
 
     def answer(self, *arguments: object) -> Answer:
-        """Runs a command; returns code (1 is success), text, ticks done.
+        """Runs a command, for "step" with a number of ticks; returns code (1 is success), text, ticks done.
 
-        Args:
-            arguments: the command; for "step" also the number of ticks, 1 by default. XML-RPC has no
-                signatures: any number of arguments may come, of any of its types.
+        XML-RPC has no signatures: any number of arguments may come, of any of its types.
         """
         if not 1 <= len(arguments) <= 2:
             return _refused(

@@ -17,27 +17,19 @@ from ros_calls.service import ServiceFailed
 from ros_calls.waiting import wait_until
 
 SPEEDS = {
-    "0.1 ×": 0.1,
-    "0.25 ×": 0.25,
-    "0.5 ×": 0.5,
-    "1 ×": 1.0,
-    "2 ×": 2.0,
-    "5 ×": 5.0,
+    "0.1 ×": 0.1, "0.25 ×": 0.25, "0.5 ×": 0.5, "1 ×": 1.0, "2 ×": 2.0, "5 ×": 5.0,
     "unlimited": 0.0,
-}
+}  # fmt: skip
 OTHER = "other"
 MOST_STEPS = 100_000
 STILL = 0.005  # of real time; no one sees a slower pace
 ONLY_STEPS = "a world in lock-step moves only by steps: a client's, or these here"
-
-
 MANAGER = "controller_manager"
 SINGLE, GROUP = "JointPositionController", "JointGroupPositionController"
 TRAJECTORY = "JointTrajectoryController"
 KINDS = {SINGLE: COMMANDS["Float64"], GROUP: COMMANDS["Float64MultiArray"]}
 MOVE_TIME = 0.5  # [s of simulated time] that a trajectory to the slider's position takes
 CONNECTING = 5.0  # [s]
-
 
 Attempt = Callable[[Callable[[], None]], None]
 """Carries out a click, and shows what went wrong."""
@@ -185,8 +177,7 @@ class Controllers:
     def command(self, holder: Holder, joint: str, positions: dict[str, float]) -> None:
         """Sends `joint` to its position [rad, m] in `positions`, which has those of all other joints, too.
 
-        Raises:
-            ServiceFailed: the controller doesn't subscribe.
+        Raises ServiceFailed if the controller doesn't subscribe.
         """
         kind = KINDS.get(holder.kind)
         message = kind.message_type if kind else JointTrajectory

@@ -13,13 +13,7 @@ import rospy
 import viser
 from bullet_gazebo_msgs.msg import SceneSensor
 from PIL import Image
-from sensor_msgs.msg import (
-    CompressedImage,
-    LaserScan,
-    PointCloud,
-    PointCloud2,
-    Range,
-)
+from sensor_msgs.msg import CompressedImage, LaserScan, PointCloud, PointCloud2, Range
 from sensor_msgs.msg import Image as ImageMessage
 
 from bullet_gazebo.common.messages import from_pose_msg
@@ -42,21 +36,13 @@ FAULTS = (
 
 
 class Drawing(NamedTuple):
-    """What a message shows, in its own axes.
+    """What a message shows, in its own axes. `faces` is what rays have passed."""
 
-    Attributes:
-        points: (n, 3) [m].
-        colours: (n, 3) of uint8, if the points have any.
-        faces: (m, 3) indices of 0, the origin, and of points counted from 1: what rays have passed.
-        picture: (height, width, 3) of uint8.
-        text: of a message that has no place in the scene.
-    """
-
-    points: np.ndarray
-    colours: np.ndarray | None = None
-    faces: np.ndarray | None = None
-    picture: np.ndarray | None = None
-    text: str = ""
+    points: np.ndarray  # (n, 3) [m]
+    colours: np.ndarray | None = None  # (n, 3) of uint8, if the points have any
+    faces: np.ndarray | None = None  # (m, 3) indices of 0, the origin, and of points counted from 1
+    picture: np.ndarray | None = None  # (height, width, 3) of uint8
+    text: str = ""  # of a message that has no place in the scene
 
 
 def draw_scan(message: LaserScan) -> Drawing:
@@ -156,12 +142,7 @@ def drawn_as(kind: str) -> tuple[type, Callable[[Any], Drawing]] | None:
 
 
 class SensorPanel:
-    """A checkbox for each topic. For one thread; viser and rospy only leave values and messages.
-
-    Args:
-        server: of the page; the caller's tab is open.
-        below: the scene node above all models.
-    """
+    """A checkbox for each topic, in the open tab. For one thread; viser and rospy only leave messages."""
 
     def __init__(self, server: viser.ViserServer, below: str) -> None:
         self._server, self._below = server, below

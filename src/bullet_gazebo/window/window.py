@@ -238,8 +238,7 @@ class TrainingTab:
 def show(address: Address, browser: bool) -> None:
     """Serves the page until the node is shut down; with `browser` opens it where there is a display.
 
-    Raises:
-        PortInUse: another process was quicker.
+    Raises PortInUse if another process was quicker.
     """
     server = serve(address, TITLE, tuple(CAMERA.eye.tolist()), CAMERA.target)
     try:

@@ -166,23 +166,15 @@ class VelocityDrive(Drive):
 
 
 class SensorHandle(Stateful):
-    """A sensor as the controller sees that has it. This one measures nothing, as where no topics are.
-
-    Args:
-        name: of the sensor.
-        frame: that it measures in.
-    """
+    """A sensor as the controller sees that has it. This one measures nothing, as where no topics are."""
 
     def __init__(self, name: str, frame: str) -> None:
         self.name, self.frame = name, frame
         self.value: Any = None  # what it has measured last, if that is known
 
     def begin(self, moved: Callable[[int], None]) -> None:
-        """Measures from now on.
-
-        Args:
-            moved: called with the time [ns] after something other than time has moved bodies, with a fresh
-                `value`.
+        """Measures from now on, and calls `moved` with the time [ns], with a fresh `value`, after something
+        other than time has moved bodies.
         """
 
     def end(self) -> None:
@@ -199,11 +191,7 @@ class RobotHardware(Shared):
     def __init__(
         self, description: RobotDescription, gains: Mapping[str, object] | None = None
     ) -> None:
-        """
-        Args:
-            description: joints and transmissions.
-            gains: the parameters `<ns>/gazebo_ros_control/pid_gains`: joints by name.
-        """
+        """`gains` are the parameters `<ns>/gazebo_ros_control/pid_gains`: joints by name."""
         self.robot = description.robot
         self.interfaces: dict[str, dict[str, JointHandle]] = {}
         for transmission in description.transmissions:
@@ -214,7 +202,11 @@ class RobotHardware(Shared):
         found = {name: j for group in self.interfaces.values() for name, j in group.items()}
         self.joints = {name: found[name] for name in sorted(found)}
         self.effort_joints = self._of(EFFORT)
-        self.drives = self._drives(gains or {})
+        gains = gains or {}
+        self.drives: list[Drive] = [
+            *(PositionDrive(j, drive_pid(gains, j.name)) for j in self._of(POSITION)),
+            *(VelocityDrive(j, drive_pid(gains, j.name)) for j in self._of(VELOCITY)),
+        ]
         self.halted = False
         # By interface, what makes a controller's handles; each raises ControlError for a faulty sensor.
         self.sensors: dict[str, list[Callable[[], SensorHandle]]] = {IMU: [], FORCE_TORQUE: []}
@@ -304,12 +296,6 @@ class RobotHardware(Shared):
     def _of(self, interface: str) -> list[JointHandle]:
         joints = self.interfaces.get(interface, {})
         return [joints[name] for name in sorted(joints)]
-
-    def _drives(self, gains: Mapping[str, object]) -> list[Drive]:
-        return [
-            *(PositionDrive(j, drive_pid(gains, j.name)) for j in self._of(POSITION)),
-            *(VelocityDrive(j, drive_pid(gains, j.name)) for j in self._of(VELOCITY)),
-        ]
 
 
 def drive_pid(gains: Mapping[str, object], joint: str) -> Pid | None:

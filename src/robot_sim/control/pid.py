@@ -41,8 +41,7 @@ class Gains:
     def from_params(cls, params: object, place: str) -> "Gains":
         """Reads gains from a parameter tree; `place` is its name, for errors.
 
-        Raises:
-            ControlError: if `p` is missing or a gain isn't a finite number.
+        Raises ControlError if `p` is missing or a gain isn't a finite number.
         """
         if not isinstance(params, Mapping) or "p" not in params:
             raise ControlError(f"No p gain specified for pid. Namespace: {place}")

@@ -160,14 +160,8 @@ class Axis(Stateful):
     """
 
     __slots__ = (
-        "desired",
-        "joint",
-        "position_error",
-        "pid",
-        "velocity_error",
-        "spline",
-        "velocity_ff",
-    )
+        "desired", "joint", "position_error", "pid", "velocity_error", "spline", "velocity_ff",
+    )  # fmt: skip
 
     def __init__(
         self, joint: JointHandle, pid: Pid | None = None, velocity_ff: float = 0.0

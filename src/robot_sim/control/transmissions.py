@@ -57,8 +57,7 @@ class RobotDescription:
 def read_description(text: str) -> RobotDescription:
     """Reads URDF text (docs/contract/gazebo_ros_control.md 6.3, docs/contract/ros_control.md 3.0 and 5).
 
-    Raises:
-        ControlError: if it isn't XML, or a transmission has an unknown interface.
+    Raises ControlError if it isn't XML, or a transmission has an unknown interface.
     """
     try:
         robot = parse(text)
@@ -84,8 +83,7 @@ def read_description(text: str) -> RobotDescription:
 def distance(robot: Element, joint: str, other: str) -> float:
     """Returns how far two joints are from each other [m], as if none above them were turned.
 
-    Raises:
-        ControlError: if the joints above one of them form a loop, or an origin is no three numbers.
+    Raises ControlError if the joints above one of them form a loop, or an origin is no three numbers.
     """
     return math.dist(_place(robot, joint), _place(robot, other))
 
@@ -113,8 +111,7 @@ def _place(robot: Element, joint: str) -> list[float]:
 def wheel_radius(robot: Element, joint: str) -> float:
     """Returns the radius [m] of the cylinder or sphere with which the child of a joint collides.
 
-    Raises:
-        ControlError: if it has neither.
+    Raises ControlError if it has neither.
     """
     child = robot.find(f"joint[@name='{joint}']/child")
     link = "" if child is None else child.get("link", "")

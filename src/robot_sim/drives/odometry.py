@@ -70,11 +70,7 @@ class DeadReckoning(Stateful):
 
 
 class WheelOdometry(Stateful):
-    """Dead reckoning of two wheels or sides, step by step.
-
-    Args:
-        separation: of the wheels [m].
-    """
+    """Dead reckoning of two wheels or sides with a separation [m], step by step."""
 
     def __init__(self, separation: float) -> None:
         self._separation = separation

@@ -10,13 +10,7 @@ NEAR = 0.01  # [m/s]; of its target a wheel counts as there
 
 
 def side_speeds(linear: float, angular: float, separation: float) -> tuple[float, float]:
-    """Returns the speeds [m/s] of the left and right wheels.
-
-    Args:
-        linear: ahead [m/s].
-        angular: to the left [rad/s].
-        separation: of the wheels [m].
-    """
+    """Returns the speeds [m/s] of the left and right wheels for a velocity [m/s, rad/s], anticlockwise."""
     across = 0.5 * angular * separation
     return linear - across, linear + across
 
@@ -35,13 +29,7 @@ class Ramp(Stateful):
     def next(
         self, targets: Sequence[float], measured: Sequence[float], seconds: float
     ) -> list[float]:
-        """Returns the speeds [m/s] to issue.
-
-        Args:
-            targets: speeds of the wheels [m/s].
-            measured: their present speeds [m/s].
-            seconds: since the last call [s].
-        """
+        """Returns the speeds to issue, given the wanted and the measured ones [m/s], each some time [s]."""
         gaps = [target - speed for target, speed in zip(targets, measured, strict=True)]
         if self._acceleration <= 0.0 or any(abs(gap) < NEAR for gap in gaps):
             return list(targets)
@@ -61,14 +49,7 @@ class SpeedLimits:
     jerk: tuple[float, float] | None = None
 
     def limited(self, speed: float, last: float, before: float, dt: float) -> float:
-        """Returns the speed to command instead of `speed`.
-
-        Args:
-            speed: the wanted one.
-            last: the last one that was commanded.
-            before: the one before.
-            dt: time between two commands [s].
-        """
+        """Returns the speed to command instead of `speed`; `last` was `dt` [s] ago, `before` twice that."""
         if self.jerk is not None:
             low, high = self.jerk
             change = last - before
@@ -93,17 +74,11 @@ class Steering:
 
 @dataclass(frozen=True)
 class SteeredWheels:
-    """Four wheels that steer about pivots at the corners of a rectangle around the vehicle's centre [m].
+    """Four wheels that steer about pivots at the corners of a rectangle around the vehicle's centre."""
 
-    Args:
-        base: from the rear pivots to the front ones.
-        track: between the pivots of an axle.
-        offset: from a pivot to its wheel, outwards.
-    """
-
-    base: float
-    track: float
-    offset: float = 0.0
+    base: float  # [m] from the rear pivots to the front ones
+    track: float  # [m] between the pivots of an axle
+    offset: float = 0.0  # [m] from a pivot to its wheel, outwards
 
     @property
     def _pivots(self) -> list[tuple[float, float]]:

@@ -20,7 +20,6 @@ BALL = "ball"
 MOVABLE = ("revolute", "continuous", "prismatic")
 UNMOVED = 1e9  # [kg, kg m²]; stands for infinity in an engine
 
-
 Color = tuple[float, float, float, float]
 """Red, green, blue, alpha: 0 to 1."""
 
@@ -59,20 +58,14 @@ class Inertia:
 class Mesh:
     """Checked triangles, of a file. Two meshes are equal if their files have the same contents.
 
-    Attributes:
-        vertices: (n, 3), finite [the file's unit; metres for COLLADA].
-        faces: (m, 3), indices of vertices.
-        hulls: points (k, 3) of the convex bodies that a moving mesh collides by: one for each object of the
-            file. A height map has none.
-        digest: of the arrays.
-        in_pieces: whether `hulls` are solid pieces of a concave mesh.
+    A moving mesh collides by the convex `hulls`: one for each object of the file; a height map has none.
     """
 
-    vertices: np.ndarray
-    faces: np.ndarray
-    hulls: tuple[np.ndarray, ...]
-    digest: str
-    in_pieces: bool = False
+    vertices: np.ndarray  # (n, 3), finite [the file's unit; metres for COLLADA]
+    faces: np.ndarray  # (m, 3), indices of vertices
+    hulls: tuple[np.ndarray, ...]  # points (k, 3) of each
+    digest: str  # of the arrays
+    in_pieces: bool = False  # whether `hulls` are solid pieces of a concave mesh
 
     @property
     def is_heightmap(self) -> bool:
@@ -119,9 +112,7 @@ class Link:
     collisions: list[Shape] = field(default_factory=list)
     visuals: list[Shape] = field(default_factory=list)
     gravity: bool = True  # whether gravity acts on it
-    says_gravity: bool = (
-        False  # whether a URDF's <gazebo> says so: then it counts where it is lumped
-    )
+    says_gravity: bool = False  # by a URDF's <gazebo>: then it counts where it is lumped
     self_collide: bool = False  # also with links of its own model that it isn't joined to
     kinematic: bool = False  # moved by services alone; true only of a free root link
     decay: tuple[float, float] | None = None  # of linear and angular velocity, the share of a step
@@ -196,20 +187,15 @@ class Joint:
 class Mimic:
     """What makes a joint follow another one: its position is multiplier · the other's + offset [rad, m].
 
-    Attributes:
-        driver: the joint that it follows.
-        effort: the most that moves it [N m, N].
-        pid: the parameters of a PID that moves it instead of a gear: "" for those that joints with gains
-            have anyway, None for a gear.
-        sensitiveness: the error [rad, m] below which the PID leaves it alone.
+    A PID moves it instead of a gear if `pid` names parameters, or is "": those of joints with gains anyway.
     """
 
-    driver: str
+    driver: str  # the joint that it follows
     multiplier: float = 1.0
     offset: float = 0.0
-    effort: float = math.inf
+    effort: float = math.inf  # [N m, N]; the most that moves it
     pid: str | None = None
-    sensitiveness: float = 0.0
+    sensitiveness: float = 0.0  # [rad, m]; the error below which the PID leaves it alone
 
 
 @dataclass(frozen=True)
@@ -282,40 +268,30 @@ class SavedMotion(NamedTuple):
 class ModelDescription:
     """A model: links and joints in document order.
 
-    Attributes:
-        root: the link that no joint carries.
-        root_pose: of the root link in the model.
-        world_joints: joints that fix the root link to the world.
-        foot: how many joints come before the one to the world, if `joints` hasn't got it.
-        left_out: plugins and the like, which nothing simulates.
-        stand_ins: models of Gazebo's database that aren't installed, in whose place simpler ones stand.
-        islands: links of a static model that no joint connects with the root, and their poses seen from it.
-        nested: models in it, by their names with all outer ones, and their poses in it.
-        mimics: what makes joints follow others, by the follower's name, drivers before their followers.
-        lumped: links that a fixed joint has made part of another one: that link, and their poses in it.
-        initial_pose: where the file puts the model.
-        start: how it begins, if not there.
-        script: of an actor: where it is at a time [s], if it was at a pose before it started.
+    `islands` are links of a static model that no joint connects with the root. `lumped` are links that a
+    fixed joint has made part of another one: that link, and their poses in it. Models of Gazebo's database
+    that aren't installed have `stand_ins`.
     """
 
     name: str
     links: dict[str, Link]
     joints: dict[str, Joint]
-    root: str
-    root_pose: Pose = Pose()
-    world_joints: list[str] = field(default_factory=list)
-    foot: int = 0
+    root: str  # the link that no joint carries
+    root_pose: Pose = Pose()  # of the root link in the model
+    world_joints: list[str] = field(default_factory=list)  # that fix the root link to the world
+    foot: int = 0  # how many joints come before the one to the world, if `joints` hasn't got it
     plugins: list[Plugin] = field(default_factory=list)
     sensors: list[Sensor] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)  # plugins and the like, not simulated
     stand_ins: list[str] = field(default_factory=list)
-    islands: dict[str, Pose] = field(default_factory=dict)
-    nested: dict[str, Pose] = field(default_factory=dict)
-    mimics: dict[str, Mimic] = field(default_factory=dict)
+    islands: dict[str, Pose] = field(default_factory=dict)  # seen from the root
+    nested: dict[str, Pose] = field(default_factory=dict)  # models in it, by their whole names
+    mimics: dict[str, Mimic] = field(default_factory=dict)  # by follower, drivers before followers
     lumped: dict[str, tuple[str, Pose]] = field(default_factory=dict)
-    initial_pose: Pose = Pose()
-    start: SavedMotion | None = None
+    initial_pose: Pose = Pose()  # where the file puts the model
+    start: SavedMotion | None = None  # how it begins, if not there
+    # Of an actor: where it is at a time [s], if it was at a pose before it started.
     script: Callable[[float, Pose], Pose] | None = None
     static: bool = False
 

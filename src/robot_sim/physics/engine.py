@@ -11,7 +11,6 @@ from robot_sim.physics.pose import Pose, Vector
 Twist = tuple[Vector, Vector]
 """Linear [m/s] and angular [rad/s] velocity in world axes."""
 
-
 FURTHEST = math.pi
 """The largest motion [rad, m] in a step of a joint, or of a free base that carries joints. Beyond half a turn
 a rotation has no direction, and explicit terms, such as centrifugal forces, add energy."""
@@ -155,8 +154,7 @@ class Engine(ABC):
     def load(self, description: ModelDescription, pose: Pose) -> Body:
         """Adds a model with its root link's frame at `pose`, its joints at zero.
 
-        Raises:
-            DescriptionError: if the engine can't take it.
+        Raises DescriptionError if the engine can't take it.
         """
 
     def load_all(
@@ -183,15 +181,9 @@ class Engine(ABC):
 
     @abstractmethod
     def fasten(self, first: LinkOf, second: LinkOf, pose: Pose) -> int:
-        """Fixes a link of one body to a link of another one; the two don't collide any more.
+        """Keeps a link of a body at `pose`, seen from another one's; the two don't collide any more.
 
-        Args:
-            first: the first one.
-            second: the second one.
-            pose: where its frame is kept, seen from the frame of the first one.
-
-        Returns:
-            The number by which to unfasten it. It ends with either of the bodies.
+        Returns the number by which to unfasten it. It ends with either of the bodies.
         """
 
     @abstractmethod
@@ -219,11 +211,7 @@ class Engine(ABC):
         """Integrates the world by one time step."""
 
     def forget_contacts(self) -> None:
-        """Forgets contacts of earlier steps, so that an episode depends on nothing before it.
-
-        It is called when an episode begins, before bodies are placed. An engine that keeps no contacts from
-        one step to the next has nothing to do.
-        """
+        """Forgets contacts of earlier steps, before the bodies of a new episode are placed."""
 
     @abstractmethod
     def contacts(self) -> list[Contact]:

@@ -103,11 +103,9 @@ def _check_joint(joint: Joint) -> None:
 
 
 def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose]]:
-    """Returns the model with link frames moved onto their joints.
+    """Returns the model with link frames moved onto their joints; every URDF has that form already.
 
-    Returns:
-        The model, and by link name the original frames as seen from the new ones, where they differ. Every
-        URDF has that form already.
+    And by link name the original frames as seen from the new ones, where they differ.
     """
     if model.static:
         model = rigid(model)

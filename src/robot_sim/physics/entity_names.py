@@ -18,16 +18,11 @@ class Entity(NamedTuple):
 
 
 class EntityNames:
-    """Maps names to what a depth-first search from the world's root finds.
-
-    Attributes:
-        entities: By plain and by scoped name.
-        joints: Joints alone, whatever else has their names.
-    """
+    """Maps names, plain and scoped, to what a depth-first search from the world's root finds."""
 
     def __init__(self) -> None:
         self.entities: dict[str, Entity] = {}
-        self.joints: dict[str, Entity] = {}
+        self.joints: dict[str, Entity] = {}  # joints alone, whatever else has their names
 
     def add(self, model: Model) -> None:
         """Adds a new model. The search finds it last, so existing entries stay."""

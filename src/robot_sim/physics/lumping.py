@@ -160,7 +160,9 @@ def _lump(model: ModelDescription, name: str) -> None:
     parent.self_collide = parent.self_collide or child.self_collide
     parent.kinematic = parent.kinematic or child.kinematic
     parent.decay = child.decay if parent.decay is None else parent.decay
-    parent.inertia = combine(parent.inertia, _moved(child.inertia, joint.pose))
+    own = child.inertia
+    moved = None if own is None else replace(own, com=joint.pose.compose(own.com))
+    parent.inertia = combine(parent.inertia, moved)
     parent.collisions += [_lumped(shape, joint.pose, child.name) for shape in child.collisions]
     parent.visuals += [_lumped(shape, joint.pose, child.name) for shape in child.visuals]
     for other in model.joints.values():
@@ -170,10 +172,6 @@ def _lump(model: ModelDescription, name: str) -> None:
         if link == child.name:
             model.lumped[name] = parent.name, joint.pose.compose(pose)
     model.lumped[child.name] = parent.name, joint.pose
-
-
-def _moved(inertia: Inertia | None, pose: Pose) -> Inertia | None:
-    return None if inertia is None else replace(inertia, com=pose.compose(inertia.com))
 
 
 def _lumped(shape: Shape, pose: Pose, link: str) -> Shape:

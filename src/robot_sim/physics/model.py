@@ -10,10 +10,7 @@ from robot_sim.physics.dynamics import effective_inertias, poses_at_zero
 from robot_sim.physics.engine import FASTEST, Body, Twist
 from robot_sim.physics.loops import closed, in_loops
 from robot_sim.physics.lumping import WORLD
-from robot_sim.physics.pose import (
-    ZERO,
-    Pose,
-)
+from robot_sim.physics.pose import ZERO, Pose
 from robot_sim.state_dict import Shared
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit
@@ -248,11 +245,9 @@ class Model(Shared):
             self.apply_damping(self.time_step)
 
     def calm(self, kept: Mapping[str, float]) -> None:
-        """Calms a robot that has blown up.
+        """Calms a robot that has blown up: joints keep a share of their speed.
 
-        Args:
-            kept: the share of their speed that joints keep, by name. Joints beyond a stop are put onto it,
-                and a free base stops spinning.
+        Joints beyond a stop are put onto it, and a free base stops spinning.
         """
         states = self.joint_states()
         for name, share in kept.items():

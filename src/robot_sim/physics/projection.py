@@ -54,9 +54,7 @@ def _match(model: Model, carriers: list[str], link: str, twist: Twist) -> None:
     _, rest = model.link_state(link)
     gap = np.array(twist[0] + twist[1]) - np.array(rest[0] + rest[1])
     _speed_up(
-        model,
-        carriers,
-        np.linalg.lstsq(_jacobian(model, carriers, link), gap, rcond=1e-9)[0],
+        model, carriers, np.linalg.lstsq(_jacobian(model, carriers, link), gap, rcond=1e-9)[0]
     )
 
 

@@ -36,8 +36,7 @@ def set_link_properties(
 ) -> None:
     """Sets a link's inertia and gravity mode. They have no effect on a static model.
 
-    Raises:
-        PropertyError: if no body can have them; nothing changes then.
+    Raises PropertyError if no body can have them; nothing changes then.
     """
     if not is_positive_definite(inertia):
         raise PropertyError(
@@ -55,8 +54,7 @@ def set_joint_properties(
 ) -> None:
     """Changes a joint's damping, stops and motor, as far as they are given.
 
-    Raises:
-        PropertyError: if no joint can have them; nothing changes then.
+    Raises PropertyError if no joint can have them; nothing changes then.
     """
     if wanted.damping is not None and wanted.damping < 0.0:
         raise PropertyError(f"a damping of {wanted.damping} would drive the joint; it must be >= 0")
@@ -76,8 +74,7 @@ def set_joint_properties(
 def set_link_friction(model: Model, link: str, factor: float) -> None:
     """Multiplies the friction of the file for the collisions of a link by `factor`.
 
-    Raises:
-        PropertyError: if it is negative, or not finite.
+    Raises PropertyError if it is negative, or not finite.
     """
     if not 0.0 <= factor < math.inf:
         raise PropertyError(f"friction of '{link}' must be a factor >= 0, not {factor}")

@@ -90,9 +90,7 @@ class World(Shared):
     def spawn(self, name: str, description: ModelDescription, pose: Pose) -> Model:
         """Adds a model with its frame at `pose`.
 
-        Raises:
-            NameTaken: if there is a model of that name.
-            DescriptionError: if the engine can't take it.
+        Raises NameTaken if there is a model of that name, DescriptionError if the engine can't take it.
         """
         if name in self.models:
             raise NameTaken(name)
@@ -219,8 +217,7 @@ class World(Shared):
     def set_inertia(self, model: Model, link: str, inertia: Inertia) -> None:
         """Gives a link of `model` another inertia; poses and velocities stay.
 
-        Raises:
-            DescriptionError: if the engine can't take it; the model is as it was then.
+        Raises DescriptionError if the engine can't take it; the model is as it was then.
         """
         self._renew()  # from descriptions that are still those of the bodies
         record = model.description.links[link]
@@ -316,8 +313,7 @@ class World(Shared):
     def check_state(self, state: Mapping[str, Any]) -> None:
         """Checks that it can take a state.
 
-        Raises:
-            SnapshotError: if models, or their properties, are others now.
+        Raises SnapshotError if models, or their properties, are others now.
         """
         settings = {
             "gravity": self.gravity,

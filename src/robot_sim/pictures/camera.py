@@ -51,8 +51,7 @@ class Camera:
     def changed(self, fields: Mapping[str, Any]) -> "Camera":
         """Returns a copy with other values of some fields.
 
-        Raises:
-            ValueError: for an unknown field, or a value that it can't have.
+        Raises ValueError for an unknown field, or a value that it can't have.
         """
         for name, value in fields.items():
             if name not in RANGES:

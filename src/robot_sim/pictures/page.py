@@ -18,13 +18,7 @@ RED = (220, 30, 30)
 
 
 class Picture:
-    """Draws models. Not thread-safe.
-
-    Args:
-        server: of the page.
-        warn: takes a line that says what can't be shown.
-        below: the scene node above all models.
-    """
+    """Draws models below a scene node, and warns of what can't be shown. Not thread-safe."""
 
     def __init__(
         self, server: viser.ViserServer, warn: Callable[[str], None], below: str = ""
@@ -161,10 +155,6 @@ class Picture:
                 self._contacts.visible = bool(len(points))
         elif len(points):
             self._contacts = self._server.scene.add_point_cloud(
-                f"{self._below}/contacts",
-                points,
-                RED,
-                point_size=CONTACT,
-                point_shape="circle",
+                f"{self._below}/contacts", points, RED, point_size=CONTACT, point_shape="circle",
                 precision="float32",
-            )
+            )  # fmt: skip

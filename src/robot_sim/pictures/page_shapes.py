@@ -38,21 +38,10 @@ LINES, SHADOW = ((117, 135, 155), (102, 119, 138)), 0.4  # on the ground; how da
 
 
 class ShapeMaker:
-    """Draws shapes. A shape that can't be shown is reported once.
-
-    Args:
-        scene: of the page.
-        batches: receives most shapes.
-        singles: receives the others.
-        warn: takes a line that says what can't be shown.
-    """
+    """Draws shapes, most of them in batches. One that can't be shown is warned of once."""
 
     def __init__(
-        self,
-        scene: viser.SceneApi,
-        batches: Batches,
-        singles: Singles,
-        warn: Callable[[str], None],
+        self, scene: viser.SceneApi, batches: Batches, singles: Singles, warn: Callable[[str], None]
     ) -> None:
         self._scene, self._batches, self._singles = scene, batches, singles
         self._warn = warn

@@ -39,22 +39,13 @@ class RecordingError(ValueError):
 
 @dataclass(frozen=True)
 class RecordingOptions:
-    """What is recorded.
+    """What is recorded: a video (.mp4), a page in 3-D (.html), or a picture of the last moment (.png)."""
 
-    Args:
-        path: the file, which replaces an older one: a video (.mp4), a page in 3-D (.html), or a picture of
-            the last moment (.png).
-        rate: frames per second of simulated time [Hz].
-        width: of the frames [pixels].
-        height: of the frames [pixels].
-        model: the model in the middle; empty: all movable ones.
-    """
-
-    path: Path
-    rate: float = 30.0
-    width: int = 640
+    path: Path  # of the file, which replaces an older one
+    rate: float = 30.0  # [Hz]; frames per second of simulated time
+    width: int = 640  # of the frames [pixels]
     height: int = 480
-    model: str = ""
+    model: str = ""  # the one in the middle; empty: all movable ones
 
     def check(self) -> None:
         """Raises RecordingError if one of the options is invalid."""

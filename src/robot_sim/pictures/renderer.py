@@ -44,14 +44,10 @@ class DrawnPart:
         self._box = box_around(piece.solid)
         looks = {} if piece.uvs is None else {"uvs": piece.uvs.tolist()}
         visual = pybullet.createVisualShape(
-            pybullet.GEOM_MESH,
-            vertices=piece.solid.corners.tolist(),
-            normals=piece.solid.normals.tolist(),
-            indices=list(range(len(piece.solid.corners))),
-            rgbaColor=piece.rgba,
-            physicsClientId=client,
-            **looks,
-        )
+            pybullet.GEOM_MESH, vertices=piece.solid.corners.tolist(),
+            normals=piece.solid.normals.tolist(), indices=list(range(len(piece.solid.corners))),
+            rgbaColor=piece.rgba, physicsClientId=client, **looks,
+        )  # fmt: skip
         self.body: int = pybullet.createMultiBody(0.0, -1, visual, physicsClientId=client)
         if texture is not None:
             pybullet.changeVisualShape(

@@ -82,14 +82,11 @@ def visible_model(
 ) -> VisibleModel:
     """Returns the visible parts of these links and joints, with collision shapes if `collisions`."""
     return VisibleModel(
-        number,
-        name,
-        [_link(description, each, collisions) for each in links],
+        number, name, [_link(description, each, collisions) for each in links],
         [description.joints[each] for each in joints],
         links.index(description.root) if description.root in links else 0,
-        description.root_pose.inverse(),
-        description.static,
-    )
+        description.root_pose.inverse(), description.static,
+    )  # fmt: skip
 
 
 def _link(description: ModelDescription, name: str, collisions: bool) -> Link:
@@ -133,8 +130,7 @@ def solid_of(shape: Shape) -> Solid:
 def pieces_of(shape: Shape) -> list[Piece]:
     """Returns the triangles of a shape by colour and texture, in its own frame; a mesh file's own come first.
 
-    Raises:
-        DescriptionError: a mesh file can't be read.
+    Raises DescriptionError if a mesh file can't be read.
     """
     rgba = shape.rgba or GREY
     if shape.kind != "mesh" or shape.solid is not None:

@@ -14,9 +14,7 @@ AXES = 3
 class DriftingError(Stateful):
     """Errors of three numbers. A drift is a random walk that returns to zero with its frequency.
 
-    Args:
-        read: returns one or three numbers of an element, or its default.
-        prefix: of the elements' names.
+    `read` returns one or three numbers of an element whose name begins with `prefix`, or its default.
     """
 
     def __init__(self, read: Callable[[str, float], np.ndarray], prefix: str) -> None:

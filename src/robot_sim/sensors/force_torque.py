@@ -16,16 +16,7 @@ from robot_sim.physics.loops import in_loops
 from robot_sim.physics.lumping import WORLD
 from robot_sim.physics.model import Model
 from robot_sim.physics.passive_forces import decay_wrench
-from robot_sim.physics.pose import (
-    ZERO,
-    Vector,
-    add,
-    conjugate,
-    cross,
-    rotate,
-    scale,
-    subtract,
-)
+from robot_sim.physics.pose import ZERO, Vector, add, conjugate, cross, rotate, scale, subtract
 from robot_sim.sensors.sensing import Measurement, Mount, sensor_of
 from robot_sim.simulator import Simulator
 from robot_sim.state_dict import Stateful
@@ -45,13 +36,7 @@ class _Look(NamedTuple):
 class LinkForces(Stateful):
     """Force and torque on links of a model in the last step; torques are about the world's origin.
 
-    `look` has to be called in each tick, before its physics step.
-
-    Args:
-        sim: the simulator.
-        model: the links' model.
-        links: their names.
-        joint: whose effort is noted.
+    `look` has to be called in each tick, before its physics step. The effort on `joint` is noted, too.
     """
 
     def __init__(self, sim: Simulator, model: Model, links: Sequence[str], joint: str = "") -> None:
@@ -66,11 +51,9 @@ class LinkForces(Stateful):
         self.effort = 0.0  # that clients apply to `joint`
 
     def look(self, now: int, moves: int) -> None:
-        """Takes down the state.
+        """Takes down the state at a tick's time [ns].
 
-        Args:
-            now: time of the tick [ns].
-            moves: counts what has moved bodies besides time: no force is known across such a move.
+        `moves` counts what has moved bodies besides time: no force is known across such a move.
         """
         last, self.net = self._last, None
         if moves != self._moves:  # the next tick sees the same state
@@ -134,13 +117,7 @@ class LinkForces(Stateful):
 class JointForces(Stateful):
     """What the child of a joint exerts on the parent, without the effort that drives a movable joint.
 
-    Args:
-        sim: the simulator.
-        model: the joint's model.
-        name: of the joint.
-
-    Raises:
-        DescriptionError: if the model doesn't have it.
+    Raises DescriptionError if the model doesn't have it.
     """
 
     non_persistent = ("_joint",)
@@ -173,17 +150,15 @@ class JointForces(Stateful):
         force, torque = _sum([forces.known, _times(forces.net, -1.0)])
         torque = subtract(torque, cross(frame.position, force))
         if joint.movable:
-            driven = scale(rotate(frame.orientation, joint.axis), self._effort())
+            robots = [robot for robot in self._sim.robots if robot.model is self._model]
+            effort = forces.effort + sum(robot.effort_on(joint.name) for robot in robots)
+            driven = scale(rotate(frame.orientation, joint.axis), effort)
             if joint.kind == "prismatic":
                 force = add(force, driven)
             else:
                 torque = add(torque, driven)
         back = conjugate(pose.orientation)
         return rotate(back, force), rotate(back, torque)
-
-    def _effort(self) -> float:
-        robots = [robot for robot in self._sim.robots if robot.model is self._model]
-        return self._forces.effort + sum(robot.effort_on(self._joint.name) for robot in robots)
 
 
 class ForceTorqueSensor(Measurement):

@@ -79,8 +79,7 @@ class Imu(Stateful):
         Args:
             now: time [ns].
             moves: counts what has moved bodies besides time: across such a move there is no acceleration.
-            motion: of the sensor.
-            gravity: of the world [m/s²].
+            motion, gravity: of the sensor, and of the world [m/s²].
         """
         last, self._last = self._last, (now, moves, motion.linear)
         if last is None or (last[1] == moves and now - last[0] > self._longest):

@@ -54,14 +54,7 @@ class Fan(NamedTuple):
 
 
 class Laser:
-    """A laser scanner.
-
-    Args:
-        sensor: of one of `KINDS`.
-
-    Raises:
-        DescriptionError: if it can't be simulated.
-    """
+    """A laser scanner, of one of `KINDS`; raises DescriptionError if it can't be simulated."""
 
     def __init__(self, sensor: Sensor) -> None:
         where = f"sensor '{sensor.name}'"
@@ -100,17 +93,10 @@ class Laser:
     def measure(
         self, scene: RayScene, pose: Pose, bias: float, random: np.random.Generator
     ) -> Scan:
-        """Measures from `pose` in the world.
+        """Measures from `pose` in the world, with the noise's bias [m].
 
-        Args:
-            scene: the collisions or visuals, see `sees_visuals`.
-            pose: of the sensor.
-            bias: of its noise [m].
-            random: draws the noise of this measurement.
-
-        Returns:
-            Ranges within the limits; inf for nothing within reach, -inf for something nearer than the lower
-            limit.
+        The scene has collisions or visuals, see `sees_visuals`. Ranges are within the limits; inf for nothing
+        within reach, -inf for something nearer than the lower limit.
         """
         turns, places = frames([pose])
         directions = np.einsum("ij,kj->ki", turns[0], self._rays)

@@ -50,10 +50,8 @@ class Noise:
 def read_noise(parent: Element | None, where: str) -> Noise | None:
     """Returns the `<noise>` of an element; None if there is none.
 
-    Its type is an attribute, or a child as in `<ray>` and `<camera>`.
-
-    Raises:
-        DescriptionError: if a number can't be read, or is impossible.
+    Its type is an attribute, or a child as in `<ray>` and `<camera>`. Raises DescriptionError if a number
+    can't be read, or is impossible.
     """
     element = None if parent is None else parent.find("noise")
     if element is None:

@@ -12,14 +12,7 @@ from robot_sim.physics.files.sdf_parts import read_pose, value
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.noise import Noise, read_noise
 from robot_sim.sensors.rays import RayScene, frames
-from robot_sim.sensors.sensing import (
-    FURTHEST,
-    Field,
-    Measurement,
-    Mount,
-    sensor_of,
-    slower,
-)
+from robot_sim.sensors.sensing import FURTHEST, Field, Measurement, Mount, sensor_of, slower
 from robot_sim.sensors.shading import colours
 
 KINECT = "libgazebo_ros_openni_kinect.so"
@@ -30,31 +23,17 @@ PIECE = 1 << 17  # pixels that are looked at together
 
 
 class CameraView(NamedTuple):
-    """What a camera sees.
+    """What a camera sees."""
 
-    Attributes:
-        colours: (height, width, 3) of uint8.
-        depths: (height, width) along the optical axis [m]; inf for nothing within the clips.
-    """
-
-    colours: np.ndarray
-    depths: np.ndarray
+    colours: np.ndarray  # (height, width, 3) of uint8
+    depths: np.ndarray  # (height, width) along the optical axis [m]; inf: nothing within the clips
 
 
 class PinholeCamera:
-    """A camera.
+    """A camera, made from a `<camera>`; `pose` is that of what holds it in `link`, `where` is for errors.
 
-    Attributes:
-        across, down: (width,), (height, 1): a pixel's point to the right and down, for each metre of depth.
-
-    Args:
-        element: a `<camera>`.
-        pose: of what holds it, in its link.
-        where: names it in errors.
-        link: what it is in.
-
-    Raises:
-        DescriptionError: if it can't be simulated.
+    `across` (width,) and `down` (height, 1) are a pixel's point to the right and down, for each metre of
+    depth. Raises DescriptionError if it can't be simulated.
     """
 
     def __init__(self, element: Element, pose: Pose, where: str, link: str) -> None:
@@ -85,13 +64,7 @@ class PinholeCamera:
         self.down = down[:, None]
 
     def picture(self, scene: RayScene, link: Pose, in_colour: bool = True) -> CameraView:
-        """Returns what the camera sees, without noise; black if not `in_colour`.
-
-        Args:
-            scene: the visuals.
-            link: pose of its link in the world.
-            in_colour: whether colours are wanted.
-        """
+        """Returns what the camera sees of visuals, without noise; black if not `in_colour`."""
         pose = link.compose(self.pose)
         shape = self.height, self.width
         seen = CameraView(np.zeros((*shape, 3), np.uint8), np.zeros(shape))
@@ -129,8 +102,7 @@ def noisy(
 def camera_of(sensor: Sensor) -> PinholeCamera:
     """Returns the only camera of a sensor.
 
-    Raises:
-        DescriptionError: if it has none, or it can't be simulated.
+    Raises DescriptionError if it has none, or it can't be simulated.
     """
     where = f"sensor '{sensor.name}'"
     element = sensor.element.find("camera")

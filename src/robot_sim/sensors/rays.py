@@ -44,19 +44,12 @@ class Target(NamedTuple):
 
 
 class Hits(NamedTuple):
-    """What rays meet first.
+    """What rays meet first."""
 
-    Attributes:
-        distances: (n,) [m]; inf for nothing.
-        targets: (n,) indices of targets; -1 for none.
-        triangles: (n,) index of the target's triangle, where triangles were met.
-        weights: (n, 2) of its second and third corner at the point that is met.
-    """
-
-    distances: np.ndarray
-    targets: np.ndarray
-    triangles: np.ndarray
-    weights: np.ndarray
+    distances: np.ndarray  # (n,) [m]; inf for nothing
+    targets: np.ndarray  # (n,) indices of targets; -1 for none
+    triangles: np.ndarray  # (n,) index of the target's triangle, where triangles were met
+    weights: np.ndarray  # (n, 2) of its second and third corner at the point that is met
 
     def improve(self, rays: np.ndarray, targets: Any, distances: np.ndarray) -> np.ndarray:
         """Takes over nearer hits, of several of a ray the nearest one; returns which are taken."""
@@ -70,11 +63,9 @@ class Hits(NamedTuple):
 
 
 class RayScene:
-    """The shapes of a world's models, for rays. The caller holds the world's lock.
+    """The shapes of a world's models, for rays: collisions, or visuals as cameras see them.
 
-    Args:
-        world: whose models are met.
-        visuals: whether rays meet visuals, as those of cameras do, or collisions, as those of lasers.
+    The caller holds the world's lock.
     """
 
     def __init__(self, world: World, visuals: bool = False) -> None:

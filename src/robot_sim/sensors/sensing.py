@@ -21,12 +21,7 @@ LARGEST_NUMBER = 1e30  # number of a plugin: messages have 32-bit floats
 
 
 class Sensing(Shared, Stateful):
-    """The sensors of a simulator.
-
-    Args:
-        sim: the simulator.
-        seed: of the sensors' noise.
-    """
+    """The sensors of a simulator; `seed` is that of their noise."""
 
     non_persistent = ("collisions", "visuals")
 
@@ -62,18 +57,13 @@ class Sensing(Shared, Stateful):
 
 @dataclass(frozen=True)
 class Mount(Shared):
-    """A sensor's place in a model, and the plugin that says more about it.
-
-    Attributes:
-        plugin: of the sensor or the model.
-        sensor: the one that the plugin belongs to; None for a model's plugin.
-    """
+    """A sensor's place in a model, and the plugin that says more about it."""
 
     sim: Simulator
     model: Model
-    plugin: Plugin
+    plugin: Plugin  # of the sensor or the model
     sensing: Sensing
-    sensor: Sensor | None
+    sensor: Sensor | None  # the one that the plugin belongs to; None for a model's plugin
 
     @property
     def key(self) -> str:
@@ -123,10 +113,8 @@ class Mount(Shared):
     def link(self, tag: str, required: bool = True) -> str:
         """Returns the model's link that the element `tag` names.
 
-        Without the element it is the model's first one, unless it is `required`.
-
-        Raises:
-            DescriptionError: if there is none.
+        Without the element it is the model's first one, unless it is `required`. Raises DescriptionError if
+        there is none.
         """
         names = self.model.link_names
         if not self.text(tag, "") and not required:
@@ -144,8 +132,7 @@ class Mount(Shared):
     def link_in_world(self, tag: str) -> tuple[Model, str]:
         """Returns the link that the element `tag` names: of its own model, or else of the world.
 
-        Raises:
-            DescriptionError: if there is none.
+        Raises DescriptionError if there is none.
         """
         name, own = self.required(tag), self.among(tag, self.model.link_names)
         found = (self.model, own) if own else self.sim.world.link(name)
@@ -170,27 +157,18 @@ class Field(NamedTuple):
 
 
 class Measurement(Stateful):
-    """A sensor on a model. Each module of this folder lists its own in `SENSORS`.
+    """A sensor on a model; raises DescriptionError if it can't be simulated.
 
-    Attributes:
-        kinds: of `<sensor>` that it measures.
-        libraries: of plugins, a sensor's or a model's, that it measures for, whatever the kind.
-        interface: of ros_control by which controllers have it.
-        fields: what `values` returns, by attribute of a `Reading`; without any, tasks can't see it.
-        rate: of measurements [Hz of simulated time]; 0 is every step.
-
-    Args:
-        mount: Its place.
-
-    Raises:
-        DescriptionError: If it can't be simulated.
+    Each module of this folder lists its own in `SENSORS`. `fields` are what `values` returns, by attribute of
+    a `Reading`; without any, tasks can't see it.
     """
 
-    kinds: ClassVar[Sequence[str]] = ()
+    kinds: ClassVar[Sequence[str]] = ()  # of `<sensor>` that it measures
+    # Of plugins, a sensor's or a model's, that it measures for, whatever the kind.
     libraries: ClassVar[Sequence[str]] = ()
-    interface: ClassVar[str] = ""
+    interface: ClassVar[str] = ""  # of ros_control by which controllers have it
     fields: ClassVar[Mapping[str, Field]] = {}
-    rate: float = 0.0
+    rate: float = 0.0  # of measurements [Hz of simulated time]; 0 is every step
 
     def __init__(self, mount: Mount) -> None:
         self.mount = mount
@@ -210,8 +188,7 @@ class Measurement(Stateful):
 def sensor_of(mount: Mount, kinds: Sequence[str]) -> Sensor:
     """Returns the sensor that a plugin belongs to.
 
-    Raises:
-        DescriptionError: if it has none, or one of another kind.
+    Raises DescriptionError if it has none, or one of another kind.
     """
     sensor = mount.sensor
     if sensor is None or sensor.kind not in kinds:

@@ -49,15 +49,8 @@ class Taken(NamedTuple):
 class SensorReaders(Stateful):
     """Sensors that measure by their own clocks, whether or not their topics are heard.
 
-    The caller holds the simulator's lock.
-
-    Args:
-        sim: the simulator.
-        sensing: its sensors.
-        names: of sensors, plain or model::sensor; of a model's IMU, the plugin's.
-
-    Raises:
-        UnknownName: if a name refers to none, or several, or to one that can't be read.
+    The caller holds the simulator's lock. Names are plain or model::sensor; of a model's IMU, the plugin's.
+    Raises UnknownName if a name refers to none, or several, or to one that can't be read.
     """
 
     non_persistent = ("names", "_schedule", "_parts", "_mounts")
@@ -155,13 +148,7 @@ def _sensors(sim: Simulator, sensing: Sensing) -> Iterator[tuple[str, Mount, typ
 class MeasuringHandle(SensorHandle):
     """A sensor that measures by its own clock while a controller has begun it.
 
-    Args:
-        mount: its place.
-        kind: makes it.
-        frame: see `SensorHandle`.
-
-    Raises:
-        ControlError: if it can't be simulated.
+    Raises ControlError if it can't be simulated.
     """
 
     non_persistent = ("_told",)

@@ -13,11 +13,7 @@ class Reading:
     """What a sensor measured last, an attribute for each of its fields. Arrays can't be written to.
 
     Which a sensor has: docs/environments.md, "Sensors". What it doesn't have is an AttributeError, which
-    names what it has.
-
-    Args:
-        time: of the measurement since the reset [s].
-        values: by attribute.
+    names what it has. `time` is that of the measurement since the reset [s].
     """
 
     time: float

@@ -8,7 +8,7 @@ import psutil
 import rospy
 
 from ros_calls import master as _master
-from ros_calls.master import NoAnswer, NobodyListens, Refused, call_node, call_plain
+from ros_calls.master import NoAnswer, NobodyListens, Refused, answer, call_node, call_plain
 from ros_calls.waiting import POLL
 
 CORE_NODES = ("/rosout",)  # starts and ends with the master
@@ -16,19 +16,14 @@ CORE_NODES = ("/rosout",)  # starts and ends with the master
 
 def node_names() -> list[str]:
     """Returns the sorted names of all registered nodes; empty without a master."""
-    try:
-        state = _master.call("getSystemState")
-    except (NoAnswer, Refused):
-        return []
+    state = answer(_master.uri(), "getSystemState") or ()
     return sorted({node for kind in state for _, nodes in kind for node in nodes})
 
 
 def node_uri(name: str) -> str | None:
     """Returns a node's XML-RPC address, or None if the master doesn't know it or is down."""
-    try:
-        return str(_master.call("lookupNode", name))
-    except (NoAnswer, Refused):
-        return None
+    address: str | None = answer(_master.uri(), "lookupNode", name)
+    return address
 
 
 def node_uris() -> dict[str, str]:
@@ -39,10 +34,8 @@ def node_uris() -> dict[str, str]:
 
 def node_pid(address: str) -> int | None:
     """Returns the process id of the node at an XML-RPC address, or None if it doesn't answer."""
-    try:
-        return int(call_node(address, "getPid", timeout=1.0))
-    except (NoAnswer, Refused):
-        return None
+    pid: int | None = answer(address, "getPid", timeout=1.0)
+    return pid
 
 
 def is_own(address: str) -> bool:
@@ -55,10 +48,9 @@ def _master_of(address: str) -> str | None:
 
     roscpp nodes have no method for it, so the answer comes from what their process was started with.
     """
-    try:
-        return str(call_node(address, "getMasterUri", timeout=1.0))
-    except (NoAnswer, Refused):
-        pass
+    told: str | None = answer(address, "getMasterUri", timeout=1.0)
+    if told is not None:
+        return told
     host = urlsplit(address).hostname
     pid = node_pid(address) if host and _master.host_is_local(host) else None
     return _started_with(pid) if pid else None

@@ -41,9 +41,8 @@ def urdf_parse_from_pkg(
 ) -> str | None:
     """Expands a package's URDF or xacro file.
 
-    Returns:
-        The XML text, or None, with an error in the log, if the package or file is missing or the
-        file is broken.
+    Returns the XML text, or None, with an error in the log, if the package or file is missing or the file is
+    broken.
     """
     try:
         path = file(pkg_name, folder, model_name)

@@ -125,8 +125,7 @@ class Started(int):
     def close(self) -> bool:
         """Ends the program and its descendants by SIGINT, then SIGTERM, then SIGKILL.
 
-        Returns:
-            True if nothing of it is left.
+        Returns True if nothing of it is left.
         """
         if self._handle is None:
             return True
@@ -255,12 +254,9 @@ def _environment(start: _processes.Start) -> dict[str, str]:
     """
     path = os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", os.defpath)])
     return {
-        **os.environ,
-        _processes.MARK: start.mark(),
-        "PATH": path,
-        "PYTHONUNBUFFERED": "1",
+        **os.environ, _processes.MARK: start.mark(), "PATH": path, "PYTHONUNBUFFERED": "1",
         "ROS_MASTER_URI": start.master,
-    }
+    }  # fmt: skip
 
 
 def _spawn(
@@ -270,13 +266,10 @@ def _spawn(
         try:
             output = stack.enter_context(open(log, "wb")) if log else None
             return subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT if output else None,
-                env=environment,
+                command, stdin=subprocess.DEVNULL, stdout=output,
+                stderr=subprocess.STDOUT if output else None, env=environment,
                 start_new_session=True,
-            )
+            )  # fmt: skip
         except (OSError, ValueError) as fault:
             raise CannotStart(
                 f"{command[0]}: {getattr(fault, 'strerror', None) or fault}"

@@ -5,7 +5,7 @@ a class derived from `RobotTestCase` has `self.world`. Both are a `RobotWorld` (
 """
 
 from ros_utils.testing.case import RobotTestCase
-from ros_utils.testing.lockstep_subscriber import WorldError
+from ros_utils.testing.followed_node import WorldError
 from ros_utils.testing.robot_world import RobotWorld
 
 __all__ = ["RobotTestCase", "RobotWorld", "WorldError"]

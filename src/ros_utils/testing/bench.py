@@ -21,7 +21,7 @@ from ros_utils import ros_gazebo, ros_node
 from ros_utils._internal import roslaunch
 from ros_utils._internal.programs import Started
 from ros_utils.simulation import LOOPBACK, reserved_port
-from ros_utils.testing.lockstep_subscriber import SIMULATOR, WorldError
+from ros_utils.testing.followed_node import SIMULATOR, WorldError
 from ros_utils.testing.robot_world import RobotWorld
 
 FAILURES = "ROS_TEST_FAILURES"  # environment variable: the folder of what failed tests leave

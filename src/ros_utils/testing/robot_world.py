@@ -14,7 +14,7 @@ from tf.transformations import quaternion_from_euler
 from file_access.text import nearest_or_all
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils._internal import packages, params
-from ros_utils.testing.lockstep_subscriber import WorldError
+from ros_utils.testing.followed_node import WorldError
 from ros_utils.testing.stepped_world import NANOSECONDS, SteppedWorld, Vector
 
 PACKAGE = "package://"

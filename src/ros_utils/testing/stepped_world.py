@@ -10,8 +10,7 @@ from bullet_gazebo_msgs.srv import StepWorldRequest
 from file_access.text import did_you_mean
 from ros_utils import ros_gazebo
 from ros_utils.step_client import PreparedSteps, StepAnswer, StepClient, StepNames, StepRefused
-from ros_utils.testing.followed_node import FollowedNode
-from ros_utils.testing.lockstep_subscriber import WorldError
+from ros_utils.testing.followed_node import FollowedNode, WorldError
 
 NANOSECONDS = 1_000_000_000
 MOTION = 13  # numbers per link: position, orientation, velocities

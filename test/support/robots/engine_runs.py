@@ -26,6 +26,23 @@ PUSH = 0.2  # [N]
 SET_POINT = 0.05  # [m]
 
 
+def runge_kutta() -> Engine:
+    """MuJoCo that integrates by RK4, for comparisons; its motors have no speed."""
+    import mujoco
+
+    from robot_sim.physics.engines.mujoco_engine import MujocoEngine
+
+    class Exact(MujocoEngine):
+        def step(self) -> None:
+            model, data = self._state.model, self._state.data
+            model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+            mujoco.mj_step(model, data)
+            data.qfrc_applied[:] = 0.0
+            self._state.stale = True
+
+    return Exact()
+
+
 def rate() -> float:
     """Growth rate of the upright pole [1/s]; of the hanging pole it is the angular frequency [rad/s]."""
     mass, ml = PLANT.cart + PLANT.pole, PLANT.pole * PLANT.length

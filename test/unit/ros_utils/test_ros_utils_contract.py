@@ -31,7 +31,7 @@ def test_signature(module, signature):
     positional = [
         parameter.replace(annotation=inspect.Parameter.empty)
         for parameter in parameters
-        if parameter.kind is not inspect.Parameter.KEYWORD_ONLY
+        if parameter.kind not in (inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.VAR_KEYWORD)
     ]
     assert f"{name}{inspect.Signature(positional)}" == signature
 
@@ -40,9 +40,13 @@ def test_signature(module, signature):
     "function", [getattr(ros_gazebo, name) for name in ros_gazebo.__all__ if name[0] == "g"]
 )
 def test_every_call_has_a_bound_and_a_simulator(function):
-    parameters = inspect.signature(function).parameters
-    assert parameters["timeout"].kind is inspect.Parameter.KEYWORD_ONLY
-    assert parameters["gazebo_ns"].default == "/gazebo"
+    parameters = inspect.signature(function).parameters.values()
+    keywords = {each.name for each in parameters if each.kind is inspect.Parameter.KEYWORD_ONLY}
+    for each in parameters:
+        if each.kind is inspect.Parameter.VAR_KEYWORD:
+            (declared,) = each.annotation.__args__  # of Unpack
+            keywords |= declared.__annotations__.keys()
+    assert {"timeout", "gazebo_ns"} <= keywords
 
 
 def test_reserved_ports_differ_and_can_be_taken_by_a_master():

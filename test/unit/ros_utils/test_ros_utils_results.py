@@ -73,7 +73,7 @@ def call(name):
     required = [
         parameter.name
         for parameter in inspect.signature(FUNCTIONS[name]).parameters.values()
-        if parameter.default is parameter.empty
+        if parameter.default is parameter.empty and parameter.kind is not parameter.VAR_KEYWORD
     ]
     more = {"custom_world_path": "/nix.world"} if name == "launch_Gazebo" else {}
     return FUNCTIONS[name](*(ARGUMENTS.get(parameter, "nix") for parameter in required), **more)

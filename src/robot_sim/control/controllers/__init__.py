@@ -31,11 +31,8 @@ def built_in() -> dict[str, type[Controller]]:
 def find_type(type_name: str) -> type[Controller] | None:
     """Returns a user's controller: class `MyController` of module `my_package` for "my_package/MyController".
 
-    Returns:
-        None if there is no such module.
-
-    Raises:
-        ControlError: if the module can't be imported, or has no such subclass of Controller.
+    None if there is no such module. Raises ControlError if the module can't be imported, or has no such
+    subclass of Controller.
     """
     package, _, name = type_name.partition("/")
     if not package.isidentifier() or not name.isidentifier():

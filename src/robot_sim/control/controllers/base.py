@@ -94,8 +94,7 @@ class Controller(Stateful, ABC):
     ) -> "Controller":
         """Creates the controller from its parameters `<ns>/<name>`.
 
-        Raises:
-            ControlError: if a parameter or a joint is missing or wrong.
+        Raises ControlError if a parameter or a joint is missing or wrong.
         """
 
     @property
@@ -124,11 +123,7 @@ class Controller(Stateful, ABC):
 
 
 def number_param(params: Mapping[str, object], key: str, place: str) -> float:
-    """Returns the numeric parameter `key`.
-
-    Raises:
-        ControlError: if it is missing or not a finite number.
-    """
+    """Returns the numeric parameter `key`; raises ControlError if it is missing or not a finite number."""
     return number(params.get(key), f"{place}/{key}")
 
 
@@ -137,7 +132,6 @@ def joint_param(
 ) -> JointHandle:
     """Returns the joint that the parameter `joint` of controller `name` names.
 
-    Raises:
-        ControlError: if there is no such joint with that interface.
+    Raises ControlError if there is no such joint with that interface.
     """
     return hardware.joint(interface, OneJoint.read(params, name).joint)

@@ -104,8 +104,7 @@ class GripperActionController(Controller):
     def pursue(self, key: str, position: float, effort: float, observer: GoalObserver) -> None:
         """Goes to `position` [rad, m] with at most `effort` [N m, N].
 
-        Raises:
-            ControlError: if it isn't running, or a number isn't finite.
+        Raises ControlError if it isn't running, or a number isn't finite.
         """
         if self.state != "running":
             raise ControlError(f"Controller '{self.name}' can't take a goal: it is not running")

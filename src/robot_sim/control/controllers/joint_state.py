@@ -86,12 +86,10 @@ class JointStateController(Controller):
         """Returns the joints' state, extra joints last."""
         joints, extra = self._joints, self._extra
         return JointStateSample(
-            now,
-            self._names,
-            tuple(j.position for j in joints) + extra[0],
+            now, self._names, tuple(j.position for j in joints) + extra[0],
             tuple(j.velocity for j in joints) + extra[1],
             tuple(j.effort for j in joints) + extra[2],
-        )
+        )  # fmt: skip
 
 
 def _extra_joints(entries: object, names: list[str]) -> list[Extra]:

@@ -184,11 +184,8 @@ class JointTrajectoryController(Controller):
     def follow(self, trajectory: Trajectory) -> str:
         """Follows a trajectory of the topic `command`; one without points holds the joints.
 
-        Returns:
-            A warning for the log, empty if there is none.
-
-        Raises:
-            TrajectoryRefused: if it can't be followed; nothing changes then.
+        Returns a warning for the log, empty if there is none. Raises TrajectoryRefused if it can't be
+        followed; nothing changes then.
         """
         self._check_running("take a trajectory")
         if trajectory.points:
@@ -218,8 +215,7 @@ class JointTrajectoryController(Controller):
     def query(self, time: int) -> list[State]:
         """Returns the desired states of the joints at `time` [ns] of the clock, in order of joint_names.
 
-        Raises:
-            TrajectoryRefused: if the controller isn't running.
+        Raises TrajectoryRefused if the controller isn't running.
         """
         self._check_running("sample its trajectory")
         uptime = self._uptime + time - self._now

@@ -20,10 +20,7 @@ class Declared(NamedTuple):
 
 
 def parameter(
-    about: str,
-    default: Any = MISSING,
-    read: Callable[[Any, str], Any] | None = None,
-    key: str = "",
+    about: str, default: Any = MISSING, read: Callable[[Any, str], Any] | None = None, key: str = ""
 ) -> Any:
     """Declares a parameter, the field of a class of `Parameters`.
 
@@ -55,8 +52,7 @@ class Parameters:
     def read(cls, params: Mapping[str, object], name: str, joint: str = "") -> Self:
         """Reads the parameters of controller `name`, those of each joint for `joint`.
 
-        Raises:
-            ControlError: if one is missing or wrong.
+        Raises ControlError if one is missing or wrong.
         """
         found = {}
         for attribute, declared in cls.declared().items():

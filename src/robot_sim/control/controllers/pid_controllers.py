@@ -7,11 +7,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, NamedTuple, Self
 
-from robot_sim.control.controllers.base import (
-    Controller,
-    Input,
-    Output,
-)
+from robot_sim.control.controllers.base import Controller, Input, Output
 from robot_sim.control.controllers.forward import check_length
 from robot_sim.control.controllers.parameters import OneJoint, Parameters, SomeJoints, parameter
 from robot_sim.control.hardware import EFFORT, VELOCITY, RobotHardware

@@ -17,13 +17,7 @@ from robot_sim.control.controllers.parameters import (
 )
 from robot_sim.control.errors import ControlError
 from robot_sim.control.transmissions import is_number
-from robot_sim.drives.odometry import (
-    DeadReckoning,
-    OdometrySample,
-    Period,
-    RollingMean,
-    Triple,
-)
+from robot_sim.drives.odometry import DeadReckoning, OdometrySample, Period, RollingMean, Triple
 from robot_sim.drives.wheels import SpeedLimits
 
 AXES = 6
@@ -84,8 +78,7 @@ class VehicleParameters(Parameters):
     def length(self, key: str, name: str, look_up: Callable[[], float]) -> float:
         """Returns a length that is given [m], or what `look_up` finds in the robot's description.
 
-        Raises:
-            ControlError: if there is nothing above 0 to be found.
+        Raises ControlError if there is nothing above 0 to be found.
         """
         given: float | None = getattr(self, key)
         return length(look_up(), f"{name}/{key}") if given is None else given
@@ -143,11 +136,7 @@ class VehicleController(Controller):
         self._wanted, self._stamp = twist, self._now
 
     def check_command(self, numbers: tuple[float, ...]) -> None:
-        """Checks that a command can be followed.
-
-        Raises:
-            ControlError: if it can't.
-        """
+        """Checks that a command can be followed; raises ControlError if it can't."""
         if self.state != "running":
             raise ControlError(f"controller '{self.name}' is not running: the command is ignored")
         if not self.options.allow_multiple_cmd_vel_publishers and self.cmd_vel.publishers() > 1:

@@ -27,13 +27,9 @@ class EngineError(ValueError):
 
 
 def make_engine(name: str = BULLET[0]) -> Engine:
-    """Returns a new, empty engine; MuJoCo, with a warning, where PyBullet can't be had.
+    """Returns a new, empty engine of one of `ENGINES`; MuJoCo, with a warning, where PyBullet can't be had.
 
-    Args:
-        name: one of `ENGINES`.
-
-    Raises:
-        EngineError: if it is unknown or not installed.
+    Raises EngineError if it is unknown or not installed.
     """
     if name not in ENGINES:
         raise EngineError(f"physics engine '{name}' is not known; there are {', '.join(ENGINES)}")

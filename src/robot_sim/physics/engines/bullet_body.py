@@ -41,8 +41,7 @@ class BulletBody(Body):
     ) -> None:
         """
         Args:
-            client: the world.
-            body: PyBullet's number.
+            client, body: PyBullet's numbers of world and body.
             description: in the engine's form.
             pose: of the root link.
             weightless: bodies and links of the world on which gravity doesn't act.

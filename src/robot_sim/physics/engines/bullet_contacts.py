@@ -56,10 +56,7 @@ class Separation:
     def add(self, body: int, model: ModelDescription, links: Mapping[str, int]) -> None:
         """Makes the contacts of a body compliant, but those of static and kinematic links.
 
-        Args:
-            body: PyBullet's number.
-            model: what it was loaded from.
-            links: PyBullet's indices of its links.
+        `body` and `links` are PyBullet's numbers.
         """
         # Python 3.12 sums floats up in another way than 3.11; their exact sum has the same bits in both.
         inertias = [link.inertia for link in model.links.values() if not link.kinematic]
@@ -101,12 +98,9 @@ class Separation:
         self.placed = any((*alone.values(), *mutual.values()))
 
     def _ease_pair(
-        self,
-        contact: Sequence[Any],
-        time_step: float,
-        alone: dict[LinkIndex, float],
+        self, contact: Sequence[Any], time_step: float, alone: dict[LinkIndex, float],
         mutual: dict[LinkIndex, float],
-    ) -> None:
+    ) -> None:  # fmt: skip
         pair = (contact[1], contact[3]), (contact[2], contact[4])
         speed = min(self.fastest, *(self._links[link][1] for link in pair))
         share = min(speed * time_step / -contact[8], time_step / (time_step + RELAXATION))

@@ -47,13 +47,14 @@ class Fastening(NamedTuple):
     apart: Sequence[tuple[int, int, int, int]]
 
 
-class BulletClient:
+class BulletEngine(Engine):
     """A PyBullet world in this process, without a window.
 
-    `live` and `waste` are the sizes of the files that present and removed bodies were loaded from [bytes].
+    Now and then a new world takes its place, which frees the memory that removed bodies leave behind. `live`
+    and `waste` are the sizes of the files that present and removed bodies were loaded from [bytes].
     """
 
-    def __init__(self, settings: BulletSettings) -> None:
+    def __init__(self, settings: BulletSettings | None = None) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
         # The solver's result depends on the order of contact pairs, and on which bodies it solves together:
         # make both the same in every run. Bodies that come near each other may share an island or not,
@@ -65,30 +66,27 @@ class BulletClient:
         )  # fmt: skip
         self._step = partial(pybullet.stepSimulation, self._client)
         self._separation = Separation(self._client)
-        self._gravity: Vector = ZERO
-        self._time_step = 0.0
+        self._settings = settings or BulletSettings()
         self._bodies: dict[int, BulletBody] = {}
         self._sides: dict[tuple[int, int], Side] = {}  # by body and link
         self._weightless: set[tuple[int, int]] = set()  # body and link, where gravity doesn't act
         self._sizes: dict[int, int] = {}  # [bytes] by body, without shared meshes
         self._meshes = SharedMeshes(self._client)
-        self.fastened: dict[int, Fastening] = {}
+        self._fastened: dict[int, Fastening] = {}
         self._last = 0  # number of what was fastened
-        self.waste = 0
-        self.apply(settings)
+        self.waste, self._most_waste = 0, MOST_WASTE
+        self._apply()
 
-    @property
-    def bodies(self) -> list[BulletBody]:
-        """In the order in which they were loaded."""
+    def order(self) -> list[BulletBody]:
         return list(self._bodies.values())
 
     @property
     def live(self) -> int:
         return sum(self._sizes.values()) + self._meshes.size
 
-    def apply(self, settings: BulletSettings) -> None:
-        """Applies settings to the world."""
-        self._gravity, self._time_step = settings.gravity, settings.time_step
+    def _apply(self) -> None:
+        """Applies the settings to the world."""
+        settings = self._settings
         self._separation.fastest = settings.separation
         iterations = max(1, min(settings.iterations, MOST_ITERATIONS))
         pybullet.setGravity(*settings.gravity, physicsClientId=self._client)
@@ -99,8 +97,23 @@ class BulletClient:
         for body in self._bodies.values():
             body.set_time_step(settings.time_step)
 
+    def set_gravity(self, gravity: Vector) -> None:
+        self._settings.gravity = gravity
+        self._apply()
+
+    def set_time_step(self, dt: float) -> None:
+        self._settings.time_step = dt
+        self._apply()
+
+    def set_iterations(self, count: int) -> None:
+        self._settings.iterations = count
+        self._apply()
+
+    def set_fastest_separation(self, speed: float) -> None:
+        self._settings.separation = speed
+        self._apply()
+
     def load(self, description: ModelDescription, pose: Pose) -> BulletBody:
-        """See `Engine.load`."""
         if description.is_plane:
             return self._load_plane(description, pose)
         engine_form, offsets = at_joints(description)
@@ -115,13 +128,10 @@ class BulletClient:
             )
         body = self._load_files(engine_form, pose, flags)
         try:
-            made = BulletBody(
-                self._client, body, engine_form, pose, self._weightless, self._separation, offsets
-            )
+            return self._made(body, engine_form, pose, offsets)
         except DescriptionError:
-            self.remove(body)
+            self._remove(body)
             raise
-        return self._keep(made)
 
     def _load_files(self, model: ModelDescription, pose: Pose, flags: int) -> int:
         """Loads a model in the engine's form by way of files; returns PyBullet's number of the body."""
@@ -155,21 +165,26 @@ class BulletClient:
             0.0, shape, -1, plane.position, plane.orientation, physicsClientId=self._client
         )
         self._sizes[body] = PLANE
-        return self._keep(
-            BulletBody(
-                self._client, body, description, pose, self._weightless, self._separation, {}
-            )
-        )
+        return self._made(body, description, pose, {})
 
-    def _keep(self, body: BulletBody) -> BulletBody:
-        body.set_time_step(self._time_step)
+    def _made(
+        self, number: int, description: ModelDescription, pose: Pose, offsets: dict[str, Pose]
+    ) -> BulletBody:
+        """Returns the body of what PyBullet has loaded."""
+        body = BulletBody(
+            self._client, number, description, pose, self._weightless, self._separation, offsets
+        )
+        body.set_time_step(self._settings.time_step)
         self._bodies[body.id] = body
         for index, touching in body.touching.items():
             self._sides[body.id, index] = Side(body, *touching)
         return body
 
-    def remove(self, body: int) -> None:
-        """Takes a body out of the world."""
+    def remove(self, body: Body) -> None:
+        assert isinstance(body, BulletBody)
+        self._remove(body.id)
+
+    def _remove(self, body: int) -> None:
         pybullet.removeBody(body, physicsClientId=self._client)
         self._weightless -= {key for key in self._weightless if key[0] == body}
         self.waste += self._sizes.pop(body) + self._meshes.remove(body)
@@ -178,31 +193,29 @@ class BulletClient:
         self._sides = {key: side for key, side in self._sides.items() if key[0] != body}
 
     def step(self) -> None:
-        """Integrates by one time step."""
         if self._separation.placed:
-            self._separation.ease(self._time_step)
+            self._separation.ease(self._settings.time_step)
         if self._weightless:
             self._hold_up()
         self._step()
 
     def contacts(self) -> list[Contact]:
-        """Returns where bodies touched in the last step, without those that were only near."""
+        # Without those that were only near.
         found = pybullet.getContactPoints(physicsClientId=self._client)
         return [_contact(each, self._sides) for each in found if each[9] > 0.0]
 
-    def fastenings(self) -> dict[int, Any]:
-        """See `Engine.fastened`; bodies are named by their places in the order."""
+    def fastened(self) -> dict[int, Any]:
         places = {body: place for place, body in enumerate(self._bodies)}
         fastened: dict[int, Any] = {}
-        for number, each in self.fastened.items():
+        for number, each in self._fastened.items():
             one, link, other, *rest = each.made_of
             pairs = [pair[2:] for pair in each.apart]
             fastened[number] = (places[one], link, places[other], *rest), pairs
         return fastened
 
     def refasten(self, fastened: Mapping[int, Any]) -> None:
-        """See `Engine.refasten`; the solver's result depends on the order of constraints."""
-        for number in list(self.fastened):
+        # The solver's result depends on the order of constraints.
+        for number in list(self._fastened):
             self.unfasten(number)
         ids = list(self._bodies)
         for number, ((one, link, other, *rest), apart) in fastened.items():
@@ -211,13 +224,11 @@ class BulletClient:
         self._last = max(self._last, *fastened, 0)
 
     def forget_contacts(self) -> None:
-        """See `Engine.forget_contacts`."""
         self._separation.placed = True
         for body in self._bodies.values():
             body.forget_contacts()
 
     def fasten(self, first: LinkOf, second: LinkOf, pose: Pose) -> int:
-        """See `Engine.fasten`."""
         (one, link), (other, its) = first, second
         assert isinstance(one, BulletBody)
         assert isinstance(other, BulletBody)
@@ -234,17 +245,16 @@ class BulletClient:
         self, number: int, made_of: Sequence[Any], apart: Sequence[tuple[int, int, int, int]]
     ) -> None:
         constraint = add_weld(self._client, made_of)
-        self.fastened[number] = Fastening(constraint, made_of, apart)
+        self._fastened[number] = Fastening(constraint, made_of, apart)
         self._let_meet(number, False)
 
     def unfasten(self, number: int) -> None:
-        """See `Engine.unfasten`."""
         self._let_meet(number, True)
         self._separation.placed = True
-        pybullet.removeConstraint(self.fastened.pop(number).constraint, self._client)
+        pybullet.removeConstraint(self._fastened.pop(number).constraint, self._client)
 
     def _let_meet(self, number: int, on: bool) -> None:
-        for pair in self.fastened[number].apart:
+        for pair in self._fastened[number].apart:
             pybullet.setCollisionFilterPair(*pair, int(on), self._client)
 
     def _hold_up(self) -> None:
@@ -255,12 +265,25 @@ class BulletClient:
                 com = pybullet.getBasePositionAndOrientation(body, self._client)[0]
             else:
                 com = pybullet.getLinkState(body, link, 0, 1, self._client)[0]
-            pybullet.applyExternalForce(
-                body, link, scale(self._gravity, -mass), com, pybullet.WORLD_FRAME, self._client
-            )
+            up = scale(self._settings.gravity, -mass)
+            pybullet.applyExternalForce(body, link, up, com, pybullet.WORLD_FRAME, self._client)
+
+    def renewed(self, bodies: Sequence[tuple[ModelDescription, Body]]) -> list[Body]:
+        if self.waste <= max(self._most_waste, self.live):
+            return super().renewed(bodies)
+        fresh = BulletEngine(self._settings)
+        try:
+            moved = [_moved(description, body, fresh) for description, body in bodies]
+        except DescriptionError:  # no space for their files: the old world continues
+            fresh.close()
+            self._most_waste = 2 * self.waste
+            return super().renewed(bodies)
+        self.close()
+        give_back()
+        vars(self).update(vars(fresh))  # its world takes the place of this one
+        return moved
 
     def close(self) -> None:
-        """Frees the world's memory."""
         pybullet.disconnect(self._client)
 
 
@@ -283,84 +306,10 @@ def _size(folder: Path) -> int:
     return sum(path.stat().st_size for path in folder.iterdir())
 
 
-class BulletEngine(Engine):
-    """PyBullet worlds, one after the other: a new one frees the memory that removed bodies leave behind."""
-
-    def __init__(self) -> None:
-        self._settings = BulletSettings()
-        self._client = BulletClient(self._settings)
-        self._most_waste = MOST_WASTE
-
-    def load(self, description: ModelDescription, pose: Pose) -> BulletBody:
-        return self._client.load(description, pose)
-
-    def remove(self, body: Body) -> None:
-        assert isinstance(body, BulletBody)
-        self._client.remove(body.id)
-
-    def renewed(self, bodies: Sequence[tuple[ModelDescription, Body]]) -> list[Body]:
-        if self._client.waste <= max(self._most_waste, self._client.live):
-            return super().renewed(bodies)
-        fresh = BulletClient(self._settings)
-        try:
-            moved = [_moved(description, body, fresh) for description, body in bodies]
-        except DescriptionError:  # no space for their files: the old world continues
-            fresh.close()
-            self._most_waste = 2 * self._client.waste
-            return super().renewed(bodies)
-        self._client.close()
-        give_back()
-        self._client, self._most_waste = fresh, MOST_WASTE
-        return moved
-
-    def fasten(self, first: LinkOf, second: LinkOf, pose: Pose) -> int:
-        return self._client.fasten(first, second, pose)
-
-    def unfasten(self, number: int) -> None:
-        self._client.unfasten(number)
-
-    def order(self) -> list[BulletBody]:
-        return self._client.bodies
-
-    def fastened(self) -> dict[int, Any]:
-        return self._client.fastenings()
-
-    def refasten(self, fastened: Mapping[int, Any]) -> None:
-        self._client.refasten(fastened)
-
-    def set_gravity(self, gravity: Vector) -> None:
-        self._settings.gravity = gravity
-        self._client.apply(self._settings)
-
-    def set_time_step(self, dt: float) -> None:
-        self._settings.time_step = dt
-        self._client.apply(self._settings)
-
-    def set_iterations(self, count: int) -> None:
-        self._settings.iterations = count
-        self._client.apply(self._settings)
-
-    def set_fastest_separation(self, speed: float) -> None:
-        self._settings.separation = speed
-        self._client.apply(self._settings)
-
-    def step(self) -> None:
-        self._client.step()
-
-    def forget_contacts(self) -> None:
-        self._client.forget_contacts()
-
-    def contacts(self) -> list[Contact]:
-        return self._client.contacts()
-
-    def close(self) -> None:
-        self._client.close()
-
-
-def _moved(description: ModelDescription, body: Body, client: BulletClient) -> Body:
+def _moved(description: ModelDescription, body: Body, engine: BulletEngine) -> Body:
     """Returns `body` reloaded into another world, in the same state."""
     assert isinstance(body, BulletBody)
-    fresh = client.load(description, body.link_state(description.root)[0])
+    fresh = engine.load(description, body.link_state(description.root)[0])
     fresh.move(body.motion())
     return fresh
 

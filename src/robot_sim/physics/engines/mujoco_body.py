@@ -13,11 +13,7 @@ from robot_sim.physics.description import (
     ModelDescription,
     Shape,
 )
-from robot_sim.physics.engine import (
-    STRONGEST,
-    Body,
-    Twist,
-)
+from robot_sim.physics.engine import STRONGEST, Body, Twist
 from robot_sim.physics.engines.mujoco_model import Elements, geoms_of, priority, wxyz, xyzw
 from robot_sim.physics.engines.mujoco_state import MujocoState
 from robot_sim.physics.pose import ZERO, Pose, Quaternion, Vector, conjugate, rotate
@@ -56,12 +52,9 @@ class MujocoBody(Body):
     implicit_damping = True
 
     def __init__(
-        self,
-        state: MujocoState,
-        description: ModelDescription,
-        pose: Pose,
+        self, state: MujocoState, description: ModelDescription, pose: Pose,
         compile_anew: Callable[[], None],
-    ) -> None:
+    ) -> None:  # fmt: skip
         """`compile_anew` recompiles the world's model from its bodies' present settings."""
         self.description = description
         self.pose = pose  # of the root link; of one that is free, where it was loaded

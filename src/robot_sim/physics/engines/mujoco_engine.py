@@ -12,12 +12,7 @@ from robot_sim.physics.description import DescriptionError, ModelDescription
 from robot_sim.physics.engine import Body, Contact, Engine, LinkOf, Side
 from robot_sim.physics.engine_form import check_bounds
 from robot_sim.physics.engines.mujoco_body import MujocoBody
-from robot_sim.physics.engines.mujoco_model import (
-    Elements,
-    ModelWriter,
-    add_weld,
-    compile_spec,
-)
+from robot_sim.physics.engines.mujoco_model import Elements, ModelWriter, add_weld, compile_spec
 from robot_sim.physics.engines.mujoco_state import MujocoState
 from robot_sim.physics.pose import ZERO, Pose, Vector
 
@@ -39,14 +34,9 @@ logger = logging.getLogger(f"rosout.{__name__}")
 class MujocoEngine(Engine):
     """One MuJoCo world. It is integrated by semi-implicit Euler, joint damping implicitly."""
 
-    def __init__(self, runge_kutta: bool = False) -> None:
-        """
-        Args:
-            runge_kutta: integrate by RK4, for comparisons; motors with a speed don't work then.
-        """
+    def __init__(self) -> None:
         # By default MuJoCo writes warnings into a file in the current folder.
         mujoco.set_mju_user_warning(logger.warning)
-        self._runge_kutta = runge_kutta
         self._gravity: Vector = ZERO
         self._time_step = DEFAULT_STEP
         self._iterations = 50
@@ -195,13 +185,9 @@ class MujocoEngine(Engine):
         model, option = self._state.model, self._state.model.opt
         self._state.set_time_step(self._time_step)
         self._state.set_fastest_separation(self._separation)
-        self._state.whole_steps = self._runge_kutta
         option.gravity[:] = self._gravity
         option.iterations = self._iterations
-        integrators = mujoco.mjtIntegrator
-        option.integrator = (
-            integrators.mjINT_RK4 if self._runge_kutta else integrators.mjINT_IMPLICITFAST
-        )
+        option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         option.impratio = IMPRATIO
         # MuJoCo 4.0.0's sparse factorisation gives wrong accelerations (mujoco#3767).
@@ -213,19 +199,13 @@ class MujocoEngine(Engine):
             mujoco.mjtDisableBit.mjDSBL_WARMSTART | mujoco.mjtDisableBit.mjDSBL_AUTORESET
         )
         for reference in (
-            model.jnt_solref,
-            model.dof_solref,
-            model.geom_solref,
-            model.tendon_solref_fri,
+            model.jnt_solref, model.dof_solref, model.geom_solref, model.tendon_solref_fri,
             model.eq_solref,
-        ):
+        ):  # fmt: skip
             reference[:] = (STIFFEST * self._time_step, 1.0)
         model.geom_solref[:] = (max(CONTACT[0], STIFFEST * self._time_step), CONTACT[1])
         for impedance in (
-            model.jnt_solimp,
-            model.dof_solimp,
-            model.geom_solimp,
-            model.tendon_solimp_fri,
+            model.jnt_solimp, model.dof_solimp, model.geom_solimp, model.tendon_solimp_fri,
             model.eq_solimp,
-        ):
+        ):  # fmt: skip
             impedance[:] = IMPEDANCE

@@ -32,7 +32,6 @@ class MujocoState:
     speeds: dict[int, float] = field(default_factory=dict)  # of motors, by degree of freedom
     gears: dict[int, float] = field(default_factory=dict)  # lengths [rad, m] of tendons
     placed: bool = True  # whether bodies may have been put into each other
-    whole_steps: bool = False  # for integrators of several stages: contacts are MuJoCo's own then
 
     def __post_init__(self) -> None:
         self.replace(self.model)
@@ -40,7 +39,10 @@ class MujocoState:
     def replace(self, model: mujoco.MjModel) -> None:
         """Uses another model; the bodies have to be bound to it."""
         self.model, self.data = model, mujoco.MjData(model)
-        self._watch()
+        # Each access to an attribute of MuJoCo makes a new array object.
+        self._positions, self._speeds = self.data.qpos, self.data.qvel.tolist
+        self._before = self._positions.copy()
+        self.set_time_step(model.opt.timestep)
         self.max_vel = np.full(model.ngeom, np.inf)  # [m/s], of each geom
         self.set_fastest_separation(np.inf)
         self.stale = self.placed = True
@@ -51,7 +53,7 @@ class MujocoState:
     def step(self) -> None:
         """Integrates by one time step; efforts and wrenches end with it."""
         np.copyto(self._before, self._positions)
-        may_lift = not self.whole_steps and (self.placed or hypot(*self._speeds()) > SLOWEST)
+        may_lift = self.placed or hypot(*self._speeds()) > SLOWEST
         if may_lift or self.speeds or self.gears:
             mujoco.mj_step1(self.model, self.data)
             if self.speeds or self.gears:
@@ -79,12 +81,6 @@ class MujocoState:
         free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
         self._fastest = np.where(alone & free, FASTEST, FURTHEST / dt)
         self._fast = FURTHEST / dt
-
-    def _watch(self) -> None:
-        # Each access to an attribute of MuJoCo makes a new array object.
-        self._positions, self._speeds = self.data.qpos, self.data.qvel.tolist
-        self._before = self._positions.copy()
-        self.set_time_step(self.model.opt.timestep)
 
     def set_fastest_separation(self, speed: float) -> None:
         """Bounds the speed [m/s] at which contacts end overlaps, in addition to the geoms' `max_vel`."""

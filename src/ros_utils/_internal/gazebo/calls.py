@@ -1,7 +1,7 @@
 """Service calls to the simulator, and results with several values. Part of `ros_gazebo`."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypedDict, Unpack
 
 import std_srvs.srv
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist
@@ -71,7 +71,16 @@ GAZEBO = "/gazebo"
 TIMEOUT = waiting.TIMEOUT
 
 
-def call(service: str, kind: Any, *request: Any, timeout: float, gazebo_ns: str) -> Any:
+class At(TypedDict, total=False):
+    """The keywords of all functions that call the simulator: see `ros_gazebo`."""
+
+    timeout: float
+    gazebo_ns: str
+
+
+def call(
+    service: str, kind: Any, *request: Any, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
+) -> Any:
     """Returns the simulator's answer, or None after a failure, which is logged."""
     name = f"{gazebo_ns.rstrip('/')}/{service}"
     try:
@@ -84,9 +93,9 @@ def call(service: str, kind: Any, *request: Any, timeout: float, gazebo_ns: str)
     return answer
 
 
-def done(service: str, kind: Any, *request: Any, timeout: float, gazebo_ns: str) -> bool:
+def done(service: str, kind: Any, *request: Any, **at: Unpack[At]) -> bool:
     """Calls the simulator; returns whether it reports success."""
-    return succeeded(call(service, kind, *request, timeout=timeout, gazebo_ns=gazebo_ns))
+    return succeeded(call(service, kind, *request, **at))
 
 
 def succeeded(answer: Any) -> bool:
@@ -94,7 +103,9 @@ def succeeded(answer: Any) -> bool:
     return answer is not None and bool(answer.success)
 
 
-def empty_call(service: str, retries: int, timeout: float, gazebo_ns: str) -> bool:
+def empty_call(
+    service: str, retries: int, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
+) -> bool:
     """Calls a service without arguments until it succeeds, at most `retries` times."""
     name = f"{gazebo_ns.rstrip('/')}/{service}"
     for attempt in range(1, retries + 1):

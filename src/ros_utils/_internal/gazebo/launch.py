@@ -23,32 +23,16 @@ READY = "pause_physics"  # comes up last of what a client needs to begin
 
 
 def launch_Gazebo(
-    paused: bool = False,
-    use_sim_time: bool = True,
-    gui: bool = True,
-    recording: bool = False,
-    debug: bool = False,
-    verbose: bool = False,
-    output: str = "screen",
+    paused: bool = False, use_sim_time: bool = True, gui: bool = True,
+    recording: bool = False, debug: bool = False, verbose: bool = False, output: str = "screen",
     custom_world_path: str | None = None,
-    custom_world_pkg: str | None = None,
-    custom_world_name: str | None = None,
-    respawn_gazebo: bool = False,
-    pub_clock_frequency: int = 100,
-    server_required: bool = False,
-    gui_required: bool = False,
-    launch_new_term: bool = True,
-    *,
-    lockstep: bool = False,
-    seed: int | None = None,
-    timeout: float = 30.0,
-    extra_gazebo_args: str = "",
-    gazebo_ns: str = "/gazebo",
-    log_file: str | None = None,
-    env: Mapping[str, str] | None = None,
-    master_uri: str | None = None,
-    ready: Ready | None = None,
-) -> Started | bool:
+    custom_world_pkg: str | None = None, custom_world_name: str | None = None,
+    respawn_gazebo: bool = False, pub_clock_frequency: int = 100,
+    server_required: bool = False, gui_required: bool = False, launch_new_term: bool = True,
+    *, lockstep: bool = False, seed: int | None = None, timeout: float = 30.0,
+    extra_gazebo_args: str = "", gazebo_ns: str = "/gazebo", log_file: str | None = None,
+    env: Mapping[str, str] | None = None, master_uri: str | None = None, ready: Ready | None = None,
+) -> Started | bool:  # fmt: skip
     """Runs ``roslaunch gazebo_ros empty_world.launch``, with a master if needed, and waits for the simulator.
 
     A simulator that already answers under this master is used unchanged, with a warning. The

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import rospy
 from gazebo_msgs import srv
@@ -15,6 +15,7 @@ from ros_utils._internal import nodes as _nodes
 from ros_utils._internal.gazebo.calls import (
     GAZEBO,
     TIMEOUT,
+    At,
     call,
     done,
     empty_call,
@@ -23,59 +24,36 @@ from ros_utils._internal.gazebo.calls import (
 )
 
 __all__ = [
-    "gazebo_get_ODE_physics",
-    "gazebo_get_gravity",
-    "gazebo_get_max_update_rate",
-    "gazebo_get_physics_properties",
-    "gazebo_get_time_step",
-    "gazebo_pause_physics",
-    "gazebo_reset_sim",
-    "gazebo_reset_world",
-    "gazebo_set_ODE_physics",
-    "gazebo_set_default_properties",
-    "gazebo_set_gravity",
-    "gazebo_set_max_update_rate",
-    "gazebo_set_physics_properties",
-    "gazebo_set_time_step",
-    "gazebo_step_physics",
+    "gazebo_get_ODE_physics", "gazebo_get_gravity", "gazebo_get_max_update_rate",
+    "gazebo_get_physics_properties", "gazebo_get_time_step", "gazebo_pause_physics",
+    "gazebo_reset_sim", "gazebo_reset_world", "gazebo_set_ODE_physics",
+    "gazebo_set_default_properties", "gazebo_set_gravity", "gazebo_set_max_update_rate",
+    "gazebo_set_physics_properties", "gazebo_set_time_step", "gazebo_step_physics",
     "gazebo_unpause_physics",
-]
+]  # fmt: skip
 
 STEP = "gazeboWorld"  # XML-RPC method of the stand-in's node; Gazebo has no service for steps
 CHUNK = 1000  # steps in one call
 
 
-def gazebo_reset_sim(
-    retries: int = 5, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
-) -> bool:
-    """Puts all models back to where they began, and sets the time to 0.
-
-    Args:
-        retries: attempts.
-        timeout, gazebo_ns: See `ros_gazebo`.
-    """
-    return empty_call("reset_simulation", retries, timeout, gazebo_ns)
+def gazebo_reset_sim(retries: int = 5, **at: Unpack[At]) -> bool:
+    """Puts all models back to where they began, and sets the time to 0; tries `retries` times at most."""
+    return empty_call("reset_simulation", retries, **at)
 
 
-def gazebo_reset_world(
-    retries: int = 5, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
-) -> bool:
+def gazebo_reset_world(retries: int = 5, **at: Unpack[At]) -> bool:
     """Puts all models back to where they began; time continues. See `gazebo_reset_sim`."""
-    return empty_call("reset_world", retries, timeout, gazebo_ns)
+    return empty_call("reset_world", retries, **at)
 
 
-def gazebo_pause_physics(
-    retries: int = 5, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
-) -> bool:
+def gazebo_pause_physics(retries: int = 5, **at: Unpack[At]) -> bool:
     """Stops simulated time. See `gazebo_reset_sim`."""
-    return empty_call("pause_physics", retries, timeout, gazebo_ns)
+    return empty_call("pause_physics", retries, **at)
 
 
-def gazebo_unpause_physics(
-    retries: int = 5, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
-) -> bool:
+def gazebo_unpause_physics(retries: int = 5, **at: Unpack[At]) -> bool:
     """Lets simulated time run. See `gazebo_reset_sim`."""
-    return empty_call("unpause_physics", retries, timeout, gazebo_ns)
+    return empty_call("unpause_physics", retries, **at)
 
 
 def gazebo_step_physics(
@@ -109,36 +87,21 @@ def gazebo_step_physics(
 
 TIME_STEP = 0.001  # [s]
 GRAVITY = (0.0, 0.0, -9.81)  # [m/s²]
-ODE = {
-    "auto_disable_bodies": False,
-    "sor_pgs_precon_iters": 0,
-    "sor_pgs_iters": 50,
-    "sor_pgs_w": 1.3,
-    "sor_pgs_rms_error_tol": 0.0,
-    "contact_surface_layer": 0.001,
-    "contact_max_correcting_vel": 0.0,
-    "cfm": 0.0,
-    "erp": 0.2,
-    "max_contacts": 20,
-}
+ODE = ODEPhysics(
+    sor_pgs_iters=50, sor_pgs_w=1.3, contact_surface_layer=0.001, erp=0.2, max_contacts=20
+)
 
 
-def gazebo_get_physics_properties(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> Any:
+def gazebo_get_physics_properties(**at: Unpack[At]) -> Any:
     """Returns the answer of gazebo_msgs/GetPhysicsProperties, or None, with an error in the log."""
-    kind = srv.GetPhysicsProperties
-    answer = call("get_physics_properties", kind, timeout=timeout, gazebo_ns=gazebo_ns)
+    answer = call("get_physics_properties", srv.GetPhysicsProperties, **at)
     return answer if succeeded(answer) else None
 
 
 def gazebo_set_physics_properties(
-    time_step: float | None = None,
-    max_update_rate: float | None = None,
-    gravity: Sequence[float] | None = None,
-    ode_config: ODEPhysics | None = None,
-    *,
-    timeout: float = TIMEOUT,
-    gazebo_ns: str = GAZEBO,
-) -> bool:
+    time_step: float | None = None, max_update_rate: float | None = None,
+    gravity: Sequence[float] | None = None, ode_config: ODEPhysics | None = None, **at: Unpack[At],
+) -> bool:  # fmt: skip
     """Changes the given properties; the others stay unchanged.
 
     Args:
@@ -146,9 +109,8 @@ def gazebo_set_physics_properties(
         max_update_rate: Steps per second of wall time [Hz]; 0 is as fast as possible.
         gravity: X, y, z [m/s²].
         ode_config: The solver's settings.
-        timeout, gazebo_ns: See `ros_gazebo`.
     """
-    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    now = gazebo_get_physics_properties(**at)
     if now is None:
         return False
     fault = not_finite("gravity", *(() if gravity is None else gravity)) or not_finite(
@@ -165,95 +127,77 @@ def gazebo_set_physics_properties(
         now.gravity if gravity is None else Vector3(*gravity),
         now.ode_config if ode_config is None else ode_config,
     )
-    kind = srv.SetPhysicsProperties
-    return done("set_physics_properties", kind, *request, timeout=timeout, gazebo_ns=gazebo_ns)
+    return done("set_physics_properties", srv.SetPhysicsProperties, *request, **at)
 
 
-def gazebo_set_max_update_rate(
-    max_update_rate: float, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
-) -> bool:
+def gazebo_set_max_update_rate(max_update_rate: float, **at: Unpack[At]) -> bool:
     """Sets how fast simulated time passes.
 
     Args:
         max_update_rate: A FACTOR of real time, 1 for real time; 0 is as fast as possible. (The
             getter answers in Hz; `gazebo_set_physics_properties` takes Hz.)
-        timeout, gazebo_ns: See `ros_gazebo`.
     """
-    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    now = gazebo_get_physics_properties(**at)
     if now is None or not now.time_step:
         return False
     rate = max_update_rate / now.time_step
-    return gazebo_set_physics_properties(max_update_rate=rate, timeout=timeout, gazebo_ns=gazebo_ns)
+    return gazebo_set_physics_properties(max_update_rate=rate, **at)
 
 
-def gazebo_get_max_update_rate(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> float:
+def gazebo_get_max_update_rate(**at: Unpack[At]) -> float:
     """Returns the steps per second of wall time [Hz], no factor; 0: unlimited, NaN: no answer."""
-    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    now = gazebo_get_physics_properties(**at)
     return float("nan") if now is None else float(now.max_update_rate)
 
 
-def gazebo_set_time_step(
-    new_time_step: float, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
-) -> bool:
+def gazebo_set_time_step(new_time_step: float, **at: Unpack[At]) -> bool:
     """Sets the length of a physics step [s]; simulated time passes as fast as before."""
-    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    now = gazebo_get_physics_properties(**at)
     if now is None:
         return False
     rate = now.max_update_rate
     if new_time_step:  # the setter rejects 0
         rate *= now.time_step / new_time_step
-    return gazebo_set_physics_properties(new_time_step, rate, timeout=timeout, gazebo_ns=gazebo_ns)
+    return gazebo_set_physics_properties(new_time_step, rate, **at)
 
 
-def gazebo_get_time_step(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> float:
+def gazebo_get_time_step(**at: Unpack[At]) -> float:
     """Returns the length of a physics step [s]; NaN without an answer."""
-    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    now = gazebo_get_physics_properties(**at)
     return float("nan") if now is None else float(now.time_step)
 
 
-def gazebo_set_gravity(
-    x: float, y: float, z: float, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
-) -> bool:
+def gazebo_set_gravity(x: float, y: float, z: float, **at: Unpack[At]) -> bool:
     """Sets gravity [m/s²]; returns True if the simulator did it."""
-    return gazebo_set_physics_properties(gravity=(x, y, z), timeout=timeout, gazebo_ns=gazebo_ns)
+    return gazebo_set_physics_properties(gravity=(x, y, z), **at)
 
 
-def gazebo_get_gravity(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> Vector3:
+def gazebo_get_gravity(**at: Unpack[At]) -> Vector3:
     """Returns gravity [m/s²]; all NaN without an answer."""
-    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    now = gazebo_get_physics_properties(**at)
     return Vector3(*(float("nan"),) * 3) if now is None else now.gravity
 
 
 def gazebo_set_ODE_physics(
-    auto_disable_bodies: bool,
-    sor_pgs_precon_iters: int,
-    sor_pgs_iters: int,
-    sor_pgs_w: float,
-    sor_pgs_rms_error_tol: float,
-    contact_surface_layer: float,
-    contact_max_correcting_vel: float,
-    cfm: float,
-    erp: float,
-    max_contacts: int,
-    *,
-    timeout: float = TIMEOUT,
-    gazebo_ns: str = GAZEBO,
-) -> bool:
+    auto_disable_bodies: bool, sor_pgs_precon_iters: int, sor_pgs_iters: int, sor_pgs_w: float,
+    sor_pgs_rms_error_tol: float, contact_surface_layer: float, contact_max_correcting_vel: float,
+    cfm: float, erp: float, max_contacts: int, **at: Unpack[At],
+) -> bool:  # fmt: skip
     """Sets all solver settings; the arguments are the fields of gazebo_msgs/ODEPhysics."""
     config = ODEPhysics(
         auto_disable_bodies, sor_pgs_precon_iters, sor_pgs_iters, sor_pgs_w, sor_pgs_rms_error_tol,
         contact_surface_layer, contact_max_correcting_vel, cfm, erp, max_contacts,
     )  # fmt: skip
-    return gazebo_set_physics_properties(ode_config=config, timeout=timeout, gazebo_ns=gazebo_ns)
+    return gazebo_set_physics_properties(ode_config=config, **at)
 
 
-def gazebo_get_ODE_physics(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> ODEPhysics:
+def gazebo_get_ODE_physics(**at: Unpack[At]) -> ODEPhysics:
     """Returns the solver's settings; without an answer all zeros, with an error in the log."""
-    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    now = gazebo_get_physics_properties(**at)
     return ODEPhysics() if now is None else now.ode_config
 
 
-def gazebo_set_default_properties(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> bool:
+def gazebo_set_default_properties(**at: Unpack[At]) -> bool:
     """Sets a step of 1 ms, real time, gravity of 9.81 m/s² and the solver's usual settings, at once."""
-    usual = (TIME_STEP, 1.0 / TIME_STEP, GRAVITY, ODEPhysics(**ODE))
-    return gazebo_set_physics_properties(*usual, timeout=timeout, gazebo_ns=gazebo_ns)
+    usual = (TIME_STEP, 1.0 / TIME_STEP, GRAVITY, ODE)
+    return gazebo_set_physics_properties(*usual, **at)

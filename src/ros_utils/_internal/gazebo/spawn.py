@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Unpack
 
 import rosgraph
 from gazebo_msgs import srv
@@ -17,6 +18,7 @@ from ros_utils._internal import params as _params
 from ros_utils._internal.gazebo.calls import (
     GAZEBO,
     TIMEOUT,
+    At,
     SpawnResult,
     call,
     done,
@@ -26,23 +28,23 @@ from ros_utils._internal.gazebo.calls import (
 from ros_utils._internal.packages import urdf_parse_from_path, urdf_parse_from_pkg
 
 __all__ = [
-    "gazebo_delete_model",
-    "gazebo_spawn_sdf_param",
-    "gazebo_spawn_sdf_path",
-    "gazebo_spawn_sdf_pkg",
-    "gazebo_spawn_sdf_string",
-    "gazebo_spawn_urdf_param",
-    "gazebo_spawn_urdf_path",
-    "gazebo_spawn_urdf_pkg",
-    "gazebo_spawn_urdf_string",
-]
+    "gazebo_delete_model", "gazebo_spawn_sdf_param", "gazebo_spawn_sdf_path",
+    "gazebo_spawn_sdf_pkg", "gazebo_spawn_sdf_string", "gazebo_spawn_urdf_param",
+    "gazebo_spawn_urdf_path", "gazebo_spawn_urdf_pkg", "gazebo_spawn_urdf_string",
+]  # fmt: skip
 
 Pose = tuple[float, float, float, float, float, float, float]  # x, y, z [m] and a quaternion
 
 
+class Spawning(At, total=False):
+    """The keywords of all functions that spawn a model: see `gazebo_spawn_urdf_string`."""
+
+    verify: bool
+
+
 def spawn(
     kind: str, xml: str, name: str, namespace: str, frame: str, pose: Pose,
-    timeout: float, gazebo_ns: str, verify: bool,
+    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
 ) -> SpawnResult:  # fmt: skip
     """Spawns a model from XML text; `kind` is "urdf" or "sdf"."""
     service = f"{gazebo_ns.rstrip('/')}/spawn_{kind}_model"
@@ -62,7 +64,7 @@ def spawn(
 
 def spawn_param(
     kind: str, param_name: str, name: str, namespace: str, frame: str, pose: Pose,
-    timeout: float, gazebo_ns: str, verify: bool,
+    **how: Unpack[Spawning],
 ) -> SpawnResult:  # fmt: skip
     """Spawns a model from the text in parameter ``<namespace>/<param_name>``. See `spawn`."""
     full = rosgraph.names.ns_join(namespace or "/", param_name)
@@ -72,21 +74,15 @@ def spawn_param(
         return _failed(f"parameter {full}: {fault}")
     except KeyError:
         return _failed(f"parameter {full} is not set: load the robot's description first")
-    return spawn(kind, xml, name, namespace, frame, pose, timeout, gazebo_ns, verify)
+    return spawn(kind, xml, name, namespace, frame, pose, **how)
 
 
 def gazebo_delete_model(
     model_name: str, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False
 ) -> bool:
-    """Deletes a model.
+    """Deletes a model; with `verify`, returns only once it is no longer in the world's list.
 
-    Args:
-        model_name: The model's name.
-        timeout, gazebo_ns: See `ros_gazebo`.
-        verify: Return only once the model is no longer in the world's list.
-
-    Returns:
-        True if the model existed and is gone.
+    Returns True if the model existed and is gone.
     """
     kind = srv.DeleteModel
     deleted = done("delete_model", kind, model_name, timeout=timeout, gazebo_ns=gazebo_ns)
@@ -115,15 +111,14 @@ def gazebo_spawn_urdf_path(
     model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
     pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
     ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
-    *, args_xacro: Sequence[str] | None = None,
-    timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+    *, args_xacro: Sequence[str] | None = None, **how: Unpack[Spawning],
 ) -> SpawnResult:  # fmt: skip
     """Spawns a URDF or xacro file, given by its path. See `gazebo_spawn_urdf_string`."""
     xml = urdf_parse_from_path(model_path, args_xacro)
     if xml is None:
         return SpawnResult(False, f"{model_path}: can't be read or expanded")
     place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    return spawn("urdf", xml, model_name, *place, timeout, gazebo_ns, verify)
+    return spawn("urdf", xml, model_name, *place, **how)
 
 
 def gazebo_spawn_urdf_pkg(
@@ -131,8 +126,7 @@ def gazebo_spawn_urdf_pkg(
     model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
     pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
     ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
-    *, args_xacro: Sequence[str] | None = None,
-    timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+    *, args_xacro: Sequence[str] | None = None, **how: Unpack[Spawning],
 ) -> SpawnResult:  # fmt: skip
     """Spawns URDF or xacro ``<pkg_name><file_folder>/<file_name>``. See `gazebo_spawn_urdf_string`."""
     xml = urdf_parse_from_pkg(pkg_name, file_name, file_folder, args_xacro)
@@ -141,7 +135,7 @@ def gazebo_spawn_urdf_pkg(
             False, f"{file_name} in package {pkg_name}: can't be found, read or expanded"
         )
     place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    return spawn("urdf", xml, model_name, *place, timeout, gazebo_ns, verify)
+    return spawn("urdf", xml, model_name, *place, **how)
 
 
 def gazebo_spawn_urdf_string(
@@ -149,7 +143,7 @@ def gazebo_spawn_urdf_string(
     model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
     pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
     ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
-    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+    **how: Unpack[Spawning],
 ) -> SpawnResult:  # fmt: skip
     """Spawns a model from URDF text.
 
@@ -160,15 +154,15 @@ def gazebo_spawn_urdf_string(
         reference_frame: Model or link that the pose refers to; "world" for the origin.
         pos_x, pos_y, pos_z: Position [m].
         ori_x, ori_y, ori_z, ori_w: Orientation, a quaternion.
-        timeout, gazebo_ns: See `ros_gazebo`.
-        verify: Return only once the model is in the world's list.
+        how: `timeout` and `gazebo_ns`, see `ros_gazebo`; `verify` returns only once the model is in the
+            world's list.
 
     Returns:
         Whether it was spawned, and the simulator's text or an earlier error: a pair that is false
         after a failure.
     """
     place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    return spawn("urdf", model_string, model_name, *place, timeout, gazebo_ns, verify)
+    return spawn("urdf", model_string, model_name, *place, **how)
 
 
 def gazebo_spawn_urdf_param(
@@ -176,11 +170,11 @@ def gazebo_spawn_urdf_param(
     model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
     pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
     ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
-    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+    **how: Unpack[Spawning],
 ) -> SpawnResult:  # fmt: skip
     """Spawns the URDF in parameter ``<robot_namespace>/<param_name>``. See `gazebo_spawn_urdf_string`."""
     place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    return spawn_param("urdf", param_name, model_name, *place, timeout, gazebo_ns, verify)
+    return spawn_param("urdf", param_name, model_name, *place, **how)
 
 
 def gazebo_spawn_sdf_path(
@@ -188,7 +182,7 @@ def gazebo_spawn_sdf_path(
     model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
     pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
     ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
-    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+    **how: Unpack[Spawning],
 ) -> bool:  # fmt: skip
     """Spawns an SDF file, given by its path. See `gazebo_spawn_sdf_string`."""
     try:
@@ -197,7 +191,7 @@ def gazebo_spawn_sdf_path(
         _log.error(f"sdf: {model_path}: {fault}")
         return False
     place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    return spawn("sdf", xml, model_name, *place, timeout, gazebo_ns, verify).success
+    return spawn("sdf", xml, model_name, *place, **how).success
 
 
 def gazebo_spawn_sdf_pkg(
@@ -205,7 +199,7 @@ def gazebo_spawn_sdf_pkg(
     model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
     pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
     ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
-    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+    **how: Unpack[Spawning],
 ) -> bool:  # fmt: skip
     """Spawns the SDF file ``<pkg_name><file_folder>/<file_name>``. See `gazebo_spawn_sdf_string`."""
     try:
@@ -215,7 +209,7 @@ def gazebo_spawn_sdf_pkg(
         return False
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     place = (model_name, robot_namespace, reference_frame, *pose)
-    return gazebo_spawn_sdf_path(path, *place, timeout=timeout, gazebo_ns=gazebo_ns, verify=verify)
+    return gazebo_spawn_sdf_path(path, *place, **how)
 
 
 def gazebo_spawn_sdf_string(
@@ -223,15 +217,14 @@ def gazebo_spawn_sdf_string(
     model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
     pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
     ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
-    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+    **how: Unpack[Spawning],
 ) -> bool:  # fmt: skip
     """Spawns a model from SDF text; the arguments are those of `gazebo_spawn_urdf_string`.
 
-    Returns:
-        True if it was spawned; a single value, unlike the pair for a URDF.
+    Returns True if it was spawned; a single value, unlike the pair for a URDF.
     """
     place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    return spawn("sdf", model_string, model_name, *place, timeout, gazebo_ns, verify).success
+    return spawn("sdf", model_string, model_name, *place, **how).success
 
 
 def gazebo_spawn_sdf_param(
@@ -239,8 +232,8 @@ def gazebo_spawn_sdf_param(
     model_name: str = "robot1", robot_namespace: str = "/", reference_frame: str = "world",
     pos_x: float = 0.0, pos_y: float = 0.0, pos_z: float = 0.0,
     ori_x: float = 0.0, ori_y: float = 0.0, ori_z: float = 0.0, ori_w: float = 1.0,
-    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO, verify: bool = False,
+    **how: Unpack[Spawning],
 ) -> bool:  # fmt: skip
     """Spawns the SDF in parameter ``<robot_namespace>/<param_name>``. See `gazebo_spawn_sdf_string`."""
     place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    return spawn_param("sdf", param_name, model_name, *place, timeout, gazebo_ns, verify).success
+    return spawn_param("sdf", param_name, model_name, *place, **how).success

@@ -4,7 +4,6 @@ import importlib.util
 import math
 import subprocess
 import sys
-from functools import partial
 
 import numpy as np
 import pytest
@@ -52,13 +51,10 @@ def test_both_engines_go_the_same_way(state, force):
 @pytest.mark.extras("mujoco")
 def test_what_is_left_of_the_error_is_the_step():
     """Integrated by RK4, MuJoCo's model gives what the equations of motion do: the figures are the same."""
-    from robot_sim.physics.engines.mujoco_engine import MujocoEngine
-
-    exact = partial(MujocoEngine, runge_kutta=True)
-    assert runs.fall_error(exact, 0.001) < 1e-8
-    assert runs.push_error(exact, 0.001) < 1e-9
-    assert runs.loop_error(exact, 0.001) < 1e-8
-    assert max(map(abs, runs.energy_error(exact, 0.001, 5.0))) < 1e-8
+    assert runs.fall_error(runs.runge_kutta, 0.001) < 1e-8
+    assert runs.push_error(runs.runge_kutta, 0.001) < 1e-9
+    assert runs.loop_error(runs.runge_kutta, 0.001) < 1e-8
+    assert max(map(abs, runs.energy_error(runs.runge_kutta, 0.001, 5.0))) < 1e-8
 
 
 def test_an_unknown_engine_is_named():

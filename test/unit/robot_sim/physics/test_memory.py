@@ -152,7 +152,7 @@ def test_in_a_new_world_of_the_engine_contacts_begin_anew_gently(sim):
     for step in range(700):
         if step == 500:
             assert speeds[-1] < 1e-3
-            client.waste = 10**9
+            engine.waste = 10**9
             world.spawn("other", parse_urdf(chain(2)), Pose((20.0, 0.0, 9.0)))
             assert engine._client is not client
         world.step()

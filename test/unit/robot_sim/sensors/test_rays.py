@@ -147,7 +147,7 @@ def test_the_engines_own_rays_agree(world, put):
     origin, ways = np.array([0.0, 0.0, 0.4]), fan(180)
     found = RayScene(world).cast(origin, ways, far=10.0).distances
     ends = (origin + 10.0 * ways).tolist()
-    client = world.engine._client._client
+    client = world.engine._client
     met = pybullet.rayTestBatch([origin.tolist()] * 180, ends, physicsClientId=client)
     expected = np.array([10.0 * each[2] if each[0] >= 0 else math.inf for each in met])
     both = np.isfinite(expected) & np.isfinite(found)
