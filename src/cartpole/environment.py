@@ -198,12 +198,7 @@ def make_environment(
     randomisation: Mapping[str, Any] | None = None,
     **options: Any,
 ) -> CartPoleEnv:
-    """Makes an environment for Gymnasium; `CartPoleEnv` explains the options.
-
-    Raises:
-        ValueError: If an option makes no sense.
-        RobotEnvError: If the robot can't be brought up.
-    """
+    """Makes an environment for Gymnasium; `CartPoleEnv` explains the options and errors."""
     check_options(options, ("noise",))
     varied: CartPoleRandomisation | Mapping[str, Any] | None = randomisation
     own = {each.name for each in fields(CartPoleRandomisation)}
@@ -213,21 +208,12 @@ def make_environment(
 
 
 def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
-    """Makes a vector of environments for Gymnasium; see `RobotVectorEnv`.
-
-    Raises:
-        ValueError: If an option makes no sense.
-        RobotEnvError: If a robot can't be brought up.
-    """
+    """Makes a vector of environments for Gymnasium; see `RobotVectorEnv`."""
     return RobotVectorEnv(num_envs, make_environment, **options)
 
 
 def make_task(name: str, noise: float | None = None) -> CartPoleTask:
-    """Makes a task; None stands for its default noise.
-
-    Raises:
-        ValueError: If there is no such task, or the noise makes no sense.
-    """
+    """Makes a task; None stands for its default noise. Raises ValueError for another name or noise."""
     if name not in TASKS:
         raise ValueError(f"there is no task {name!r}; there are {', '.join(TASKS)}")
     return TASKS[name]() if noise is None else TASKS[name](noise=noise)  # type: ignore[call-arg]

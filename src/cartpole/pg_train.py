@@ -92,8 +92,7 @@ def main(argv: list[str] | None = None) -> int:
 def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOptions, RobotOptions]:
     """Reads the options of training and robot from flags and private parameters.
 
-    Raises:
-        SystemExit: With code 2 and a usage line, if they are wrong; with 0 after --help.
+    Exits with code 2 and a usage line, if they are wrong; with 0 after --help.
     """
     parser = argparse.ArgumentParser(
         PROG,
@@ -158,17 +157,10 @@ def _backend(options: TrainingOptions) -> str:
 def session(
     options: TrainingOptions, name: str, argv: list[str], robot: RobotOptions, folder: Path
 ) -> Iterator[None]:
-    """Runs the robot's ROS session until the block ends.
+    """Runs the robot's ROS session until the block ends; the simulator's window shows the folder's curves.
 
-    Args:
-        options: Of the training.
-        name: This node's full name.
-        argv: The process's arguments, with roslaunch's remappings.
-        robot: The robot's options, among them whether to open RViz.
-        folder: The run folder, whose curves the simulator's window shows.
-
-    Raises:
-        RobotEnvError: If something can't be started, or an already running part doesn't fit.
+    `argv` has roslaunch's remappings. Raises RobotEnvError if something can't be started, or what runs
+    doesn't fit.
     """
     backend = _backend(options)
     need_ros(f"the backend {backend}")

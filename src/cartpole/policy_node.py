@@ -83,8 +83,7 @@ def main(argv: list[str] | None = None) -> int:
 def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:
     """Parses flags and private parameters; flags override parameters.
 
-    Raises:
-        SystemExit: With code 2 and a usage line, if they are wrong; with 0 after --help.
+    Exits with code 2 and a usage line, if they are wrong; with 0 after --help.
     """
     parser = argparse.ArgumentParser(
         f"{NODE}.py",
@@ -135,14 +134,9 @@ def _share(text: str) -> float:
 def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
     """Loads the policy of a run folder or an exported file, with its robot and task.
 
-    Args:
-        path: The run folder or the exported file.
-        which: The checkpoint of a run folder.
-        options: Options of the environment on top of the training's.
-
-    Raises:
-        WorkbenchError: If there is no such policy or environment.
-        RobotEnvError: If its environment doesn't have exactly one robot.
+    `which` is the checkpoint of a run folder; `options` of the environment are added to the training's.
+    Raises WorkbenchError if there is no such policy or environment, RobotEnvError unless it has exactly one
+    robot.
     """
     # They import torch, for which --help need not wait.
     from rl_workbench.tools.policies import load_learned

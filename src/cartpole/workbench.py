@@ -70,22 +70,12 @@ def _free_port() -> int:
 
 
 def ros_options(argv: list[str], default_name: str) -> tuple[list[str], dict[str, Any], str]:
-    """Splits a command's arguments into its own and ROS's.
+    """Splits a command's arguments; returns its own flags, its private parameters, and the node's full name.
 
-    Without an argument in ROS's form nothing of ROS is imported, and no master is asked; roslaunch always
-    passes `__name:=`.
-
-    Args:
-        argv: The arguments, without the command itself.
-        default_name: Of the node, if ROS gives it no other one.
-
-    Returns:
-        The command's own flags; its private parameters, where those of the command line override those of the
-        master; the node's full name.
-
-    Raises:
-        RobotEnvError: If ROS isn't installed, a private parameter isn't YAML, or the master doesn't answer a
-            node that roslaunch started.
+    Parameters of the command line override those of the master; `default_name` is the node's, if ROS gives it
+    no other one. Without an argument in ROS's form nothing of ROS is imported, and no master is asked;
+    roslaunch always passes `__name:=`. Raises RobotEnvError if ROS isn't installed, a private parameter isn't
+    YAML, or the master doesn't answer a node that roslaunch started.
     """
     if not any(REMAPPING in argument for argument in argv):
         namespace = os.environ.get("ROS_NAMESPACE", "").strip("/")

@@ -31,13 +31,9 @@ class NotAFile(OSError):
 
 
 def open_file(path: Path) -> BinaryIO:
-    """Opens a regular file for reading.
+    """Opens a regular file for reading; raises NotAFile for anything else, OSError if it can't be opened.
 
     Opening a pipe or a device could block forever, so they are refused first.
-
-    Raises:
-        NotAFile: If it isn't a regular file.
-        OSError: If it can't be opened.
     """
     if not stat.S_ISREG(path.stat().st_mode):
         raise NotAFile(path)
@@ -51,15 +47,9 @@ def open_text(path: Path) -> io.TextIOWrapper:
 
 
 def read_file(path: Path, most: int = MAX_BYTES) -> bytes:
-    """Returns the content of a regular file.
+    """Returns the content of a regular file of at most `most` bytes.
 
-    Args:
-        path: The file.
-        most: The largest size that is accepted [bytes].
-
-    Raises:
-        FileError: If it can't be read or isn't a regular file.
-        TooLarge: If it is larger.
+    Raises TooLarge if it is larger, FileError if it can't be read or isn't a regular file.
     """
     try:
         with open_file(path) as file:

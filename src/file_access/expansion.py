@@ -47,18 +47,9 @@ class CannotExpand(Exception):
 def expand(
     path: str | os.PathLike[str], mappings: Mapping[str, str] | None = None, limits: Limits = LIMITS
 ) -> str:
-    """Expands a URDF or xacro file.
+    """Returns the XML text of a URDF or xacro file, expanded with xacro's arguments.
 
-    Args:
-        path: The file, which may be plain XML.
-        mappings: Xacro arguments, name and value.
-        limits: What it may take.
-
-    Returns:
-        The XML text.
-
-    Raises:
-        CannotExpand: If the file is broken or goes beyond a limit.
+    Raises CannotExpand if the file is broken or goes beyond a limit.
     """
     return _ask("xml", os.fspath(path), mappings, limits)
 
@@ -68,8 +59,7 @@ def included_files(
 ) -> list[str]:
     """Returns the files that a xacro file includes, or takes numbers from, with these arguments.
 
-    Raises:
-        CannotExpand: If the file is broken or goes beyond a limit.
+    Raises as `expand`.
     """
     return _ask("files", os.fspath(path), mappings, LIMITS).splitlines()
 
@@ -97,8 +87,7 @@ def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: Lim
 def answer(data: bytes) -> bytes:
     """Answers a request of this module in the child process.
 
-    Returns:
-        JSON: "text", the XML or a line for each included file; "warnings", as `_heard` gives them.
+    The JSON has "text", the XML or a line for each included file; and "warnings", as `_heard` gives them.
     """
     request = json.loads(data)
     path = request["path"]

@@ -46,13 +46,10 @@ class Limits:
 
 
 class LimitedProcess:
-    """Answers requests in a child process, one at a time.
+    """Answers requests in a child process, one at a time, each within limits.
 
-    The process starts with the first request, and again after it has died. It ends with its parent.
-
-    Args:
-        program: "module:function" that answers a request, bytes to bytes; what it raises refuses it.
-        limits: Of each request.
+    The process starts with the first request, and again after it has died. It ends with its parent. The
+    program is the "module:function" that answers a request, bytes to bytes; what it raises refuses it.
     """
 
     def __init__(self, program: str, limits: Limits) -> None:
@@ -63,11 +60,9 @@ class LimitedProcess:
         self._parent = 0  # process id: after a fork the process is the parent's
 
     def ask(self, request: bytes) -> bytes:
-        """Returns the answer to a request.
+        """Returns the answer to a request; raises RequestRefused if the program has raised an error.
 
-        Raises:
-            RequestRefused: If the program has raised an error.
-            ProcessDied: If it has gone beyond a limit or crashed; the next request starts it again.
+        ProcessDied is one that went beyond a limit or crashed; the next request starts it again.
         """
         with self._lock:
             process = self._running()

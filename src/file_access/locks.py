@@ -19,10 +19,8 @@ SCRATCH = ("cartpole_", ".tmp")  # begin and end of a temporary folder's name
 def locked_folder(folder: Path) -> Iterator[None]:
     """Holds the lock of an existing folder for the block.
 
-    Raises:
-        BlockingIOError: If another holder has it, even in this process.
-        FileNotFoundError: If there is no such folder, also if its last holder has just removed it.
-        OSError: If it can't be opened, or its file system has no locks.
+    Raises BlockingIOError if another holder has it, even in this process; FileNotFoundError if there is no
+    such folder, also if its last holder has just removed it; or another OSError.
     """
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
@@ -56,11 +54,7 @@ def is_locked(folder: Path) -> bool:
 def scratch_folder(parent: str | None = None) -> Iterator[Path]:
     """Makes a temporary folder for the block; a process's first one also removes those of killed processes.
 
-    Args:
-        parent: Where it is made; None for the system's folder of temporary files.
-
-    Raises:
-        OSError: If it can't be made.
+    It is in `parent`, or in the system's folder of temporary files. Raises OSError if it can't be made.
     """
     place = Path(parent or tempfile.gettempdir())
     _sweep(place)

@@ -53,14 +53,9 @@ class _BoundedBuilder(TreeBuilder):
 
 
 def parse(text: str | bytes) -> Element:
-    """Returns the root element.
+    """Returns the root element of a text, or of the content of a file of any encoding.
 
-    Args:
-        text: A text, or the content of a file of any encoding.
-
-    Raises:
-        FileError: If it isn't well-formed, or has a document type.
-        TooLarge: If it exceeds a bound.
+    Raises FileError if it isn't well-formed or has a document type, TooLarge if it exceeds a bound.
     """
     if len(text) > MAX_BYTES:
         raise TooLarge(f"it has more than {MAX_BYTES} bytes (MAX_BYTES)")
@@ -77,8 +72,7 @@ def parse(text: str | bytes) -> Element:
 def decode(data: bytes) -> str:
     """Returns the text of a file in the encoding of its byte-order mark, its declaration, or else UTF-8.
 
-    Raises:
-        FileError: If it can't be decoded, or the declared encoding isn't supported.
+    Raises FileError if it can't be decoded, or the declared encoding isn't supported.
     """
     for mark, name in BYTE_ORDER_MARKS:
         if data.startswith(mark):

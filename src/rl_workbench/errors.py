@@ -44,13 +44,7 @@ def own_frames(error: BaseException) -> list[traceback.FrameSummary]:
 
 
 def need(module: str, package: str, what: str) -> None:
-    """Makes sure that an optional package is installed.
-
-    Args:
-        module: What would be imported.
-        package: Its name for the user.
-        what: What needs it.
-    """
+    """Raises WorkbenchError unless a module is installed, by its package's name; `what` needs it."""
     if not importlib.util.find_spec(module):
         command = hints.installing(package)
         raise WorkbenchError(f"{what} needs {package}, an extra: {command} installs it")

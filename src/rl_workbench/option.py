@@ -34,13 +34,8 @@ def option(
 ) -> Any:
     """Makes a dataclass field that knows its meaning and its limits.
 
-    Args:
-        default: A dict or a list is copied for each instance.
-        text: For `--help`.
-        lowest: The smallest number allowed.
-        highest: The largest number allowed.
-        choices: All values that a text may have.
-        metavar: What `--help` calls the value; by default the last word of its name.
+    `text` and `metavar` are for `--help`: by default the last word of its name. `choices` are all values that
+    a text may have. A default that is a dict or a list is copied for each instance.
     """
     limits = None if (lowest, highest) == (-math.inf, math.inf) else (lowest, highest)
     metadata = {"help": text, "limits": limits, "choices": choices, "metavar": metavar}
@@ -50,11 +45,7 @@ def option(
 
 
 def check_options(instance: Any) -> None:
-    """Checks every value of a dataclass of options against its limits and choices.
-
-    Raises:
-        WorkbenchError: If a value is outside them. NaN is outside of any limits.
-    """
+    """Raises WorkbenchError if an option is outside its limits, as NaN is, or none of its choices."""
     for each in fields(instance):
         value = getattr(instance, each.name)
         limits, choices = each.metadata.get("limits"), each.metadata.get("choices")
@@ -113,9 +104,7 @@ class Options:
     ) -> None:
         """Adds a flag for each option. A flag that isn't given is absent from the result.
 
-        Args:
-            parser: Gets the flags.
-            defaults: Defaults to show in `--help` where they differ from those of the dataclasses.
+        `defaults` are shown in `--help` where they differ from those of the dataclasses.
         """
         for name, each in self._fields.items():
             flag = f"--{name.replace('_', '-')}"
@@ -186,11 +175,7 @@ def is_plain(value: Any) -> bool:
 
 
 def plain_value(value: Any) -> Any:
-    """Reads a text as YAML, and 1e-3 and 5e4 as numbers, which YAML 1.1 doesn't.
-
-    Raises:
-        ValueError: If it isn't YAML.
-    """
+    """Reads a text as YAML, and 1e-3 and 5e4 as numbers, which YAML 1.1 doesn't; else raises ValueError."""
     if not isinstance(value, str):
         return value
     try:
@@ -249,8 +234,7 @@ def _numbers(value: Any, kind: type) -> tuple[Any, ...]:
 def mapping(value: Any) -> dict[str, Any]:
     """Reads a mapping, or a text such as `control_period=0.02, variation={mass: 0.2, gain: [0.9, 1.1]}`.
 
-    Raises:
-        ValueError: If it is neither. The text is the expected form.
+    Raises ValueError, whose text is the expected form, if it is neither.
     """
     if isinstance(value, str):
         first, *words = _KEY.split(value)

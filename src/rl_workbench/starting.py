@@ -125,12 +125,9 @@ class Interrupt:
 
 
 def run_command(prog: str, command: Callable[[Interrupt], object], *errors: type[Exception]) -> int:
-    """Runs a command; returns the process's exit code.
+    """Runs a command, which gets what handles signals; returns the process's exit code.
 
-    Args:
-        prog: The command's name, for errors.
-        command: Gets what handles signals. An error for the user becomes one line and exit code 1.
-        errors: Further ones for the user than WorkbenchError.
+    A WorkbenchError, or one of further errors for the user, becomes one line after `prog`, and exit code 1.
     """
     from rl_workbench.errors import WorkbenchError  # only after Ctrl-C is handled
 

@@ -122,12 +122,8 @@ def faults(
 ) -> Iterator[str]:
     """Yields what is wrong with a robot's controllers.
 
-    Args:
-        run: Names of those that should run.
-        commanded: Names of those that a task should command; None: all that take numbers.
-        parameters: Parameters of all controllers.
-        hardware: Hardware of the robot.
-        movable: Its movable joints, also those without a transmission.
+    `commanded` are those that a task should command, None all that take numbers; `movable` are all movable
+    joints, also those without a transmission.
     """
     manager = ControllerManager(hardware)
     loaded: Loaded = {}

@@ -92,12 +92,7 @@ class _Node:
 
 
 class Followers(Others):
-    """All nodes that follow the clock, which connect to a socket.
-
-    Args:
-        address: Path of the socket.
-        runner: The script's.
-    """
+    """All nodes that follow the script's clock, which connect to the socket at `address`."""
 
     def __init__(self, address: str, runner: ScriptRunner) -> None:
         self._clock, self._world = runner.clock, runner.world

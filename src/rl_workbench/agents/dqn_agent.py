@@ -148,9 +148,7 @@ class DQNAgent:
     def learn(self) -> Learned:
         """Runs one round of `settings.gradient_steps` gradient steps.
 
-        Raises:
-            WorkbenchError: If the loss or the gradient isn't finite. That gradient step changes no
-                weight.
+        Raises WorkbenchError if loss or gradient isn't finite; that gradient step changes no weight.
         """
         settings = self.settings
         self._optimizer.param_groups[0]["lr"] = learning_rate(settings, self.steps)

@@ -11,10 +11,7 @@ from torch import nn
 class Scaling(nn.Module):
     """Scales observations (N, D) as in the training: (x - offset) * factors, clipped to +-limit.
 
-    Args:
-        offset: (D,) float32.
-        factors: (D,) float32.
-        limit: The largest absolute result.
+    Offset and factors are (D,), float32.
     """
 
     offset: torch.Tensor
@@ -35,9 +32,7 @@ class Scaling(nn.Module):
 class Spread(nn.Module):
     """Converts actions (N, n), given in half-ranges from the middle of their range, to their own units.
 
-    Args:
-        middle: (n,) float32.
-        half: (n,) float32.
+    Middle and half are (n,), float32.
     """
 
     middle: torch.Tensor
@@ -55,10 +50,7 @@ class Spread(nn.Module):
 class Continuous(nn.Module):
     """Maps observations (N, D) to continuous actions, in the action space's shape and type.
 
-    Args:
-        outputs: Maps observations to numbers (N, n).
-        low: The smallest action, in the space's shape and type.
-        high: The largest action.
+    `outputs` maps them to numbers (N, n); low and high have the space's shape and type.
     """
 
     low: torch.Tensor
@@ -80,11 +72,7 @@ class ClippedAction(Continuous):
 
 
 class Choice(nn.Module):
-    """Maps observations (N, D), float32, to the actions that their scores choose.
-
-    Args:
-        scores: Maps observations to scores (N, A), on any scale.
-    """
+    """Maps observations (N, D), float32, to actions, by what maps them to scores (N, A), on any scale."""
 
     def __init__(self, scores: nn.Module) -> None:
         super().__init__()
@@ -101,9 +89,7 @@ class SingleChoice(Choice):
 class SeveralChoices(Choice):
     """Chooses the action with the highest score in each group of scores, (N, groups).
 
-    Args:
-        scores: Maps observations to scores (N, A), on any scale.
-        sizes: Of the groups; their sum is A.
+    The sum of the groups' sizes is A.
     """
 
     def __init__(self, scores: nn.Module, sizes: list[int]) -> None:

@@ -15,13 +15,7 @@ SMALLEST_CHANCE = float(np.finfo(np.float32).tiny)  # lower bound of probabiliti
 
 
 class PolicyNetworkBase(nn.Module):
-    """A linear layer, after a hidden tanh layer if there is one.
-
-    Args:
-        observations: D.
-        outputs: A.
-        hidden: Units of the hidden layer; 0 for no such layer.
-    """
+    """A linear layer from D to A, after a hidden tanh layer if it has any units."""
 
     def __init__(self, observations: int, outputs: int, hidden: int) -> None:
         super().__init__()
@@ -73,12 +67,7 @@ class SoftmaxNetwork(PolicyNetworkBase):
 
 
 class PairActor:
-    """Acts by one dot product: for two actions and no hidden layer.
-
-    Args:
-        network: Has two actions and no hidden layer.
-        factors: (D,), multiply the observations.
-    """
+    """Acts by one dot product: for two actions and no hidden layer. Factors (D,) multiply observations."""
 
     def __init__(self, network: SoftmaxNetwork, factors: np.ndarray) -> None:
         weight = network.fc.weight.detach().numpy()  # (2, D)
@@ -159,11 +148,7 @@ class Bounds(NamedTuple):
 class GaussianNetwork(PolicyNetworkBase):
     """Maps prepared observations (N, D) to the actions' means (N, n), in half-ranges from the middle.
 
-    Args:
-        observations: D.
-        bounds: Of the actions.
-        hidden: Units of the hidden layer; 0 for no such layer.
-        log_std: Logarithm of the initial standard deviation.
+    `log_std` is the logarithm of the initial standard deviation.
     """
 
     def __init__(self, observations: int, bounds: Bounds, hidden: int, log_std: float) -> None:

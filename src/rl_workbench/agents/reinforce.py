@@ -134,12 +134,8 @@ class ReinforceAgent(TwoNetworks):
     def learn(self, *episodes: Episode) -> Losses | None:
         """Adds an episode, or one per environment, to the batch; a full batch updates both networks.
 
-        Returns:
-            The losses before the update; None if the batch isn't full yet.
-
-        Raises:
-            WorkbenchError: If a loss or a gradient isn't finite. The network that it belongs to is as
-                before then.
+        Returns the losses before the update; None if the batch isn't full yet. Raises WorkbenchError if a
+        loss or a gradient isn't finite; the network that it belongs to is as before then.
         """
         batch = [*self._batch, *episodes]
         if len(batch) < self._batch_size:
@@ -240,12 +236,7 @@ def generalised_advantages(
 ) -> np.ndarray:
     """Computes Â_t = Σ_k (γλ)^k δ_{t+k}, δ_t = r_t + γ V(s_{t+1}) - V(s_t) (Schulman et al. 2016, eq. 16).
 
-    Args:
-        rewards: Of T steps.
-        values: V at the T states and the final one, (T + 1,).
-
-    Returns:
-        float64, (T,).
+    Returns (T,), float64, for rewards (T,) and the values of T states and the final one, (T + 1,).
     """
     advantages = np.empty(len(rewards))
     following = 0.0

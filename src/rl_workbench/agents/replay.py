@@ -99,12 +99,7 @@ class ReplayBuffer:
 
 
 class NStepReturns:
-    """Combines an episode's steps into n-step transitions, shorter ones at the episode's end.
-
-    Args:
-        steps: N; with 1 each step is its own transition.
-        gamma: The discount factor.
-    """
+    """Combines an episode's steps into n-step transitions, shorter ones at the episode's end."""
 
     def __init__(self, steps: int, gamma: float) -> None:
         self._steps = steps
@@ -114,13 +109,9 @@ class NStepReturns:
     def add(
         self, step: tuple[np.ndarray, int, float], following: np.ndarray, ended: bool, valued: bool
     ) -> list[Transition]:
-        """Adds one step; returns the transitions that it completes.
+        """Adds a step (observation, action, reward); returns the transitions that it completes.
 
-        Args:
-            step: Observation before the action, action, reward.
-            following: The observation after it.
-            ended: Whether the episode is over, by termination or truncation.
-            valued: Whether the following observation's value counts; false after a termination.
+        `following` is the observation after it, whose value counts if `valued`: not after a termination.
         """
         self._window.append(step)
         transitions = []

@@ -65,13 +65,9 @@ def job_pool(
 
 
 def claim(folder: Path, name: str, wanted: Any, refusal: str) -> None:
-    """Writes the settings of a folder's runs to a file, or checks that the file has the same.
+    """Writes the settings of a folder's runs to a file, or checks that it has the same.
 
-    Args:
-        folder: Of a benchmark or a sweep.
-        name: Of the file.
-        wanted: The settings as plain values.
-        refusal: The error's text, after the folder's name, if the file has other settings.
+    `refusal` is the error's text, after the folder's name, if it has others.
     """
     found = read_json(folder / name)
     if found is None:
@@ -95,14 +91,9 @@ class JobEntry:
 
 
 class JobPool:
-    """Runs jobs in threads, reports each end, and keeps jobs.json.
+    """Runs jobs in threads, reports each end, and keeps jobs.json in the folder of all runs.
 
-    Args:
-        folder: Contains jobs.json and all run folders.
-        run: Runs a job, here or on a cluster.
-        at_once: The number of jobs at a time.
-        interrupt: Ends all jobs.
-        jobs: Those known from the beginning; `run` adds others.
+    `jobs` are those known from the beginning; `run` adds others.
     """
 
     def __init__(
@@ -134,13 +125,10 @@ class JobPool:
             list(threads.map(self.run, jobs))
 
     def run(self, job: Job, is_needed: Callable[[], bool] = lambda: True) -> str:
-        """Runs a job in the calling thread; returns why it failed, or "" if it didn't.
+        """Runs a job that isn't complete in the calling thread; returns why it failed, or "" if it didn't.
 
-        A job that is stopped, by the user or because it is not needed, has not failed.
-
-        Args:
-            job: The job; skipped if it is complete.
-            is_needed: Called several times a second; the training is stopped once it returns False.
+        A job that is stopped, by the user or because `is_needed` (called several times a second) says so, has
+        not failed.
         """
         if job.is_done():
             self._set(job, DONE)

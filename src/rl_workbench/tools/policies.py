@@ -65,18 +65,11 @@ def load_learned(
     say: Callable[[str], None] = warn,
     env: gymnasium.Env[Any, Any] | None = None,
 ) -> Player:
-    """Loads the policy of a checkpoint, or of an earlier one if that is damaged.
+    """Loads the policy of the checkpoint "best" or "last", or of an earlier one if that is damaged.
 
-    Args:
-        run: The run.
-        which: The checkpoint, "best" or "last".
-        env_options: Options of the environment on top of the training's, such as `render_mode`.
-        say: Receives a line for each skipped checkpoint.
-        env: The environment to act in; by default a new one of the run's kind.
-
-    Raises:
-        WorkbenchError: If no checkpoint can be read, it belongs to another run, or the environment
-            can't be made.
+    `env_options` are added to the training's, `say` receives a line for each skipped checkpoint. It acts in
+    `env`, by default a new environment of the run's kind. Raises WorkbenchError if no checkpoint can be read,
+    it belongs to another run, or the environment can't be made.
     """
     paths = checkpoints.candidates(run.folder, best_first=which == "best")
     for path in paths:
@@ -133,14 +126,7 @@ class Step(NamedTuple):
 def episode_steps(
     env: gymnasium.Env[Any, Any], act: Act, seed: int, max_steps: int = 0
 ) -> Iterator[Step]:
-    """Plays one episode; yields the reset and each step.
-
-    Args:
-        env: The environment.
-        act: Chooses the action for an observation.
-        seed: Of the episode.
-        max_steps: Steps after which the episode is cut off; 0 for never.
-    """
+    """Plays one episode; yields the reset and each step, at most `max_steps` of them unless that is 0."""
     observation, _ = env.reset(seed=seed)
     yield Step(observation, None, 0.0, False, None)
     for length in count(1):

@@ -143,9 +143,8 @@ def _in_a_line(error: Exception) -> str:
 def joined(address: str) -> Iterator[Any]:
     """Joins a cluster, or starts one on this machine; yields the module `ray`.
 
-    Args:
-        address: HOST:PORT of the cluster's head, "auto" for the cluster that this machine belongs to, or
-            "local" for a cluster that ends with the block.
+    `address` is the HOST:PORT of the head, "auto" for the cluster that this machine belongs to, or "local"
+    for one that ends with the block.
     """
     need("ray", "Ray", "--ray")
     for name, value in QUIET.items():

@@ -172,15 +172,9 @@ def record_episode(
     stride: float = 1.0,
     max_steps: int = 0,
 ) -> Iterator[EpisodeFrame]:
-    """Plays one episode; yields its frames.
+    """Plays one episode; yields its frames, one in `stride` steps on average, and the last.
 
-    Args:
-        env: The environment.
-        act: Chooses the action for an observation.
-        view: Of the environment.
-        seed: Of the episode.
-        stride: Average number of steps between frames; the last step always has a frame.
-        max_steps: Steps after which the episode is cut off; 0 for never.
+    It is cut off after `max_steps`; 0 for never.
     """
     total, due = 0.0, 0.0
     for length, step in enumerate(episode_steps(env, act, seed, max_steps)):
@@ -235,13 +229,7 @@ class RecordedEpisode:
 
 
 class EpisodeRecorder:
-    """Plays and records episodes of a run; only its thread touches the environment.
-
-    Args:
-        folder: The run folder, which may still be empty.
-        server: Of the page.
-        env_options: Of the environment, on top of the training's own.
-    """
+    """Plays and records episodes of a run, which may begin later; only its thread touches the environment."""
 
     def __init__(
         self, folder: Path, server: "viser.ViserServer", env_options: dict[str, Any]
@@ -349,12 +337,7 @@ class EpisodeRecorder:
 
 
 def check_robot_is_free(run: Run, options: dict[str, Any]) -> None:
-    """Checks that an episode won't move the robot of a running training.
-
-    Args:
-        run: The run, whose record has the options that name a shared robot.
-        options: Of the episode's environment.
-    """
+    """Checks that an episode with these options won't move the robot of a running training."""
     shared = run.config.get("shared_robot")
     if shared is None or not is_held(run.folder):
         return

@@ -53,8 +53,7 @@ def examine(
     Args:
         run: The run.
         group: Of the result.
-        episodes: Greedy episodes on fresh seeds for each score; 0 to score a run by the mean of its
-            last training episodes.
+        episodes: Greedy episodes for each score; 0: the mean of the last training episodes is the score.
         warn: Receives a line for each skipped checkpoint.
         which: The checkpoint, "best" or "last".
         also_last: Whether to play the last checkpoint, too.

@@ -54,8 +54,8 @@ def show_run(
     Args:
         folder: The run folder.
         policies: The choices; the first one is played first.
-        seed: Of the first episode.
-        episodes: Number of episodes, with consecutive seeds, that are repeated.
+        seed: Of the first of `episodes`, whose seeds follow one another, and which are repeated.
+        episodes: See above.
         env_options: Options of the environment on top of the training's.
         host: The address to serve on.
         port: The port to serve on; None for the first free one.
@@ -127,15 +127,7 @@ def _draw(server: viser.ViserServer, curves: Curves, ended: threading.Event) -> 
 
 
 class Playback:
-    """The controls of the page. One thread calls `tick`; clicks come in viser's threads.
-
-    Args:
-        gui: Of the page.
-        recorder: Records the episodes.
-        policies: The choices; the first one is played first.
-        seed: Of the first episode.
-        episodes: Number of consecutive seeds to play before the first one follows again.
-    """
+    """The controls of the page: as in `show_run`. One thread calls `tick`; clicks come in viser's threads."""
 
     def __init__(
         self,

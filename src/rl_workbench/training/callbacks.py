@@ -113,11 +113,7 @@ class CurvesPicture(Callback):
 
 
 def load_callbacks(names: str) -> list[Callback]:
-    """Makes callbacks of the user's own.
-
-    Args:
-        names: Module:Class, several with commas.
-    """
+    """Makes callbacks of the user's own: module:Class, several with commas."""
     return [_load(name.strip()) for name in names.split(",") if name.strip()]
 
 
@@ -133,12 +129,7 @@ def _load(name: str) -> Callback:
 
 
 class CallbackList:
-    """Calls the callbacks of a training.
-
-    Args:
-        own: Ours. Their errors propagate as they are.
-        users: The user's. Their errors end the training with one line.
-    """
+    """Calls the callbacks of a training. Errors of the user's end it with one line, ours propagate."""
 
     def __init__(self, own: Sequence[Callback], users: Sequence[Callback]) -> None:
         self._own, self._users = own, users

@@ -117,15 +117,9 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self.env.has_wrapper_attr(COMPUTE_REWARD)
 
     def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> np.ndarray:
-        """Computes rewards in hindsight: for goals that were achieved while others were desired.
+        """Returns the rewards (N,), float32, for goals (N, n) that were achieved while others were desired.
 
-        Args:
-            achieved: Goals (N, n).
-            desired: Goals (N, n).
-            info: A list of N, one of each step.
-
-        Returns:
-            float32, (N,).
+        `info` is a list of N, one of each step.
         """
         with self._running(COMPUTE_REWARD):
             found = self.env.get_wrapper_attr(COMPUTE_REWARD)(achieved, desired, info)

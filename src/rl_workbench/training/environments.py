@@ -42,17 +42,10 @@ def make_environment(
 ) -> CheckedEnvironment:
     """Makes an environment that refuses observations and rewards that aren't finite.
 
-    Args:
-        env_id: Gymnasium's, also as module:id.
-        options: Of the environment.
-        keep_dict: Leave a Dict of arrays, and images, as they are. Other observations are flattened to a
-            vector (D,).
-        which: Begins the errors while it runs, as "environment 2 of 3: ".
-        wrapper: A function that wraps it, as module:function.
-
-    Raises:
-        WorkbenchError: If there is no such environment, something that it needs isn't installed, its options
-            make no sense, or it observes images that can't be learned from.
+    `keep_dict` leaves a Dict of arrays, and images, as they are; other observations are flattened to a vector
+    (D,). `which` begins the errors while it runs, as "environment 2 of 3: ". `wrapper` is a function that
+    wraps it, as module:function. Raises WorkbenchError if there is no such environment, something that it
+    needs isn't installed, its options make no sense, or it observes images that can't be learned from.
     """
     import_module_of(env_id)
     _check_names(env_id, options or {})
@@ -254,8 +247,7 @@ def is_continuous(space: gymnasium.Space[Any]) -> TypeGuard[spaces.Box]:
 def discrete_actions(env: gymnasium.Env[Any, Any], env_id: str, algorithm: str) -> int:
     """Returns the number of discrete actions.
 
-    Raises:
-        WorkbenchError: If the actions aren't the numbers from 0 on. The text names algorithms that fit.
+    Raises WorkbenchError, which names algorithms that fit, unless they are the numbers from 0 on.
     """
     space = env.action_space
     if isinstance(space, spaces.Discrete) and space.start == 0:

@@ -106,13 +106,9 @@ class Evaluator:
     def evaluate(self, best: float, say: Say, is_last: bool = False) -> Score | None:
         """Plays greedy episodes; returns None if interrupted.
 
-        A policy that is perfect in ten episodes may well fail in the next ninety. So one that seems to be the
-        best so far is confirmed over `confirm_episodes`.
-
-        Args:
-            best: The mean return of the best policy so far.
-            say: Called if the current episode can't be restored.
-            is_last: Whether the training is over, so that no episode needs restoring.
+        A policy that is perfect in ten episodes may well fail in the next ninety. So one whose mean return is
+        above `best` is confirmed over `confirm_episodes`. `say` is called if the current episode can't be
+        restored, which isn't tried at the training's end (`is_last`).
         """
         self._algorithm.check_weights()
         with self._undisturbed(say, is_last):

@@ -223,12 +223,7 @@ def default_file(name: str) -> Path:
 
 
 def section_names(form: str, env_id: str | None) -> tuple[str, ...]:
-    """Returns the possible names of an environment's section: with and without the id's module.
-
-    Args:
-        form: The name with `{env_id}`.
-        env_id: None if no environment was named; then there are no names.
-    """
+    """Returns the possible names of an environment's section, with and without the id's module."""
     ids = (env_id, without_module(env_id)) if env_id else ()
     return tuple(dict.fromkeys(form.format(env_id=each) for each in ids))
 

@@ -67,10 +67,7 @@ def load_policy(
 class PolicyGradientTraining(Algorithm):
     """Learns from rounds of one episode from each environment. It can be saved between two rounds.
 
-    Args:
-        agent: Acts and learns.
-        source: Plays the episodes.
-        save_every: Episodes between saves of the networks; 0: at the end only.
+    The networks are saved every `save_every` episodes; 0: at the end only.
     """
 
     def __init__(self, agent: Agent, source: EpisodeSource, save_every: int) -> None:

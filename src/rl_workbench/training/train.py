@@ -79,20 +79,11 @@ def run_training(
     begin: Callable[[Path], object] = lambda _: None,
     callbacks: Sequence[Callback] = (),
 ) -> Path:
-    """Trains into the options' folder, or a new one below runs/.
+    """Trains into the options' folder, or a new one below runs/; returns it.
 
-    Args:
-        options: Of a new training, or of one to resume.
-        interrupt: Says when to stop.
-        begin: Is called with the folder before the training begins, to start what goes beside it.
-        callbacks: Further ones than those that the options name.
-
-    Returns:
-        The folder.
-
-    Raises:
-        WorkbenchError: If something fails that the user can mend. What was learned is saved, up to
-            the step that the text names.
+    `begin` is called with the folder before the training begins, to start what goes beside it. `callbacks`
+    are further ones than those that the options name. Raises WorkbenchError if something fails that the user
+    can mend; what was learned is saved, up to the step that the text names.
     """
     with interrupt.reading():  # both are slow to import, and --help needs neither
         from rl_workbench.training import folder as run_folder
@@ -130,12 +121,8 @@ def main(
 ) -> int:
     """Trains as the arguments say; returns the exit code of the process.
 
-    Args:
-        argv: The arguments without the command.
-        parameters: Options from outside, as a launch file sets them.
-        prog: The command's name, for `--help` and errors.
-        default: The algorithm if none is named.
-        program: Starts the whole command line, for a page in a process of its own.
+    `default` is the algorithm if none is named, `parameters` are options from outside, as a launch file sets
+    them. `program` starts the whole command line, for a page in a process of its own.
     """
 
     def command(interrupt: Interrupt) -> None:
@@ -173,17 +160,8 @@ def choose_training(
 ) -> TrainingOptions:
     """Reads a command line. It finds --algo first, since the other flags depend on it.
 
-    Args:
-        argv: The arguments without the command.
-        parameters: Options from outside, see `choose`.
-        prog: The command, for `--help`.
-        default: The algorithm if none is named.
-        env_id: The environment if none is named.
-        parent: Has further flags to show in `--help`. The caller has parsed them.
-
-    Raises:
-        SystemExit: With code 2 and a usage line if the flags are wrong; with 0 after `--help`.
-        WorkbenchError: If a name is unknown or a value is wrong anywhere else.
+    `default` is the algorithm if none is named. `parent` has further flags to show in `--help`, which the
+    caller has parsed. The other arguments, and what is raised, are `choose`'s.
     """
     parser, parameters = algorithm_parser(prog), dict(parameters or {})
     known, rest = parser.parse_known_args(argv)

@@ -26,21 +26,10 @@ from robot_sim.control.joint import JointLimits
 
 
 class CommandLimits:
-    """Keeps a controller's commands within the URDF's limits of its joints.
+    """Keeps a controller's commands within its own limits, or the URDF's of its joints (docs/deploying.md).
 
-    | command | limited to |
-    |---|---|
-    | position | `lower` and `upper`, also the soft ones; and moves no faster than `velocity` |
-    | velocity | `velocity` either way |
-    | effort | `effort` either way |
-    | speeds of a vehicle | the controller's own limits |
-
-    Args:
-        robot: With these limits.
-        port: Port of the controller.
-        way: Largest move of a position from one command to the next, as a share of what the joint's velocity
-            limit allows; infinity: no limit.
-        period: From one command to the next [s].
+    `way` is the largest move of a position from one command to the next, `period` later [s], as a share of
+    what the joint's velocity limit allows; infinity: no limit.
     """
 
     def __init__(self, robot: Robot, port: CommandPort, way: float, period: float) -> None:

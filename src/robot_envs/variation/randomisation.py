@@ -120,27 +120,11 @@ Drawn = dict[str, Any]
 
 
 class UniformRandomisation(Shared):
-    """Draws a robot for each episode, uniformly, within the bounds of its options.
-
-    | option | of each | what differs | a number means |
-    |---|---|---|---|
-    | `mass` | link | factor of its mass and moments | half-width: 0.2 is 0.8 to 1.2 |
-    | `length` | link | factor of the distance of its centre of mass, and of its moments | half-width |
-    | `com` | link | its centre of mass [m], each of x, y and z | half-width |
-    | `damping` | joint | viscous friction [N s/m, N m s/rad] in addition to its own | largest value |
-    | `friction` | joint | dry friction [N, N m] in addition to its own | largest value |
-    | `surface_friction` | link | factor of the friction of its surfaces | half-width |
-    | `gains` | controller | factor of p, i and d of its PIDs | half-width |
-    | `gravity` | the world | factor of its gravity | half-width |
+    """Draws a robot for each episode, uniformly, within the bounds of its options (docs/sim_to_real.md).
 
     A value is a number, a pair (low, high), or a mapping with either by name, for some links, joints or
-    controllers only.
-
-    The same count of random numbers is drawn whatever the options, so that later draws don't depend on them.
-
-    Args:
-        scene: The robots; names are as in `Parts`.
-        options: By name.
+    controllers only; names are as in `Parts`. The same count of random numbers is drawn whatever the options,
+    so that later draws don't depend on them.
 
     Raises:
         ValueError: For an unknown option or name, or an impossible interval.

@@ -46,9 +46,7 @@ def load_policy(
 def greedy_network(model: Any, algorithm: str) -> nn.Module:
     """Returns what `model.predict(..., deterministic=True)` computes, for observations (N, D).
 
-    Args:
-        model: With the policy MlpPolicy, or MultiInputPolicy on vectors.
-        algorithm: The value of --algo.
+    The model's policy is MlpPolicy, or MultiInputPolicy on vectors.
     """
     policy, actions = model.policy, model.action_space
     if algorithm == "dqn-sb3":
