@@ -21,35 +21,18 @@ MASTER_PORTS = range(30000, 32768)
 REMAPPING = ":="  # in every argument of ROS's: __name:=pg_train, _gamma:=0.9, old:=new
 
 
-class WorkspaceHints(errors.Hints):
-    """The commands that texts recommend, by way of `ws`.
-
-    Args:
-        workspace: The path of `ws`.
-    """
-
-    def __init__(self, workspace: str) -> None:
-        self._workspace = workspace
-        self.extras = shlex.join([workspace, "extras"])
-
-    def finding_modules(self) -> str:
-        return f"{shlex.quote(self._workspace)} --with FOLDER ... finds those in FOLDER"
-
-    def watching(self, folder: Path) -> str:
-        return shlex.join([self._workspace, "tensorboard", "--logdir", str(folder)])
-
-    def replaying(self, folder: Path) -> str:
+def recommend_ws() -> None:
+    """Has texts recommend commands by way of ws, if it has started this one."""
+    if workspace := os.environ.get("CARTPOLE_WS"):  # its path
         folders = filter(None, os.environ.get("CARTPOLE_WITH", "").split(":"))
         # Each where it really is: ws may name a link.
         found = [word for each in folders for word in ("--with", os.path.realpath(each))]
-        command = [self._workspace, *found, "rosrun", "cartpole", "workbench.py"]
-        return shlex.join([*command, "view", str(folder)])
-
-
-def recommend_ws() -> None:
-    """Has texts recommend commands by way of ws, if it has started this one."""
-    if "CARTPOLE_WS" in os.environ:  # its path
-        errors.hints = WorkspaceHints(os.environ["CARTPOLE_WS"])
+        errors.hints = errors.Hints(
+            shlex.join([workspace, "extras"]),
+            f"{shlex.quote(workspace)} --with FOLDER ... finds those in FOLDER",
+            [workspace, "tensorboard"],
+            [workspace, *found, "rosrun", "cartpole", "workbench.py"],
+        )
 
 
 def main(argv: list[str] | None = None) -> int:

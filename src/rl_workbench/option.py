@@ -161,7 +161,7 @@ def imported(name: str, flag: str) -> Any:
     try:
         return getattr(import_module(module), attribute)
     except ModuleNotFoundError as error:
-        raise WorkbenchError(f"{flag} {name}: {error}; {errors.hints.finding_modules()}") from error
+        raise WorkbenchError(f"{flag} {name}: {error}; {errors.hints.modules}") from error
     except Exception as error:
         raise WorkbenchError(f"{flag} {name}: {errors.error_line(error)}") from error
 

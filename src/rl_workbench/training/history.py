@@ -145,8 +145,9 @@ class Outcome(NamedTuple):
         tell(f"all results are in {self.folder}")
         if self.is_interrupted:
             tell(f"interrupted{self._how_to_resume()}")
-        tell(f"watch: {errors.hints.replaying(self.folder)}")
-        tell(f"curves: {errors.hints.watching(self.folder)}")
+        hints, folder = errors.hints, str(self.folder)
+        tell(f"watch: {shlex.join([*hints.workbench, 'view', folder])}")
+        tell(f"curves: {shlex.join([*hints.tensorboard, '--logdir', folder])}")
 
     def failure_text(self, failure: WorkbenchError, saved_at: int) -> str:
         """Returns the line for a training that failed; its last checkpoint is of `saved_at`, -1 for none."""
