@@ -1,8 +1,7 @@
 """Learned policies with an environment to act in, and their episodes."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,13 +15,13 @@ from rl_workbench.tools.runs import Run
 from rl_workbench.training import checkpoints
 from rl_workbench.training.algorithm import load_policy
 from rl_workbench.training.algorithms import algorithm
-from rl_workbench.training.environments import as_float32, make_environment, succeeded
-from rl_workbench.training.evaluator import Evaluation, run_greedily
+from rl_workbench.training.environments import make_environment
+from rl_workbench.training.evaluator import Act, Evaluation, run_greedily
+from rl_workbench.training.evaluator import episode_steps as episode_steps  # noqa: PLC0414 - public
 from rl_workbench.training.options import recorded_options
 from rl_workbench.training.progress import warn
 
 TEST_SEED = 5_000_000  # other episodes than those of trainings and their evaluations
-Act = Callable[[Any], Any]  # an observation to an action
 
 
 class Player(NamedTuple):
@@ -111,29 +110,3 @@ def play(policy: Player, episodes: int, seed: int) -> Evaluation:
         raise WorkbenchError(f"the policy doesn't fit the environment: {error}") from error
     assert result is not None  # None would mean it was stopped
     return result
-
-
-class Step(NamedTuple):
-    """The result of a step; the first one is the reset, which has no action."""
-
-    observation: Any
-    action: Any
-    reward: float
-    finished: bool
-    success: bool | None  # None before the end, or if the environment doesn't say
-
-
-def episode_steps(
-    env: gymnasium.Env[Any, Any], act: Act, seed: int, max_steps: int = 0
-) -> Iterator[Step]:
-    """Plays one episode; yields the reset and each step, at most `max_steps` of them unless that is 0."""
-    observation, _ = env.reset(seed=seed)
-    yield Step(observation, None, 0.0, False, None)
-    for length in count(1):
-        action = act(as_float32(observation))
-        observation, reward, terminated, truncated, info = env.step(action)
-        finished = terminated or truncated or length == max_steps
-        success = succeeded(info) if finished else None
-        yield Step(observation, action, float(reward), finished, success)
-        if finished:
-            return

@@ -20,16 +20,10 @@ from PIL import Image
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.flags import RANDOM
-from rl_workbench.tools.policies import (
-    TEST_SEED,
-    Act,
-    environment_of,
-    episode_steps,
-    load_learned,
-    random_actions,
-)
+from rl_workbench.tools.policies import TEST_SEED, environment_of, load_learned, random_actions
 from rl_workbench.tools.runs import Run, open_run
 from rl_workbench.training import checkpoints
+from rl_workbench.training.evaluator import Act, episode_steps
 from rl_workbench.training.folder import is_held
 
 if TYPE_CHECKING:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -14,6 +15,7 @@ from rl_workbench.training.algorithm import Algorithm, Say
 from rl_workbench.training.environments import as_float32, environment_for, shares_robot, succeeded
 from rl_workbench.training.options import TrainingOptions
 
+Act = Callable[[Any], Any]  # an observation to an action
 EVALUATION_SEED = 1_000_000  # added to the training's: other episodes than those learned from
 
 
@@ -39,9 +41,35 @@ class Evaluation:
         return float(np.mean(self.successes)) if self.successes else None
 
 
+class Step(NamedTuple):
+    """The result of a step; the first one is the reset, which has no action."""
+
+    observation: Any
+    action: Any
+    reward: float
+    finished: bool
+    success: bool | None  # None before the end, or if the environment doesn't say
+
+
+def episode_steps(
+    env: gymnasium.Env[Any, Any], act: Act, seed: int | None, max_steps: int = 0
+) -> Iterator[Step]:
+    """Plays one episode; yields the reset and each step, at most `max_steps` of them unless that is 0."""
+    observation, _ = env.reset(seed=seed)
+    yield Step(observation, None, 0.0, False, None)
+    for length in count(1):
+        action = act(as_float32(observation))
+        observation, reward, terminated, truncated, info = env.step(action)
+        finished = terminated or truncated or length == max_steps
+        success = succeeded(info) if finished else None
+        yield Step(observation, action, float(reward), finished, success)
+        if finished:
+            return
+
+
 def run_greedily(
     env: gymnasium.Env[Any, Any],
-    act: Callable[[Any], Any],
+    act: Act,
     seed: int,
     episodes: int,
     should_stop: Callable[[], bool] = lambda: False,
@@ -49,21 +77,15 @@ def run_greedily(
     """Plays episodes in an environment, seeded once; returns None if `should_stop()` became true."""
     found = Evaluation([], [])
     for index in range(episodes):
-        observation, _ = env.reset(seed=seed if index == 0 else None)
-        length, total, finished = 0, 0.0, False
-        while not finished:
+        length, total = -1, 0.0  # the first step is the reset
+        for step in episode_steps(env, act, None if index else seed):
             if should_stop():
                 return None
-            observation, reward, terminated, truncated, info = env.step(
-                act(as_float32(observation))
-            )
-            length, total = length + 1, total + float(reward)
-            finished = terminated or truncated
+            length, total = length + 1, total + step.reward
         found.lengths.append(length)
         found.returns.append(total)
-        success = succeeded(info)
-        if success is not None:
-            found.successes.append(success)
+        if step.success is not None:
+            found.successes.append(step.success)
     return found
 
 
