@@ -1,6 +1,5 @@
 """The command pg_train.py: trains the cart-pole by policy gradient, over ROS in lock-step by default."""
 
-import argparse
 import contextlib
 import sys
 from collections.abc import Iterator
@@ -15,7 +14,7 @@ from rl_workbench.option import Options, check_options, option
 from rl_workbench.starting import Interrupt, run_command
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.progress import tell
-from rl_workbench.training.train import USAGE, choose_training, flag, page_of, run_training
+from rl_workbench.training.train import choose_training, flag, new_parser, page_of, run_training
 from robot_envs.backends import has_ros, need_ros
 from robot_envs.errors import RobotEnvError
 
@@ -94,13 +93,7 @@ def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOption
 
     Exits with code 2 and a usage line, if they are wrong; with 0 after --help.
     """
-    parser = argparse.ArgumentParser(
-        PROG,
-        usage=USAGE.format(prog=PROG),
-        add_help=False,
-        allow_abbrev=False,
-        argument_default=argparse.SUPPRESS,
-    )
+    parser = new_parser(PROG, add_help=False)
     ROBOT_OPTIONS.add_flags(parser.add_argument_group("the robot"))
     known, rest = parser.parse_known_args(flags)
     own = {key: value for key, value in parameters.items() if key in ROBOT_OPTIONS.names}

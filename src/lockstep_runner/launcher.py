@@ -106,36 +106,21 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         description="Runs a script that was written for Gazebo, unchanged, in lock-step: repeatable, and as"
         " fast as it computes. A simulator that it launches comes up in lock-step.",
     )
-    parser.add_argument("--seed", type=_seed, help="seed random, NumPy, torch and the simulator")
-    parser.add_argument(
-        "--dt",
-        type=_period,
-        default=0.008,
+    add = parser.add_argument
+    add("--seed", type=_seed, help="seed random, NumPy, torch and the simulator")
+    add("--dt", type=_period, default=0.008,
         help="simulated time that passes at each trigger [s], rounded up to whole physics steps"
-        " (default: %(default)s)",
-    )
-    parser.add_argument(
-        STEP_ON,
-        action="append",
-        metavar="TOPIC-OR-SERVICE",
+        " (default: %(default)s)")  # fmt: skip
+    add(STEP_ON, action="append", metavar="TOPIC-OR-SERVICE",
         help="let time pass at each message on this topic, or call of this service; may be repeated;"
-        " 'none': no triggers (default: commands to controllers, if the script doesn't wait by itself)",
-    )
-    parser.add_argument(
-        "--virtual-wall-clock",
-        action="store_true",
-        help="simulate time.time(), monotonic() and perf_counter(), too",
-    )
-    parser.add_argument(
-        "--record",
-        type=_writable,
-        metavar="BAG",
-        help="record the run in this bag, which replay.py repeats",
-    )
-    parser.add_argument("script", help="the Python file to run")
-    parser.add_argument(
-        "arguments", nargs=argparse.REMAINDER, help="arguments passed to the script"
-    )
+        " 'none': no triggers (default: commands to controllers, if the script doesn't wait by"
+        " itself)")  # fmt: skip
+    add("--virtual-wall-clock", action="store_true",
+        help="simulate time.time(), monotonic() and perf_counter(), too")  # fmt: skip
+    add("--record", type=_writable, metavar="BAG",
+        help="record the run in this bag, which replay.py repeats")  # fmt: skip
+    add("script", help="the Python file to run")
+    add("arguments", nargs=argparse.REMAINDER, help="arguments passed to the script")
     args = parser.parse_args(_one_by_one(argv))
     if NO_TRIGGERS in (args.step_on or ()) and set(args.step_on) != {NO_TRIGGERS}:
         parser.error(f"argument {STEP_ON}: '{NO_TRIGGERS}' can't be combined with other names")

@@ -86,7 +86,8 @@ def examine(
         group=group, seed=run.seed, run=run.name, score=score, success=success,
         final=last.mean_return if last else None, training_mean=trained,
         evaluations=None if evaluated is None or not len(evaluated) else float(evaluated.mean()),
-        avg20=_largest_mean(returns),
+        avg20=float(np.convolve(returns, np.full(WINDOW, 1 / WINDOW), mode="valid").max())
+        if len(returns) >= WINDOW else None,
         solved_step=solved_step, steps=steps,
         episodes=summary.get("episodes") or len(returns) or None, seconds=summary.get("seconds"),
         cpu_seconds=cost_of(run.folder).get("cpu_seconds"), fault="; ".join(dict.fromkeys(faults)),
@@ -97,12 +98,6 @@ def _greedy(run: Run, episodes: int, which: str, warn: Callable[[str], None]) ->
     policy = load_learned(run, which, say=warn)
     with closing(policy.env):
         return play(policy, episodes, run.seed)
-
-
-def _largest_mean(returns: np.ndarray) -> float | None:
-    if len(returns) < WINDOW:
-        return None
-    return float(np.convolve(returns, np.full(WINDOW, 1 / WINDOW), mode="valid").max())
 
 
 def _solved(run: Run) -> int | None:

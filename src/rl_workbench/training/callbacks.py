@@ -114,18 +114,18 @@ class CurvesPicture(Callback):
 
 def load_callbacks(names: str) -> list[Callback]:
     """Makes callbacks of the user's own: module:Class, several with commas."""
-    return [_load(name.strip()) for name in names.split(",") if name.strip()]
-
-
-def _load(name: str) -> Callback:
-    make = imported(name, "--callback")
-    try:
-        made = make()
-    except Exception as error:
-        raise WorkbenchError(f"--callback {name}: {error_line(error)}") from error
-    if not isinstance(made, Callback):
-        raise WorkbenchError(f"--callback {name}: it must be a subclass of rl_workbench.Callback")
-    return made
+    callbacks = []
+    for name in filter(None, map(str.strip, names.split(","))):
+        make = imported(name, "--callback")
+        try:
+            made = make()
+        except Exception as error:
+            raise WorkbenchError(f"--callback {name}: {error_line(error)}") from error
+        if not isinstance(made, Callback):
+            text = "it must be a subclass of rl_workbench.Callback"
+            raise WorkbenchError(f"--callback {name}: {text}")
+        callbacks.append(made)
+    return callbacks
 
 
 class CallbackList:

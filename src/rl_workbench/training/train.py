@@ -36,7 +36,6 @@ from rl_workbench.training.progress import warn
 
 PROGRAM = starting.program("rl_workbench")
 PROG = "rl-workbench train"
-USAGE = "{prog} [--help] [--OPTION VALUE ...]"
 DESCRIPTION = """\
 Trains {about}.
 
@@ -184,18 +183,22 @@ def choose_training(
     return choose(kind, rest, parameters, prog, env_id, parents)
 
 
-def algorithm_parser(prog: str) -> argparse.ArgumentParser:
-    """Makes the parser of --algo alone."""
-    result = argparse.ArgumentParser(
+def new_parser(prog: str, **options: Any) -> argparse.ArgumentParser:
+    """Makes a parser whose result lacks flags that aren't given."""
+    return argparse.ArgumentParser(
         prog,
-        usage=USAGE.format(prog=prog),
-        description="Trains an agent.",
-        epilog=EPILOG,
+        usage=f"{prog} [--help] [--OPTION VALUE ...]",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
-        add_help=False,  # --algo NAME --help is the algorithm's
         argument_default=argparse.SUPPRESS,
+        **options,
     )
+
+
+def algorithm_parser(prog: str) -> argparse.ArgumentParser:
+    """Makes the parser of --algo alone."""
+    # --algo NAME --help is the algorithm's
+    result = new_parser(prog, description="Trains an agent.", epilog=EPILOG, add_help=False)
     names = ", ".join(ALGORITHMS)
     result.add_argument("--algo", metavar="NAME", help=f"one of {names}; each has flags of its own")
     return result
@@ -226,7 +229,12 @@ def choose(
     options = known_options(kind)
     default = env_id or kind.defaults.get("env_id", RunOptions.env_id)
     known = [*SOURCES, *options.names, *SESSION.names]
-    from_flags = _parse(_parser(kind, options, prog, default, parents), flags, known)
+    parser = _parser(kind, options, prog, default, parents)
+    found, left = parser.parse_known_args(flags)
+    if left:
+        flags = [flag(each) for each in known]
+        parser.error(unknown("flag", left[0].partition("=")[0], flags))
+    from_flags = vars(found)
     parameters = parameters or {}
     if strange := [name for name in parameters if name not in known]:
         raise WorkbenchError(f"parameters: {unknown('parameter', strange[0], known)}")
@@ -242,7 +250,12 @@ def choose(
     given = options.read(key_values(pairs, "--params"), "--params")
     given |= options.read(_of(options, parameters), "parameters") | from_flags
     if "resume" in files:
-        _check_extending([*given, *(name for name in files if name != "resume")])
+        for name in (*given, *files):
+            if name not in (*EXTENDING, "resume"):
+                raise WorkbenchError(
+                    f"a resumed training keeps its settings: --resume allows no {flag(name)}, "
+                    f"only {', '.join(map(flag, EXTENDING))}"
+                )
         return resumed_options(kind, Path(files["resume"]), given)._replace(session=session)
 
     preset = files.get("preset")
@@ -252,16 +265,6 @@ def choose(
     section = read_section(path, section_names(kind.section, env_id), preset)
     merged = ({"env_id": env_id} if env_id else {}) | options.read(section, origin)
     return make_options(kind, until_the_steps(merged, given))._replace(session=session)
-
-
-def _check_extending(given: list[str]) -> None:
-    """Refuses options that a resumed training can't change."""
-    for name in given:
-        if name not in EXTENDING:
-            raise WorkbenchError(
-                f"a resumed training keeps its settings: --resume allows no {flag(name)}, "
-                f"only {', '.join(map(flag, EXTENDING))}"
-            )
 
 
 def _of(options: Options, values: dict[str, Any]) -> dict[str, Any]:
@@ -275,15 +278,8 @@ def _parser(
     env_id: str,
     parents: Sequence[argparse.ArgumentParser],
 ) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog,
-        usage=USAGE.format(prog=prog),
-        description=DESCRIPTION.format(about=kind.about, config=kind.config),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-        argument_default=argparse.SUPPRESS,
-        parents=list(parents),
-    )
+    about = DESCRIPTION.format(about=kind.about, config=kind.config)
+    parser = new_parser(prog, description=about, parents=parents)
     add = parser.add_argument
     add("--config", metavar="FILE", help=f"options in YAML (default config/{kind.config})")
     add("--preset", metavar="NAME", help="section of that file to use, e.g. tutorial")
@@ -292,13 +288,3 @@ def _parser(
     options.add_flags(parser, {"exp_name": kind.name, **kind.defaults, "env_id": env_id})
     SESSION.add_flags(parser)
     return parser
-
-
-def _parse(
-    parser: argparse.ArgumentParser, flags: list[str], known: Sequence[str]
-) -> dict[str, Any]:
-    found, strange = parser.parse_known_args(flags)
-    if strange:
-        name = strange[0].partition("=")[0]
-        parser.error(unknown("flag", name, [flag(each) for each in known]))
-    return vars(found)
