@@ -174,10 +174,7 @@ class CartPoleRandomisation:
                 raise ValueError(f"randomisation of {name} must lie in [0, {most}], not {value}")
 
     def draw(self, rng: np.random.Generator) -> tuple[Variation, np.ndarray]:
-        """Draws one robot; returns it also as a `CartPoleVariation` in an array, (5,).
-
-        It always draws five numbers, so that later draws don't depend on which properties vary.
-        """
+        """Draws one robot by five numbers; returns it also as a `CartPoleVariation` in an array, (5,)."""
         cart, pole, length, rail, hinge = (float(value) for value in rng.random(5))
         drawn = CartPoleVariation(
             1.0 + self.mass * (2.0 * cart - 1.0),

@@ -89,10 +89,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOptions, RobotOptions]:
-    """Reads the options of training and robot from flags and private parameters.
-
-    Exits with code 2 and a usage line, if they are wrong; with 0 after --help.
-    """
+    """Reads the options of training and robot from flags and private parameters; exits with 2 if wrong."""
     parser = new_parser(PROG, add_help=False)
     ROBOT_OPTIONS.add_flags(parser.add_argument_group("the robot"))
     known, rest = parser.parse_known_args(flags)
@@ -150,11 +147,7 @@ def _backend(options: TrainingOptions) -> str:
 def session(
     options: TrainingOptions, name: str, argv: list[str], robot: RobotOptions, folder: Path
 ) -> Iterator[None]:
-    """Runs the robot's ROS session until the block ends; the simulator's window shows the folder's curves.
-
-    `argv` has roslaunch's remappings. Raises RobotEnvError if something can't be started, or what runs
-    doesn't fit.
-    """
+    """Runs the robot's ROS session until the block ends; the simulator's window shows the folder's curves."""
     backend = _backend(options)
     need_ros(f"the backend {backend}")
     from cartpole.robot import ROBOT

@@ -81,10 +81,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:
-    """Parses flags and private parameters; flags override parameters.
-
-    Exits with code 2 and a usage line, if they are wrong; with 0 after --help.
-    """
+    """Parses flags and private parameters, which flags override; exits with 2 if they are wrong."""
     parser = argparse.ArgumentParser(
         f"{NODE}.py",
         description=DESCRIPTION,

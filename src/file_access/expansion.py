@@ -47,20 +47,14 @@ class CannotExpand(Exception):
 def expand(
     path: str | os.PathLike[str], mappings: Mapping[str, str] | None = None, limits: Limits = LIMITS
 ) -> str:
-    """Returns the XML text of a URDF or xacro file, expanded with xacro's arguments.
-
-    Raises CannotExpand if the file is broken or goes beyond a limit.
-    """
+    """Returns the XML text of a URDF or xacro file; raises CannotExpand if it is broken or beyond a limit."""
     return _ask("xml", os.fspath(path), mappings, limits)
 
 
 def included_files(
     path: str | os.PathLike[str], mappings: Mapping[str, str] | None = None
 ) -> list[str]:
-    """Returns the files that a xacro file includes, or takes numbers from, with these arguments.
-
-    Raises as `expand`.
-    """
+    """Returns the files that a xacro file includes, or takes numbers from; raises CannotExpand."""
     return _ask("files", os.fspath(path), mappings, LIMITS).splitlines()
 
 
@@ -85,10 +79,7 @@ def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: Lim
 
 
 def answer(data: bytes) -> bytes:
-    """Answers a request of this module in the child process.
-
-    The JSON has "text", the XML or a line for each included file; and "warnings", as `_heard` gives them.
-    """
+    """Answers a request in the child process, in JSON: the XML or a file in each line, and warnings."""
     request = json.loads(data)
     path = request["path"]
     try:

@@ -60,10 +60,7 @@ class LimitedProcess:
         self._parent = 0  # process id: after a fork the process is the parent's
 
     def ask(self, request: bytes) -> bytes:
-        """Returns the answer to a request; raises RequestRefused if the program has raised an error.
-
-        ProcessDied is one that went beyond a limit or crashed; the next request starts it again.
-        """
+        """Returns the answer to a request; raises RequestRefused, or ProcessDied after a limit or crash."""
         with self._lock:
             process = self._running()
             assert process.stdin is not None
@@ -116,12 +113,7 @@ class LimitedProcess:
 
 
 def _receive(process: subprocess.Popen[bytes], size: int, deadline: float) -> bytes:
-    """Returns `size` bytes of a process's output.
-
-    Raises:
-        EOFError: If the process has ended.
-        ProcessDied: If they don't come in time.
-    """
+    """Returns `size` bytes of output; raises EOFError if the process has ended, ProcessDied if late."""
     assert process.stdout is not None
     descriptor = process.stdout.fileno()
     poll = select.poll()

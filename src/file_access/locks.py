@@ -33,10 +33,7 @@ def locked_folder(folder: Path) -> Iterator[None]:
 
 
 def is_locked(folder: Path) -> bool:
-    """Returns whether the lock of an existing folder is held.
-
-    It takes a shared lock for a moment, so it may keep another process out: call it seldom.
-    """
+    """Returns whether an existing folder's lock is held, by a shared one for a moment: call it seldom."""
     try:
         descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
     except OSError:
@@ -52,10 +49,7 @@ def is_locked(folder: Path) -> bool:
 
 @contextmanager
 def scratch_folder(parent: str | None = None) -> Iterator[Path]:
-    """Makes a temporary folder for the block; a process's first one also removes those of killed processes.
-
-    It is in `parent`, or in the system's folder of temporary files. Raises OSError if it can't be made.
-    """
+    """Makes a temporary folder for the block; the first one also removes those of killed processes."""
     place = Path(parent or tempfile.gettempdir())
     _sweep(place)
     with ExitStack() as stack:

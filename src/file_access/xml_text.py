@@ -53,10 +53,7 @@ class _BoundedBuilder(TreeBuilder):
 
 
 def parse(text: str | bytes) -> Element:
-    """Returns the root element of a text, or of the content of a file of any encoding.
-
-    Raises FileError if it isn't well-formed or has a document type, TooLarge if it exceeds a bound.
-    """
+    """Returns the root element of a text or a file's content; raises FileError, TooLarge beyond a bound."""
     if len(text) > MAX_BYTES:
         raise TooLarge(f"it has more than {MAX_BYTES} bytes (MAX_BYTES)")
     text = without_declaration(decode(text) if isinstance(text, bytes) else text)
@@ -70,10 +67,7 @@ def parse(text: str | bytes) -> Element:
 
 
 def decode(data: bytes) -> str:
-    """Returns the text of a file in the encoding of its byte-order mark, its declaration, or else UTF-8.
-
-    Raises FileError if it can't be decoded, or the declared encoding isn't supported.
-    """
+    """Returns a file's text, by its byte-order mark, declaration, or else as UTF-8; raises FileError."""
     for mark, name in BYTE_ORDER_MARKS:
         if data.startswith(mark):
             return _decoded(data[len(mark) :], name)

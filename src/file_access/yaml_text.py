@@ -52,10 +52,7 @@ def load_documents(data: bytes | str) -> list[Any]:
 
 
 def load_parameters(data: bytes | str) -> list[dict[str, Any]]:
-    """Returns the documents of a YAML text that are mappings of parameters; empty ones are left out.
-
-    Raises as `load_documents`, and FileError if a value can't be a parameter.
-    """
+    """Returns the documents that are mappings of parameters; raises as `load_documents`, and FileError."""
     documents = [document for document in load_documents(data) if document is not None]
     for document in documents:
         if not isinstance(document, dict):

@@ -68,10 +68,7 @@ class Base:
 
 
 def find_base(survey: Survey) -> Base | None:
-    """Returns the base that wheels on its left and right drive, which turn about its y.
-
-    None if its wheels are others, or their motors take no velocity.
-    """
+    """Returns the base that wheels on its left and right drive, about its y, by velocity; None for others."""
     wheels = survey.wheels
     measured = [_wheel(survey, motor) for motor in wheels]
     rims = [each for each in measured if each is not None]

@@ -37,10 +37,7 @@ COMMANDS = {
 def main(
     argv: list[str] | None = None, prog: str = PROG, program: tuple[str, ...] = training.PROGRAM
 ) -> int:
-    """Runs the command line; returns the process's exit code.
-
-    `program` starts this command line, for trainings in processes of their own.
-    """
+    """Runs the command line; returns the exit code. `program` starts it, for trainings as processes."""
     words = sys.argv[1:] if argv is None else argv
     if words[:1] == [TRAIN]:  # its flags depend on the algorithm
         return training.main(words[1:], prog=f"{prog} {TRAIN}", program=program)

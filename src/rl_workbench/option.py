@@ -102,10 +102,7 @@ class Options:
     def add_flags(
         self, parser: argparse._ActionsContainer, defaults: Mapping[str, Any] | None = None
     ) -> None:
-        """Adds a flag for each option. A flag that isn't given is absent from the result.
-
-        `defaults` are shown in `--help` where they differ from those of the dataclasses.
-        """
+        """Adds a flag for each option, whose default is SUPPRESS; `defaults` are shown in `--help`."""
         for name, each in self._fields.items():
             flag = f"--{name.replace('_', '-')}"
             default = (defaults or {}).get(name, None if each.default is MISSING else each.default)
@@ -232,10 +229,7 @@ def _numbers(value: Any, kind: type) -> tuple[Any, ...]:
 
 
 def mapping(value: Any) -> dict[str, Any]:
-    """Reads a mapping, or a text such as `control_period=0.02, variation={mass: 0.2, gain: [0.9, 1.1]}`.
-
-    Raises ValueError, whose text is the expected form, if it is neither.
-    """
+    """Reads a mapping, or a text such as `control_period=0.02, variation={mass: 0.2, gain: [0.9, 1.1]}`."""
     if isinstance(value, str):
         first, *words = _KEY.split(value)
         try:

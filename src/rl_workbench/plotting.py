@@ -88,10 +88,7 @@ def mean_over_seeds(
 def learning_curve(
     lengths: Sequence[int], returns: Sequence[float], title: str, successes: Sequence[bool] = ()
 ) -> Figure:
-    """Draws one training: length [steps] and return of every episode, with their moving averages.
-
-    Successes, if there are any, have a third curve.
-    """
+    """Draws one training: length [steps], return and success of every episode, with their moving averages."""
     parts: list[tuple[Sequence[float], str, str]] = [
         (lengths, "episode length [steps]", "tab:blue"),
         (returns, "return", "tab:green"),

@@ -125,10 +125,7 @@ class Interrupt:
 
 
 def run_command(prog: str, command: Callable[[Interrupt], object], *errors: type[Exception]) -> int:
-    """Runs a command, which gets what handles signals; returns the process's exit code.
-
-    A WorkbenchError, or one of further errors for the user, becomes one line after `prog`, and exit code 1.
-    """
+    """Runs a command; returns the exit code: 1 after an error for the user, printed as one line."""
     from rl_workbench.errors import WorkbenchError  # only after Ctrl-C is handled
 
     expected: tuple[type[Exception], ...] = (WorkbenchError, *errors)

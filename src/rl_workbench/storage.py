@@ -15,10 +15,7 @@ Writer = Callable[[BinaryIO], object]  # fills a file
 
 
 def write_atomically(path: Path, write: Writer) -> None:
-    """Lets `write` fill a file that replaces `path` only once it is complete and on disk.
-
-    Raises OSError if it can't be written; an older file of that name is untouched.
-    """
+    """Lets `write` fill a file that replaces `path` once it is complete and on disk; or raises OSError."""
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     try:
         with temporary.open("xb") as stream:
@@ -37,10 +34,7 @@ def write_atomically(path: Path, write: Writer) -> None:
 
 
 def write_file(path: Path, write: Writer, shown: Path | None = None) -> None:
-    """Writes a file that the user asked for, as `shown`, atomically; also makes its folder.
-
-    Raises WorkbenchError if it can't be written; an older file of that name is untouched.
-    """
+    """Writes a file that the user asked for, as `shown`, atomically; else raises WorkbenchError."""
     shown = shown or path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

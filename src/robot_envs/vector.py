@@ -96,11 +96,7 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
         return given
 
     def step(self, actions: Any) -> Results:
-        """Carries out one action in each; see `SyncVectorEnv`.
-
-        Raises as `RobotEnv.step`; a ValueError for a wrong action or a wrong number of them, and nothing has
-        moved.
-        """
+        """Carries out one action in each; nothing moves for a wrong one, which is a ValueError."""
         self._check_ready()
         read = [self._read(action) for action in iterate(self.action_space, actions)]
         if len(read) != self.num_envs:

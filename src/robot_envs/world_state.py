@@ -61,10 +61,7 @@ class Motion(NamedTuple):
         return cls(pose, Twist(*twist))
 
     def seen_from(self, frame: "Motion") -> "Motion":
-        """Returns the same, seen from the frame of another motion, both given in one frame.
-
-        Velocities are differences in the other's axes; its rotation adds nothing.
-        """
+        """Returns the same, seen from the frame of another; its rotation adds nothing to velocities."""
         return Motion.of(*seen_from(self, frame))
 
 

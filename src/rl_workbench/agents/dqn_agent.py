@@ -26,15 +26,9 @@ class Learned(NamedTuple):
 class DQNAgent:
     """Learns a Q-network from single steps.
 
-    It has its own generators for initial weights, exploration and batches: the same seed and the same
-    steps give bit-identical weights.
-
-    Args:
-        settings: The algorithm's options.
-        observation_size: D; observations are float32 of shape (D,).
-        actions: A; actions are 0 to A - 1.
-        seed: Seeds weights, exploration and batches.
-        device: The networks' torch device.
+    It has its own generators for initial weights, exploration and batches: the same seed and the same steps
+    give bit-identical weights. Observations are float32 of shape (observation_size,), actions 0 to `actions`
+    - 1.
     """
 
     def __init__(

@@ -9,10 +9,7 @@ from torch import nn
 
 
 class Scaling(nn.Module):
-    """Scales observations (N, D) as in the training: (x - offset) * factors, clipped to +-limit.
-
-    Offset and factors are (D,), float32.
-    """
+    """Scales observations (N, D): (x - offset) * factors, both (D,) float32, clipped to +-limit."""
 
     offset: torch.Tensor
     factors: torch.Tensor
@@ -30,10 +27,7 @@ class Scaling(nn.Module):
 
 
 class Spread(nn.Module):
-    """Converts actions (N, n), given in half-ranges from the middle of their range, to their own units.
-
-    Middle and half are (n,), float32.
-    """
+    """Converts actions (N, n) in half-ranges from the middle of their range, (n,) float32, to their units."""
 
     middle: torch.Tensor
     reach: torch.Tensor
@@ -48,10 +42,7 @@ class Spread(nn.Module):
 
 
 class Continuous(nn.Module):
-    """Maps observations (N, D) to continuous actions, in the action space's shape and type.
-
-    `outputs` maps them to numbers (N, n); low and high have the space's shape and type.
-    """
+    """Maps observations (N, D) by `outputs` (N, n) to continuous actions, in their space's shape and type."""
 
     low: torch.Tensor
     high: torch.Tensor
@@ -87,10 +78,7 @@ class SingleChoice(Choice):
 
 
 class SeveralChoices(Choice):
-    """Chooses the action with the highest score in each group of scores, (N, groups).
-
-    The sum of the groups' sizes is A.
-    """
+    """Chooses the action with the highest score in each group of scores, (N, groups), of these sizes."""
 
     def __init__(self, scores: nn.Module, sizes: list[int]) -> None:
         super().__init__(scores)

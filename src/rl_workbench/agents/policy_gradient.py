@@ -78,10 +78,9 @@ class Losses(NamedTuple):
 
 
 class TwoNetworks(ABC):
-    """Base class: a policy and a value network, an Adam for each, and a generator for the actions.
+    """Base class: policy and value networks, an Adam for each, and a generator for the actions.
 
-    They map observations (N, D) to probabilities (N, A) and to estimated returns (N, 1); `rates` are their
-    learning rates.
+    They map observations (N, D) to probabilities (N, A) and to estimated returns (N, 1).
     """
 
     def __init__(
@@ -131,11 +130,7 @@ def start_at_zero(layer: nn.Linear) -> None:
 
 
 def descend(optimizer: torch.optim.Optimizer, loss: torch.Tensor) -> None:
-    """Takes one optimizer step down the loss.
-
-    Raises WorkbenchError, and changes no weight, if the gradient isn't finite, as is possible with a finite
-    loss.
-    """
+    """Takes an optimizer step; raises WorkbenchError, weights unchanged, if the gradient isn't finite."""
     optimizer.zero_grad()
     loss.backward()
     gradients = [weight.grad for group in optimizer.param_groups for weight in group["params"]]

@@ -146,10 +146,7 @@ class Bounds(NamedTuple):
 
 
 class GaussianNetwork(PolicyNetworkBase):
-    """Maps prepared observations (N, D) to the actions' means (N, n), in half-ranges from the middle.
-
-    `log_std` is the logarithm of the initial standard deviation.
-    """
+    """Maps prepared observations (N, D) to the actions' means (N, n), in half-ranges from the middle."""
 
     def __init__(self, observations: int, bounds: Bounds, hidden: int, log_std: float) -> None:
         super().__init__(observations, bounds.low.size, hidden)

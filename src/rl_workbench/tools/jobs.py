@@ -65,10 +65,7 @@ def job_pool(
 
 
 def claim(folder: Path, name: str, wanted: Any, refusal: str) -> None:
-    """Writes the settings of a folder's runs to a file, or checks that it has the same.
-
-    `refusal` is the error's text, after the folder's name, if it has others.
-    """
+    """Writes the settings of a folder's runs to a file, or refuses those that differ from the file's."""
     found = read_json(folder / name)
     if found is None:
         write_file(folder / name, as_json(wanted))

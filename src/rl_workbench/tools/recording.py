@@ -166,10 +166,7 @@ def record_episode(
     stride: float = 1.0,
     max_steps: int = 0,
 ) -> Iterator[EpisodeFrame]:
-    """Plays one episode; yields its frames, one in `stride` steps on average, and the last.
-
-    It is cut off after `max_steps`; 0 for never.
-    """
+    """Plays an episode; yields its frames, one in `stride` steps on average, and the last."""
     total, due = 0.0, 0.0
     for length, step in enumerate(episode_steps(env, act, seed, max_steps)):
         total += step.reward

@@ -261,10 +261,7 @@ class Search:
 
 
 class Judge:
-    """Reports the evaluations of a trial's running training to Optuna.
-
-    Its folder may not exist yet. `frequency` is 0 if only the end is evaluated.
-    """
+    """Reports the evaluations of a trial's running training, every `frequency` steps, to Optuna."""
 
     def __init__(self, study: Any, trial: Any, folder: Path, frequency: int) -> None:
         self._trial, self._frequency = trial, frequency

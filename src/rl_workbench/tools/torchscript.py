@@ -151,10 +151,7 @@ class OfVectors(nn.Module):
 
 
 class OfDicts(nn.Module):
-    """Maps observations, a dict of (N, ...) of any number type, to greedy actions (N, ...).
-
-    The network takes the parts concatenated, in the order of `names`.
-    """
+    """Maps a dict of observations (N, ...) of any number type to greedy actions (N, ...)."""
 
     def __init__(self, network: nn.Module, names: Sequence[str]) -> None:
         super().__init__()

@@ -20,8 +20,7 @@ class AlgorithmKind:
         name: The value of `--algo`, also written into records.
         about: What it trains, for `--help`.
         config: The file with tuned options below `config/`.
-        implementation: The module with `make(options, envs) -> Algorithm` and
-            `load_policy(options, checkpoint, env) -> Policy`.
+        implementation: The module with `make` and `load_policy`; see `algorithm`.
         settings: The dataclass of the algorithm's own options, as `module:Class`.
         section: The name of an environment's section in that file.
         defaults: Common options whose default differs for this algorithm.

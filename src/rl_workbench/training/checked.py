@@ -32,14 +32,10 @@ _OLD_GYM = re.compile(r"unpack \(expected [25]\b|unexpected keyword argument '(s
 class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Turns NaN, wrong shapes and exceptions of an environment into one-line errors.
 
-    All methods raise WorkbenchError if the environment fails; `reset` and `step` also if an observation or
-    a reward isn't finite in float32. The last info of an episode has the means of numbers, see `CURVES`.
-    An environment that declares no `max_episode_steps` is truncated after `LONGEST` steps.
-
-    Args:
-        env: Its observations are vectors, or a Dict of arrays.
-        env_id: For errors.
-        which: Begins every error, as "environment 2 of 3: ".
+    All methods raise WorkbenchError if the environment fails; `reset` and `step` also if an observation, a
+    vector or a Dict of arrays, or a reward isn't finite in float32. The last info of an episode has the means
+    of numbers, see `CURVES`. An environment that declares no `max_episode_steps` is truncated after `LONGEST`
+    steps. `which` begins every error, as "environment 2 of 3: ".
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], env_id: str, which: str = "") -> None:
@@ -117,10 +113,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self.env.has_wrapper_attr(COMPUTE_REWARD)
 
     def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> np.ndarray:
-        """Returns the rewards (N,), float32, for goals (N, n) that were achieved while others were desired.
-
-        `info` is a list of N, one of each step.
-        """
+        """Returns rewards (N,), float32, for goals (N, n) achieved while others were desired; N infos."""
         with self._running(COMPUTE_REWARD):
             found = self.env.get_wrapper_attr(COMPUTE_REWARD)(achieved, desired, info)
             rewards = np.asarray(found, np.float32)
@@ -222,10 +215,7 @@ def _without_checks(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
 
 
 def _begin_method(env: gymnasium.Env[Any, Any]) -> Callable[[Any], object]:
-    """Returns what begins a step of an environment.
-
-    It does nothing if the environment can't, or if a wrapper in between might change the actions.
-    """
+    """Returns what begins a step; nothing if the environment can't, or a wrapper might change the actions."""
     layer: Any = env
     while isinstance(layer, gymnasium.Wrapper):
         is_known = type(layer).__module__.startswith("gymnasium.")

@@ -53,10 +53,7 @@ class Checkpoints:
             raise FileNotFoundError(errno.ENOENT, moved, str(self._run))
 
     def save(self, step: int, content: dict[str, Any], best: bool = False) -> Path:
-        """Writes a checkpoint as the last one, and also as the best one if `best`; returns its path.
-
-        Raises OSError if it can't be written; the earlier checkpoints are untouched.
-        """
+        """Writes a checkpoint as the last one, also as the best one if `best`; raises OSError if it can't."""
         self.check_place()
         path = self._run / FOLDER / f"step_{step:09d}.pt"
         path.parent.mkdir(exist_ok=True)

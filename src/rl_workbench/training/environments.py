@@ -118,10 +118,7 @@ def environment_for(
 
 
 def training_environments(options: TrainingOptions) -> list[CheckedEnvironment]:
-    """Makes the `num_envs` environments of a training, each with a robot of its own.
-
-    The caller closes them with `close_all`.
-    """
+    """Makes the `num_envs` environments of a training, for `close_all`, each with a robot of its own."""
     run, given = options.run, options.run.training_environment
     count = run.num_envs
     first = environment_for(options, given, _which(0, count))
@@ -245,10 +242,7 @@ def is_continuous(space: gymnasium.Space[Any]) -> TypeGuard[spaces.Box]:
 
 
 def discrete_actions(env: gymnasium.Env[Any, Any], env_id: str, algorithm: str) -> int:
-    """Returns the number of discrete actions.
-
-    Raises WorkbenchError, which names algorithms that fit, unless they are the numbers from 0 on.
-    """
+    """Returns the number of discrete actions; else raises WorkbenchError, which names algorithms that fit."""
     space = env.action_space
     if isinstance(space, spaces.Discrete) and space.start == 0:
         return int(space.n)
@@ -272,10 +266,7 @@ def as_float32(observation: Any) -> Any:
 
 
 def as_vector(observation: Any) -> np.ndarray:
-    """Returns all numbers of an observation, (D,), float32.
-
-    It is a copy: an environment may well write into the array that it returned.
-    """
+    """Returns a copy of all numbers of an observation, (D,), float32: an environment may reuse its array."""
     if isinstance(observation, dict):
         return np.concatenate([np.ravel(part) for part in observation.values()], dtype=np.float32)
     return np.array(observation, dtype=np.float32)

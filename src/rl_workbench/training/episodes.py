@@ -95,10 +95,7 @@ class EpisodeSource:
             env.reset(seed=self._seed + index)
 
     def collect(self, should_stop: Callable[[], bool]) -> list[Episode] | None:
-        """Plays one episode in each environment, all by the agent's present policy.
-
-        Returns them in the order of the environments; None if `should_stop()` became true.
-        """
+        """Plays one episode in each environment, in this order; None if `should_stop()` became true."""
         agent = self._agent
         # No one else waits while a single environment takes its step.
         begins: list[Callable[[Any], object]] = [lambda action: None]

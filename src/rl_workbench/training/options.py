@@ -229,10 +229,7 @@ def section_names(form: str, env_id: str | None) -> tuple[str, ...]:
 
 
 def read_section(path: Path, names: Sequence[str], preset: str | None) -> dict[str, Any]:
-    """Reads the options of a preset, or else of the first section that exists; {} if none does.
-
-    A file without sections holds options for every environment.
-    """
+    """Reads the options of a preset, or of the first section that exists; a file without sections is one."""
     content = _read_yaml(path)
     if content and not any(isinstance(value, dict) for value in content.values()):
         if preset:

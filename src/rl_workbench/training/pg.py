@@ -65,10 +65,7 @@ def load_policy(
 
 
 class PolicyGradientTraining(Algorithm):
-    """Learns from rounds of one episode from each environment. It can be saved between two rounds.
-
-    The networks are saved every `save_every` episodes; 0: at the end only.
-    """
+    """Learns from rounds of one episode from each environment; can be saved between two rounds."""
 
     def __init__(self, agent: Agent, source: EpisodeSource, save_every: int) -> None:
         self._agent, self._source, self._save_every = agent, source, save_every

@@ -25,10 +25,7 @@ def warn(text: str) -> None:
 
 
 class Progress(Callback):
-    """A bar over the training's length, and lines.
-
-    The length is `total` of a unit, "step" or "episode", of which `done` were done before.
-    """
+    """A bar over the training's length, `total` of a unit ("step" or "episode"), and lines."""
 
     def __init__(
         self,

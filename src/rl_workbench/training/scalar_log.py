@@ -29,13 +29,10 @@ Point = tuple[str, float, int, float]  # tag, value, step, wall time [s]
 
 
 class ScalarLog:
-    """Writes points, each with its step, tag and value.
+    """Writes points, each with its step, tag and value, into both files.
 
-    Args:
-        folder: Where both files go.
-        settings: Shown as a table under TEXT, and under HPARAMS next to those of other trainings.
-        length: The CSV's length [bytes] at the checkpoint to continue from; 0 starts a new one.
-        say: Is called if the CSV lacks rows. The training doesn't depend on them.
+    Settings are a table under TEXT, and under HPARAMS next to those of other trainings. `length` is the CSV's
+    [bytes] at the checkpoint to continue from; 0 starts a new one. `say` is called if the CSV lacks rows.
     """
 
     def __init__(

@@ -214,17 +214,10 @@ def choose(
 ) -> TrainingOptions:
     """Reads the options of one algorithm.
 
-    Args:
-        kind: The algorithm.
-        flags: As on the command line.
-        parameters: Options from outside, as a launch file sets them: between --params and the flags.
-        prog: The command, for `--help`.
-        env_id: The environment if none is given.
-        parents: Have further flags to show in `--help`. The caller has parsed them.
-
-    Raises:
-        SystemExit: With code 2 and a usage line if a flag is wrong; with 0 after `--help`.
-        WorkbenchError: If a name is unknown or a value is wrong anywhere else.
+    `parameters` are options from outside, as a launch file sets them: between --params and the flags.
+    `parents` have further flags to show in `--help`, which the caller has parsed. Exits with code 2 and a
+    usage line if a flag is wrong, with 0 after `--help`; raises WorkbenchError if a name is unknown or a
+    value wrong anywhere else.
     """
     options = known_options(kind)
     default = env_id or kind.defaults.get("env_id", RunOptions.env_id)

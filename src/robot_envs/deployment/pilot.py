@@ -117,9 +117,8 @@ class Pilot:
         way: See `CommandLimits`.
         say: Reports commands beyond their limits, once for each controller.
 
-    Raises:
-        RobotEnvError: If the robot's description is wrong, or the task asks for what joints don't determine.
-        ValueError: If the goal isn't one of the task's.
+    Raises RobotEnvError if the robot's description is wrong, or the task asks for what joints don't
+    determine; ValueError if the goal isn't one of the task's.
     """
 
     def __init__(
@@ -185,10 +184,7 @@ class Pilot:
     def step(
         self, time: float, joints: Joints, sensors: Sensors = NO_SENSORS
     ) -> dict[str, Command] | None:
-        """Returns commands for a time since the beginning [s]; None if the task's episode would end.
-
-        Raises ValueError if the policy or the task returns something impossible.
-        """
+        """Returns commands for a time since the beginning [s]; None if the task's episode would end."""
         task, state = self._task, self._state(time, joints, sensors)
         over = self._evaluator.is_terminal(state)
         if self._action is not None:

@@ -25,11 +25,7 @@ def is_number(value: Any) -> bool:
 def by_name(
     option: str, given: Any, names: Sequence[str], kind: str, which: str = ""
 ) -> dict[str, Any]:
-    """Returns an option's values by name, unchecked: one for all, or a mapping, which may leave names out.
-
-    `kind` and `which` describe what has the names ("joint", "that moves") in the ValueError for an unknown
-    one.
-    """
+    """Returns an option's values by name: one for all, or a mapping; ValueError for an unknown name."""
     if not isinstance(given, Mapping):
         return dict.fromkeys(names, given)
     for name in given:

@@ -74,10 +74,7 @@ def check_names(given: Iterable[str]) -> None:
 
 
 def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, UniformRange]:
-    """Returns an option's intervals by name, from a number, a pair (low, high), or a mapping.
-
-    Raises ValueError for an impossible interval, or an unknown name.
-    """
+    """Returns an option's intervals by name, from a number, a pair (low, high), or a mapping of these."""
     if not names:
         raise ValueError(
             f"randomisation of {option.name}: the robot has no {option.of.name} {option.of.which}"

@@ -44,10 +44,7 @@ def load_policy(
 
 
 def greedy_network(model: Any, algorithm: str) -> nn.Module:
-    """Returns what `model.predict(..., deterministic=True)` computes, for observations (N, D).
-
-    The model's policy is MlpPolicy, or MultiInputPolicy on vectors.
-    """
+    """Returns what `model.predict(..., deterministic=True)` computes for observations (N, D), by an MLP."""
     policy, actions = model.policy, model.action_space
     if algorithm == "dqn-sb3":
         return SingleChoice(policy.q_net.q_net)

@@ -67,10 +67,7 @@ class StoppableOffPolicy(OffPolicyAlgorithm):
 
 
 class ParallelVecEnv(DummyVecEnv):
-    """Begins a step in all environments before it waits for the first.
-
-    So steps that take time in other processes run at the same time.
-    """
+    """Begins a step in all environments before it waits: those in other processes run at the same time."""
 
     def __init__(self, envs: Sequence[gymnasium.Env[Any, Any]]) -> None:
         super().__init__([partial(_given, env) for env in envs])
