@@ -72,7 +72,8 @@ def main(argv: list[str] | None = None) -> int:
     def command(interrupt: Interrupt) -> None:
         flags, parameters, name = ros_options(words, NODE)
         options, robot = choose(flags, parameters)
-        over_ros = needs_session(options)
+        # The cart-pole is trained over ROS.
+        over_ros = options.run.env_id.startswith(f"{NAMESPACE}/") and _backend(options) != "bullet"
         # A single robot over ROS is shown in its simulator's window.
         in_window = over_ros and options.run.num_envs == 1
         callbacks = [] if in_window else page_of(options, PROGRAM)
@@ -132,11 +133,6 @@ def _combined(
     if "backend" in run.training_environment and not (robot.backend or robot.realtime):
         del environment["backend"]  # the default must not override it
     return options._replace(run=replace(run, train_env_kwargs=run.train_env_kwargs | environment))
-
-
-def needs_session(options: TrainingOptions) -> bool:
-    """Returns whether the cart-pole is trained over ROS."""
-    return options.run.env_id.startswith(f"{NAMESPACE}/") and _backend(options) != "bullet"
 
 
 def _backend(options: TrainingOptions) -> str:

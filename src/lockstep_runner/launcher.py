@@ -138,14 +138,12 @@ def _one_by_one(argv: Sequence[str]) -> list[str]:
                 return given + left  # the script and its arguments
             continue
         names = []
-        while left and not (left[0].startswith("-") or _is_a_script(left[0])):
+        while left and not left[0].startswith("-"):
+            if left[0].endswith(".py") or os.path.isfile(left[0]):
+                break  # the script
             names.append(left.pop(0))
         given += [part for name in names for part in (STEP_ON, name)] or [STEP_ON]
     return given
-
-
-def _is_a_script(argument: str) -> bool:
-    return argument.endswith(".py") or os.path.isfile(argument)
 
 
 def _seed(text: str) -> int:

@@ -76,13 +76,18 @@ class ReinforceAgent(TwoNetworks):
         self.settings = settings = settings or ReinforceSettings()
         with torch.random.fork_rng():
             torch.manual_seed(seed)
-            self._network = _make_network(len(scale), actions, settings)
-            value = BaselineNetwork(len(scale), settings.value_hidden)
+            size, hidden = len(scale), settings.policy_hidden
+            self._network: SoftmaxNetwork | GaussianNetwork
+            if isinstance(actions, int):
+                self._network = SoftmaxNetwork(size, actions, hidden)
+            else:
+                self._network = GaussianNetwork(size, actions, hidden, settings.log_std_init)
+            value = BaselineNetwork(size, settings.value_hidden)
         start_at_zero(self._network.fc)
         rates = (settings.policy_learning_rate, settings.value_learning_rate)
         super().__init__(self._network, value, rates, seed)
         self._factors = 1.0 / np.asarray(scale, np.float32)  # (D,)
-        self._normaliser = Normaliser(len(scale)) if settings.normalize_observations else None
+        self._normaliser = Normaliser(size) if settings.normalize_observations else None
         self._actions = actions
         self._batch_size = settings.batch_episodes * environments
         self._batch: list[Episode] = []
@@ -221,14 +226,6 @@ class ReinforceAgent(TwoNetworks):
         if self._normaliser is not None:
             self._normaliser.load_state_dict(state["normaliser"])
         super().load_state_dict(state)
-
-
-def _make_network(
-    observations: int, actions: int | Bounds, settings: ReinforceSettings
-) -> SoftmaxNetwork | GaussianNetwork:
-    if isinstance(actions, int):
-        return SoftmaxNetwork(observations, actions, settings.policy_hidden)
-    return GaussianNetwork(observations, actions, settings.policy_hidden, settings.log_std_init)
 
 
 def generalised_advantages(

@@ -130,13 +130,9 @@ class RayJobs:
             cause = getattr(error, "cause", None)  # the task's own error
             if isinstance(cause, NodeUnusable | WorkbenchError):
                 raise WorkbenchError(str(cause)) from error
-            return Ending(lost=_in_a_line(cause or error))
-
-
-def _in_a_line(error: Exception) -> str:
-    """Returns the end of an error, since Ray's own messages are pages long."""
-    lines = str(error).split("\n")
-    return next((line.strip() for line in reversed(lines) if line.strip()), type(error).__name__)
+            # Ray's own messages are pages long.
+            lines = str(cause or error).strip().split("\n")
+            return Ending(lost=lines[-1].strip() or type(cause or error).__name__)
 
 
 @contextlib.contextmanager

@@ -285,14 +285,12 @@ class Judge:
                 if tag == EVALUATION and self._frequency and not self._is_pruned:
                     # Episodes and vectors skip steps, so report the step at which the evaluation was due:
                     # that one is comparable between trials.
-                    self._report(int(step) // self._frequency * self._frequency, value)
+                    due = int(step) // self._frequency * self._frequency
+                    if due not in self._steps:
+                        self._steps.add(due)
+                        self._trial.report(value, due)
+                        self._is_pruned = self._trial.should_prune()
         return not self._is_pruned
-
-    def _report(self, step: int, value: float) -> None:
-        if step not in self._steps:
-            self._steps.add(step)
-            self._trial.report(value, step)
-            self._is_pruned = self._trial.should_prune()
 
 
 def score_of(job: Job) -> float:

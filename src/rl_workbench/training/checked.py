@@ -107,11 +107,6 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         }
         return {**info, CURVES: {tag: mean for tag, mean in means.items() if math.isfinite(mean)}}
 
-    @property
-    def can_compute_reward(self) -> bool:
-        """Whether it can compute rewards for arbitrary goals."""
-        return self.env.has_wrapper_attr(COMPUTE_REWARD)
-
     def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> np.ndarray:
         """Returns rewards (N,), float32, for goals (N, n) achieved while others were desired; N infos."""
         with self._running(COMPUTE_REWARD):

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from rl_workbench.env_ids import without_module
-from rl_workbench.errors import WorkbenchError
+from rl_workbench.errors import WorkbenchError, need
 from rl_workbench.option import Options, check_options, is_plain, option, unknown
 from rl_workbench.storage import CONFIG_RECORD, read_record
 from rl_workbench.training.algorithms import AlgorithmKind, algorithm
@@ -151,7 +151,8 @@ class TrainingOptions(NamedTuple):
 
 def known_options(kind: AlgorithmKind) -> Options:
     """Returns all recorded options of an algorithm's trainings."""
-    kind.check_installed()
+    if kind.package:
+        need(*kind.package, f"the algorithm {kind.name}")
     return Options(RunOptions, kind.hyperparameters())
 
 
@@ -230,7 +231,14 @@ def section_names(form: str, env_id: str | None) -> tuple[str, ...]:
 
 def read_section(path: Path, names: Sequence[str], preset: str | None) -> dict[str, Any]:
     """Reads the options of a preset, or of the first section that exists; a file without sections is one."""
-    content = _read_yaml(path)
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+    except OSError as error:
+        raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise WorkbenchError(f"{path} isn't YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(content, dict):
+        raise WorkbenchError(f"{path} isn't a YAML file of options")
     if content and not any(isinstance(value, dict) for value in content.values()):
         if preset:
             raise WorkbenchError(f"{path} has no sections, so no preset {preset!r} either")
@@ -242,15 +250,3 @@ def read_section(path: Path, names: Sequence[str], preset: str | None) -> dict[s
     if not isinstance(section, dict):
         raise WorkbenchError(f"{path}: {name} isn't a section of options")
     return section
-
-
-def _read_yaml(path: Path) -> dict[str, Any]:
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    except OSError as error:
-        raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise WorkbenchError(f"{path} isn't YAML: {' '.join(str(error).split())}") from error
-    if not isinstance(content, dict):
-        raise WorkbenchError(f"{path} isn't a YAML file of options")
-    return content

@@ -1,6 +1,6 @@
 """An environment's pictures, its page in the browser, and its render modes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -12,7 +12,7 @@ from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, WorldState
-from robot_sim.physics.pose import Pose, Vector, add
+from robot_sim.physics.pose import Pose, add
 from robot_sim.pictures.camera import Camera, CameraLike
 
 if TYPE_CHECKING:
@@ -122,7 +122,11 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
             *size,
             camera=camera,
             base=self._base,
-            beside=Surroundings(self.scene, self._poses, self._goal),
+            beside=Surroundings(
+                self.scene,
+                lambda links: self.backend.poses(links),  # noqa: PLW0108 - there is none yet
+                self.task.goal_mark,
+            ),
         )
         self._shown_for = period  # [s] of wall time, of each state in the render mode "human"
         self._page: LivePage | None = None
@@ -156,12 +160,6 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         if robot.links.fixed_base:
             return self.scene.stand(self._initial, robot).compose(robot.links.root_pose)
         return self.backend.poses([f"{robot.model}::{robot.links.root}"])[0]
-
-    def _poses(self, links: Sequence[str]) -> Sequence[Pose]:
-        return self.backend.poses(links)
-
-    def _goal(self) -> tuple[Vector, float] | None:
-        return self.task.goal_mark()
 
     def render(self) -> np.ndarray | None:
         """Returns a picture of the robot, (height, width, 3) of uint8; None in the render mode "human".

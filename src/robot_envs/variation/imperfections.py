@@ -42,6 +42,12 @@ def at_least_zero(option: str, given: Any) -> float:
     return float(given)
 
 
+def _sizes(option: str, given: Any, names: Sequence[str], kind: str) -> dict[str, float]:
+    """Returns an option's numbers >= 0 by name; see `by_name`."""
+    values = by_name(option, given, names, kind)
+    return {name: at_least_zero(option, each) for name, each in values.items()}
+
+
 def steps(option: str, given: Any, most: int) -> int:
     """Returns `given` as a number of control steps; raises ValueError for anything else."""
     if not is_number(given) or not 0 <= given <= most or given != int(given):
@@ -103,13 +109,16 @@ class Sensor:
         self._period = period
         self._sensors: dict[str, dict[str, float]] = {}
         if isinstance(noise, Mapping):
-            self._sensors = {name: _by_part(noise[name]) for name in noise if name in sensors}
+            self._sensors = {
+                name: _sizes("sensor_noise", noise[name], noisy_fields(), "attribute of a reading")
+                for name in noise
+                if name in sensors
+            }
             noise = {name: each for name, each in noise.items() if name not in sensors}
         self._readings: dict[str, tuple[float, Reading]] = {}  # noisy ones, with their times [s]
         by_joint = by_name("sensor_noise", noise, joints, "joint")
         sizes = {name: _pair("sensor_noise", size) for name, size in by_joint.items()}
-        by_joint = by_name("encoder_step", encoder_step, joints, "joint")
-        notches = {name: at_least_zero("encoder_step", size) for name, size in by_joint.items()}
+        notches = _sizes("encoder_step", encoder_step, joints, "joint")
         for size in notches.values():
             if 0.0 < size < LEAST_STEP:
                 raise ValueError(f"encoder_step must be 0 or at least {LEAST_STEP:g}, not {size!r}")
@@ -199,12 +208,6 @@ class Sensor:
         return measured, (measured - before) / self._period
 
 
-def _by_part(given: Any) -> dict[str, float]:
-    """Returns the standard deviations of what a sensor measures, by attribute of its `Reading`."""
-    sizes = by_name("sensor_noise", given, noisy_fields(), "attribute of a reading")
-    return {name: at_least_zero("sensor_noise", size) for name, size in sizes.items()}
-
-
 def _pair(option: str, given: Any) -> tuple[float, float]:
     """Returns the standard deviations of position and velocity."""
     numbers = [given, given] if is_number(given) else np.ravel(given).tolist()
@@ -250,14 +253,12 @@ class Actuator:
     ) -> None:
         names = list(holds)
         self._delay = steps("action_delay", delay, MOST_DELAY)
-        given = {} if limit is None else by_name("actuator_limit", limit, names, "controller")
-        most = {name: at_least_zero("actuator_limit", each) for name, each in given.items()}
+        most = {} if limit is None else _sizes("actuator_limit", limit, names, "controller")
         self._limits: Rules = {
             name: (_follow, each * period) if holds[name] else (_cut, each)
             for name, each in most.items()
         }
-        given = by_name("actuator_lag", lag, names, "controller")
-        lags = {name: at_least_zero("actuator_lag", each) for name, each in given.items()}
+        lags = _sizes("actuator_lag", lag, names, "controller")
         self._lags: Rules = {
             name: (_lag, -math.expm1(-period / each)) for name, each in lags.items() if each > 0.0
         }

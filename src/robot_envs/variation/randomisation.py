@@ -1,6 +1,6 @@
 """Domain randomisation of any robot, from named options."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,15 +64,6 @@ class UniformRange(NamedTuple):
         return self.low + (self.high - self.low) * share
 
 
-def check_names(given: Iterable[str]) -> None:
-    """Raises ValueError for an unknown option, with the nearest name."""
-    known = [option.name for option in OPTIONS]
-    for name in given:
-        if name not in known:
-            hint = nearest_or_all(str(name), known)
-            raise ValueError(f"randomisation has no option {name!r}{hint}")
-
-
 def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, UniformRange]:
     """Returns an option's intervals by name, from a number, a pair (low, high), or a mapping of these."""
     if not names:
@@ -129,7 +120,11 @@ class UniformRandomisation(Shared):
     """
 
     def __init__(self, scene: Scene, options: Mapping[str, Any]) -> None:
-        check_names(options)
+        known = [option.name for option in OPTIONS]
+        for name in options:
+            if name not in known:
+                hint = nearest_or_all(str(name), known)
+                raise ValueError(f"randomisation has no option {name!r}{hint}")
         parts = Parts(scene)
         self._axes = parts.axes
         pids = parts.pids() if "gains" in options else {}
