@@ -34,6 +34,7 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
 
     Each environment is bit-identical to one alone: the seed s stands for s, s + 1, ..., one for each. A wrong
     action is refused before anything moves. After an error in the middle of a step all have to be reset.
+    Raises ValueError if an option makes no sense, RobotEnvError if a robot can't be brought up.
 
     Args:
         num_envs: Number of environments.
@@ -41,10 +42,6 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
         backend: The backend of all; "ros" and "ros-own" are the same here.
         autoreset_mode: Gymnasium's: "NextStep", "SameStep" or "Disabled".
         options: Keyword arguments of `make`.
-
-    Raises:
-        ValueError: If an option makes no sense.
-        RobotEnvError: If a robot can't be brought up.
     """
 
     def __init__(

@@ -10,20 +10,8 @@ from robot_sim.physics.world import seen_from
 from robot_sim.sensors.sensor_reading import Reading
 from robot_sim.state import ContactPair, LinkQuery, StateQuery
 
-__all__ = [
-    "Command",
-    "Commands",
-    "ContactPair",
-    "InitialState",
-    "JointState",
-    "LinkQuery",
-    "Motion",
-    "Pose",
-    "Reading",
-    "StateQuery",
-    "Twist",
-    "WorldState",
-]
+__all__ = ["Command", "Commands", "ContactPair", "InitialState", "JointState", "LinkQuery", "Motion", "Pose",
+           "Reading", "StateQuery", "Twist", "WorldState"]  # fmt: skip
 
 Entry = TypeVar("Entry")
 Command = float | Sequence[float]

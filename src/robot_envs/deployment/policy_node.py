@@ -239,7 +239,13 @@ class PolicyNode:
         for _ in range(2):
             sent = self._sent()
             self._publish(commands)
-            self._wait_until_sent(sent)
+            deadline = time.monotonic() + SENDING
+            # rospy drops what its threads haven't sent when the node ends.
+            while time.monotonic() < deadline:
+                now = self._sent()
+                if all(now[each] > count for each, count in sent.items() if each in now):
+                    break
+                rospy.rostime.wallsleep(0.002)
         rospy.loginfo("the robot is stopped")
 
     def _sent(self) -> dict[tuple[str, int], int]:
@@ -249,15 +255,6 @@ class PolicyNode:
             for name, topic in self._topics.items()
             for connection in topic.impl.connections
         }
-
-    def _wait_until_sent(self, before: Mapping[tuple[str, int], int]) -> None:
-        """Waits, since rospy drops what its threads haven't sent when the node ends."""
-        deadline = time.monotonic() + SENDING
-        while time.monotonic() < deadline:
-            now = self._sent()
-            if all(now[each] > count for each, count in before.items() if each in now):
-                return
-            rospy.rostime.wallsleep(0.002)
 
 
 def _late(robot: Robot, period: float) -> float:

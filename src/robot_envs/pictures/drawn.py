@@ -162,11 +162,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         return self.backend.poses([f"{robot.model}::{robot.links.root}"])[0]
 
     def render(self) -> np.ndarray | None:
-        """Returns a picture of the robot, (height, width, 3) of uint8; None in the render mode "human".
-
-        Raises:
-            SimulatorError: If the backend has to be asked where the robot is, and doesn't answer.
-        """
+        """Returns a picture of the robot, (height, width, 3) of uint8; None in the render mode "human"."""
         return self._picture(self._positions()) if self.render_mode == "rgb_array" else None
 
     def draw_on(self, server: "ViserServer", beside: int = 0) -> "RobotOnPage":
@@ -179,16 +175,9 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
             ...  # env.reset(), env.step(action)
             robot()
 
-        Args:
-            server: Server of the page.
-            beside: How many robots of this kind are on the page already; it is drawn beside them.
-
-        Returns:
-            What moves the robot on the page to where it is now: a function, which takes a caption to show
-            below the robot, and may raise `SimulatorError`. Its two halves are `look()`, which returns where
-            the robot is, and `show()`, which moves it there, then or later.
-
-        Raises:
-            SimulatorError: If the backend has to be asked where the robot is, and doesn't answer.
+        `beside` is how many robots of this kind are on the page already. Returns what moves the robot to
+        where it is now: a function, which takes a caption to show below it. Its two halves are `look()`,
+        which returns where the robot is, and `show()`, which moves it there, then or later. They raise
+        SimulatorError if the backend has to be asked where the robot is, and doesn't answer.
         """
         return self._picture.draw_on(server, self._positions, beside)

@@ -41,9 +41,6 @@ class Balance(Task):
     ## End of an episode
     Terminated when a rod is 0.5 rad from the vertical or the cart 0.95 m from the middle; truncated after 500
     steps of 0.02 s.
-
-    Args:
-        noise: See above.
     """
 
     max_steps = 500

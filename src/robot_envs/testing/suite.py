@@ -30,7 +30,9 @@ def check_robot_env(
     `begin_step`, and over every backend but real time); wrong actions and options are refused and move
     nothing; truncation isn't termination; reset knows its options; the spec can be copied and pickled;
     pictures show motion; a closed environment says so; rewards of goals agree; and Gymnasium's own checker
-    finds nothing. In this process also: vectors are bit-identical to environments alone.
+    finds nothing. In this process also: vectors are bit-identical to environments alone. Raises
+    AssertionError, which lists broken promises and the environment's own errors, a line each; RuntimeError
+    under `python -O`.
 
     Args:
         env: An id, "my_arm/Reach-v0" or "my_module:my_arm/Reach-v0"; or a function that makes an
@@ -38,10 +40,6 @@ def check_robot_env(
         backends: Names of them.
         options: That it is made with.
         steps: Steps of each rollout.
-
-    Raises:
-        AssertionError: Lists broken promises and the environment's own errors, a line each.
-        RuntimeError: Under `python -O`, which removes the checks.
     """
     if not __debug__:
         raise RuntimeError("check_robot_env checks by assert statements: run Python without -O")

@@ -75,26 +75,23 @@ class Encoder(NamedTuple):
 
 
 class Sensor:
-    """Measures joints with noise, rounding and delay, and sensors with further noise and delay. The rest of
-    a state is only delayed, except the commands, which are the present ones.
+    """Measures joints with noise, rounding and delay, and sensors with further noise and delay.
 
-    The velocity of a joint with an `encoder_step` is the difference of two measured positions over the
-    control period, as drivers compute it: a multiple of step / period, without noise of its own.
+    The rest of a state is only delayed, except the commands, which are the present ones. The velocity of a
+    joint with an `encoder_step` is the difference of two measured positions over the control period, as
+    drivers compute it: a multiple of step / period, without noise of its own. Raises ValueError for an
+    impossible number, or an unknown joint.
 
     Args:
-        joints: Their names.
+        joints: Names of a state's joints.
         period: Period of control [s].
         noise: Standard deviation of the normal noise on positions and velocities [m, m/s, rad, rad/s]: a
             number, or a pair (position, velocity), for all joints, or by joint. It is drawn for all joints,
             those of a mapping first, in its order, and added before an encoder rounds. A mapping may name
             sensors, too: a number for all that one measures, or by attribute of its `Reading`.
-        delay: Age of a measurement [control steps]; until there are any so old, the episode's first is
-            repeated.
+        delay: Age of a measurement [control steps]; until any is so old, the episode's first is repeated.
         encoder_step: Resolution of positions [rad, m]: one for all joints, or by joint; 0: exact.
-        sensors: Names of the sensors of a state.
-
-    Raises:
-        ValueError: For an impossible number, or an unknown joint.
+        sensors: Names of a state's sensors.
     """
 
     def __init__(
@@ -227,7 +224,8 @@ Rules = dict[str, tuple[Rule, float]]
 class Actuator:
     """Between a task's commands and the controllers: first the delay, then the limit, then the lag.
 
-    Angles are treated as plain numbers: a set-point that jumps from pi to -pi passes 0.
+    Angles are treated as plain numbers: a set-point that jumps from pi to -pi passes 0. Raises ValueError for
+    an impossible number, or an unknown controller.
 
     Args:
         holds: Whether a controller takes positions, or else velocities or efforts, by its name.
@@ -238,9 +236,6 @@ class Actuator:
             either way; positions move no faster than that [m/s, rad/s].
         lag: Time constant of a first-order lag [s]: one for all, or by controller; 0: none. During a control
             period a controller gets what the lag reaches at its end: 1 - exp(-t / lag) of a step.
-
-    Raises:
-        ValueError: For an impossible number, or an unknown controller.
     """
 
     def __init__(

@@ -112,11 +112,8 @@ class UniformRandomisation(Shared):
 
     A value is a number, a pair (low, high), or a mapping with either by name, for some links, joints or
     controllers only; names are as in `Parts`. The same count of random numbers is drawn whatever the options,
-    so that later draws don't depend on them.
-
-    Raises:
-        ValueError: For an unknown option or name, or an impossible interval.
-        RobotEnvError: If something in a robot's description is wrong.
+    so that later draws don't depend on them. Raises ValueError for an unknown option or name, or an
+    impossible interval.
     """
 
     def __init__(self, scene: Scene, options: Mapping[str, Any]) -> None:
