@@ -15,18 +15,10 @@ from contextlib import contextmanager, redirect_stderr, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
-from file_access.limited import (
-    LimitedProcess,
-    Limits,
-    ProcessDied,
-    RequestRefused,
-    limit_memory,
-    limit_time,
-    why_ended,
-)
+from file_access import limited
 from file_access.xml_text import decode, without_declaration
 
-LIMITS = Limits(
+LIMITS = limited.Limits(
     processor_time=30,  # [s], far more than the largest robots in use need
     wall_time=60.0,
     memory=1 << 30,
@@ -45,7 +37,9 @@ class CannotExpand(Exception):
 
 
 def expand(
-    path: str | os.PathLike[str], mappings: Mapping[str, str] | None = None, limits: Limits = LIMITS
+    path: str | os.PathLike[str],
+    mappings: Mapping[str, str] | None = None,
+    limits: limited.Limits = LIMITS,
 ) -> str:
     """Returns the XML text of a URDF or xacro file; raises CannotExpand if it is broken or beyond a limit."""
     return _ask("xml", os.fspath(path), mappings, limits)
@@ -58,10 +52,10 @@ def included_files(
     return _ask("files", os.fspath(path), mappings, LIMITS).splitlines()
 
 
-def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: Limits) -> str:
+def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: limited.Limits) -> str:
     request = {"wanted": wanted, "path": path, "mappings": dict(mappings or {})}
     # A process for each file: xacro keeps its state in module variables.
-    process = LimitedProcess("file_access.expansion:answer", limits)
+    process = limited.LimitedProcess("file_access.expansion:answer", limits)
     try:
         answered = json.loads(process.ask(json.dumps(request).encode()))
         for line, more in answered["warnings"].items():
@@ -69,9 +63,9 @@ def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: Lim
                 _told.add(line)
                 print(line, *more, sep="\n", file=sys.stderr)
         return str(answered["text"])
-    except ProcessDied as fault:
+    except limited.ProcessDied as fault:
         raise CannotExpand(f"{path}: xacro: {fault}") from fault
-    except RequestRefused as fault:
+    except limited.RequestRefused as fault:
         text = str(fault)
         raise CannotExpand(text if path in text else f"{path}: xacro: {text}") from fault
     finally:
@@ -117,14 +111,14 @@ def main() -> int:
     if status == -signal.SIGPIPE:  # the reader has gone
         return 128 + signal.SIGPIPE
     if status < 0:
-        print(f"xacro: {why_ended(status, LIMITS)}", file=sys.stderr)
+        print(f"xacro: {limited.why_ended(status, LIMITS)}", file=sys.stderr)
         return BROKEN
     return status
 
 
 def _run_program() -> NoReturn:
-    limit_memory(LIMITS.memory)
-    limit_time(LIMITS.processor_time, LIMITS.wall_time)
+    limited.limit_memory(LIMITS.memory)
+    limited.limit_time(LIMITS.processor_time, LIMITS.wall_time)
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     import xacro
 

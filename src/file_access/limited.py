@@ -172,10 +172,7 @@ def limit_memory(memory: int) -> None:
 
 
 def limit_time(processor_time: int, wall_time: float) -> None:
-    """Has the kernel end this process after some more processor time and wall time [s].
-
-    SIGXCPU or SIGALRM ends it, and SIGINT as well, without a traceback.
-    """
+    """Has the kernel end this process by a signal, without a traceback, after some more time [s]."""
     signals = {signal.SIGINT, signal.SIGXCPU, signal.SIGALRM}
     for each in signals:
         signal.signal(each, signal.SIG_DFL)

@@ -65,10 +65,7 @@ def scratch_folder(parent: str | None = None) -> Iterator[Path]:
 
 @functools.cache
 def _sweep(place: Path) -> None:
-    """Removes the temporary folders that no process holds; other users' can't be opened.
-
-    It knows them by the form of `mkdtemp`'s names.
-    """
+    """Removes the temporary folders that no process holds, known by the form of `mkdtemp`'s names."""
     for folder in place.glob(("[a-z0-9_]" * 8).join(SCRATCH)):
         with suppress(OSError), locked_folder(folder):
             shutil.rmtree(folder, ignore_errors=True)

@@ -89,10 +89,7 @@ def decode(data: bytes) -> str:
 
 
 def without_declaration(text: str) -> str:
-    """Returns `text` without byte-order mark and XML declaration.
-
-    The parser accepts nothing before a declaration, and decoded text doesn't need one.
-    """
+    """Returns a text without byte-order mark and XML declaration, before which parsers accept nothing."""
     text = text.removeprefix("\ufeff")
     declaration = DECLARATION.match(text)
     if declaration is None:

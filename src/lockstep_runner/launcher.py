@@ -7,7 +7,8 @@ import shlex
 import sys
 import threading
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 from lockstep_runner import script
 from lockstep_runner.notices import tell
@@ -66,10 +67,19 @@ def _run(args: argparse.Namespace, code: types.CodeType) -> int:
     if args.seed is not None:
         script.seed_everything(args.seed)
     watch(runner)
-    show, sys.excepthook = sys.excepthook, _hide_ourselves(sys.excepthook, args.script)
+    show = sys.excepthook
+
+    def hide_ourselves(kind: Any, fault: BaseException, trace: Any) -> None:
+        """Shows tracebacks that begin with the script."""
+        fault.__traceback__ = script.own_part(trace, args.script)  # the default hook prints this
+        show(kind, fault, fault.__traceback__)
+
+    sys.excepthook = hide_ourselves
     try:
         script.run(args.script, args.arguments, code)
-        on_demand.end_threads()
+        threads = sys.modules.get("lockstep_runner.concurrency.python_threads")
+        if threads is not None:
+            threads.end_executors()
         others = [
             each
             for each in threading.enumerate()
@@ -83,21 +93,6 @@ def _run(args: argparse.Namespace, code: types.CodeType) -> int:
             tell(f"--step-on {name}: the script used no topic or service of that name, but {seen}")
     sys.excepthook = show
     return 0
-
-
-Hook = Callable[[type[BaseException], BaseException, types.TracebackType | None], object]
-
-
-def _hide_ourselves(show: Hook, path: str) -> Hook:
-    """Returns an excepthook whose tracebacks begin with the script."""
-
-    def shown(
-        kind: type[BaseException], fault: BaseException, trace: types.TracebackType | None
-    ) -> None:
-        fault.__traceback__ = script.own_part(trace, path)  # the default hook prints this
-        show(kind, fault, fault.__traceback__)
-
-    return shown
 
 
 def _parse(argv: Sequence[str]) -> argparse.Namespace:

@@ -71,9 +71,7 @@ def _name(pid: int) -> str:
     return "ended"
 
 
-NODE_PATIENCE = (
-    10.0  # [s of wall time] for a node that computes or waits for something other than time
-)
+NODE_PATIENCE = 10.0  # [s of wall time] for a node that computes, or waits for anything but time
 
 
 @dataclass
