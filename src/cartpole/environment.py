@@ -145,22 +145,12 @@ class CartPoleVariation(NamedTuple):
 
 @dataclass(frozen=True)
 class CartPoleRandomisation:
-    """The ranges from which a `CartPoleVariation` is drawn for each episode, uniformly.
+    """The ranges from which a `CartPoleVariation` is drawn for each episode, uniformly; or ValueError."""
 
-    Args:
-        mass: Half-width of the factor on each mass, e.g. 0.2 for 0.8 to 1.2.
-        length: Half-width of the factor on the pole's length.
-        cart_friction: Largest viscous friction between cart and rail [N s/m].
-        pole_friction: Largest viscous friction in the hinge [N m s/rad].
-
-    Raises:
-        ValueError: If one of them is negative or too large.
-    """
-
-    mass: float = 0.0
-    length: float = 0.0
-    cart_friction: float = 0.0
-    pole_friction: float = 0.0
+    mass: float = 0.0  # half-width of the factor on each mass, e.g. 0.2 for 0.8 to 1.2
+    length: float = 0.0  # half-width of the factor on the pole's length
+    cart_friction: float = 0.0  # largest viscous friction between cart and rail [N s/m]
+    pole_friction: float = 0.0  # largest viscous friction in the hinge [N m s/rad]
 
     def __post_init__(self) -> None:
         for name, most in (

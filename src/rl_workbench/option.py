@@ -34,8 +34,8 @@ def option(
 ) -> Any:
     """Makes a dataclass field that knows its meaning and its limits.
 
-    `text` and `metavar` are for `--help`: by default the last word of its name. `choices` are all values that
-    a text may have. A default that is a dict or a list is copied for each instance.
+    `text` and `metavar`, by default the last word of its name, are for `--help`. `choices` are all values
+    that a text may have. A default that is a dict or a list is copied for each instance.
     """
     limits = None if (lowest, highest) == (-math.inf, math.inf) else (lowest, highest)
     metadata = {"help": text, "limits": limits, "choices": choices, "metavar": metavar}

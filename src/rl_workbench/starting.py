@@ -37,10 +37,7 @@ JOB = "RL_WORKBENCH_JOB"  # set in the environment of a training that is one of 
 
 
 def program(module: str) -> tuple[str, ...]:
-    """Returns the command that starts a module as a process of its own; see `search_path`.
-
-    -P: a user's `token.py` in the current folder mustn't replace the standard library's.
-    """
+    """Returns the command that starts a module as a process; -P: a user's `token.py` isn't Python's."""
     return (sys.executable, "-P", "-m", module)
 
 

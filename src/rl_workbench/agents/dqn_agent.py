@@ -127,7 +127,7 @@ class DQNAgent:
     def episode_done(self) -> None:
         """Ends the current episode, whether it finished or is abandoned."""
         self._returns.clear()
-        self._epsilon.episode_done()
+        self._epsilon.ended("episode")
 
     @property
     def is_due(self) -> bool:
@@ -149,7 +149,7 @@ class DQNAgent:
         batch = self.buffer.sample(settings.batch_size, self._draw, settings.gradient_steps)
         for index in range(settings.gradient_steps):
             learned = self._gradient_step(self._tensors(batch, index))
-        self._epsilon.learned()
+        self._epsilon.ended("step")
         return learned
 
     def _tensors(self, batch: Batch, index: int) -> tuple[torch.Tensor, ...]:
@@ -351,18 +351,10 @@ class Epsilon:
             share = min(1.0, steps / self._duration) if self._duration else 1.0
             self.value = start + (end - start) * share
 
-    def learned(self) -> None:
-        """Applies the decay of a round of learning."""
-        if self._settings.epsilon_schedule == "step":
-            self._decay()
-
-    def episode_done(self) -> None:
-        """Applies the decay of an episode."""
-        if self._settings.epsilon_schedule == "episode":
-            self._decay()
-
-    def _decay(self) -> None:
-        self.value = max(self._settings.end_e, self.value * self._settings.epsilon_decay)
+    def ended(self, what: str) -> None:
+        """Applies the decay of a round of learning, "step", or of an "episode"."""
+        if self._settings.epsilon_schedule == what:
+            self.value = max(self._settings.end_e, self.value * self._settings.epsilon_decay)
 
 
 def learning_rate(settings: DQNSettings, steps: int) -> float:

@@ -1,7 +1,4 @@
-"""Greedy policies as torch modules, from observations to actions, without the agent that learned them.
-
-TorchScript can compile all of them. For single observations the agents use faster NumPy code.
-"""
+"""Greedy policies as torch modules that TorchScript can compile, without the agent that learned them."""
 
 import numpy as np
 import torch

@@ -1,7 +1,4 @@
-"""Softmax and Gaussian policies: the torch networks that learn, and NumPy actors that act.
-
-For a single observation NumPy is several times as fast as torch.
-"""
+"""Softmax and Gaussian policies: torch networks that learn; NumPy actors, several times as fast."""
 
 import math
 from collections.abc import Callable

@@ -57,12 +57,8 @@ class BaselineNetwork(nn.Module):
 class ReinforceAgent(TwoNetworks):
     """Learns from batches of whole episodes, with a softmax policy or, for continuous actions, a Gaussian.
 
-    Args:
-        seed: Seeds the agent's own generators, for the initial weights and for the actions.
-        scale: (D,), divides observations.
-        settings: The algorithm's options.
-        actions: Number of discrete actions, or the bounds of continuous ones.
-        environments: How many play at the same time; each contributes equally to a batch.
+    `scale` (D,) divides observations. `actions` are their number, or the bounds of continuous ones. Each of
+    the `environments` that play at the same time contributes equally to a batch.
     """
 
     def __init__(

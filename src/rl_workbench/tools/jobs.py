@@ -149,7 +149,11 @@ class JobPool:
         if self._is_over():
             self._set(job, WAITING)
             return ""
-        return self._ended(job, _failure(job, ending))
+        words = last_words(job.log)
+        failure = f"ended with exit code {ending.code}, see {job.log}" + f": {words}" * bool(words)
+        if ending.lost:
+            failure = f"given up after {MAX_ATTEMPTS} attempts without progress: {ending.lost}"
+        return self._ended(job, failure)
 
     def _is_over(self) -> bool:
         return self._interrupt.requested() or self.failure is not None
@@ -182,14 +186,6 @@ class JobPool:
         with self._lock:
             content = [asdict(each) for each in self._entries.values()]
             write_file(self._folder / NAME, as_json({"jobs": content}))
-
-
-def _failure(job: Job, ending: Ending) -> str:
-    if ending.lost:
-        return f"given up after {MAX_ATTEMPTS} attempts without progress: {ending.lost}"
-    words = last_words(job.log)
-    code = f"ended with exit code {ending.code}, see {job.log}"
-    return f"{code}: {words}" if words else code
 
 
 def _written(folder: Path) -> list[JobEntry]:

@@ -5,7 +5,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import gymnasium
 from torch import nn
 
 from rl_workbench.errors import WorkbenchError
@@ -15,6 +14,7 @@ from rl_workbench.tools.runs import Run
 from rl_workbench.training import checkpoints
 from rl_workbench.training.algorithm import load_policy
 from rl_workbench.training.algorithms import algorithm
+from rl_workbench.training.checked import Env
 from rl_workbench.training.environments import make_environment
 from rl_workbench.training.evaluator import Act, Evaluation, run_greedily
 from rl_workbench.training.evaluator import episode_steps as episode_steps  # noqa: PLC0414 - public
@@ -28,15 +28,13 @@ class Player(NamedTuple):
     """A learned or random policy and an environment of its training's kind, which the caller closes."""
 
     act: Act  # greedily, for one observation: (D,), or a dict as in the training
-    env: gymnasium.Env[Any, Any]
-    network: nn.Module | None = (
-        None  # observations (N, D) to actions; a choice of N has `scores`, too
-    )
+    env: Env
+    network: nn.Module | None = None  # (N, D) to actions; a choice of N has `scores`, too
     checkpoint: Path | None = None  # None for random actions
     steps: int = 0  # of the training up to this checkpoint
 
 
-def environment_of(run: Run, options: Mapping[str, Any]) -> gymnasium.Env[Any, Any]:
+def environment_of(run: Run, options: Mapping[str, Any]) -> Env:
     """Makes an environment with the observations that a run's policies expect."""
     keeps_dict = algorithm(run.algorithm).keeps_dict
     given = {**run.env_kwargs, **options}
@@ -51,7 +49,7 @@ def load_any(run: Run, which: str, env_options: Mapping[str, Any], seed: int) ->
     return Player(random_actions(env, seed), env)
 
 
-def random_actions(env: gymnasium.Env[Any, Any], seed: int) -> Act:
+def random_actions(env: Env, seed: int) -> Act:
     """Returns a policy of random actions with that seed."""
     env.action_space.seed(seed)
     return lambda _: env.action_space.sample()
@@ -62,7 +60,7 @@ def load_learned(
     which: str = "best",
     env_options: Mapping[str, Any] | None = None,
     say: Callable[[str], None] = warn,
-    env: gymnasium.Env[Any, Any] | None = None,
+    env: Env | None = None,
 ) -> Player:
     """Loads the policy of the checkpoint "best" or "last", or of an earlier one if that is damaged.
 
@@ -89,7 +87,7 @@ def load_learned(
     raise WorkbenchError(f"{run.folder} has no policy: {reason}")
 
 
-def _learned(run: Run, path: Path, content: dict[str, Any], env: gymnasium.Env[Any, Any]) -> Player:
+def _learned(run: Run, path: Path, content: dict[str, Any], env: Env) -> Player:
     options = recorded_options(content.get("config"), str(path))
     recorded = recorded_options(run.config, str(run.folder / CONFIG_RECORD))
     try:

@@ -50,13 +50,8 @@ def examine(
 ) -> RunResult:
     """Collects the results of a run; unreadable ones become the row's `fault`, not an error.
 
-    Args:
-        run: The run.
-        group: Of the result.
-        episodes: Greedy episodes for each score; 0: the mean of the last training episodes is the score.
-        warn: Receives a line for each skipped checkpoint.
-        which: The checkpoint, "best" or "last".
-        also_last: Whether to play the last checkpoint, too.
+    The score is of that many greedy episodes of the checkpoint `which`, "best" or "last"; with 0 the mean of
+    the last training episodes. `warn` receives a line for each skipped checkpoint.
     """
     faults: list[str] = []
 

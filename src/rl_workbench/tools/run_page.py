@@ -51,17 +51,9 @@ def show_run(
 ) -> None:
     """Serves the page until Ctrl-C, or until the training that started it ends.
 
-    Args:
-        folder: The run folder.
-        policies: The choices; the first one is played first.
-        seed: Of the first of `episodes`, whose seeds follow one another, and which are repeated.
-        episodes: See above.
-        env_options: Options of the environment on top of the training's.
-        host: The address to serve on.
-        port: The port to serve on; None for the first free one.
-        browser: Whether to open a browser.
-        interrupt: Ends the serving.
-        beside_training: Whether a training started this process, which ends when its standard input closes.
+    It plays `episodes` with consecutive seeds from `seed` on, again and again, at first by the first of the
+    policies, with options of the environment on top of the training's. `port` is None for the first free one.
+    If it is `beside_training`, its standard input closes with that.
     """
     import torch
 

@@ -1,7 +1,4 @@
-"""Policies as TorchScript files with a description of the policy.
-
-The file's content is compared with the policy before it is written.
-"""
+"""Policies as TorchScript files with a description of the policy."""
 
 import copy
 import io

@@ -13,12 +13,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import gymnasium
 import numpy as np
 import torch
 from torch import nn
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.checked import Env
 from rl_workbench.training.options import TrainingOptions
 
 Say = Callable[[str], None]  # reports a line to the user
@@ -99,9 +99,7 @@ class Policy(NamedTuple):
     network: nn.Module | None
 
 
-def load_policy(
-    options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any], origin: str
-) -> Policy:
+def load_policy(options: TrainingOptions, content: dict[str, Any], env: Env, origin: str) -> Policy:
     """Makes the policy of a checkpoint, for an environment like its own; `origin` is the file, for errors."""
     try:
         made: Policy = import_module(options.kind.implementation).load_policy(options, content, env)

@@ -15,9 +15,8 @@ from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, own_frames
 from rl_workbench.training.progress import warn
 
-LARGEST_FLOAT32 = float(
-    np.finfo(np.float32).max
-)  # networks and replay buffers hold no larger number
+Env = gymnasium.Env[Any, Any]
+LARGEST_FLOAT32 = float(np.finfo(np.float32).max)  # that networks and replay buffers hold
 COMPUTE_REWARD = "compute_reward"  # method of an environment with a goal
 BEGIN_STEP = "begin_step"  # method of an environment whose step takes time in another process
 SHORT = 32  # numbers of an observation
@@ -38,7 +37,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     steps. `which` begins every error, as "environment 2 of 3: ".
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any], env_id: str, which: str = "") -> None:
+    def __init__(self, env: Env, env_id: str, which: str = "") -> None:
         super().__init__(env)
         self._id, self._which, self._begin_step = env_id, which, _begin_method(env)
         self._space = env.observation_space  # a property that asks each wrapper
@@ -201,7 +200,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._error(f"the {what} of {self._id} isn't finite in float32: {text}")
 
 
-def _without_checks(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
+def _without_checks(env: Env) -> Env:
     """Takes Gymnasium's checks out of the wrappers of an environment."""
     if not isinstance(env, gymnasium.Wrapper):
         return env
@@ -209,7 +208,7 @@ def _without_checks(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
     return env.env if isinstance(env, OrderEnforcing | PassiveEnvChecker) else env
 
 
-def _begin_method(env: gymnasium.Env[Any, Any]) -> Callable[[Any], object]:
+def _begin_method(env: Env) -> Callable[[Any], object]:
     """Returns what begins a step; nothing if the environment can't, or a wrapper might change the actions."""
     layer: Any = env
     while isinstance(layer, gymnasium.Wrapper):

@@ -143,10 +143,13 @@ class DQNTraining(Algorithm):
         self._last = None if last is None else Learned(*map(float, last))
         self._repeatable.generator = state["generator"]
         if state["episode"] is not None:
-            self._observation = self._repeatable.load_state_dict(state["episode"])
-            self._reward = float(state["reward"])
-            if self._observation is None:
-                say("the environment is not repeatable: the current episode is abandoned")
-                self._reward = 0.0
-                self._agent.episode_done()
+            self._repeat(state, say)
         self._mark = None
+
+    def _repeat(self, state: dict[str, Any], say: Say) -> None:
+        self._observation = self._repeatable.load_state_dict(state["episode"])
+        self._reward = float(state["reward"])
+        if self._observation is None:
+            say("the environment is not repeatable: the current episode is abandoned")
+            self._reward = 0.0
+            self._agent.episode_done()

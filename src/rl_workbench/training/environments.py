@@ -24,7 +24,7 @@ from rl_workbench import errors
 from rl_workbench.env_ids import FORM, import_module_of, module_of, spec_of
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
 from rl_workbench.option import imported
-from rl_workbench.training.checked import CheckedEnvironment
+from rl_workbench.training.checked import CheckedEnvironment, Env
 from rl_workbench.training.options import TrainingOptions
 
 _CODE = re.compile(r"[\w.]+:[\w.]+")  # module:name
@@ -54,7 +54,7 @@ def make_environment(
         raise WorkbenchError(f"--wrapper {wrapper}: it is no gymnasium.Wrapper")
     with ExitStack() as refused:
         try:
-            env: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **(options or {}))
+            env: Env = gymnasium.make(env_id, **(options or {}))
             refused.callback(env.close)
             env = wrap(env)
             if not isinstance(env, gymnasium.Env):
@@ -89,7 +89,7 @@ def _check_names(env_id: str, options: Mapping[str, Any]) -> None:
             )
 
 
-def _suited(env: gymnasium.Env[Any, Any], env_id: str, keep_dict: bool) -> gymnasium.Env[Any, Any]:
+def _suited(env: Env, env_id: str, keep_dict: bool) -> Env:
     """Returns an environment whose observations are vectors, or in a form that is to be kept."""
     space = env.observation_space
     parts = list(space.values()) if isinstance(space, spaces.Dict) else [space]
@@ -148,7 +148,7 @@ def _which(index: int, count: int) -> str:
     return f"environment {index + 1} of {count}: " if count > 1 else ""
 
 
-def close_all(envs: Sequence[gymnasium.Env[Any, Any]]) -> None:
+def close_all(envs: Sequence[Env]) -> None:
     """Closes environments, the others too if one fails."""
     if not envs:
         return
@@ -158,7 +158,7 @@ def close_all(envs: Sequence[gymnasium.Env[Any, Any]]) -> None:
 
 
 @contextmanager
-def _side_by_side(env: gymnasium.Env[Any, Any], count: int) -> Iterator[None]:
+def _side_by_side(env: Env, count: int) -> Iterator[None]:
     """Lets environments like `env` start or close at the same time, if they can."""
     waiting = _attribute(env, "side_by_side")
     try:
@@ -168,14 +168,12 @@ def _side_by_side(env: gymnasium.Env[Any, Any], count: int) -> Iterator[None]:
         raise WorkbenchError(str(error) or type(error).__name__) from error
 
 
-def shares_robot(env: gymnasium.Env[Any, Any]) -> bool:
+def shares_robot(env: Env) -> bool:
     """Returns whether another environment of this kind would move the same robot."""
     return bool(_attribute(env, "shares_robot"))
 
 
-def robot_options(
-    env: gymnasium.Env[Any, Any], given: Mapping[str, Any]
-) -> dict[str, list[Any]] | None:
+def robot_options(env: Env, given: Mapping[str, Any]) -> dict[str, list[Any]] | None:
     """Returns the values of options with which other environments move the same robot; None if none does."""
     if not shares_robot(env):
         return None
@@ -183,7 +181,7 @@ def robot_options(
     return {name: [given.get(name), *values] for name, values in named.items()}
 
 
-def source_digest(env: gymnasium.Env[Any, Any]) -> str:
+def source_digest(env: Env) -> str:
     """Returns the digest of the files that the environment's task is written in, or else its class.
 
     Those of Python, Gymnasium and abstract classes don't count: other versions of them are the same task.
@@ -200,11 +198,8 @@ def source_digest(env: gymnasium.Env[Any, Any]) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _attribute(env: gymnasium.Env[Any, Any], name: str) -> Any:
+def _attribute(env: Env, name: str) -> Any:
     return env.get_wrapper_attr(name) if env.has_wrapper_attr(name) else None
-
-
-# --- spaces -------------------------------------------------------------------------------------
 
 
 SMALLEST_IMAGE = 36  # [pixels], of each side, as Stable-Baselines3's CNN needs
@@ -241,7 +236,7 @@ def is_continuous(space: gymnasium.Space[Any]) -> TypeGuard[spaces.Box]:
     return isinstance(space, spaces.Box) and np.issubdtype(space.dtype, np.floating)
 
 
-def discrete_actions(env: gymnasium.Env[Any, Any], env_id: str, algorithm: str) -> int:
+def discrete_actions(env: Env, env_id: str, algorithm: str) -> int:
     """Returns the number of discrete actions; else raises WorkbenchError, which names algorithms that fit."""
     space = env.action_space
     if isinstance(space, spaces.Discrete) and space.start == 0:
@@ -253,9 +248,6 @@ def discrete_actions(env: gymnasium.Env[Any, Any], env_id: str, algorithm: str) 
         f"{algorithm} needs discrete actions, Discrete(n); {env_id} has {space}. "
         f"--algo {fits}: these fit it"
     )
-
-
-# --- observations and results -------------------------------------------------------------------
 
 
 def as_float32(observation: Any) -> Any:

@@ -4,7 +4,6 @@ from collections.abc import Callable, Generator, Sequence
 from functools import partial
 from typing import Any
 
-import gymnasium
 import numpy as np
 
 from rl_workbench.agents.document import PolicyGradientAgent
@@ -16,14 +15,14 @@ from rl_workbench.states import (
     rewind_random_states,
     set_generator,
 )
-from rl_workbench.training.checked import BEGIN_STEP, CURVES
+from rl_workbench.training.checked import BEGIN_STEP, CURVES, Env
 from rl_workbench.training.environments import as_vector, succeeded
 
 Agent = PolicyGradientAgent | ReinforceAgent
 
 
 def play(
-    env: gymnasium.Env[Any, Any],
+    env: Env,
     act: Callable[[np.ndarray], Any],
     limited: Callable[[Any], Any] = lambda action: action,
     begin: Callable[[Any], object] = lambda action: None,
@@ -84,7 +83,7 @@ class EpisodeSource:
     takes its draws back, so that it can be played again as it would have been.
     """
 
-    def __init__(self, envs: Sequence[gymnasium.Env[Any, Any]], agent: Agent, seed: int) -> None:
+    def __init__(self, envs: Sequence[Env], agent: Agent, seed: int) -> None:
         self._envs, self._agent, self._seed = envs, agent, seed
         others = [np.random.default_rng((seed, index)) for index in range(1, len(envs))]
         self._actions = [agent.generator, *others]

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import Any, NamedTuple
 
-import gymnasium
 import numpy as np
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import random_states, restore_random_states
 from rl_workbench.training.algorithm import Algorithm, Say
+from rl_workbench.training.checked import Env
 from rl_workbench.training.environments import as_float32, environment_for, shares_robot, succeeded
 from rl_workbench.training.options import TrainingOptions
 
@@ -51,9 +51,7 @@ class Step(NamedTuple):
     success: bool | None  # None before the end, or if the environment doesn't say
 
 
-def episode_steps(
-    env: gymnasium.Env[Any, Any], act: Act, seed: int | None, max_steps: int = 0
-) -> Iterator[Step]:
+def episode_steps(env: Env, act: Act, seed: int | None, max_steps: int = 0) -> Iterator[Step]:
     """Plays one episode; yields the reset and each step, at most `max_steps` of them unless that is 0."""
     observation, _ = env.reset(seed=seed)
     yield Step(observation, None, 0.0, False, None)
@@ -68,11 +66,7 @@ def episode_steps(
 
 
 def run_greedily(
-    env: gymnasium.Env[Any, Any],
-    act: Act,
-    seed: int,
-    episodes: int,
-    should_stop: Callable[[], bool] = lambda: False,
+    env: Env, act: Act, seed: int, episodes: int, should_stop: Callable[[], bool] = lambda: False
 ) -> Evaluation | None:
     """Plays episodes in an environment, seeded once; returns None if `should_stop()` became true."""
     found = Evaluation([], [])
@@ -89,13 +83,6 @@ def run_greedily(
     return found
 
 
-class Score(NamedTuple):
-    """An evaluation, and the mean return by which policies are compared."""
-
-    evaluation: Evaluation
-    confirmed: float
-
-
 class Evaluator:
     """Evaluates an algorithm's policy, in a separate environment if possible.
 
@@ -106,7 +93,7 @@ class Evaluator:
         self,
         options: TrainingOptions,
         algorithm: Algorithm,
-        env: gymnasium.Env[Any, Any],
+        env: Env,
         should_stop: Callable[[], bool],
         say: Say,
     ) -> None:
@@ -125,8 +112,10 @@ class Evaluator:
                     f"evaluating in the training's environment, because a second one can't be made: {error}"
                 )
 
-    def evaluate(self, best: float, say: Say, is_last: bool = False) -> Score | None:
-        """Plays greedy episodes; returns None if interrupted.
+    def evaluate(
+        self, best: float, say: Say, is_last: bool = False
+    ) -> tuple[Evaluation, float] | None:
+        """Plays greedy episodes; also returns the mean by which policies compare; None if interrupted.
 
         A policy that is perfect in ten episodes may well fail in the next ninety. So one whose mean return is
         above `best` is confirmed over `confirm_episodes`. `say` is called if the current episode can't be
@@ -138,9 +127,9 @@ class Evaluator:
             if found is None:
                 return None
             if found.mean_return <= best or not self._run.confirm_episodes:
-                return Score(found, found.mean_return)
+                return found, found.mean_return
             confirmed = self._episodes(self._run.confirm_episodes, 1)
-            return None if confirmed is None else Score(found, confirmed.mean_return)
+            return None if confirmed is None else (found, confirmed.mean_return)
 
     @contextmanager
     def _undisturbed(self, say: Say, is_last: bool) -> Iterator[None]:

@@ -211,9 +211,6 @@ def _flat(record: Any, origin: str) -> dict[str, Any]:
     return {"algorithm": plain["algorithm"], **plain["hyperparameters"], **plain["run"]}
 
 
-# --- files with tuned options -------------------------------------------------------------------
-
-
 def default_file(name: str) -> Path:
     """Finds the project's own config/NAME: in the source tree, or next to the installed modules."""
     for folder in (TREE, SHARE):

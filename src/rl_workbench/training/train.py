@@ -53,7 +53,7 @@ SOURCES = ("config", "preset", "params", "resume")  # flags that name where opti
 
 
 def train(algo: str, callbacks: Sequence[Callback] = (), **options: Any) -> Path:
-    """Trains an agent from Python, like `rl-workbench train`.
+    """Trains an agent from Python, like `rl-workbench train`; returns the run folder.
 
         folder = train("dqn", env_id="CartPole-v1", total_timesteps=5000, callbacks=[Mine()])
 
@@ -62,12 +62,8 @@ def train(algo: str, callbacks: Sequence[Callback] = (), **options: Any) -> Path
         callbacks: Called at the events of the training, see `Callback`.
         options: Options by name, as the flags with underscores; also `config`, `preset` and `resume`.
 
-    Returns:
-        The run folder.
-
-    Raises:
-        WorkbenchError: If an option is wrong, or the training fails. What was learned is saved, up to the
-            step that the text names.
+    Raises WorkbenchError if an option is wrong, or the training fails; what was learned is saved, up to the
+    step that the text names.
     """
     return run_training(choose(algorithm(algo), [], options), Interrupt(), callbacks=callbacks)
 

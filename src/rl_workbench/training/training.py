@@ -139,7 +139,7 @@ class Training:
         if score is None:  # interrupted: the next resumption evaluates it
             self._task = before
             return None
-        return int(content["steps"]), score.confirmed
+        return int(content["steps"]), score[1]
 
     # --- the course of a training ---------------------------------------------------------------
 
@@ -305,13 +305,13 @@ class Training:
         score = self._evaluator.evaluate(history.best_return, self._progress.say, is_last)
         if score is None:
             return False
-        self._evaluation = score.evaluation
-        history.evaluations.append((steps, score.evaluation.mean_return))
-        is_best = score.confirmed > history.best_return
+        self._evaluation, confirmed = score
+        history.evaluations.append((steps, self._evaluation.mean_return))
+        is_best = confirmed > history.best_return
         if is_best:
-            history.best = (steps, score.confirmed)
+            history.best = (steps, confirmed)
         was_confirmed = bool(self._run.confirm_episodes)
-        result = EvaluationResult(steps, score.evaluation, score.confirmed, is_best, was_confirmed)
+        result = EvaluationResult(steps, self._evaluation, confirmed, is_best, was_confirmed)
         self._callbacks.call("on_evaluation", self, result)
         return is_best
 

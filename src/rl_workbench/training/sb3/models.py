@@ -19,7 +19,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import imported
-from rl_workbench.training.checked import BEGIN_STEP, COMPUTE_REWARD, CheckedEnvironment
+from rl_workbench.training.checked import BEGIN_STEP, COMPUTE_REWARD, CheckedEnvironment, Env
 from rl_workbench.training.environments import has_goal, is_image
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.repeatable import RepeatableEnvironment
@@ -68,7 +68,7 @@ class StoppableOffPolicy(OffPolicyAlgorithm):
 class ParallelVecEnv(DummyVecEnv):
     """Begins a step in all environments before it waits: those in other processes run at the same time."""
 
-    def __init__(self, envs: Sequence[gymnasium.Env[Any, Any]]) -> None:
+    def __init__(self, envs: Sequence[Env]) -> None:
         super().__init__([lambda env=env: env for env in envs])  # type: ignore[misc]
         self._begins = [env.get_wrapper_attr(BEGIN_STEP) for env in envs] if len(envs) > 1 else []
 
@@ -89,7 +89,7 @@ def make_learning_model(options: TrainingOptions, envs: Sequence[CheckedEnvironm
     return _model_in(vector, options, arguments, type(own.__name__, (mixin, own), {}))
 
 
-def make_acting_model(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Any:
+def make_acting_model(options: TrainingOptions, env: Env) -> Any:
     """Makes a model that only acts, in another environment than those that it learned in."""
     vector = DummyVecEnv([lambda: env])
     _check_fit(options, vector.action_space)
