@@ -1,8 +1,6 @@
 """The cart-pole: its description, its tasks, its environments.
 
-Importing this registers the environments `cartpole/Balance-v0`, `cartpole/Classic-v0` and
-`cartpole/SwingUp-v0` with Gymnasium, and imports nothing else; Gymnasium imports their modules when it makes
-one.
+Importing this registers its environments with Gymnasium, which imports their modules when it makes one.
 """
 
 import gymnasium

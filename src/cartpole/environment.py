@@ -145,22 +145,12 @@ class CartPoleVariation(NamedTuple):
 
 @dataclass(frozen=True)
 class CartPoleRandomisation:
-    """The ranges from which a `CartPoleVariation` is drawn for each episode, uniformly.
+    """The ranges from which a `CartPoleVariation` is drawn for each episode, uniformly; or ValueError."""
 
-    Args:
-        mass: Half-width of the factor on each mass, e.g. 0.2 for 0.8 to 1.2.
-        length: Half-width of the factor on the pole's length.
-        cart_friction: Largest viscous friction between cart and rail [N s/m].
-        pole_friction: Largest viscous friction in the hinge [N m s/rad].
-
-    Raises:
-        ValueError: If one of them is negative or too large.
-    """
-
-    mass: float = 0.0
-    length: float = 0.0
-    cart_friction: float = 0.0
-    pole_friction: float = 0.0
+    mass: float = 0.0  # half-width of the factor on each mass, e.g. 0.2 for 0.8 to 1.2
+    length: float = 0.0  # half-width of the factor on the pole's length
+    cart_friction: float = 0.0  # largest viscous friction between cart and rail [N s/m]
+    pole_friction: float = 0.0  # largest viscous friction in the hinge [N m s/rad]
 
     def __post_init__(self) -> None:
         for name, most in (
@@ -174,10 +164,7 @@ class CartPoleRandomisation:
                 raise ValueError(f"randomisation of {name} must lie in [0, {most}], not {value}")
 
     def draw(self, rng: np.random.Generator) -> tuple[Variation, np.ndarray]:
-        """Draws one robot; returns it also as a `CartPoleVariation` in an array, (5,).
-
-        It always draws five numbers, so that later draws don't depend on which properties vary.
-        """
+        """Draws one robot by five numbers; returns it also as a `CartPoleVariation` in an array, (5,)."""
         cart, pole, length, rail, hinge = (float(value) for value in rng.random(5))
         drawn = CartPoleVariation(
             1.0 + self.mass * (2.0 * cart - 1.0),
@@ -198,12 +185,7 @@ def make_environment(
     randomisation: Mapping[str, Any] | None = None,
     **options: Any,
 ) -> CartPoleEnv:
-    """Makes an environment for Gymnasium; `CartPoleEnv` explains the options.
-
-    Raises:
-        ValueError: If an option makes no sense.
-        RobotEnvError: If the robot can't be brought up.
-    """
+    """Makes an environment for Gymnasium; `CartPoleEnv` explains the options and errors."""
     check_options(options, ("noise",))
     varied: CartPoleRandomisation | Mapping[str, Any] | None = randomisation
     own = {each.name for each in fields(CartPoleRandomisation)}
@@ -213,21 +195,12 @@ def make_environment(
 
 
 def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
-    """Makes a vector of environments for Gymnasium; see `RobotVectorEnv`.
-
-    Raises:
-        ValueError: If an option makes no sense.
-        RobotEnvError: If a robot can't be brought up.
-    """
+    """Makes a vector of environments for Gymnasium; see `RobotVectorEnv`."""
     return RobotVectorEnv(num_envs, make_environment, **options)
 
 
 def make_task(name: str, noise: float | None = None) -> CartPoleTask:
-    """Makes a task; None stands for its default noise.
-
-    Raises:
-        ValueError: If there is no such task, or the noise makes no sense.
-    """
+    """Makes a task; None stands for its default noise. Raises ValueError for another name or noise."""
     if name not in TASKS:
         raise ValueError(f"there is no task {name!r}; there are {', '.join(TASKS)}")
     return TASKS[name]() if noise is None else TASKS[name](noise=noise)  # type: ignore[call-arg]

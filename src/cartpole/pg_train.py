@@ -1,6 +1,5 @@
 """The command pg_train.py: trains the cart-pole by policy gradient, over ROS in lock-step by default."""
 
-import argparse
 import contextlib
 import sys
 from collections.abc import Iterator
@@ -15,7 +14,7 @@ from rl_workbench.option import Options, check_options, option
 from rl_workbench.starting import Interrupt, run_command
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.progress import tell
-from rl_workbench.training.train import USAGE, choose_training, flag, page_of, run_training
+from rl_workbench.training.train import choose_training, flag, new_parser, page_of, run_training
 from robot_envs.backends import has_ros, need_ros
 from robot_envs.errors import RobotEnvError
 
@@ -73,7 +72,8 @@ def main(argv: list[str] | None = None) -> int:
     def command(interrupt: Interrupt) -> None:
         flags, parameters, name = ros_options(words, NODE)
         options, robot = choose(flags, parameters)
-        over_ros = needs_session(options)
+        # The cart-pole is trained over ROS.
+        over_ros = options.run.env_id.startswith(f"{NAMESPACE}/") and _backend(options) != "bullet"
         # A single robot over ROS is shown in its simulator's window.
         in_window = over_ros and options.run.num_envs == 1
         callbacks = [] if in_window else page_of(options, PROGRAM)
@@ -90,18 +90,8 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOptions, RobotOptions]:
-    """Reads the options of training and robot from flags and private parameters.
-
-    Raises:
-        SystemExit: With code 2 and a usage line, if they are wrong; with 0 after --help.
-    """
-    parser = argparse.ArgumentParser(
-        PROG,
-        usage=USAGE.format(prog=PROG),
-        add_help=False,
-        allow_abbrev=False,
-        argument_default=argparse.SUPPRESS,
-    )
+    """Reads the options of training and robot from flags and private parameters; exits with 2 if wrong."""
+    parser = new_parser(PROG, add_help=False)
     ROBOT_OPTIONS.add_flags(parser.add_argument_group("the robot"))
     known, rest = parser.parse_known_args(flags)
     own = {key: value for key, value in parameters.items() if key in ROBOT_OPTIONS.names}
@@ -145,11 +135,6 @@ def _combined(
     return options._replace(run=replace(run, train_env_kwargs=run.train_env_kwargs | environment))
 
 
-def needs_session(options: TrainingOptions) -> bool:
-    """Returns whether the cart-pole is trained over ROS."""
-    return options.run.env_id.startswith(f"{NAMESPACE}/") and _backend(options) != "bullet"
-
-
 def _backend(options: TrainingOptions) -> str:
     return str(options.run.training_environment.get("backend", "bullet"))
 
@@ -158,18 +143,7 @@ def _backend(options: TrainingOptions) -> str:
 def session(
     options: TrainingOptions, name: str, argv: list[str], robot: RobotOptions, folder: Path
 ) -> Iterator[None]:
-    """Runs the robot's ROS session until the block ends.
-
-    Args:
-        options: Of the training.
-        name: This node's full name.
-        argv: The process's arguments, with roslaunch's remappings.
-        robot: The robot's options, among them whether to open RViz.
-        folder: The run folder, whose curves the simulator's window shows.
-
-    Raises:
-        RobotEnvError: If something can't be started, or an already running part doesn't fit.
-    """
+    """Runs the robot's ROS session until the block ends; the simulator's window shows the folder's curves."""
     backend = _backend(options)
     need_ros(f"the backend {backend}")
     from cartpole.robot import ROBOT

@@ -81,11 +81,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:
-    """Parses flags and private parameters; flags override parameters.
-
-    Raises:
-        SystemExit: With code 2 and a usage line, if they are wrong; with 0 after --help.
-    """
+    """Parses flags and private parameters, which flags override; exits with 2 if they are wrong."""
     parser = argparse.ArgumentParser(
         f"{NODE}.py",
         description=DESCRIPTION,
@@ -135,18 +131,13 @@ def _share(text: str) -> float:
 def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
     """Loads the policy of a run folder or an exported file, with its robot and task.
 
-    Args:
-        path: The run folder or the exported file.
-        which: The checkpoint of a run folder.
-        options: Options of the environment on top of the training's.
-
-    Raises:
-        WorkbenchError: If there is no such policy or environment.
-        RobotEnvError: If its environment doesn't have exactly one robot.
+    `which` is the checkpoint of a run folder; `options` of the environment are added to the training's.
+    Raises WorkbenchError if there is no such policy or environment, RobotEnvError unless it has exactly one
+    robot.
     """
     # They import torch, for which --help need not wait.
     from rl_workbench.tools.policies import load_learned
-    from rl_workbench.tools.torchscript import open_exported
+    from rl_workbench.tools.torchscript import described, open_exported
     from rl_workbench.training.environments import make_environment
 
     if path.is_dir():
@@ -161,8 +152,13 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
         recorded = {**exported.metadata["env_kwargs"], **options}
         sees_dict = exported.metadata["observation_space"].get("kind") == "Dict"
         env = make_environment(env_id, _in_process(recorded), keep_dict=sees_dict)
-        _check_same(path, exported.metadata, env)
     try:
+        for name in () if path.is_dir() else ("observation_space", "action_space"):
+            space = getattr(env, name)
+            if exported.metadata[name] != described(space):
+                raise WorkbenchError(
+                    f"{path} was exported for another {name.replace('_', ' ')} than {env_id} has now: {space}"
+                )
         base = env.unwrapped
         if not isinstance(base, RobotEnv):
             raise RobotEnvError(
@@ -187,19 +183,6 @@ def _in_process(options: dict[str, Any]) -> dict[str, Any]:
     if options.get("control_period") == 0.0:  # real time, one action per joint state
         options["control_period"] = None
     return options
-
-
-def _check_same(path: Path, metadata: dict[str, Any], env: gymnasium.Env[Any, Any]) -> None:
-    from rl_workbench.tools.torchscript import described
-
-    found = {"observation_space": env.observation_space, "action_space": env.action_space}
-    for name, space in found.items():
-        if metadata[name] != described(space):
-            env.close()
-            raise WorkbenchError(
-                f"{path} was exported for another {name.replace('_', ' ')} than {metadata['env_id']} has "
-                f"now: {space}"
-            )
 
 
 def _of_task(env: gymnasium.Env[Any, Any], act: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -40,16 +40,10 @@ class CartPoleState(NamedTuple):
 
 
 class CartPoleTask(Task):
-    """Base class of the cart-pole's tasks.
+    """Base class of the cart-pole's tasks: actions move the set-point of the cart's position controller.
 
-    Actions move the set-point of the cart's position controller. Set-points add up over an
-    episode, starting where the cart stands.
-
-    Args:
-        noise: Half-width of the uniform noise on the initial state; with 0 all episodes start alike.
-
-    Raises:
-        ValueError: For an impossible noise.
+    Set-points add up over an episode, starting where the cart stands. `noise` is the half-width of the
+    uniform noise on the initial state; with 0 all episodes start alike.
     """
 
     start: ClassVar[CartPoleState] = CartPoleState(0.0, 0.0, 0.0, 0.0)  # without noise
@@ -71,12 +65,9 @@ class CartPoleTask(Task):
 
 
 class BalanceTask(CartPoleTask):
-    """Keep the pole up and the cart near the middle, by nudging the cart's set-point.
+    """Keep the pole up and the cart near the middle, by nudging the cart's set-point; see `CartPoleEnv`.
 
-    Action 0 moves the set-point by -0.02 m, action 1 by +0.02 m. The reward of a step is
-    0.5 + |pole angle| - |cart position|, and 10 less for the step that ends the episode by
-    leaving +-0.4 m or +-12 degrees. The noise is of position [m] and angle [rad]; both joints
-    start at rest.
+    The noise is of position [m] and angle [rad]; both joints start at rest.
     """
 
     max_steps = 3000
@@ -118,11 +109,7 @@ class BalanceTask(CartPoleTask):
 
 
 class ClassicTask(BalanceTask):
-    """As Gymnasium's CartPole-v1: +1 for each step, up to 500 of them.
-
-    Actions, observations and limits are BalanceTask's. Positions and velocities start within
-    +-0.05 [m, m/s, rad, rad/s]. As in CartPole-v1 the step that falls counts as well.
-    """
+    """As Gymnasium's CartPole-v1; see `CartPoleEnv`. As there, the step that falls counts as well."""
 
     max_steps = 500
 

@@ -21,35 +21,18 @@ MASTER_PORTS = range(30000, 32768)
 REMAPPING = ":="  # in every argument of ROS's: __name:=pg_train, _gamma:=0.9, old:=new
 
 
-class WorkspaceHints(errors.Hints):
-    """The commands that texts recommend, by way of `ws`.
-
-    Args:
-        workspace: The path of `ws`.
-    """
-
-    def __init__(self, workspace: str) -> None:
-        self._workspace = workspace
-        self.extras = shlex.join([workspace, "extras"])
-
-    def finding_modules(self) -> str:
-        return f"{shlex.quote(self._workspace)} --with FOLDER ... finds those in FOLDER"
-
-    def watching(self, folder: Path) -> str:
-        return shlex.join([self._workspace, "tensorboard", "--logdir", str(folder)])
-
-    def replaying(self, folder: Path) -> str:
+def recommend_ws() -> None:
+    """Has texts recommend commands by way of ws, if it has started this one."""
+    if workspace := os.environ.get("CARTPOLE_WS"):  # its path
         folders = filter(None, os.environ.get("CARTPOLE_WITH", "").split(":"))
         # Each where it really is: ws may name a link.
         found = [word for each in folders for word in ("--with", os.path.realpath(each))]
-        command = [self._workspace, *found, "rosrun", "cartpole", "workbench.py"]
-        return shlex.join([*command, "view", str(folder)])
-
-
-def recommend_ws() -> None:
-    """Has texts recommend commands by way of ws, if it has started this one."""
-    if "CARTPOLE_WS" in os.environ:  # its path
-        errors.hints = WorkspaceHints(os.environ["CARTPOLE_WS"])
+        errors.hints = errors.Hints(
+            shlex.join([workspace, "extras"]),
+            f"{shlex.quote(workspace)} --with FOLDER ... finds those in FOLDER",
+            [workspace, "tensorboard"],
+            [workspace, *found, "rosrun", "cartpole", "workbench.py"],
+        )
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -70,22 +53,12 @@ def _free_port() -> int:
 
 
 def ros_options(argv: list[str], default_name: str) -> tuple[list[str], dict[str, Any], str]:
-    """Splits a command's arguments into its own and ROS's.
+    """Splits a command's arguments; returns its own flags, its private parameters, and the node's full name.
 
-    Without an argument in ROS's form nothing of ROS is imported, and no master is asked; roslaunch always
-    passes `__name:=`.
-
-    Args:
-        argv: The arguments, without the command itself.
-        default_name: Of the node, if ROS gives it no other one.
-
-    Returns:
-        The command's own flags; its private parameters, where those of the command line override those of the
-        master; the node's full name.
-
-    Raises:
-        RobotEnvError: If ROS isn't installed, a private parameter isn't YAML, or the master doesn't answer a
-            node that roslaunch started.
+    Parameters of the command line override those of the master; `default_name` is the node's, if ROS gives it
+    no other one. Without an argument in ROS's form nothing of ROS is imported, and no master is asked;
+    roslaunch always passes `__name:=`. Raises RobotEnvError if ROS isn't installed, a private parameter isn't
+    YAML, or the master doesn't answer a node that roslaunch started.
     """
     if not any(REMAPPING in argument for argument in argv):
         namespace = os.environ.get("ROS_NAMESPACE", "").strip("/")

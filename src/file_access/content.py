@@ -31,14 +31,7 @@ class NotAFile(OSError):
 
 
 def open_file(path: Path) -> BinaryIO:
-    """Opens a regular file for reading.
-
-    Opening a pipe or a device could block forever, so they are refused first.
-
-    Raises:
-        NotAFile: If it isn't a regular file.
-        OSError: If it can't be opened.
-    """
+    """Opens a regular file; raises NotAFile for a pipe or device, which could block forever, or OSError."""
     if not stat.S_ISREG(path.stat().st_mode):
         raise NotAFile(path)
     # Some files of the kernel block until there is news.
@@ -51,16 +44,7 @@ def open_text(path: Path) -> io.TextIOWrapper:
 
 
 def read_file(path: Path, most: int = MAX_BYTES) -> bytes:
-    """Returns the content of a regular file.
-
-    Args:
-        path: The file.
-        most: The largest size that is accepted [bytes].
-
-    Raises:
-        FileError: If it can't be read or isn't a regular file.
-        TooLarge: If it is larger.
-    """
+    """Returns the content of a regular file; raises TooLarge beyond `most` bytes, or FileError."""
     try:
         with open_file(path) as file:
             data = file.read(most + 1)  # some files of the kernel have no end

@@ -15,18 +15,10 @@ from contextlib import contextmanager, redirect_stderr, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
-from file_access.limited import (
-    LimitedProcess,
-    Limits,
-    ProcessDied,
-    RequestRefused,
-    limit_memory,
-    limit_time,
-    why_ended,
-)
+from file_access import limited
 from file_access.xml_text import decode, without_declaration
 
-LIMITS = Limits(
+LIMITS = limited.Limits(
     processor_time=30,  # [s], far more than the largest robots in use need
     wall_time=60.0,
     memory=1 << 30,
@@ -45,39 +37,25 @@ class CannotExpand(Exception):
 
 
 def expand(
-    path: str | os.PathLike[str], mappings: Mapping[str, str] | None = None, limits: Limits = LIMITS
+    path: str | os.PathLike[str],
+    mappings: Mapping[str, str] | None = None,
+    limits: limited.Limits = LIMITS,
 ) -> str:
-    """Expands a URDF or xacro file.
-
-    Args:
-        path: The file, which may be plain XML.
-        mappings: Xacro arguments, name and value.
-        limits: What it may take.
-
-    Returns:
-        The XML text.
-
-    Raises:
-        CannotExpand: If the file is broken or goes beyond a limit.
-    """
+    """Returns the XML text of a URDF or xacro file; raises CannotExpand if it is broken or beyond a limit."""
     return _ask("xml", os.fspath(path), mappings, limits)
 
 
 def included_files(
     path: str | os.PathLike[str], mappings: Mapping[str, str] | None = None
 ) -> list[str]:
-    """Returns the files that a xacro file includes, or takes numbers from, with these arguments.
-
-    Raises:
-        CannotExpand: If the file is broken or goes beyond a limit.
-    """
+    """Returns the files that a xacro file includes, or takes numbers from; raises CannotExpand."""
     return _ask("files", os.fspath(path), mappings, LIMITS).splitlines()
 
 
-def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: Limits) -> str:
+def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: limited.Limits) -> str:
     request = {"wanted": wanted, "path": path, "mappings": dict(mappings or {})}
     # A process for each file: xacro keeps its state in module variables.
-    process = LimitedProcess("file_access.expansion:answer", limits)
+    process = limited.LimitedProcess("file_access.expansion:answer", limits)
     try:
         answered = json.loads(process.ask(json.dumps(request).encode()))
         for line, more in answered["warnings"].items():
@@ -85,9 +63,9 @@ def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: Lim
                 _told.add(line)
                 print(line, *more, sep="\n", file=sys.stderr)
         return str(answered["text"])
-    except ProcessDied as fault:
+    except limited.ProcessDied as fault:
         raise CannotExpand(f"{path}: xacro: {fault}") from fault
-    except RequestRefused as fault:
+    except limited.RequestRefused as fault:
         text = str(fault)
         raise CannotExpand(text if path in text else f"{path}: xacro: {text}") from fault
     finally:
@@ -95,11 +73,7 @@ def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: Lim
 
 
 def answer(data: bytes) -> bytes:
-    """Answers a request of this module in the child process.
-
-    Returns:
-        JSON: "text", the XML or a line for each included file; "warnings", as `_heard` gives them.
-    """
+    """Answers a request in the child process, in JSON: the XML or a file in each line, and warnings."""
     request = json.loads(data)
     path = request["path"]
     try:
@@ -137,14 +111,14 @@ def main() -> int:
     if status == -signal.SIGPIPE:  # the reader has gone
         return 128 + signal.SIGPIPE
     if status < 0:
-        print(f"xacro: {why_ended(status, LIMITS)}", file=sys.stderr)
+        print(f"xacro: {limited.why_ended(status, LIMITS)}", file=sys.stderr)
         return BROKEN
     return status
 
 
 def _run_program() -> NoReturn:
-    limit_memory(LIMITS.memory)
-    limit_time(LIMITS.processor_time, LIMITS.wall_time)
+    limited.limit_memory(LIMITS.memory)
+    limited.limit_time(LIMITS.processor_time, LIMITS.wall_time)
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     import xacro
 

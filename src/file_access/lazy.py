@@ -12,10 +12,8 @@ def attach(
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """Returns `__getattr__`, `__dir__` and `__all__` of a package, from its imports for type checkers.
 
-    Args:
-        package: The package's name.
-        path: Its `__path__`; what `if TYPE_CHECKING:` imports in `__init__.py` there are the public names. In
-            catkin's devel space that is another file than its `__file__`.
+    Its public names are what `if TYPE_CHECKING:` imports in `__init__.py` in its `__path__`: in catkin's
+    devel space that is another file than its `__file__`.
     """
     places = {
         alias.name: node.module

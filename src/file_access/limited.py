@@ -47,13 +47,10 @@ class Limits:
 
 
 class LimitedProcess:
-    """Answers requests in a child process, one at a time.
+    """Answers requests in a child process, one at a time, each within limits.
 
-    The process starts with the first request, and again after it has died. It ends with its parent.
-
-    Args:
-        program: "module:function" that answers a request, bytes to bytes; what it raises refuses it.
-        limits: Of each request.
+    The process starts with the first request, and again after it has died. It ends with its parent. The
+    program is the "module:function" that answers a request, bytes to bytes; what it raises refuses it.
     """
 
     def __init__(self, program: str, limits: Limits) -> None:
@@ -64,12 +61,7 @@ class LimitedProcess:
         self._parent = 0  # process id: after a fork the process is the parent's
 
     def ask(self, request: bytes) -> bytes:
-        """Returns the answer to a request.
-
-        Raises:
-            RequestRefused: If the program has raised an error.
-            ProcessDied: If it has gone beyond a limit or crashed; the next request starts it again.
-        """
+        """Returns the answer to a request; raises RequestRefused, or ProcessDied after a limit or crash."""
         with self._lock:
             process = self._running()
             assert process.stdin is not None
@@ -123,12 +115,7 @@ class LimitedProcess:
 
 
 def _receive(process: subprocess.Popen[bytes], size: int, deadline: float) -> bytes:
-    """Returns `size` bytes of a process's output.
-
-    Raises:
-        EOFError: If the process has ended.
-        ProcessDied: If they don't come in time.
-    """
+    """Returns `size` bytes of output; raises EOFError if the process has ended, ProcessDied if late."""
     assert process.stdout is not None
     descriptor = process.stdout.fileno()
     poll = select.poll()
@@ -187,10 +174,7 @@ def limit_memory(memory: int) -> None:
 
 
 def limit_time(processor_time: int, wall_time: float) -> None:
-    """Has the kernel end this process after some more processor time and wall time [s].
-
-    SIGXCPU or SIGALRM ends it, and SIGINT as well, without a traceback.
-    """
+    """Has the kernel end this process by a signal, without a traceback, after some more time [s]."""
     signals = {signal.SIGINT, signal.SIGXCPU, signal.SIGALRM}
     for each in signals:
         signal.signal(each, signal.SIG_DFL)

@@ -19,10 +19,8 @@ SCRATCH = ("cartpole_", ".tmp")  # begin and end of a temporary folder's name
 def locked_folder(folder: Path) -> Iterator[None]:
     """Holds the lock of an existing folder for the block.
 
-    Raises:
-        BlockingIOError: If another holder has it, even in this process.
-        FileNotFoundError: If there is no such folder, also if its last holder has just removed it.
-        OSError: If it can't be opened, or its file system has no locks.
+    Raises BlockingIOError if another holder has it, even in this process; FileNotFoundError if there is no
+    such folder, also if its last holder has just removed it; or another OSError.
     """
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
@@ -35,10 +33,7 @@ def locked_folder(folder: Path) -> Iterator[None]:
 
 
 def is_locked(folder: Path) -> bool:
-    """Returns whether the lock of an existing folder is held.
-
-    It takes a shared lock for a moment, so it may keep another process out: call it seldom.
-    """
+    """Returns whether an existing folder's lock is held, by a shared one for a moment: call it seldom."""
     try:
         descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
     except OSError:
@@ -54,14 +49,7 @@ def is_locked(folder: Path) -> bool:
 
 @contextmanager
 def scratch_folder(parent: str | None = None) -> Iterator[Path]:
-    """Makes a temporary folder for the block; a process's first one also removes those of killed processes.
-
-    Args:
-        parent: Where it is made; None for the system's folder of temporary files.
-
-    Raises:
-        OSError: If it can't be made.
-    """
+    """Makes a temporary folder for the block; the first one also removes those of killed processes."""
     place = Path(parent or tempfile.gettempdir())
     _sweep(place)
     with ExitStack() as stack:
@@ -77,10 +65,7 @@ def scratch_folder(parent: str | None = None) -> Iterator[Path]:
 
 @functools.cache
 def _sweep(place: Path) -> None:
-    """Removes the temporary folders that no process holds; other users' can't be opened.
-
-    It knows them by the form of `mkdtemp`'s names.
-    """
+    """Removes the temporary folders that no process holds, known by the form of `mkdtemp`'s names."""
     for folder in place.glob(("[a-z0-9_]" * 8).join(SCRATCH)):
         with suppress(OSError), locked_folder(folder):
             shutil.rmtree(folder, ignore_errors=True)

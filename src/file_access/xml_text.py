@@ -53,15 +53,7 @@ class _BoundedBuilder(TreeBuilder):
 
 
 def parse(text: str | bytes) -> Element:
-    """Returns the root element.
-
-    Args:
-        text: A text, or the content of a file of any encoding.
-
-    Raises:
-        FileError: If it isn't well-formed, or has a document type.
-        TooLarge: If it exceeds a bound.
-    """
+    """Returns the root element of a text or a file's content; raises FileError, TooLarge beyond a bound."""
     if len(text) > MAX_BYTES:
         raise TooLarge(f"it has more than {MAX_BYTES} bytes (MAX_BYTES)")
     text = without_declaration(decode(text) if isinstance(text, bytes) else text)
@@ -75,11 +67,7 @@ def parse(text: str | bytes) -> Element:
 
 
 def decode(data: bytes) -> str:
-    """Returns the text of a file in the encoding of its byte-order mark, its declaration, or else UTF-8.
-
-    Raises:
-        FileError: If it can't be decoded, or the declared encoding isn't supported.
-    """
+    """Returns a file's text, by its byte-order mark, declaration, or else as UTF-8; raises FileError."""
     for mark, name in BYTE_ORDER_MARKS:
         if data.startswith(mark):
             return _decoded(data[len(mark) :], name)
@@ -101,10 +89,7 @@ def decode(data: bytes) -> str:
 
 
 def without_declaration(text: str) -> str:
-    """Returns `text` without byte-order mark and XML declaration.
-
-    The parser accepts nothing before a declaration, and decoded text doesn't need one.
-    """
+    """Returns a text without byte-order mark and XML declaration, before which parsers accept nothing."""
     text = text.removeprefix("\ufeff")
     declaration = DECLARATION.match(text)
     if declaration is None:

@@ -28,9 +28,8 @@ SIMPLE = (str, int, float, bytes, datetime)  # types that the parameter server t
 def load_documents(data: bytes | str) -> list[Any]:
     """Returns the documents of a YAML text in UTF-8 or UTF-16; ``deg(90)`` and ``rad(pi/2)`` are radians.
 
-    Raises:
-        FileError: If it isn't YAML, with the place, or if a value contains itself.
-        TooLarge: If it exceeds a bound, also with its anchors expanded.
+    Raises FileError, with the place, if it isn't YAML or a value contains itself; TooLarge if it exceeds a
+    bound, also with its anchors expanded.
     """
     if len(data) > MAX_BYTES:
         raise TooLarge(f"it has more than {MAX_BYTES} bytes (MAX_BYTES)")
@@ -53,12 +52,7 @@ def load_documents(data: bytes | str) -> list[Any]:
 
 
 def load_parameters(data: bytes | str) -> list[dict[str, Any]]:
-    """Returns the documents of a YAML text that are mappings of parameters; empty ones are left out.
-
-    Raises:
-        FileError: As `load_documents`, or if a value can't be a parameter.
-        TooLarge: As `load_documents`.
-    """
+    """Returns the documents that are mappings of parameters; raises as `load_documents`, and FileError."""
     documents = [document for document in load_documents(data) if document is not None]
     for document in documents:
         if not isinstance(document, dict):
@@ -112,10 +106,7 @@ def _evaluated(node: ast.expr) -> float:
 def _count(value: Any, known: dict[int, int | None], depth: int) -> int:
     """Returns the number of values in `value` with anchors expanded, without expanding them.
 
-    Args:
-        value: A parsed value.
-        known: Counts by id; None for a value that is being counted: if it comes up, it contains itself.
-        depth: Of `value`.
+    `known` are counts by id; None for a value that is being counted: if it comes up, it contains itself.
     """
     if not isinstance(value, (list, dict, tuple, set)):
         return 1

@@ -1,6 +1,3 @@
-"""Unchanged ROS scripts in a process whose time is the simulation's (docs/lockstep.md).
-
-The command is `launcher.main`; everything else is private.
-"""
+"""Unchanged ROS scripts in the simulation's time (docs/lockstep.md); the command is `launcher.main`."""
 
 __all__ = ["launcher"]

@@ -101,16 +101,11 @@ class Clock:
         topics: Collection[str] = (),
         in_pause: float = math.inf,
     ) -> bool:
-        """Blocks the calling thread in simulated time.
+        """Blocks the calling thread in simulated time [s]; returns whether `until` became true before.
 
-        Args:
-            seconds: Longest wait [s of simulated time]; may be infinity.
-            until: Ends the wait once true; checked after messages, callbacks and other threads' turns.
-            topics: Topics whose messages may make it true.
-            in_pause: Longest wait of a thread other than the main one in a paused world [s of wall time].
-
-        Returns:
-            Whether `until` became true.
+        That is checked after messages (those on `topics` may make it true), callbacks and other threads'
+        turns. `in_pause` is the longest wait of a thread other than the main one in a paused world [s of wall
+        time].
         """
         # Whole nanoseconds: no tick would reach a fraction, and the thread would never wake.
         span = seconds if seconds == math.inf else round(max(0.0, seconds) * NANOSECONDS)

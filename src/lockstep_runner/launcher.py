@@ -7,7 +7,8 @@ import shlex
 import sys
 import threading
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 from lockstep_runner import script
 from lockstep_runner.notices import tell
@@ -66,10 +67,19 @@ def _run(args: argparse.Namespace, code: types.CodeType) -> int:
     if args.seed is not None:
         script.seed_everything(args.seed)
     watch(runner)
-    show, sys.excepthook = sys.excepthook, _hide_ourselves(sys.excepthook, args.script)
+    show = sys.excepthook
+
+    def hide_ourselves(kind: Any, fault: BaseException, trace: Any) -> None:
+        """Shows tracebacks that begin with the script."""
+        fault.__traceback__ = script.own_part(trace, args.script)  # the default hook prints this
+        show(kind, fault, fault.__traceback__)
+
+    sys.excepthook = hide_ourselves
     try:
         script.run(args.script, args.arguments, code)
-        on_demand.end_threads()
+        threads = sys.modules.get("lockstep_runner.concurrency.python_threads")
+        if threads is not None:
+            threads.end_executors()
         others = [
             each
             for each in threading.enumerate()
@@ -85,57 +95,27 @@ def _run(args: argparse.Namespace, code: types.CodeType) -> int:
     return 0
 
 
-Hook = Callable[[type[BaseException], BaseException, types.TracebackType | None], object]
-
-
-def _hide_ourselves(show: Hook, path: str) -> Hook:
-    """Returns an excepthook whose tracebacks begin with the script."""
-
-    def shown(
-        kind: type[BaseException], fault: BaseException, trace: types.TracebackType | None
-    ) -> None:
-        fault.__traceback__ = script.own_part(trace, path)  # the default hook prints this
-        show(kind, fault, fault.__traceback__)
-
-    return shown
-
-
 def _parse(argv: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="lockstep.py",
         description="Runs a script that was written for Gazebo, unchanged, in lock-step: repeatable, and as"
         " fast as it computes. A simulator that it launches comes up in lock-step.",
     )
-    parser.add_argument("--seed", type=_seed, help="seed random, NumPy, torch and the simulator")
-    parser.add_argument(
-        "--dt",
-        type=_period,
-        default=0.008,
+    add = parser.add_argument
+    add("--seed", type=_seed, help="seed random, NumPy, torch and the simulator")
+    add("--dt", type=_period, default=0.008,
         help="simulated time that passes at each trigger [s], rounded up to whole physics steps"
-        " (default: %(default)s)",
-    )
-    parser.add_argument(
-        STEP_ON,
-        action="append",
-        metavar="TOPIC-OR-SERVICE",
+        " (default: %(default)s)")  # fmt: skip
+    add(STEP_ON, action="append", metavar="TOPIC-OR-SERVICE",
         help="let time pass at each message on this topic, or call of this service; may be repeated;"
-        " 'none': no triggers (default: commands to controllers, if the script doesn't wait by itself)",
-    )
-    parser.add_argument(
-        "--virtual-wall-clock",
-        action="store_true",
-        help="simulate time.time(), monotonic() and perf_counter(), too",
-    )
-    parser.add_argument(
-        "--record",
-        type=_writable,
-        metavar="BAG",
-        help="record the run in this bag, which replay.py repeats",
-    )
-    parser.add_argument("script", help="the Python file to run")
-    parser.add_argument(
-        "arguments", nargs=argparse.REMAINDER, help="arguments passed to the script"
-    )
+        " 'none': no triggers (default: commands to controllers, if the script doesn't wait by"
+        " itself)")  # fmt: skip
+    add("--virtual-wall-clock", action="store_true",
+        help="simulate time.time(), monotonic() and perf_counter(), too")  # fmt: skip
+    add("--record", type=_writable, metavar="BAG",
+        help="record the run in this bag, which replay.py repeats")  # fmt: skip
+    add("script", help="the Python file to run")
+    add("arguments", nargs=argparse.REMAINDER, help="arguments passed to the script")
     args = parser.parse_args(_one_by_one(argv))
     if NO_TRIGGERS in (args.step_on or ()) and set(args.step_on) != {NO_TRIGGERS}:
         parser.error(f"argument {STEP_ON}: '{NO_TRIGGERS}' can't be combined with other names")
@@ -153,14 +133,12 @@ def _one_by_one(argv: Sequence[str]) -> list[str]:
                 return given + left  # the script and its arguments
             continue
         names = []
-        while left and not (left[0].startswith("-") or _is_a_script(left[0])):
+        while left and not left[0].startswith("-"):
+            if left[0].endswith(".py") or os.path.isfile(left[0]):
+                break  # the script
             names.append(left.pop(0))
         given += [part for name in names for part in (STEP_ON, name)] or [STEP_ON]
     return given
-
-
-def _is_a_script(argument: str) -> bool:
-    return argument.endswith(".py") or os.path.isfile(argument)
 
 
 def _seed(text: str) -> int:

@@ -5,7 +5,6 @@ import builtins
 import contextlib
 import os
 import subprocess
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,13 +33,6 @@ def replace_threads(runner: ScriptRunner) -> None:
         return find(name, *args, **kwds)
 
     builtins.__import__ = importing
-
-
-def end_threads() -> None:
-    """Ends the threads of executors after their tasks."""
-    threads = sys.modules.get("lockstep_runner.concurrency.python_threads")
-    if threads is not None:
-        threads.end_executors()
 
 
 def follow_processes(runner: ScriptRunner) -> None:

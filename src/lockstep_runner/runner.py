@@ -61,10 +61,8 @@ def _ends_with_the_world(instead: bool | None) -> Callable[[Method], Method]:
 class ScriptRunner:
     """One script in lock-step; nothing is replaced yet.
 
-    Args:
-        period: Simulated time that passes at a trigger [s], in whole physics steps; 0 is one.
-        triggers: Topics and services; None for the commands to controllers.
-        world: The simulator, and the source of time.
+    `period` passes at a trigger [s], in whole physics steps, 0 is one. Triggers are topics and services; None
+    for the commands to controllers. The world is the source of time.
     """
 
     def __init__(self, period: float, triggers: Collection[str] | None, world: ScriptWorld) -> None:

@@ -45,10 +45,7 @@ def compiled(path: str) -> types.CodeType:
 
 
 def run(path: str, arguments: Sequence[str], code: types.CodeType) -> None:
-    """Runs a script as `__main__` with its arguments, in the current folder.
-
-    Its exceptions pass through; `own_part` removes this package's frames from their tracebacks.
-    """
+    """Runs a script as `__main__` in the current folder; its exceptions pass through, see `own_part`."""
     main = types.ModuleType("__main__")
     main.__dict__.update(__file__=path, __builtins__=builtins, __cached__=None)
     sys.modules["__main__"] = main

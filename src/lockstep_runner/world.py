@@ -34,10 +34,7 @@ class WorldFailed(Exception):
 
 
 class ScriptWorld:
-    """The connection to a simulator, found by `look`, one at a time; thread-safe.
-
-    `seed` seeds the random numbers of each simulator found; None leaves them.
-    """
+    """The connection to a simulator, found by `look`, one at a time, and seeded if asked for; thread-safe."""
 
     def __init__(self, seed: int | None = None) -> None:
         self.now = 0  # [ns] simulated

@@ -3,12 +3,11 @@
 import math
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
-from typing import NamedTuple
 
 from package_writing.standing import stance, standing_height
 from robot_envs.testing.episodes import LOWER, UPRIGHT
 from robot_sim.control.hardware import EFFORT
-from robot_sim.physics.description import Joint, ModelDescription
+from robot_sim.physics.description import DescriptionError, Joint, ModelDescription
 from robot_sim.physics.engines import make_engine
 from robot_sim.physics.files.world_file import WorldDescription
 from robot_sim.physics.loops import in_loops
@@ -27,26 +26,13 @@ SLACK = 0.01  # [m], by which a base on the ground may sink
 FASTEST, QUICKEST = 100.0, 1000.0  # [m/s] of a base, [rad/s, m/s] of a joint
 
 
-class Trial(NamedTuple):
-    """The behaviour of a robot or a world in an engine."""
-
-    text: str
-    fault: str = ""  # why it doesn't stand
-    still: tuple[str, ...] = ()  # a line for each joint that commands don't move
-
-
 def observe(
     content: ModelDescription | WorldDescription, interfaces: Mapping[str, str], engine: str
-) -> Trial:
+) -> tuple[str, list[str]]:
     """Lets a world run, or a robot stand, and then commands its joints, each alone.
 
-    Args:
-        content: Content of a file.
-        interfaces: Hardware interfaces by joint; joints without one take efforts.
-        engine: "bullet" or "mujoco".
-
-    Raises:
-        DescriptionError: If the engine can't take it.
+    `interfaces` are hardware interfaces by joint; joints without one take efforts. Returns a line, and the
+    faults: why it doesn't stand, or the engine can't take it, and the joints that commands don't move.
     """
     sim = Simulator(World(make_engine(engine)), lockstep=True)
     try:
@@ -56,51 +42,51 @@ def observe(
         sim.world.set_gravity(content.gravity)
         for name, each in content.models.items():
             sim.world.spawn(name, deepcopy(each), each.initial_pose)
-        return _still(_run(sim, sim.world.models.values()))
+        return _run(sim, sim.world.models.values())
+    except DescriptionError as error:
+        return str(error), [str(error)]
     finally:
         sim.world.close()
 
 
-def _still(fault: str) -> Trial:
-    return Trial(fault or f"nothing blows up within {SECONDS:g} s", fault)
-
-
-def _of_robot(sim: Simulator, robot: ModelDescription, interfaces: Mapping[str, str]) -> Trial:
+def _of_robot(
+    sim: Simulator, robot: ModelDescription, interfaces: Mapping[str, str]
+) -> tuple[str, list[str]]:
     starts, height = stance(robot), 0.0
     if not robot.fixed_base:
         sim.world.spawn("ground_plane", ground_plane(), Pose())
         height = standing_height(robot, starts) or 0.0
     model = sim.world.spawn(robot.name, deepcopy(robot), Pose((0.0, 0.0, height)))
     sim.set_joint_states(model, starts, {})
-    driven = [each for each in robot.movable_joints if each.name not in robot.mimics]
     if robot.static:
-        return _still(_run(sim, [model]))
+        return _run(sim, [model])
+    driven = [each for each in robot.movable_joints if each.name not in robot.mimics]
     for joint in driven:
         model.set_motor(joint.name, 0.0, _strength(joint, ""))
     begin, (first, _) = sim.save_state(), model.root_state()
-    fault = _run(sim, [model])
+    _, faults = _run(sim, [model])
     pose, _ = model.root_state()
     sank, most = first.position[2] - pose.position[2], (1.0 - LOWER) * abs(first.position[2])
     up = rotate(conjugate(first.orientation), (0.0, 0.0, 1.0))
     level = max(-1.0, min(1.0, rotate(pose.orientation, up)[2]))
-    if not fault and not (level > UPRIGHT and sank < most + SLACK):
+    if not faults and not (level > UPRIGHT and sank < most + SLACK):
         solid = any(each.collisions for each in robot.links.values())
-        fault = (
+        faults = [
             "it falls" if solid else "it has no <collision>, so that it falls through the ground"
-        )
+        ]
+    text = faults[0] if faults else "held by its fixed base" if robot.fixed_base else "stands"
+    if not robot.fixed_base:
+        tilt = math.degrees(math.acos(level))
+        text += f", {1000.0 * sank:.1f} mm lower and tilted by {tilt:.1f}°"
+        text += f" after {SECONDS:g} s, joints held"
     still = []
     for joint in driven:
         sim.restore_state(begin)
-        why = _why_still(sim, model, joint, interfaces.get(joint.name, EFFORT))
-        still += [f"commands don't move '{joint.name}': {why}"] if why else []
-    text = fault or ("held by its fixed base" if robot.fixed_base else "stands")
-    if not robot.fixed_base:
-        text += (
-            f", {1000.0 * sank:.1f} mm lower and tilted by {math.degrees(math.acos(level)):.1f}°"
-        )
-        text += f" after {SECONDS:g} s, joints held"
-    moved = f"; commands move {len(driven) - len(still)} of {len(driven)} joints"
-    return Trial(text + (moved if driven else ""), fault, tuple(still))
+        if why := _why_still(sim, model, joint, interfaces.get(joint.name, EFFORT)):
+            still.append(f"commands don't move '{joint.name}': {why}")
+    if driven:
+        text += f"; commands move {len(driven) - len(still)} of {len(driven)} joints"
+    return text, faults + still
 
 
 def _why_still(sim: Simulator, model: Model, joint: Joint, interface: str) -> str:
@@ -125,16 +111,17 @@ def _why_still(sim: Simulator, model: Model, joint: Joint, interface: str) -> st
     return f"{strength:g} {unit} are too little for its load, or links are in the way"
 
 
-def _run(sim: Simulator, models: Iterable[Model]) -> str:
-    """Lets time pass; returns which model blew up, "" for none."""
+def _run(sim: Simulator, models: Iterable[Model]) -> tuple[str, list[str]]:
+    """Lets time pass; returns a line, and which model blew up, if one did."""
     for _ in range(round(SECONDS / LOOK)):
         sim.advance(max(1, round(LOOK / sim.world.time_step)))
         for model in models:
             _, (linear, _) = model.root_state()
             speeds = [abs(speed) for _, speed in model.joint_states()]
             if not (math.hypot(*linear) < FASTEST and all(speed < QUICKEST for speed in speeds)):
-                return f"'{model.name}' blows up after {sim.sim_time:.2g} s"
-    return ""
+                fault = f"'{model.name}' blows up after {sim.sim_time:.2g} s"
+                return fault, [fault]
+    return f"nothing blows up within {SECONDS:g} s", []
 
 
 def _strength(joint: Joint, interface: str) -> float:

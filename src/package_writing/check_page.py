@@ -3,19 +3,19 @@
 import importlib.util
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from package_writing.check_files import RobotFile
-from package_writing.check_motion import Trial, observe
+from package_writing.check_motion import observe
 from package_writing.trial import ENGINES
 from robot_envs import Robot, RobotEnvError, controllers
 from robot_sim.control.errors import ControlError
 from robot_sim.physics.description import (
-    DescriptionError,
     ModelDescription,
     Plugin,
     is_control_plugin,
@@ -24,9 +24,19 @@ from robot_sim.physics.description import (
 from robot_sim.physics.engines import installing
 from robot_sim.physics.files.elements import truth
 from robot_sim.physics.files.sdf_parts import MOMENTS
+from robot_sim.physics.files.world_file import WorldDescription
 
 SHOWN = 8  # lines and names of one kind
 NAMES = {"bullet": "PyBullet", "mujoco": "MuJoCo"}
+
+
+class RobotFile(NamedTuple):
+    """A file and its contents: a model, or a world."""
+
+    path: Path
+    text: str
+    root: Element
+    content: ModelDescription | WorldDescription
 
 
 @dataclass
@@ -52,6 +62,7 @@ def examine(file: RobotFile, parameters: str | None) -> Findings:
     page, content = Findings(str(file.path)), file.content
     interfaces: Mapping[str, str] = {}
     if isinstance(content, ModelDescription):
+        models, plugins = [content], []
         page.notes += [f"without effect: {each}" for each in content.left_out]
         page.notes += content.warnings
         page.lines |= _contents(content)
@@ -59,27 +70,22 @@ def examine(file: RobotFile, parameters: str | None) -> Findings:
         lost = [each.get("name", "") for each in file.root.findall("link")]
         page.wrong += [f"link '{name}' is dropped: no mass" for name in lost if name not in known]
         page.wrong += [] if content.static else _inertia_faults(file.root)
-        _add_served(page, [content], [])
-        if file.root.tag == "robot":
-            interfaces = _control(page, file, content, parameters)
     else:
         page.wrong += [*content.warnings, *_inertia_faults(file.root)]  # models that are left out
-        models = list(content.models.values())
+        models, plugins = list(content.models.values()), content.plugins
         page.notes += [f"model '{m.name}': {w}" for m in models for w in (*m.warnings, *m.left_out)]
         page.lines["world"] = f"{content.name}; models: {', '.join(content.models) or 'none'}"
-        _add_served(page, models, content.plugins)
+    _add_served(page, models, plugins)
+    if isinstance(content, ModelDescription) and file.root.tag == "robot":
+        interfaces = _control(page, file.text, content, parameters)
     faults = defaultdict(list)
     for module, engine in ENGINES.items():
         name = NAMES[engine]
         if importlib.util.find_spec(module) is None:
             page.notes.append(f"not tried with {name}: '{installing(module)}' installs it")
             continue
-        try:
-            trial = observe(content, interfaces, engine)
-        except DescriptionError as error:
-            trial = Trial(str(error), str(error))
-        page.lines[name] = trial.text
-        for text in filter(None, (trial.fault, *trial.still)):
+        page.lines[name], found = observe(content, interfaces, engine)
+        for text in found:
             faults[text].append(name)
     page.wrong += [f"{text} ({' and '.join(names)})" for text, names in faults.items()]
     return page
@@ -125,34 +131,30 @@ def _inertia_faults(root: Element) -> Iterator[str]:
             yield f"link '{link.get('name')}': one moment of inertia exceeds the sum of the others: {moments}"
 
 
-def _add_served(
-    page: Findings, models: Sequence[ModelDescription], world: Sequence[Plugin]
-) -> None:
+def _add_served(page: Findings, models: list[ModelDescription], world: list[Plugin]) -> None:
     """Adds plugins and sensors, and notes on those that nothing serves."""
-    sensors = [each for model in models for each in model.sensors]
-    listed = [[library_of(plugin.filename) for plugin in each.plugins] for each in sensors]
-    texts = [
-        f"{s.name}: {s.kind}, {', '.join(f) or 'no plugin'}"
-        for s, f in zip(sensors, listed, strict=True)
-    ]
     plugins = [*world, *(each for model in models for each in model.plugins)]
-    libraries = [library_of(each.filename) for each in plugins]
+    libraries, served, sensors = [library_of(each.filename) for each in plugins], [], []
+    for sensor in (each for model in models for each in model.sensors):
+        own = [library_of(each.filename) for each in sensor.plugins]
+        sensors.append(f"{sensor.name}: {sensor.kind}, {', '.join(own) or 'no plugin'}")
+        served += own
     if importlib.util.find_spec("rospy") is not None:  # which plugins import
         from bullet_gazebo.plugins.plugin_loader import built_in
 
         known = {*built_in("LIBRARIES"), *built_in("WORLD_LIBRARIES")}
-        given = [*(each for row in listed for each in row), *libraries]
-        page.notes += [f"nothing serves {each}" for each in given if each not in known]
-    page.lines |= {h: "; ".join(f) for h, f in (("plugins", libraries), ("sensors", texts)) if f}
+        unknown = [each for each in (*served, *libraries) if each not in known]
+        page.notes += [f"nothing serves {each}" for each in unknown]
+    page.lines |= {h: "; ".join(f) for h, f in (("plugins", libraries), ("sensors", sensors)) if f}
 
 
 def _control(
-    page: Findings, file: RobotFile, model: ModelDescription, parameters: str | None
+    page: Findings, text: str, model: ModelDescription, parameters: str | None
 ) -> Mapping[str, str]:
     """Adds transmissions and controllers; returns hardware interfaces by joint."""
     plugin = next((each for each in model.plugins if is_control_plugin(each.filename)), None)
     namespace = "" if plugin is None else (plugin.element.findtext("robotNamespace") or "").strip()
-    robot = Robot(urdf=file.text, controllers=parameters or {}, namespace=namespace)
+    robot = Robot(urdf=text, controllers=parameters or {}, namespace=namespace)
     movable = [each.name for each in model.movable_joints]
     try:
         interfaces = {each.joint: each.interface for each in robot.control.transmissions}

@@ -70,50 +70,29 @@ def _parser() -> argparse.ArgumentParser:
         description="Writes a catkin package for your robot: URDF, controllers, launch files, a task that "
         "can be trained at once, and a test. Overwrites nothing.",
     )
-    parser.add_argument("name", help="name of the package, such as my_arm")
-    parser.add_argument(
-        "--urdf",
-        type=Path,
-        metavar="FILE",
-        help="the robot's URDF or xacro file (default: a two-link arm)",
-    )
-    parser.add_argument(
-        "arguments", nargs="*", metavar="ARG:=VALUE", help="arguments of the xacro file"
-    )
-    parser.add_argument(
-        "--to", type=Path, metavar="FOLDER",
-        help=f"folder in which the package is created (default: {package.PARENT})",
-    )  # fmt: skip
-    parser.add_argument(
-        "--standalone", action="store_true",
+    add = parser.add_argument
+    add("name", help="name of the package, such as my_arm")
+    add("--urdf", type=Path, metavar="FILE",
+        help="the robot's URDF or xacro file (default: a two-link arm)")  # fmt: skip
+    add("arguments", nargs="*", metavar="ARG:=VALUE", help="arguments of the xacro file")
+    add("--to", type=Path, metavar="FOLDER",
+        help=f"folder in which the package is created (default: {package.PARENT})")  # fmt: skip
+    add("--standalone", action="store_true",
         help="write the robot's URDF expanded, with all its meshes but without their textures, so that it "
-             "needs no other package",
-    )  # fmt: skip
-    _add_robot_options(parser)
-    return parser
-
-
-def _add_robot_options(parser: argparse.ArgumentParser) -> None:
-    """Adds the options for what the robot's file doesn't say."""
-    parser.add_argument(
-        "--base", choices=("fixed", "free"),
-        help="fix a robot to the world that its file doesn't fix (an arm), or let it stand or fall",
-    )  # fmt: skip
-    parser.add_argument(
-        "--height",
-        type=float,
-        metavar="Z",
-        help="height at which it is spawned [m] (default: 0; for a free base: where it stands on the ground)",
-    )
-    parser.add_argument(
-        "--interface", choices=package.INTERFACES,
+        "needs no other package")  # fmt: skip
+    # What the robot's file doesn't say
+    add("--base", choices=("fixed", "free"),
+        help="fix a robot to the world that its file doesn't fix (an arm), or let it stand or "
+        "fall")  # fmt: skip
+    add("--height", type=float, metavar="Z",
+        help="height at which it is spawned [m] (default: 0; for a free base: where it stands on the "
+        "ground)")  # fmt: skip
+    add("--interface", choices=package.INTERFACES,
         help="hardware interface of the joints, if the file has no transmissions (default: effort; velocity "
-        "for continuous joints of a free base, which are wheels)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--passive", action="append", default=[], metavar="JOINT",
-        help="a joint without a motor, if the file has no transmissions; may be repeated",
-    )  # fmt: skip
+        "for continuous joints of a free base, which are wheels)")  # fmt: skip
+    add("--passive", action="append", default=[], metavar="JOINT",
+        help="a joint without a motor, if the file has no transmissions; may be repeated")  # fmt: skip
+    return parser
 
 
 def _write(args: argparse.Namespace, parent: Path) -> str:

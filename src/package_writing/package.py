@@ -34,19 +34,7 @@ OURS = ("cartpole", "controller_manager", "gazebo_ros", "xacro")  # the template
 
 @dataclass(frozen=True)
 class PackageRequest:
-    """The user's request for a package.
-
-    Args:
-        name: The package's name.
-        folder: Its destination.
-        urdf: The robot's file; None for a two-link arm.
-        arguments: Xacro's arguments.
-        base: "fixed" or "free", for a robot that isn't fixed to the world; None if not given.
-        height: Where to spawn it [m]; None for 0, or so that a free base stands on the ground.
-        interface: Of joints without transmissions; None for velocity on wheels and effort on others.
-        passive: Joints that get no motor, if none has a transmission.
-        standalone: Whether its URDF is written expanded, with all meshes.
-    """
+    """The user's request for a package, by the options of new_robot.py."""
 
     name: str
     folder: Path
@@ -71,10 +59,7 @@ def read_arguments(texts: Sequence[str]) -> dict[str, str]:
 
 
 def write(request: PackageRequest, made: Path) -> str:
-    """Writes the package into an empty folder; returns the report to print.
-
-    Raises CannotWrite if the robot can't be read, simulated or moved.
-    """
+    """Writes the package into an empty folder; returns the report. Raises CannotWrite if it can't."""
     if request.height is not None and not math.isfinite(request.height):
         raise CannotWrite(f"--height is a number of metres, not {request.height}")
     copied = copy_urdf(
@@ -125,10 +110,7 @@ def write(request: PackageRequest, made: Path) -> str:
 def _completed(
     request: PackageRequest, copied: Copied, made: Path, loose: str
 ) -> tuple[str, str, Survey]:
-    """Surveys the robot, and writes a file that adds what its own lacks.
-
-    Returns the file to use, in the folder urdf; its XML; and the survey.
-    """
+    """Writes a file that adds what the robot's own lacks; returns the one to use, its XML and the survey."""
     others = files.resources()
     resources = Resources(
         package=lambda name: str(made) if name == request.name else others.package(name)

@@ -127,10 +127,7 @@ def centre_of_mass(model: ModelDescription, poses: Mapping[str, Pose]) -> np.nda
 
 
 def standing_height(model: ModelDescription, positions: Mapping[str, float]) -> float | None:
-    """Returns the least height at which no collision is below the ground [m, three decimals].
-
-    `positions` are those of the joints; others are at 0. None if there are no collisions.
-    """
+    """Returns the least height with all collisions above the ground [m, three decimals]; None without any."""
     lows = lows_of(model, positions)
     if not lows:
         return None
@@ -138,10 +135,7 @@ def standing_height(model: ModelDescription, positions: Mapping[str, float]) -> 
 
 
 def feet(model: ModelDescription) -> list[str]:
-    """Returns the links on which a robot stands, joints at zero: the lowest of each leg.
-
-    There are none on wheels, or on its base.
-    """
+    """Returns the links on which a robot stands, joints at zero, none of them wheels or its base."""
     lows = {} if model.fixed_base else lows_of(model, {})
     ground = min(lows.values(), default=0.0)
     low = [name for name, height in lows.items() if height <= (1.0 - FOOT) * ground]

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import yaml
@@ -170,10 +170,11 @@ def _motors(
         joint = control.joints[name]
         limits = joint.limits
         wheel = name in wheels and interface != POSITION
+        speed = min(SHARE * (limits.velocity or math.inf), FASTEST)
         yield Motor(
             name,
             interface,
-            *(_speeds(joint) if wheel else _range(joint)),
+            *(_bounds(-speed, speed) if wheel else _range(joint)),
             linear=joint.kind == "prismatic",
             limited=limits.effort != 0.0 and limits.velocity != 0.0,
             wheel=wheel,
@@ -195,11 +196,6 @@ def _casters(model: ModelDescription) -> set[str]:
     return casters
 
 
-def _speeds(joint: JointHandle) -> tuple[float, float]:
-    fastest = min(SHARE * (joint.limits.velocity or math.inf), FASTEST)
-    return _inwards(-fastest, math.ceil), _inwards(fastest, math.floor)
-
-
 def _range(joint: JointHandle) -> tuple[float, float]:
     lower, upper = joint.limits.lower, joint.limits.upper
     if lower is None or upper is None:
@@ -214,12 +210,12 @@ def _range(joint: JointHandle) -> tuple[float, float]:
         raise CannotWrite(
             f"joint '{joint.name}' can't move from {lower:g} to {upper:g}: mend its <limit>"
         )
-    return _inwards(middle - half, math.ceil), _inwards(middle + half, math.floor)
+    return _bounds(middle - half, middle + half)
 
 
-def _inwards(bound: float, rounded: Callable[[float], int]) -> float:
-    """Rounds a bound to three decimals, inwards."""
-    return rounded(bound * 1000.0) / 1000.0
+def _bounds(low: float, high: float) -> tuple[float, float]:
+    """Rounds bounds to three decimals, inwards."""
+    return math.ceil(low * 1000.0) / 1000.0, math.floor(high * 1000.0) / 1000.0
 
 
 def height_note(height: float, stands: float | None) -> str:

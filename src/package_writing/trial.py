@@ -61,10 +61,7 @@ def try_out(package: str, env_id: str, made: Path, *, stands: bool) -> dict[str,
 
 
 def stands_note(feet: Sequence[str], faults: Mapping[str, str]) -> str:
-    """Returns a line on whether a robot stands on its feet, and what to change if not.
-
-    `faults` are the results of `try_out`.
-    """
+    """Returns a line on whether a robot stands on its feet, by what `try_out` found, and what to change."""
     names = ", ".join(feet)
     if not faults:
         return f"its feet: {names}; without ROS it wasn't tried whether it stands on them"

@@ -30,31 +30,18 @@ WAYS = 64  # directions in which an outline is measured
 
 @dataclass(frozen=True)
 class Base:
-    """What a diff_drive_controller drives.
+    """What a diff_drive_controller drives."""
 
-    Args:
-        left: Joints of the wheels on the left.
-        right: On the right, as many.
-        radius: Radius of the wheels [m].
-        separation: Separation of the left ones from the right ones [m].
-        speed: The highest ahead [m/s].
-        frame: The root link.
-        laser: One that sees its surroundings alone; None: there is none.
-        touch: Range of the laser at which the base touches what it sees [m].
-        clearance: Free space about the middle of the base where it starts [m].
-        note: Why there is no laser, although the file has one; or "".
-    """
-
-    left: tuple[str, ...]
-    right: tuple[str, ...]
-    radius: float
-    separation: float
-    speed: float
-    frame: str
-    laser: Sensor | None = None
-    touch: float = 0.0
-    clearance: float = 0.0
-    note: str = ""
+    left: tuple[str, ...]  # joints of the wheels on the left
+    right: tuple[str, ...]  # on the right, as many
+    radius: float  # of the wheels [m]
+    separation: float  # of the left ones from the right ones [m]
+    speed: float  # the highest ahead [m/s]
+    frame: str  # the root link
+    laser: Sensor | None = None  # one that sees its surroundings alone; None: there is none
+    touch: float = 0.0  # range of the laser at which the base touches what it sees [m]
+    clearance: float = 0.0  # free space about the middle of the base where it starts [m]
+    note: str = ""  # why there is no laser, although the file has one
 
     @property
     def turn(self) -> float:
@@ -68,10 +55,7 @@ class Base:
 
 
 def find_base(survey: Survey) -> Base | None:
-    """Returns the base that wheels on its left and right drive, which turn about its y.
-
-    None if its wheels are others, or their motors take no velocity.
-    """
+    """Returns the base that wheels on its left and right drive, about its y, by velocity; None for others."""
     wheels = survey.wheels
     measured = [_wheel(survey, motor) for motor in wheels]
     rims = [each for each in measured if each is not None]

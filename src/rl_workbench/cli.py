@@ -37,13 +37,7 @@ COMMANDS = {
 def main(
     argv: list[str] | None = None, prog: str = PROG, program: tuple[str, ...] = training.PROGRAM
 ) -> int:
-    """Runs the command line; returns the process's exit code.
-
-    Args:
-        argv: The arguments.
-        prog: The command's name, for --help and errors.
-        program: Starts this command line, for trainings in processes of their own.
-    """
+    """Runs the command line; returns the exit code. `program` starts it, for trainings as processes."""
     words = sys.argv[1:] if argv is None else argv
     if words[:1] == [TRAIN]:  # its flags depend on the algorithm
         return training.main(words[1:], prog=f"{prog} {TRAIN}", program=program)
@@ -59,11 +53,7 @@ def main(
 
 
 def parse(argv: list[str], prog: str = PROG) -> argparse.Namespace:
-    """Parses the arguments of a subcommand.
-
-    Raises:
-        SystemExit: With code 2 and a usage line, if they are wrong; with 0 after --help.
-    """
+    """Parses the arguments of a subcommand; exits with 2 and a usage line if they are wrong."""
     parser = argparse.ArgumentParser(
         prog,
         description=DESCRIPTION,

@@ -42,7 +42,7 @@ def import_module_of(env_id: str) -> None:
         missing = error.name if isinstance(error, ModuleNotFoundError) else None
         if missing and f"{module}.".startswith(f"{missing}."):  # not one that it imports itself
             text = f"can't make {env_id}: there is no module '{missing}'"
-            raise WorkbenchError(f"{text}; {errors.hints.finding_modules()}") from error
+            raise WorkbenchError(f"{text}; {errors.hints.modules}") from error
         raise EnvironmentFailure(f"can't make {env_id}: {error_line(error)}") from error
 
 

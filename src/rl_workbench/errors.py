@@ -11,6 +11,9 @@ import shutil
 import sys
 import sysconfig
 import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 # Code below these folders isn't the user's.
@@ -44,46 +47,30 @@ def own_frames(error: BaseException) -> list[traceback.FrameSummary]:
 
 
 def need(module: str, package: str, what: str) -> None:
-    """Makes sure that an optional package is installed.
-
-    Args:
-        module: What would be imported.
-        package: Its name for the user.
-        what: What needs it.
-    """
+    """Raises WorkbenchError unless a module is installed, by its package's name; `what` needs it."""
     if not importlib.util.find_spec(module):
-        command = hints.installing(package)
+        command = hints.extras or shlex.join([sys.executable, "-m", "pip", "install", package])
         raise WorkbenchError(f"{what} needs {package}, an extra: {command} installs it")
-
-
-class Hints:
-    """The commands that texts recommend, each ready to be pasted. A command sets `hints` to its own."""
-
-    extras = ""
-    """Installs all optional packages; empty if each has to be named."""
-
-    def installing(self, package: str) -> str:
-        """Returns the command that installs an optional package."""
-        return self.extras or shlex.join([sys.executable, "-m", "pip", "install", package])
-
-    def finding_modules(self) -> str:
-        """Returns how Python finds a module of the user's own."""
-        return "its folder must be on PYTHONPATH"
-
-    def watching(self, folder: Path) -> str:
-        """Returns the command that shows a run in TensorBoard."""
-        command = _command("tensorboard", "tensorboard.main")
-        return shlex.join([*command, "--logdir", str(folder)])
-
-    def replaying(self, folder: Path) -> str:
-        """Returns the command that shows a run's episodes and curves on a page."""
-        return shlex.join([*_command("rl-workbench", "rl_workbench"), "view", str(folder)])
 
 
 def _command(name: str, module: str) -> list[str]:
     """Returns how a command of this Python's environment is started: by its name if PATH finds it."""
     beside = Path(sys.executable).with_name(name)
     return [name] if shutil.which(name) == str(beside) else [sys.executable, "-m", module]
+
+
+@dataclass
+class Hints:
+    """What texts recommend, ready to be pasted. A command sets `hints` to its own."""
+
+    extras: str = ""  # installs all optional packages; empty if each has to be named
+    modules: str = "its folder must be on PYTHONPATH"  # how Python finds a module of the user's own
+    tensorboard: Sequence[str] = field(
+        default_factory=partial(_command, "tensorboard", "tensorboard.main")
+    )
+    workbench: Sequence[str] = field(
+        default_factory=partial(_command, "rl-workbench", "rl_workbench")
+    )
 
 
 hints = Hints()

@@ -34,13 +34,8 @@ def option(
 ) -> Any:
     """Makes a dataclass field that knows its meaning and its limits.
 
-    Args:
-        default: A dict or a list is copied for each instance.
-        text: For `--help`.
-        lowest: The smallest number allowed.
-        highest: The largest number allowed.
-        choices: All values that a text may have.
-        metavar: What `--help` calls the value; by default the last word of its name.
+    `text` and `metavar`, by default the last word of its name, are for `--help`. `choices` are all values
+    that a text may have. A default that is a dict or a list is copied for each instance.
     """
     limits = None if (lowest, highest) == (-math.inf, math.inf) else (lowest, highest)
     metadata = {"help": text, "limits": limits, "choices": choices, "metavar": metavar}
@@ -50,11 +45,7 @@ def option(
 
 
 def check_options(instance: Any) -> None:
-    """Checks every value of a dataclass of options against its limits and choices.
-
-    Raises:
-        WorkbenchError: If a value is outside them. NaN is outside of any limits.
-    """
+    """Raises WorkbenchError if an option is outside its limits, as NaN is, or none of its choices."""
     for each in fields(instance):
         value = getattr(instance, each.name)
         limits, choices = each.metadata.get("limits"), each.metadata.get("choices")
@@ -111,12 +102,7 @@ class Options:
     def add_flags(
         self, parser: argparse._ActionsContainer, defaults: Mapping[str, Any] | None = None
     ) -> None:
-        """Adds a flag for each option. A flag that isn't given is absent from the result.
-
-        Args:
-            parser: Gets the flags.
-            defaults: Defaults to show in `--help` where they differ from those of the dataclasses.
-        """
+        """Adds a flag for each option, whose default is SUPPRESS; `defaults` are shown in `--help`."""
         for name, each in self._fields.items():
             flag = f"--{name.replace('_', '-')}"
             default = (defaults or {}).get(name, None if each.default is MISSING else each.default)
@@ -172,7 +158,7 @@ def imported(name: str, flag: str) -> Any:
     try:
         return getattr(import_module(module), attribute)
     except ModuleNotFoundError as error:
-        raise WorkbenchError(f"{flag} {name}: {error}; {errors.hints.finding_modules()}") from error
+        raise WorkbenchError(f"{flag} {name}: {error}; {errors.hints.modules}") from error
     except Exception as error:
         raise WorkbenchError(f"{flag} {name}: {errors.error_line(error)}") from error
 
@@ -186,11 +172,7 @@ def is_plain(value: Any) -> bool:
 
 
 def plain_value(value: Any) -> Any:
-    """Reads a text as YAML, and 1e-3 and 5e4 as numbers, which YAML 1.1 doesn't.
-
-    Raises:
-        ValueError: If it isn't YAML.
-    """
+    """Reads a text as YAML, and 1e-3 and 5e4 as numbers, which YAML 1.1 doesn't; else raises ValueError."""
     if not isinstance(value, str):
         return value
     try:
@@ -247,11 +229,7 @@ def _numbers(value: Any, kind: type) -> tuple[Any, ...]:
 
 
 def mapping(value: Any) -> dict[str, Any]:
-    """Reads a mapping, or a text such as `control_period=0.02, variation={mass: 0.2, gain: [0.9, 1.1]}`.
-
-    Raises:
-        ValueError: If it is neither. The text is the expected form.
-    """
+    """Reads a mapping, or a text such as `control_period=0.02, variation={mass: 0.2, gain: [0.9, 1.1]}`."""
     if isinstance(value, str):
         first, *words = _KEY.split(value)
         try:

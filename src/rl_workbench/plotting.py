@@ -70,13 +70,10 @@ def moving_average(values: Sequence[float] | np.ndarray, window: int = WINDOW) -
 def mean_over_seeds(
     curves: Sequence[SeedCurve],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Returns the mean over all seeds, from where each has a value to the end of the longest.
+    """Returns positions, mean over all seeds, and the ends of its 95 % interval, each (P,).
 
-    A seed that has ended counts with its last value. Otherwise the mean would fall whenever a good
-    seed ends early.
-
-    Returns:
-        Positions, means and the ends of their 95 % intervals, each (P,).
+    They go from where each has a value to the end of the longest. A seed that has ended counts with its last
+    value: otherwise the mean would fall whenever a good seed ends early.
     """
     positions = np.unique(np.concatenate([curve.positions for curve in curves]))
     positions = positions[positions >= max(curve.positions[0] for curve in curves)]
@@ -91,14 +88,7 @@ def mean_over_seeds(
 def learning_curve(
     lengths: Sequence[int], returns: Sequence[float], title: str, successes: Sequence[bool] = ()
 ) -> Figure:
-    """Draws one training: length and return of every episode, with their moving averages.
-
-    Args:
-        lengths: Of the episodes [steps].
-        returns: Of the episodes.
-        title: Above the curves.
-        successes: Of the episodes, for a third curve; empty to leave it out.
-    """
+    """Draws one training: length [steps], return and success of every episode, with their moving averages."""
     parts: list[tuple[Sequence[float], str, str]] = [
         (lengths, "episode length [steps]", "tab:blue"),
         (returns, "return", "tab:green"),
@@ -121,12 +111,7 @@ def learning_curve(
 
 
 def training_curves(panels: Sequence[Panel], across: str) -> Figure:
-    """Draws every run by itself: the return of each episode and the moving average.
-
-    Args:
-        panels: One for each environment; their groups are single runs.
-        across: Label of the positions.
-    """
+    """Draws every run by itself, a group of its own: the return of each episode and the moving average."""
     figure, grid = _environments(panels)
     returns = [panel for panel in panels if not panel.shows_success]
     pale, styles = sum(len(panel.curves) for panel in returns) <= MAX_PALE, _styles(panels)
@@ -144,11 +129,7 @@ def training_curves(panels: Sequence[Panel], across: str) -> Figure:
 
 
 def seed_curves(panels: Sequence[Panel]) -> Figure:
-    """Draws groups of seeds: the moving averages over the steps.
-
-    Args:
-        panels: One for each environment, with the return of each episode over the steps.
-    """
+    """Draws groups of seeds in a panel for each environment: moving averages of returns over the steps."""
     figure, grid = _environments(panels)
     styles = _styles(panels)
     for axes, panel in zip(grid, panels, strict=True):
@@ -164,11 +145,7 @@ def seed_curves(panels: Sequence[Panel]) -> Figure:
 
 
 def evaluation_curves(panels: Sequence[Panel]) -> Figure:
-    """Draws a small panel for each variant, with the first variant's mean in grey behind it.
-
-    Args:
-        panels: One for each variant, with the mean returns of its evaluations over the steps.
-    """
+    """Draws a small panel of evaluations for each variant, with the first one's mean in grey behind it."""
     first, environments = panels[0], {panel.environment for panel in panels}
     columns = min(COLUMNS, len(panels))
     rows = math.ceil(len(panels) / columns)

@@ -37,10 +37,7 @@ JOB = "RL_WORKBENCH_JOB"  # set in the environment of a training that is one of 
 
 
 def program(module: str) -> tuple[str, ...]:
-    """Returns the command that starts a module as a process of its own; see `search_path`.
-
-    -P: a user's `token.py` in the current folder mustn't replace the standard library's.
-    """
+    """Returns the command that starts a module as a process; -P: a user's `token.py` isn't Python's."""
     return (sys.executable, "-P", "-m", module)
 
 
@@ -125,13 +122,7 @@ class Interrupt:
 
 
 def run_command(prog: str, command: Callable[[Interrupt], object], *errors: type[Exception]) -> int:
-    """Runs a command; returns the process's exit code.
-
-    Args:
-        prog: The command's name, for errors.
-        command: Gets what handles signals. An error for the user becomes one line and exit code 1.
-        errors: Further ones for the user than WorkbenchError.
-    """
+    """Runs a command; returns the exit code: 1 after an error for the user, printed as one line."""
     from rl_workbench.errors import WorkbenchError  # only after Ctrl-C is handled
 
     expected: tuple[type[Exception], ...] = (WorkbenchError, *errors)

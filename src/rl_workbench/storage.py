@@ -15,11 +15,7 @@ Writer = Callable[[BinaryIO], object]  # fills a file
 
 
 def write_atomically(path: Path, write: Writer) -> None:
-    """Lets `write` fill a file that replaces `path` only once it is complete and on disk.
-
-    Raises:
-        OSError: If it can't be written. An older file of that name is untouched.
-    """
+    """Lets `write` fill a file that replaces `path` once it is complete and on disk; or raises OSError."""
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     try:
         with temporary.open("xb") as stream:
@@ -38,16 +34,7 @@ def write_atomically(path: Path, write: Writer) -> None:
 
 
 def write_file(path: Path, write: Writer, shown: Path | None = None) -> None:
-    """Writes a file that the user asked for, atomically; also makes its folder.
-
-    Args:
-        path: The file.
-        write: Fills it.
-        shown: Its name for the error, if the user gave another one.
-
-    Raises:
-        WorkbenchError: If it can't be written. An older file of that name is untouched.
-    """
+    """Writes a file that the user asked for, as `shown`, atomically; else raises WorkbenchError."""
     shown = shown or path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -73,21 +60,14 @@ def as_text(text: str) -> Writer:
 
 
 def as_json(content: Any) -> Writer:
-    """Returns a writer of JSON.
-
-    Raises:
-        ValueError: If a number is NaN or infinite.
-    """
+    """Returns a writer of JSON; raises ValueError if a number is NaN or infinite."""
     return as_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
 def save_tensors(path: Path, content: dict[str, Any]) -> None:
-    """Writes a file for `torch.load`.
+    """Writes a file for `torch.load`; raises OSError if it can't, and an older file is untouched.
 
     The content is serialised in memory first, since torch hides a full disk behind an error of its own.
-
-    Raises:
-        OSError: If it can't be written. An older file of that name is untouched.
     """
     import torch  # takes seconds to import, and most files don't need it
 

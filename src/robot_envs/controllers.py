@@ -72,10 +72,7 @@ def _load_one(manager: ControllerManager, name: str, parameters: Mapping[str, An
 def ports(
     commanded: Sequence[str] | None, parameters: Mapping[str, Any], loaded: Loaded
 ) -> list[CommandPort]:
-    """Returns the ports of the controllers that a task commands; None: all that take numbers.
-
-    Raises ControlError if one doesn't run, or takes no numbers.
-    """
+    """Returns the ports of these controllers, None: all that take numbers; else raises ControlError."""
     if commanded is None:
         return [_port(each, parameters) for each in loaded.values() if _takes_numbers(each)]
     for name in commanded:
@@ -122,12 +119,8 @@ def faults(
 ) -> Iterator[str]:
     """Yields what is wrong with a robot's controllers.
 
-    Args:
-        run: Names of those that should run.
-        commanded: Names of those that a task should command; None: all that take numbers.
-        parameters: Parameters of all controllers.
-        hardware: Hardware of the robot.
-        movable: Its movable joints, also those without a transmission.
+    `commanded` are those that a task should command, None all that take numbers; `movable` are all movable
+    joints, also those without a transmission.
     """
     manager = ControllerManager(hardware)
     loaded: Loaded = {}

@@ -23,10 +23,7 @@ SHARE = Path(__file__).resolve().parent / "share"  # in a wheel (setup.py)
 
 
 def own_file(package: str, place: str) -> Path:
-    """Finds a file of this package, or of one of its companions, without a running ROS.
-
-    It is in the source tree, in a wheel next to this module, or in a catkin workspace, where rospkg finds it.
-    """
+    """Finds a file of this package or a companion: in the source tree, a wheel, or a catkin workspace."""
     source = TREE if package == "cartpole" else TREE / "companions" / package
     for folder in (source, SHARE / package):
         if (folder / place).is_file():

@@ -88,10 +88,7 @@ def check_options(given: Iterable[str], known: Iterable[str] = ()) -> None:
 
 
 def option_names(make: Callable[..., Any]) -> list[str]:
-    """Returns the names of the keyword arguments of a class or function, without a robot and a task.
-
-    What a class takes as `**options` are those of its base that have defaults.
-    """
+    """Returns the keyword arguments of a class (its bases' with defaults for `**options`) or function."""
     names: dict[str, None] = {}
     for maker in inspect.getmro(make) if isinstance(make, type) else [make]:
         parameters = inspect.signature(maker).parameters.values()

@@ -101,14 +101,11 @@ class Scene:
                 f"commands are given by controller, {{{next(iter(self.ports), '')!r}: ...}}, not {given!r}"
             ) from None
         for name, value in items:
-            commands[name] = _command(self._port(name), name, value)
+            if name not in self.ports:
+                near = nearest_or_all(name, self.ports)
+                raise TaskError(f"no controller '{name}' takes commands{near}")
+            commands[name] = _command(self.ports[name][1], name, value)
         return commands
-
-    def _port(self, name: str) -> CommandPort:
-        if name not in self.ports:
-            near = nearest_or_all(name, self.ports)
-            raise TaskError(f"no controller '{name}' takes commands{near}")
-        return self.ports[name][1]
 
     def placed_joints(self, initial: InitialState) -> Placed:
         """Returns all movable joints' position and velocity; raises TaskError for an unknown or wrong one."""

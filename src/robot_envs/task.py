@@ -1,7 +1,4 @@
-"""Tasks: actions, observations, rewards, and the beginning and end of episodes.
-
-A task knows neither ROS nor a simulator nor a learner; every backend runs the same tasks.
-"""
+"""Tasks: actions, observations, rewards, episodes; they know neither ROS nor simulators nor learners."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -76,14 +73,9 @@ class Task(Stateful, ABC):
 
     @abstractmethod
     def apply(self, action: Any, state: WorldState) -> Commands:
-        """Converts an action to commands.
+        """Converts an action to commands by controller; those that aren't named keep theirs.
 
-        Args:
-            action: In the action space.
-            state: Before the action; `state.commands` is what the controllers hold.
-
-        Returns:
-            Commands by controller; controllers that aren't named keep theirs.
+        `state` is that before the action; its `commands` are what the controllers hold.
         """
 
     @abstractmethod

@@ -34,6 +34,7 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
 
     Each environment is bit-identical to one alone: the seed s stands for s, s + 1, ..., one for each. A wrong
     action is refused before anything moves. After an error in the middle of a step all have to be reset.
+    Raises ValueError if an option makes no sense, RobotEnvError if a robot can't be brought up.
 
     Args:
         num_envs: Number of environments.
@@ -41,10 +42,6 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
         backend: The backend of all; "ros" and "ros-own" are the same here.
         autoreset_mode: Gymnasium's: "NextStep", "SameStep" or "Disabled".
         options: Keyword arguments of `make`.
-
-    Raises:
-        ValueError: If an option makes no sense.
-        RobotEnvError: If a robot can't be brought up.
     """
 
     def __init__(
@@ -105,11 +102,7 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
         return given
 
     def step(self, actions: Any) -> Results:
-        """Carries out one action in each; see `SyncVectorEnv`.
-
-        Raises as `RobotEnv.step`; a ValueError for a wrong action or a wrong number of them, and nothing has
-        moved.
-        """
+        """Carries out one action in each; nothing moves for a wrong one, which is a ValueError."""
         self._check_ready()
         read = [self._read(action) for action in iterate(self.action_space, actions)]
         if len(read) != self.num_envs:

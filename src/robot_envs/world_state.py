@@ -10,20 +10,8 @@ from robot_sim.physics.world import seen_from
 from robot_sim.sensors.sensor_reading import Reading
 from robot_sim.state import ContactPair, LinkQuery, StateQuery
 
-__all__ = [
-    "Command",
-    "Commands",
-    "ContactPair",
-    "InitialState",
-    "JointState",
-    "LinkQuery",
-    "Motion",
-    "Pose",
-    "Reading",
-    "StateQuery",
-    "Twist",
-    "WorldState",
-]
+__all__ = ["Command", "Commands", "ContactPair", "InitialState", "JointState", "LinkQuery", "Motion", "Pose",
+           "Reading", "StateQuery", "Twist", "WorldState"]  # fmt: skip
 
 Entry = TypeVar("Entry")
 Command = float | Sequence[float]
@@ -61,10 +49,7 @@ class Motion(NamedTuple):
         return cls(pose, Twist(*twist))
 
     def seen_from(self, frame: "Motion") -> "Motion":
-        """Returns the same, seen from the frame of another motion, both given in one frame.
-
-        Velocities are differences in the other's axes; its rotation adds nothing.
-        """
+        """Returns the same, seen from the frame of another; its rotation adds nothing to velocities."""
         return Motion.of(*seen_from(self, frame))
 
 

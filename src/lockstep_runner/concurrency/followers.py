@@ -71,9 +71,7 @@ def _name(pid: int) -> str:
     return "ended"
 
 
-NODE_PATIENCE = (
-    10.0  # [s of wall time] for a node that computes or waits for something other than time
-)
+NODE_PATIENCE = 10.0  # [s of wall time] for a node that computes, or waits for anything but time
 
 
 @dataclass
@@ -92,12 +90,7 @@ class _Node:
 
 
 class Followers(Others):
-    """All nodes that follow the clock, which connect to a socket.
-
-    Args:
-        address: Path of the socket.
-        runner: The script's.
-    """
+    """All nodes that follow the script's clock, which connect to the socket at `address`."""
 
     def __init__(self, address: str, runner: ScriptRunner) -> None:
         self._clock, self._world = runner.clock, runner.world

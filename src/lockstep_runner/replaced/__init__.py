@@ -11,10 +11,7 @@ from lockstep_runner.world import ScriptWorld
 
 
 def install(args: argparse.Namespace, world: ScriptWorld | None = None) -> ScriptRunner:
-    """Replaces the functions that docs/lockstep.md lists; returns the runner that the replacements share.
-
-    `args` are the launcher's options, `world` that of a node that follows the script's clock.
-    """
+    """Replaces the functions that docs/lockstep.md lists, by the launcher's options; returns the runner."""
     triggers = None
     if args.step_on is not None:
         triggers = [f"/{name.removeprefix('/')}" for name in args.step_on if name != "none"]

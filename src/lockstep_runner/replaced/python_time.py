@@ -15,6 +15,7 @@ LONGEST_SLEEP = 9e9  # [s]; Python counts nanoseconds in 64 bits
 
 def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
     """Replaces time.sleep, and with `virtual_wall_clock` Python's clocks."""
+    start, clock = time.time(), runner.clock
 
     def sleep(seconds: float) -> None:
         """As time.sleep, in simulated time [s]."""
@@ -25,7 +26,7 @@ def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
             and runner.waits_for_others(seconds)
         ):
             originals.sleep(seconds)
-        elif _is_wall_time(runner):
+        elif not clock.covers_this_thread() or clock.is_own(threading.current_thread()):
             _sleep_in_wall_time(runner, seconds)
         elif runner.is_connected():
             if not 0.0 <= seconds <= LONGEST_SLEEP:
@@ -36,10 +37,9 @@ def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
 
     time.sleep = sleep  # type: ignore[assignment]
     if virtual_wall_clock:
-        start, passed = time.time(), runner.clock
 
         def simulated() -> float:
-            return passed.passed / 1e9
+            return clock.passed / 1e9
 
         time.time = lambda: start + simulated()
         time.monotonic = time.perf_counter = simulated
@@ -54,9 +54,3 @@ def _sleep_in_wall_time(runner: ScriptRunner, seconds: float) -> None:
     )
     runner.clock.ended(thread)  # time doesn't wait for this thread
     originals.sleep(seconds)
-
-
-def _is_wall_time(runner: ScriptRunner) -> bool:
-    """Returns whether this thread sleeps in wall time, as threads do that the script itself started."""
-    clock = runner.clock
-    return not clock.covers_this_thread() or clock.is_own(threading.current_thread())

@@ -48,11 +48,7 @@ class ValueNetwork(nn.Module):
 
 
 def discounted_returns(rewards: list[float], gamma: float) -> np.ndarray:
-    """Computes each step's return backwards from the last: G_t = r_t + gamma G_t+1.
-
-    Returns:
-        float64, shape (len(rewards),).
-    """
+    """Computes each step's return (T,), float64, backwards from the last: G_t = r_t + gamma G_t+1."""
     returns = np.empty(len(rewards))
     future = 0.0
     for index in range(len(rewards) - 1, -1, -1):
@@ -65,13 +61,9 @@ class PolicyGradientAgent(TwoNetworks):
     """Learns from whole episodes; acts from a NumPy copy of the linear policy.
 
     Both output layers start at zero: a uniform policy, and a value of 0 everywhere. With random output
-    layers, as in the existing script, several seeds in ten need more than 600 episodes: a policy weight
-    of the wrong sign has to be unlearned, and a hidden unit with a negative weight to the value's output
-    soon dies, since returns are positive.
-
-    Args:
-        seed: Seeds the agent's own generators, for the initial weights and for the actions.
-        settings: The algorithm's options.
+    layers, as in the existing script, several seeds in ten need more than 600 episodes: a policy weight of
+    the wrong sign has to be unlearned, and a hidden unit with a negative weight to the value's output soon
+    dies, since returns are positive. `seed` is of initial weights and actions.
     """
 
     def __init__(self, seed: int = 0, settings: DocumentSettings | None = None) -> None:
@@ -93,10 +85,7 @@ class PolicyGradientAgent(TwoNetworks):
         self._bias = self._output.bias.detach().numpy().copy()  # (2,)
 
     def probability_of_zero(self, observation: np.ndarray) -> float:
-        """Returns the policy's probability of action 0 for an observation (4,).
-
-        NumPy is eight times as fast as torch here, and equal within float32 rounding.
-        """
+        """Returns the probability of action 0 for an observation (4,), eight times as fast as torch."""
         left, right = (self._weight @ observation + self._bias).tolist()
         return 1.0 / (1.0 + math.exp(min(right - left, 700.0)))
 
@@ -119,9 +108,8 @@ class PolicyGradientAgent(TwoNetworks):
     def learn(self, episode: Episode) -> Losses:
         """Updates both networks once from one episode.
 
-        Raises:
-            WorkbenchError: If a loss or the policy's gradient isn't finite, before any weight changes; or if
-                the value's gradient isn't.
+        Raises WorkbenchError if a loss or the policy's gradient isn't finite, before any weight changes; or
+        if the value's gradient isn't.
         """
         observations = torch.from_numpy(np.stack(episode.observations))  # (T, 4)
         actions = torch.tensor(episode.actions)  # (T,)

@@ -26,15 +26,9 @@ class Learned(NamedTuple):
 class DQNAgent:
     """Learns a Q-network from single steps.
 
-    It has its own generators for initial weights, exploration and batches: the same seed and the same
-    steps give bit-identical weights.
-
-    Args:
-        settings: The algorithm's options.
-        observation_size: D; observations are float32 of shape (D,).
-        actions: A; actions are 0 to A - 1.
-        seed: Seeds weights, exploration and batches.
-        device: The networks' torch device.
+    It has its own generators for initial weights, exploration and batches: the same seed and the same steps
+    give bit-identical weights. Observations are float32 of shape (observation_size,), actions 0 to `actions`
+    - 1.
     """
 
     def __init__(
@@ -133,7 +127,7 @@ class DQNAgent:
     def episode_done(self) -> None:
         """Ends the current episode, whether it finished or is abandoned."""
         self._returns.clear()
-        self._epsilon.episode_done()
+        self._epsilon.ended("episode")
 
     @property
     def is_due(self) -> bool:
@@ -148,16 +142,14 @@ class DQNAgent:
     def learn(self) -> Learned:
         """Runs one round of `settings.gradient_steps` gradient steps.
 
-        Raises:
-            WorkbenchError: If the loss or the gradient isn't finite. That gradient step changes no
-                weight.
+        Raises WorkbenchError if loss or gradient isn't finite; that gradient step changes no weight.
         """
         settings = self.settings
         self._optimizer.param_groups[0]["lr"] = learning_rate(settings, self.steps)
         batch = self.buffer.sample(settings.batch_size, self._draw, settings.gradient_steps)
         for index in range(settings.gradient_steps):
             learned = self._gradient_step(self._tensors(batch, index))
-        self._epsilon.learned()
+        self._epsilon.ended("step")
         return learned
 
     def _tensors(self, batch: Batch, index: int) -> tuple[torch.Tensor, ...]:
@@ -359,18 +351,10 @@ class Epsilon:
             share = min(1.0, steps / self._duration) if self._duration else 1.0
             self.value = start + (end - start) * share
 
-    def learned(self) -> None:
-        """Applies the decay of a round of learning."""
-        if self._settings.epsilon_schedule == "step":
-            self._decay()
-
-    def episode_done(self) -> None:
-        """Applies the decay of an episode."""
-        if self._settings.epsilon_schedule == "episode":
-            self._decay()
-
-    def _decay(self) -> None:
-        self.value = max(self._settings.end_e, self.value * self._settings.epsilon_decay)
+    def ended(self, what: str) -> None:
+        """Applies the decay of a round of learning, "step", or of an "episode"."""
+        if self._settings.epsilon_schedule == what:
+            self.value = max(self._settings.end_e, self.value * self._settings.epsilon_decay)
 
 
 def learning_rate(settings: DQNSettings, steps: int) -> float:

@@ -1,7 +1,4 @@
-"""Greedy policies as torch modules, from observations to actions, without the agent that learned them.
-
-TorchScript can compile all of them. For single observations the agents use faster NumPy code.
-"""
+"""Greedy policies as torch modules that TorchScript can compile, without the agent that learned them."""
 
 import numpy as np
 import torch
@@ -9,13 +6,7 @@ from torch import nn
 
 
 class Scaling(nn.Module):
-    """Scales observations (N, D) as in the training: (x - offset) * factors, clipped to +-limit.
-
-    Args:
-        offset: (D,) float32.
-        factors: (D,) float32.
-        limit: The largest absolute result.
-    """
+    """Scales observations (N, D): (x - offset) * factors, both (D,) float32, clipped to +-limit."""
 
     offset: torch.Tensor
     factors: torch.Tensor
@@ -33,12 +24,7 @@ class Scaling(nn.Module):
 
 
 class Spread(nn.Module):
-    """Converts actions (N, n), given in half-ranges from the middle of their range, to their own units.
-
-    Args:
-        middle: (n,) float32.
-        half: (n,) float32.
-    """
+    """Converts actions (N, n) in half-ranges from the middle of their range, (n,) float32, to their units."""
 
     middle: torch.Tensor
     reach: torch.Tensor
@@ -53,13 +39,7 @@ class Spread(nn.Module):
 
 
 class Continuous(nn.Module):
-    """Maps observations (N, D) to continuous actions, in the action space's shape and type.
-
-    Args:
-        outputs: Maps observations to numbers (N, n).
-        low: The smallest action, in the space's shape and type.
-        high: The largest action.
-    """
+    """Maps observations (N, D) by `outputs` (N, n) to continuous actions, in their space's shape and type."""
 
     low: torch.Tensor
     high: torch.Tensor
@@ -80,11 +60,7 @@ class ClippedAction(Continuous):
 
 
 class Choice(nn.Module):
-    """Maps observations (N, D), float32, to the actions that their scores choose.
-
-    Args:
-        scores: Maps observations to scores (N, A), on any scale.
-    """
+    """Maps observations (N, D), float32, to actions, by what maps them to scores (N, A), on any scale."""
 
     def __init__(self, scores: nn.Module) -> None:
         super().__init__()
@@ -99,12 +75,7 @@ class SingleChoice(Choice):
 
 
 class SeveralChoices(Choice):
-    """Chooses the action with the highest score in each group of scores, (N, groups).
-
-    Args:
-        scores: Maps observations to scores (N, A), on any scale.
-        sizes: Of the groups; their sum is A.
-    """
+    """Chooses the action with the highest score in each group of scores, (N, groups), of these sizes."""
 
     def __init__(self, scores: nn.Module, sizes: list[int]) -> None:
         super().__init__(scores)

@@ -78,13 +78,9 @@ class Losses(NamedTuple):
 
 
 class TwoNetworks(ABC):
-    """Base class: a policy and a value network, an Adam for each, and a generator for the actions.
+    """Base class: policy and value networks, an Adam for each, and a generator for the actions.
 
-    Args:
-        policy: Maps observations (N, D) to probabilities (N, A).
-        value: Maps observations (N, D) to estimated returns (N, 1).
-        rates: Learning rates of policy and value.
-        seed: Seeds the generator.
+    They map observations (N, D) to probabilities (N, A) and to estimated returns (N, 1).
     """
 
     def __init__(
@@ -134,12 +130,7 @@ def start_at_zero(layer: nn.Linear) -> None:
 
 
 def descend(optimizer: torch.optim.Optimizer, loss: torch.Tensor) -> None:
-    """Takes one optimizer step down the loss.
-
-    Raises:
-        WorkbenchError: If the gradient isn't finite, which is possible even with a finite loss. The
-            weights are unchanged.
-    """
+    """Takes an optimizer step; raises WorkbenchError, weights unchanged, if the gradient isn't finite."""
     optimizer.zero_grad()
     loss.backward()
     gradients = [weight.grad for group in optimizer.param_groups for weight in group["params"]]

@@ -1,7 +1,4 @@
-"""Softmax and Gaussian policies: the torch networks that learn, and NumPy actors that act.
-
-For a single observation NumPy is several times as fast as torch.
-"""
+"""Softmax and Gaussian policies: torch networks that learn; NumPy actors, several times as fast."""
 
 import math
 from collections.abc import Callable
@@ -15,13 +12,7 @@ SMALLEST_CHANCE = float(np.finfo(np.float32).tiny)  # lower bound of probabiliti
 
 
 class PolicyNetworkBase(nn.Module):
-    """A linear layer, after a hidden tanh layer if there is one.
-
-    Args:
-        observations: D.
-        outputs: A.
-        hidden: Units of the hidden layer; 0 for no such layer.
-    """
+    """A linear layer from D to A, after a hidden tanh layer if it has any units."""
 
     def __init__(self, observations: int, outputs: int, hidden: int) -> None:
         super().__init__()
@@ -73,12 +64,7 @@ class SoftmaxNetwork(PolicyNetworkBase):
 
 
 class PairActor:
-    """Acts by one dot product: for two actions and no hidden layer.
-
-    Args:
-        network: Has two actions and no hidden layer.
-        factors: (D,), multiply the observations.
-    """
+    """Acts by one dot product: for two actions and no hidden layer. Factors (D,) multiply observations."""
 
     def __init__(self, network: SoftmaxNetwork, factors: np.ndarray) -> None:
         weight = network.fc.weight.detach().numpy()  # (2, D)
@@ -157,14 +143,7 @@ class Bounds(NamedTuple):
 
 
 class GaussianNetwork(PolicyNetworkBase):
-    """Maps prepared observations (N, D) to the actions' means (N, n), in half-ranges from the middle.
-
-    Args:
-        observations: D.
-        bounds: Of the actions.
-        hidden: Units of the hidden layer; 0 for no such layer.
-        log_std: Logarithm of the initial standard deviation.
-    """
+    """Maps prepared observations (N, D) to the actions' means (N, n), in half-ranges from the middle."""
 
     def __init__(self, observations: int, bounds: Bounds, hidden: int, log_std: float) -> None:
         super().__init__(observations, bounds.low.size, hidden)

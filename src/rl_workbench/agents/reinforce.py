@@ -57,12 +57,8 @@ class BaselineNetwork(nn.Module):
 class ReinforceAgent(TwoNetworks):
     """Learns from batches of whole episodes, with a softmax policy or, for continuous actions, a Gaussian.
 
-    Args:
-        seed: Seeds the agent's own generators, for the initial weights and for the actions.
-        scale: (D,), divides observations.
-        settings: The algorithm's options.
-        actions: Number of discrete actions, or the bounds of continuous ones.
-        environments: How many play at the same time; each contributes equally to a batch.
+    `scale` (D,) divides observations. `actions` are their number, or the bounds of continuous ones. Each of
+    the `environments` that play at the same time contributes equally to a batch.
     """
 
     def __init__(
@@ -76,13 +72,18 @@ class ReinforceAgent(TwoNetworks):
         self.settings = settings = settings or ReinforceSettings()
         with torch.random.fork_rng():
             torch.manual_seed(seed)
-            self._network = _make_network(len(scale), actions, settings)
-            value = BaselineNetwork(len(scale), settings.value_hidden)
+            size, hidden = len(scale), settings.policy_hidden
+            self._network: SoftmaxNetwork | GaussianNetwork
+            if isinstance(actions, int):
+                self._network = SoftmaxNetwork(size, actions, hidden)
+            else:
+                self._network = GaussianNetwork(size, actions, hidden, settings.log_std_init)
+            value = BaselineNetwork(size, settings.value_hidden)
         start_at_zero(self._network.fc)
         rates = (settings.policy_learning_rate, settings.value_learning_rate)
         super().__init__(self._network, value, rates, seed)
         self._factors = 1.0 / np.asarray(scale, np.float32)  # (D,)
-        self._normaliser = Normaliser(len(scale)) if settings.normalize_observations else None
+        self._normaliser = Normaliser(size) if settings.normalize_observations else None
         self._actions = actions
         self._batch_size = settings.batch_episodes * environments
         self._batch: list[Episode] = []
@@ -134,12 +135,8 @@ class ReinforceAgent(TwoNetworks):
     def learn(self, *episodes: Episode) -> Losses | None:
         """Adds an episode, or one per environment, to the batch; a full batch updates both networks.
 
-        Returns:
-            The losses before the update; None if the batch isn't full yet.
-
-        Raises:
-            WorkbenchError: If a loss or a gradient isn't finite. The network that it belongs to is as
-                before then.
+        Returns the losses before the update; None if the batch isn't full yet. Raises WorkbenchError if a
+        loss or a gradient isn't finite; the network that it belongs to is as before then.
         """
         batch = [*self._batch, *episodes]
         if len(batch) < self._batch_size:
@@ -227,25 +224,12 @@ class ReinforceAgent(TwoNetworks):
         super().load_state_dict(state)
 
 
-def _make_network(
-    observations: int, actions: int | Bounds, settings: ReinforceSettings
-) -> SoftmaxNetwork | GaussianNetwork:
-    if isinstance(actions, int):
-        return SoftmaxNetwork(observations, actions, settings.policy_hidden)
-    return GaussianNetwork(observations, actions, settings.policy_hidden, settings.log_std_init)
-
-
 def generalised_advantages(
     rewards: Sequence[float], values: np.ndarray, gamma: float, gae_lambda: float
 ) -> np.ndarray:
     """Computes Â_t = Σ_k (γλ)^k δ_{t+k}, δ_t = r_t + γ V(s_{t+1}) - V(s_t) (Schulman et al. 2016, eq. 16).
 
-    Args:
-        rewards: Of T steps.
-        values: V at the T states and the final one, (T + 1,).
-
-    Returns:
-        float64, (T,).
+    Returns (T,), float64, for rewards (T,) and the values of T states and the final one, (T + 1,).
     """
     advantages = np.empty(len(rewards))
     following = 0.0

@@ -10,10 +10,7 @@ from rl_workbench.errors import WorkbenchError
 
 
 class Transition(NamedTuple):
-    """One step, or n steps in one, for the target of Q(observation, action).
-
-    `discount` multiplies the next observation's value: gamma^n, or 0 after a termination.
-    """
+    """One step, or n, for the target of Q(observation, action)."""
 
     observation: np.ndarray  # (D,) float32
     action: int
@@ -33,10 +30,7 @@ class Batch(NamedTuple):
 
 
 class ReplayBuffer:
-    """Keeps the newest `capacity` transitions.
-
-    Memory is reserved but not touched, so a large buffer takes no RAM until it fills.
-    """
+    """Keeps the newest `capacity` transitions; memory that is only reserved takes no RAM until it fills."""
 
     def __init__(self, capacity: int, observation_size: int) -> None:
         shape = (capacity, observation_size)
@@ -68,10 +62,7 @@ class ReplayBuffer:
         self._size = max(self._size, index + 1)
 
     def sample(self, batch_size: int, rng: np.random.Generator, rounds: int = 1) -> Batch:
-        """Draws `rounds` batches, each without replacement.
-
-        If the buffer holds fewer than `batch_size` transitions, each batch holds all of them.
-        """
+        """Draws `rounds` batches, each without replacement, of all transitions if these are fewer."""
         count = min(batch_size, self._size)
         if count == self._size:
             indices = np.tile(np.arange(count), (rounds, 1))
@@ -99,12 +90,7 @@ class ReplayBuffer:
 
 
 class NStepReturns:
-    """Combines an episode's steps into n-step transitions, shorter ones at the episode's end.
-
-    Args:
-        steps: N; with 1 each step is its own transition.
-        gamma: The discount factor.
-    """
+    """Combines an episode's steps into n-step transitions, shorter ones at the episode's end."""
 
     def __init__(self, steps: int, gamma: float) -> None:
         self._steps = steps
@@ -114,13 +100,9 @@ class NStepReturns:
     def add(
         self, step: tuple[np.ndarray, int, float], following: np.ndarray, ended: bool, valued: bool
     ) -> list[Transition]:
-        """Adds one step; returns the transitions that it completes.
+        """Adds a step (observation, action, reward); returns the transitions that it completes.
 
-        Args:
-            step: Observation before the action, action, reward.
-            following: The observation after it.
-            ended: Whether the episode is over, by termination or truncation.
-            valued: Whether the following observation's value counts; false after a termination.
+        `following` is the observation after it, whose value counts if `valued`: not after a termination.
         """
         self._window.append(step)
         transitions = []

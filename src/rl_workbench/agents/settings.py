@@ -93,11 +93,9 @@ class ReinforceSettings:
         0, "units in the policy's hidden layer; 0: a linear policy", 0, 2**16
     )
     log_std_init: float = option(
-        -0.5,
-        "continuous actions: log of the initial standard deviation, in units of half their range",
-        -4,
-        4,
-    )
+        -0.5, "continuous actions: log of the initial standard deviation, in units of half their range",
+        -4, 4,
+    )  # fmt: skip
     value_hidden: int = option(32, "units in each of the baseline's two layers", 1, 2**16)
     normalize_observations: bool = option(
         False,
@@ -106,7 +104,6 @@ class ReinforceSettings:
     observation_scale: tuple[float, ...] = option(
         (), "divisor of each element of an observation; empty: no scaling"
     )
-
     save_every: int = option(
         100, "episodes between saves of the networks as .pth; 0: only at the end", 0, 2**31 - 1
     )
@@ -130,7 +127,6 @@ class DocumentSettings:
         False, "draw all initial weights at random, as the script does; else the output layers "
         "start at zero, which learns more reliably",
     )  # fmt: skip
-
     save_every: int = option(
         100, "episodes between saves of the networks as .pth; 0: only at the end", 0, 2**31 - 1
     )

@@ -6,10 +6,9 @@ import itertools
 import os
 import platform
 import re
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from rl_workbench.env_ids import as_file_name, threshold
 from rl_workbench.errors import WorkbenchError
@@ -56,12 +55,8 @@ class Suite:
     variants: tuple[Variant, ...]
 
 
-class _Planned(NamedTuple):
-    """A training of the benchmark."""
-
-    variant: str
-    seed: int
-    job: Job
+Planned = list[tuple[str, int, Job]]
+"""The trainings of a benchmark: variant, seed and job."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -101,12 +96,12 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
             raise WorkbenchError(f"{folder} holds something else; name another folder with --out")
         variants = [asdict(each) for each in suite.variants]
         claim(folder, SUITE_RECORD, variants, "runs with other options")
-        planned = []
+        planned: Planned = []
         for variant, seed in itertools.product(suite.variants, seeds):
             name, own = f"{variant.name}, seed {seed}", folder / variant.name / f"seed_{seed}"
             job = Job(name, own, tuple(training_flags(variant, seed)))
-            planned.append(_Planned(variant.name, seed, job))
-        jobs = [each.job for each in planned]
+            planned.append((variant.name, seed, job))
+        jobs = [job for _, _, job in planned]
         with job_pool(arguments, folder, interrupt, jobs) as pool:
             interrupt.defer()
             pool.run_all(jobs)
@@ -210,7 +205,7 @@ def _text(value: Any) -> str:
     return str(value)
 
 
-def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, where: str) -> None:
+def _report(folder: Path, suite: Suite, planned: Planned, episodes: int, where: str) -> None:
     """Writes all files. results.md depends neither on interruptions nor on the folder's place."""
     from rl_workbench.tools import results as figures
 
@@ -219,7 +214,7 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
     if all(each.steps is None for each in results):
         fault = results[0].fault
         raise WorkbenchError(
-            f"no training has a result; the first one ({planned[0].job.log}): {fault}"
+            f"no training has a result; the first one ({planned[0][2].log}): {fault}"
         )
     groups = figures.grouped(results)
     summary = figures.summary_table(groups, figures.SUMMARY)
@@ -233,10 +228,16 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
         "where": where,
         "runs": figures.rows(results, {**figures.RESULTS, **figures.COSTS}),
     }
-    about = f"{suite.about}\n\n{_measured(episodes, {threshold(run.env_id) for run in runs})}"
+    machine = f"{datetime.date.today().isoformat()}, {platform.machine()}, {os.cpu_count()} cores"
+    machine += f", load {os.getloadavg()[0]:.1f}"
+    lines = {line for run in runs if (line := threshold(run.env_id)) is not None}
+    text = " Solved: the first confirmed evaluation of at least {:g}."
+    solved = "".join(map(text.format, sorted(lines)))
+    about = f"{suite.about}\n\nBest and final: mean return of {episodes} greedy episodes on fresh "
+    about += f"seeds, which chose no policy.{solved}"
     for name, write in (
         ("results.md", as_text(f"# {suite.name}\n\n{about}\n\n{summary}\n\n{every}\n")),
-        ("costs.md", as_text(f"# {suite.name}: costs\n\n{_machine()}, {where}.\n\n{costs}\n")),
+        ("costs.md", as_text(f"# {suite.name}: costs\n\n{machine}, {where}.\n\n{costs}\n")),
         ("results.json", as_json(content)),
     ):
         write_file(folder / name, write)
@@ -247,14 +248,6 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
         raise WorkbenchError(
             f"{len(failed)} of {len(results)} trainings failed; the first one: {failed[0].fault}"
         )
-
-
-def _machine() -> str:
-    load = os.getloadavg()[0]
-    return (
-        f"{datetime.date.today().isoformat()}, {platform.machine()}, {os.cpu_count()} cores, "
-        f"load {load:.1f}"
-    )
 
 
 def _draw(folder: Path, runs: list[Run]) -> None:
@@ -274,7 +267,7 @@ def _draw(folder: Path, runs: list[Run]) -> None:
             write_figure(folder / name, figure)
 
 
-def _examine(planned: list[_Planned], episodes: int) -> "tuple[list[Run], list[RunResult]]":
+def _examine(planned: Planned, episodes: int) -> "tuple[list[Run], list[RunResult]]":
     """Returns the runs whose record is readable, and a row of results for every planned run."""
     from rl_workbench.tools.results import RunResult, examine
 
@@ -290,15 +283,3 @@ def _examine(planned: list[_Planned], episodes: int) -> "tuple[list[Run], list[R
             tell(f"evaluating {count} of {len(planned)}: {each} of {job.name}")
             results.append(examine(runs[-1], name, episodes, warn, also_last=True))
     return runs, results
-
-
-def _measured(episodes: int, thresholds: Iterable[float | None]) -> str:
-    """Returns a text on how the figures were measured."""
-    lines = sorted(line for line in thresholds if line is not None)
-    solved = "".join(
-        f" Solved: the first confirmed evaluation of at least {line:g}." for line in lines
-    )
-    return (
-        f"Best and final: mean return of {episodes} greedy episodes on fresh seeds, which chose no "
-        f"policy.{solved}"
-    )

@@ -51,12 +51,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
 
 
 def statistics(result: "Evaluation", threshold: float | None) -> dict[str, Any]:
-    """Returns the statistics of episodes as plain numbers, for JSON.
-
-    Args:
-        result: The episodes.
-        threshold: The mean return at which the environment counts as solved, if there is one.
-    """
+    """Returns statistics of episodes as plain numbers, for JSON; `threshold` is the return that solves."""
     import numpy as np
 
     returns = np.array(result.returns)

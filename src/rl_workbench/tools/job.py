@@ -78,14 +78,11 @@ class Ending(NamedTuple):
 def run_attempt(
     job: Job, program: Program, stop_within: StopWithin, since: float, death_signal: str = "TERM"
 ) -> Ending:
-    """Runs a training as a child process, which ends with this one.
+    """Runs a training as a child process, which ends with this one; resumes it if it has a checkpoint.
 
-    Args:
-        job: The training; it is resumed if it has a checkpoint.
-        program: How it is started.
-        stop_within: Called several times a second. A KeyboardInterrupt stops the training, too.
-        since: When the command began [s since 1970]; earlier attempts don't count as lost.
-        death_signal: Sent to the training if this process is killed.
+    `stop_within` is called several times a second; a KeyboardInterrupt stops the training, too. `since` is
+    when the command began [s since 1970]: earlier attempts don't count as lost. `death_signal` is sent to the
+    training if this process is killed.
     """
     spans = cost_of(job.folder).get("spans", [])
     lost = _lost_attempts(job, since)

@@ -65,14 +65,7 @@ def job_pool(
 
 
 def claim(folder: Path, name: str, wanted: Any, refusal: str) -> None:
-    """Writes the settings of a folder's runs to a file, or checks that the file has the same.
-
-    Args:
-        folder: Of a benchmark or a sweep.
-        name: Of the file.
-        wanted: The settings as plain values.
-        refusal: The error's text, after the folder's name, if the file has other settings.
-    """
+    """Writes the settings of a folder's runs to a file, or refuses those that differ from the file's."""
     found = read_json(folder / name)
     if found is None:
         write_file(folder / name, as_json(wanted))
@@ -95,14 +88,9 @@ class JobEntry:
 
 
 class JobPool:
-    """Runs jobs in threads, reports each end, and keeps jobs.json.
+    """Runs jobs in threads, reports each end, and keeps jobs.json in the folder of all runs.
 
-    Args:
-        folder: Contains jobs.json and all run folders.
-        run: Runs a job, here or on a cluster.
-        at_once: The number of jobs at a time.
-        interrupt: Ends all jobs.
-        jobs: Those known from the beginning; `run` adds others.
+    `jobs` are those known from the beginning; `run` adds others.
     """
 
     def __init__(
@@ -134,13 +122,10 @@ class JobPool:
             list(threads.map(self.run, jobs))
 
     def run(self, job: Job, is_needed: Callable[[], bool] = lambda: True) -> str:
-        """Runs a job in the calling thread; returns why it failed, or "" if it didn't.
+        """Runs a job that isn't complete in the calling thread; returns why it failed, or "" if it didn't.
 
-        A job that is stopped, by the user or because it is not needed, has not failed.
-
-        Args:
-            job: The job; skipped if it is complete.
-            is_needed: Called several times a second; the training is stopped once it returns False.
+        A job that is stopped, by the user or because `is_needed` (called several times a second) says so, has
+        not failed.
         """
         if job.is_done():
             self._set(job, DONE)
@@ -164,7 +149,11 @@ class JobPool:
         if self._is_over():
             self._set(job, WAITING)
             return ""
-        return self._ended(job, _failure(job, ending))
+        words = last_words(job.log)
+        failure = f"ended with exit code {ending.code}, see {job.log}" + f": {words}" * bool(words)
+        if ending.lost:
+            failure = f"given up after {MAX_ATTEMPTS} attempts without progress: {ending.lost}"
+        return self._ended(job, failure)
 
     def _is_over(self) -> bool:
         return self._interrupt.requested() or self.failure is not None
@@ -197,14 +186,6 @@ class JobPool:
         with self._lock:
             content = [asdict(each) for each in self._entries.values()]
             write_file(self._folder / NAME, as_json({"jobs": content}))
-
-
-def _failure(job: Job, ending: Ending) -> str:
-    if ending.lost:
-        return f"given up after {MAX_ATTEMPTS} attempts without progress: {ending.lost}"
-    words = last_words(job.log)
-    code = f"ended with exit code {ending.code}, see {job.log}"
-    return f"{code}: {words}" if words else code
 
 
 def _written(folder: Path) -> list[JobEntry]:

@@ -4,6 +4,7 @@ import argparse
 from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from rl_workbench.training.scalar_log import EVALUATION, RETURN, SUCCESS
 if TYPE_CHECKING:
     from rl_workbench.plotting import Panel, SeedCurve
 
+_experiment = attrgetter("experiment")  # of a run
 CurveOf = Callable[[Run], "SeedCurve | None"]  # None: leave the run out
 
 
@@ -79,10 +81,6 @@ def variant_panels(runs: Sequence[Run]) -> "list[Panel]":
     if not panels:
         raise WorkbenchError("none of these runs was evaluated")
     return panels
-
-
-def _experiment(run: Run) -> str:
-    return run.experiment
 
 
 def _seed_curve(run: Run, tag: str) -> "SeedCurve | None":

@@ -1,12 +1,10 @@
 """Learned policies with an environment to act in, and their episodes."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import gymnasium
 from torch import nn
 
 from rl_workbench.errors import WorkbenchError
@@ -16,28 +14,27 @@ from rl_workbench.tools.runs import Run
 from rl_workbench.training import checkpoints
 from rl_workbench.training.algorithm import load_policy
 from rl_workbench.training.algorithms import algorithm
-from rl_workbench.training.environments import as_float32, make_environment, succeeded
-from rl_workbench.training.evaluator import Evaluation, run_greedily
+from rl_workbench.training.checked import Env
+from rl_workbench.training.environments import make_environment
+from rl_workbench.training.evaluator import Act, Evaluation, run_greedily
+from rl_workbench.training.evaluator import episode_steps as episode_steps  # noqa: PLC0414 - public
 from rl_workbench.training.options import recorded_options
 from rl_workbench.training.progress import warn
 
 TEST_SEED = 5_000_000  # other episodes than those of trainings and their evaluations
-Act = Callable[[Any], Any]  # an observation to an action
 
 
 class Player(NamedTuple):
     """A learned or random policy and an environment of its training's kind, which the caller closes."""
 
     act: Act  # greedily, for one observation: (D,), or a dict as in the training
-    env: gymnasium.Env[Any, Any]
-    network: nn.Module | None = (
-        None  # observations (N, D) to actions; a choice of N has `scores`, too
-    )
+    env: Env
+    network: nn.Module | None = None  # (N, D) to actions; a choice of N has `scores`, too
     checkpoint: Path | None = None  # None for random actions
     steps: int = 0  # of the training up to this checkpoint
 
 
-def environment_of(run: Run, options: Mapping[str, Any]) -> gymnasium.Env[Any, Any]:
+def environment_of(run: Run, options: Mapping[str, Any]) -> Env:
     """Makes an environment with the observations that a run's policies expect."""
     keeps_dict = algorithm(run.algorithm).keeps_dict
     given = {**run.env_kwargs, **options}
@@ -52,7 +49,7 @@ def load_any(run: Run, which: str, env_options: Mapping[str, Any], seed: int) ->
     return Player(random_actions(env, seed), env)
 
 
-def random_actions(env: gymnasium.Env[Any, Any], seed: int) -> Act:
+def random_actions(env: Env, seed: int) -> Act:
     """Returns a policy of random actions with that seed."""
     env.action_space.seed(seed)
     return lambda _: env.action_space.sample()
@@ -63,20 +60,13 @@ def load_learned(
     which: str = "best",
     env_options: Mapping[str, Any] | None = None,
     say: Callable[[str], None] = warn,
-    env: gymnasium.Env[Any, Any] | None = None,
+    env: Env | None = None,
 ) -> Player:
-    """Loads the policy of a checkpoint, or of an earlier one if that is damaged.
+    """Loads the policy of the checkpoint "best" or "last", or of an earlier one if that is damaged.
 
-    Args:
-        run: The run.
-        which: The checkpoint, "best" or "last".
-        env_options: Options of the environment on top of the training's, such as `render_mode`.
-        say: Receives a line for each skipped checkpoint.
-        env: The environment to act in; by default a new one of the run's kind.
-
-    Raises:
-        WorkbenchError: If no checkpoint can be read, it belongs to another run, or the environment
-            can't be made.
+    `env_options` are added to the training's, `say` receives a line for each skipped checkpoint. It acts in
+    `env`, by default a new environment of the run's kind. Raises WorkbenchError if no checkpoint can be read,
+    it belongs to another run, or the environment can't be made.
     """
     paths = checkpoints.candidates(run.folder, best_first=which == "best")
     for path in paths:
@@ -97,7 +87,7 @@ def load_learned(
     raise WorkbenchError(f"{run.folder} has no policy: {reason}")
 
 
-def _learned(run: Run, path: Path, content: dict[str, Any], env: gymnasium.Env[Any, Any]) -> Player:
+def _learned(run: Run, path: Path, content: dict[str, Any], env: Env) -> Player:
     options = recorded_options(content.get("config"), str(path))
     recorded = recorded_options(run.config, str(run.folder / CONFIG_RECORD))
     try:
@@ -118,36 +108,3 @@ def play(policy: Player, episodes: int, seed: int) -> Evaluation:
         raise WorkbenchError(f"the policy doesn't fit the environment: {error}") from error
     assert result is not None  # None would mean it was stopped
     return result
-
-
-class Step(NamedTuple):
-    """The result of a step; the first one is the reset, which has no action."""
-
-    observation: Any
-    action: Any
-    reward: float
-    finished: bool
-    success: bool | None  # None before the end, or if the environment doesn't say
-
-
-def episode_steps(
-    env: gymnasium.Env[Any, Any], act: Act, seed: int, max_steps: int = 0
-) -> Iterator[Step]:
-    """Plays one episode; yields the reset and each step.
-
-    Args:
-        env: The environment.
-        act: Chooses the action for an observation.
-        seed: Of the episode.
-        max_steps: Steps after which the episode is cut off; 0 for never.
-    """
-    observation, _ = env.reset(seed=seed)
-    yield Step(observation, None, 0.0, False, None)
-    for length in count(1):
-        action = act(as_float32(observation))
-        observation, reward, terminated, truncated, info = env.step(action)
-        finished = terminated or truncated or length == max_steps
-        success = succeeded(info) if finished else None
-        yield Step(observation, action, float(reward), finished, success)
-        if finished:
-            return

@@ -130,22 +130,17 @@ class RayJobs:
             cause = getattr(error, "cause", None)  # the task's own error
             if isinstance(cause, NodeUnusable | WorkbenchError):
                 raise WorkbenchError(str(cause)) from error
-            return Ending(lost=_in_a_line(cause or error))
-
-
-def _in_a_line(error: Exception) -> str:
-    """Returns the end of an error, since Ray's own messages are pages long."""
-    lines = str(error).split("\n")
-    return next((line.strip() for line in reversed(lines) if line.strip()), type(error).__name__)
+            # Ray's own messages are pages long.
+            lines = str(cause or error).strip().split("\n")
+            return Ending(lost=lines[-1].strip() or type(cause or error).__name__)
 
 
 @contextlib.contextmanager
 def joined(address: str) -> Iterator[Any]:
     """Joins a cluster, or starts one on this machine; yields the module `ray`.
 
-    Args:
-        address: HOST:PORT of the cluster's head, "auto" for the cluster that this machine belongs to, or
-            "local" for a cluster that ends with the block.
+    `address` is the HOST:PORT of the head, "auto" for the cluster that this machine belongs to, or "local"
+    for one that ends with the block.
     """
     need("ray", "Ray", "--ray")
     for name, value in QUIET.items():

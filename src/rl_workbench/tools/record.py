@@ -217,13 +217,7 @@ def _captioned(picture: "Image", text: str) -> "Image":
 
 
 def write_video(path: Path, frames: "Sequence[np.ndarray]", rate: float) -> None:
-    """Writes a video in the format of the file's suffix; replaces an older file atomically.
-
-    Args:
-        path: The file.
-        frames: At least one, all of one size, (H, W, 3) uint8.
-        rate: Frame rate [Hz].
-    """
+    """Writes frames (H, W, 3) of uint8, `rate` a second, in the format of the suffix; atomically."""
     from rl_workbench.storage import write_file
 
     write = {".gif": _write_gif, ".mp4": _write_mp4, ".html": _write_html}[path.suffix.lower()]

@@ -20,16 +20,11 @@ from PIL import Image
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.flags import RANDOM
-from rl_workbench.tools.policies import (
-    TEST_SEED,
-    Act,
-    environment_of,
-    episode_steps,
-    load_learned,
-    random_actions,
-)
+from rl_workbench.tools.policies import TEST_SEED, environment_of, load_learned, random_actions
 from rl_workbench.tools.runs import Run, open_run
 from rl_workbench.training import checkpoints
+from rl_workbench.training.checked import Env
+from rl_workbench.training.evaluator import Act, episode_steps
 from rl_workbench.training.folder import is_held
 
 if TYPE_CHECKING:
@@ -92,10 +87,7 @@ class PictureView:
     """Takes the pictures of `render`, scaled to a size, and shows them on a page if there is one."""
 
     def __init__(
-        self,
-        env: gymnasium.Env[Any, Any],
-        server: "viser.ViserServer | None" = None,
-        size: Size | None = None,
+        self, env: Env, server: "viser.ViserServer | None" = None, size: Size | None = None
     ) -> None:
         if env.render_mode != "rgb_array":
             raise WorkbenchError("the environment draws no pictures")
@@ -126,9 +118,7 @@ class PictureView:
 class SceneView:
     """Shows an environment that draws itself in 3-D on a page, as one of several with `index`."""
 
-    def __init__(
-        self, env: gymnasium.Env[Any, Any], server: "viser.ViserServer", index: int = 0
-    ) -> None:
+    def __init__(self, env: Env, server: "viser.ViserServer", index: int = 0) -> None:
         try:
             self._drawn = getattr(env.unwrapped, DRAW)(server, index)
         except gymnasium.error.Error as error:
@@ -145,12 +135,12 @@ View = PictureView | SceneView
 """Captures an environment by `take`, and shows what that returned on a page, maybe in another thread."""
 
 
-def draws_itself(env: gymnasium.Env[Any, Any]) -> bool:
+def draws_itself(env: Env) -> bool:
     """Returns whether an environment can be seen in 3-D."""
     return hasattr(env.unwrapped, DRAW)
 
 
-def make_view(server: "viser.ViserServer", env: gymnasium.Env[Any, Any]) -> View:
+def make_view(server: "viser.ViserServer", env: Env) -> View:
     """Makes the best view that the environment has, and points the open pages' cameras at its front."""
     if not draws_itself(env):
         return PictureView(env, server)
@@ -164,24 +154,9 @@ def make_view(server: "viser.ViserServer", env: gymnasium.Env[Any, Any]) -> View
 
 
 def record_episode(
-    env: gymnasium.Env[Any, Any],
-    act: Act,
-    view: View,
-    seed: int,
-    *,
-    stride: float = 1.0,
-    max_steps: int = 0,
+    env: Env, act: Act, view: View, seed: int, *, stride: float = 1.0, max_steps: int = 0
 ) -> Iterator[EpisodeFrame]:
-    """Plays one episode; yields its frames.
-
-    Args:
-        env: The environment.
-        act: Chooses the action for an observation.
-        view: Of the environment.
-        seed: Of the episode.
-        stride: Average number of steps between frames; the last step always has a frame.
-        max_steps: Steps after which the episode is cut off; 0 for never.
-    """
+    """Plays an episode; yields its frames, one in `stride` steps on average, and the last."""
     total, due = 0.0, 0.0
     for length, step in enumerate(episode_steps(env, act, seed, max_steps)):
         total += step.reward
@@ -203,7 +178,7 @@ def _action_text(action: Any) -> str:
     return " ".join([*words, *(["..."] if len(numbers) > MAX_NUMBERS else [])])
 
 
-def step_rate(env: gymnasium.Env[Any, Any]) -> float:
+def step_rate(env: Env) -> float:
     """Returns the steps per second of simulated time [Hz]."""
     return float(env.metadata.get("render_fps") or DEFAULT_RATE)
 
@@ -235,19 +210,13 @@ class RecordedEpisode:
 
 
 class EpisodeRecorder:
-    """Plays and records episodes of a run; only its thread touches the environment.
-
-    Args:
-        folder: The run folder, which may still be empty.
-        server: Of the page.
-        env_options: Of the environment, on top of the training's own.
-    """
+    """Plays and records episodes of a run, which may begin later; only its thread touches the environment."""
 
     def __init__(
         self, folder: Path, server: "viser.ViserServer", env_options: dict[str, Any]
     ) -> None:
         self._folder, self._server, self._env_options = folder, server, env_options
-        self._env: gymnasium.Env[Any, Any] | None = None
+        self._env: Env | None = None
         self.view: View | None = None
         self._wanted: RecordedEpisode | None = None
         self._changed = threading.Condition()
@@ -311,7 +280,12 @@ class EpisodeRecorder:
         run = open_run(self._folder)
         check_robot_is_free(run, {**run.env_kwargs, **self._env_options})
         if self._env is None or self.view is None:
-            self._env = drawn_environment(run, self._env_options)
+            try:
+                drawn = {**self._env_options, "render_mode": "rgb_array"}
+                self._env = environment_of(run, drawn)
+            except WorkbenchError as error:
+                environment_of(run, self._env_options).close()  # raises if it isn't the drawing
+                raise WorkbenchError(f"the environment draws no pictures: {error}") from error
             self._server.scene.reset()  # removes the view of a failed environment
             self.view = make_view(self._server, self._env)
         act = self._policy(run, episode, self._env)
@@ -323,9 +297,7 @@ class EpisodeRecorder:
         except (ValueError, AssertionError, RuntimeError) as error:
             raise WorkbenchError(f"the policy doesn't fit the environment: {error}") from error
 
-    def _record(
-        self, episode: RecordedEpisode, env: gymnasium.Env[Any, Any], act: Act, view: View
-    ) -> None:
+    def _record(self, episode: RecordedEpisode, env: Env, act: Act, view: View) -> None:
         size = 0
         seed = TEST_SEED + episode.seed
         for frame in record_episode(env, act, view, seed, max_steps=MAX_STEPS):
@@ -337,7 +309,7 @@ class EpisodeRecorder:
                 episode.note = f"cut off after {frame.step} steps"
                 return
 
-    def _policy(self, run: Run, episode: RecordedEpisode, env: gymnasium.Env[Any, Any]) -> Act:
+    def _policy(self, run: Run, episode: RecordedEpisode, env: Env) -> Act:
         if episode.which == RANDOM:
             episode.policy = RANDOM
             return random_actions(env, episode.seed)
@@ -349,12 +321,7 @@ class EpisodeRecorder:
 
 
 def check_robot_is_free(run: Run, options: dict[str, Any]) -> None:
-    """Checks that an episode won't move the robot of a running training.
-
-    Args:
-        run: The run, whose record has the options that name a shared robot.
-        options: Of the episode's environment.
-    """
+    """Checks that an episode with these options won't move the robot of a running training."""
     shared = run.config.get("shared_robot")
     if shared is None or not is_held(run.folder):
         return
@@ -366,12 +333,3 @@ def check_robot_is_free(run: Run, options: dict[str, Any]) -> None:
         "another one plays that, and so does --gui of a training with --train-env-kwargs instead of "
         "--env-kwargs"
     )
-
-
-def drawn_environment(run: Run, options: dict[str, Any]) -> gymnasium.Env[Any, Any]:
-    """Makes an environment that draws pictures."""
-    try:
-        return environment_of(run, {**options, "render_mode": "rgb_array"})
-    except WorkbenchError as error:
-        environment_of(run, options).close()  # raises if the cause isn't the drawing
-        raise WorkbenchError(f"the environment draws no pictures: {error}") from error

@@ -50,14 +50,8 @@ def examine(
 ) -> RunResult:
     """Collects the results of a run; unreadable ones become the row's `fault`, not an error.
 
-    Args:
-        run: The run.
-        group: Of the result.
-        episodes: Greedy episodes on fresh seeds for each score; 0 to score a run by the mean of its
-            last training episodes.
-        warn: Receives a line for each skipped checkpoint.
-        which: The checkpoint, "best" or "last".
-        also_last: Whether to play the last checkpoint, too.
+    The score is of that many greedy episodes of the checkpoint `which`, "best" or "last"; with 0 the mean of
+    the last training episodes. `warn` receives a line for each skipped checkpoint.
     """
     faults: list[str] = []
 
@@ -87,7 +81,8 @@ def examine(
         group=group, seed=run.seed, run=run.name, score=score, success=success,
         final=last.mean_return if last else None, training_mean=trained,
         evaluations=None if evaluated is None or not len(evaluated) else float(evaluated.mean()),
-        avg20=_largest_mean(returns),
+        avg20=float(np.convolve(returns, np.full(WINDOW, 1 / WINDOW), mode="valid").max())
+        if len(returns) >= WINDOW else None,
         solved_step=solved_step, steps=steps,
         episodes=summary.get("episodes") or len(returns) or None, seconds=summary.get("seconds"),
         cpu_seconds=cost_of(run.folder).get("cpu_seconds"), fault="; ".join(dict.fromkeys(faults)),
@@ -98,12 +93,6 @@ def _greedy(run: Run, episodes: int, which: str, warn: Callable[[str], None]) ->
     policy = load_learned(run, which, say=warn)
     with closing(policy.env):
         return play(policy, episodes, run.seed)
-
-
-def _largest_mean(returns: np.ndarray) -> float | None:
-    if len(returns) < WINDOW:
-        return None
-    return float(np.convolve(returns, np.full(WINDOW, 1 / WINDOW), mode="valid").max())
 
 
 def _solved(run: Run) -> int | None:

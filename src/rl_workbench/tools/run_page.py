@@ -51,17 +51,9 @@ def show_run(
 ) -> None:
     """Serves the page until Ctrl-C, or until the training that started it ends.
 
-    Args:
-        folder: The run folder.
-        policies: The choices; the first one is played first.
-        seed: Of the first episode.
-        episodes: Number of episodes, with consecutive seeds, that are repeated.
-        env_options: Options of the environment on top of the training's.
-        host: The address to serve on.
-        port: The port to serve on; None for the first free one.
-        browser: Whether to open a browser.
-        interrupt: Ends the serving.
-        beside_training: Whether a training started this process, which ends when its standard input closes.
+    It plays `episodes` with consecutive seeds from `seed` on, again and again, at first by the first of the
+    policies, with options of the environment on top of the training's. `port` is None for the first free one.
+    If it is `beside_training`, its standard input closes with that.
     """
     import torch
 
@@ -127,15 +119,7 @@ def _draw(server: viser.ViserServer, curves: Curves, ended: threading.Event) -> 
 
 
 class Playback:
-    """The controls of the page. One thread calls `tick`; clicks come in viser's threads.
-
-    Args:
-        gui: Of the page.
-        recorder: Records the episodes.
-        policies: The choices; the first one is played first.
-        seed: Of the first episode.
-        episodes: Number of consecutive seeds to play before the first one follows again.
-    """
+    """The controls of the page: as in `show_run`. One thread calls `tick`; clicks come in viser's threads."""
 
     def __init__(
         self,

@@ -111,9 +111,7 @@ def is_run(folder: Path) -> bool:
 def find_runs(patterns: Sequence[str], warn: Callable[[str], None]) -> list[Run]:
     """Returns the runs of run folders, of patterns such as 'runs/*dqn*', and of folders that hold runs.
 
-    Args:
-        patterns: As the user typed them; matches that aren't runs are skipped.
-        warn: Receives a line for each run that is skipped for its damaged record.
+    Matches that aren't runs are skipped; `warn` receives a line for each whose record is damaged.
     """
     found: dict[Path, Run] = {}
     for pattern in patterns:

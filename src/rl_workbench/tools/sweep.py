@@ -261,10 +261,7 @@ class Search:
 
 
 class Judge:
-    """Reports the evaluations of a trial's running training to Optuna.
-
-    Its folder may not exist yet. `frequency` is 0 if only the end is evaluated.
-    """
+    """Reports the evaluations of a trial's running training, every `frequency` steps, to Optuna."""
 
     def __init__(self, study: Any, trial: Any, folder: Path, frequency: int) -> None:
         self._trial, self._frequency = trial, frequency
@@ -288,14 +285,12 @@ class Judge:
                 if tag == EVALUATION and self._frequency and not self._is_pruned:
                     # Episodes and vectors skip steps, so report the step at which the evaluation was due:
                     # that one is comparable between trials.
-                    self._report(int(step) // self._frequency * self._frequency, value)
+                    due = int(step) // self._frequency * self._frequency
+                    if due not in self._steps:
+                        self._steps.add(due)
+                        self._trial.report(value, due)
+                        self._is_pruned = self._trial.should_prune()
         return not self._is_pruned
-
-    def _report(self, step: int, value: float) -> None:
-        if step not in self._steps:
-            self._steps.add(step)
-            self._trial.report(value, step)
-            self._is_pruned = self._trial.should_prune()
 
 
 def score_of(job: Job) -> float:

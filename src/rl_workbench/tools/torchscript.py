@@ -1,7 +1,4 @@
-"""Policies as TorchScript files with a description of the policy.
-
-The file's content is compared with the policy before it is written.
-"""
+"""Policies as TorchScript files with a description of the policy."""
 
 import copy
 import io
@@ -90,11 +87,7 @@ def written(module: nn.Module, metadata: dict[str, Any]) -> bytes:
 
 
 def read(content: bytes) -> tuple[torch.jit.ScriptModule, dict[str, Any]]:
-    """Reads what `written` returned.
-
-    Raises:
-        RuntimeError, ValueError: If the content is something else.
-    """
+    """Reads what `written` returned; raises RuntimeError or ValueError for anything else."""
     extra: dict[str, Any] = {METADATA: ""}
     with _no_deprecation():
         module = torch.jit.load(io.BytesIO(content), map_location="cpu", _extra_files=extra)
@@ -155,12 +148,7 @@ class OfVectors(nn.Module):
 
 
 class OfDicts(nn.Module):
-    """Maps observations, a dict of (N, ...) of any number type, to greedy actions (N, ...).
-
-    Args:
-        network: Takes the parts concatenated.
-        names: The parts' names, in the network's order.
-    """
+    """Maps a dict of observations (N, ...) of any number type to greedy actions (N, ...)."""
 
     def __init__(self, network: nn.Module, names: Sequence[str]) -> None:
         super().__init__()
@@ -174,9 +162,8 @@ class OfDicts(nn.Module):
 def export(run: Run, policy: Player, seed: int) -> tuple[bytes, Agreement]:
     """Returns the file's content, and how it compares with the policy.
 
-    Raises:
-        WorkbenchError: If the environment fails, its observations can't be exported, or the file
-            would act differently.
+    Raises WorkbenchError if the environment fails, its observations can't be exported, or the file would act
+    differently.
     """
     if policy.network is None or policy.checkpoint is None:
         raise WorkbenchError(
@@ -239,11 +226,7 @@ def _observations(policy: Player, seed: int) -> list[Observation]:
 def _compare(
     file: torch.jit.ScriptModule, policy: Player, observations: list[Observation]
 ) -> Agreement:
-    """Compares the file's actions with the policy's.
-
-    Raises:
-        WorkbenchError: If actions differ by more than rounding can explain.
-    """
+    """Compares the file's actions with the policy's; raises WorkbenchError if more than rounding differs."""
     wanted = np.stack([np.asarray(policy.act(each)) for each in observations])
     with torch.no_grad():
         found = file(batch(observations)).numpy()

@@ -13,12 +13,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import gymnasium
 import numpy as np
 import torch
 from torch import nn
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.checked import Env
 from rl_workbench.training.options import TrainingOptions
 
 Say = Callable[[str], None]  # reports a line to the user
@@ -39,20 +39,11 @@ class Algorithm(ABC):
 
     @abstractmethod
     def start_environment(self, state: Any, say: Say) -> None:
-        """Seeds the environment, then restores `environment_state`.
-
-        Args:
-            state: What that returned; None in a new training.
-            say: Called if that fails.
-        """
+        """Seeds the environment, then restores `environment_state` unless that is None; says if it fails."""
 
     @abstractmethod
     def learn(self, frame: Any) -> None:
-        """Learns until `frame.is_over()`, and calls `frame.step_done()` wherever it can be saved.
-
-        Args:
-            frame: The `training.Training`.
-        """
+        """Learns until `frame.is_over()`, and calls `frame.step_done()` wherever it can be saved."""
 
     @abstractmethod
     def act_greedily(self, observation: np.ndarray) -> Any:
@@ -79,28 +70,15 @@ class Algorithm(ABC):
         return self.environment_state()
 
     def restore_environment(self, state: Any, say: Say) -> None:
-        """Restores the environment after an evaluation in it.
-
-        Args:
-            state: What `leave_environment` returned.
-            say: Called if that fails.
-        """
+        """Restores what `leave_environment` returned, after an evaluation; says if that fails."""
         raise NotImplementedError
 
     def settle(self) -> bool:
-        """Discards unfinished work after a failure.
-
-        Returns:
-            Whether the training can be saved now and continued.
-        """
+        """Discards unfinished work after a failure; returns whether the training can now be saved."""
         return False
 
     def export(self, folder: Path) -> None:
-        """Writes the networks in further formats, if it has any.
-
-        Raises:
-            OSError: If a file can't be written.
-        """
+        """Writes the networks in further formats, if it has any; raises OSError if that fails."""
         return
 
 
@@ -121,17 +99,8 @@ class Policy(NamedTuple):
     network: nn.Module | None
 
 
-def load_policy(
-    options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any], origin: str
-) -> Policy:
-    """Makes the policy of a checkpoint.
-
-    Args:
-        options: Of its training.
-        content: Of the checkpoint.
-        env: An environment like the one that it learned in.
-        origin: The checkpoint's file, for errors.
-    """
+def load_policy(options: TrainingOptions, content: dict[str, Any], env: Env, origin: str) -> Policy:
+    """Makes the policy of a checkpoint, for an environment like its own; `origin` is the file, for errors."""
     try:
         made: Policy = import_module(options.kind.implementation).load_policy(options, content, env)
         return made

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
-from rl_workbench.errors import WorkbenchError, need
+from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import unknown
 
 _TRAINING = "rl_workbench.training"
@@ -14,42 +14,23 @@ _SETTINGS = "rl_workbench.agents.settings"
 
 @dataclass(frozen=True)
 class AlgorithmKind:
-    """What the command line and a record need to know of an algorithm.
+    """What the command line and a record need to know of an algorithm."""
 
-    Args:
-        name: The value of `--algo`, also written into records.
-        about: What it trains, for `--help`.
-        config: The file with tuned options below `config/`.
-        implementation: The module with `make(options, envs) -> Algorithm` and
-            `load_policy(options, checkpoint, env) -> Policy`.
-        settings: The dataclass of the algorithm's own options, as `module:Class`.
-        section: The name of an environment's section in that file.
-        defaults: Common options whose default differs for this algorithm.
-        keeps_dict: Whether it learns from a Dict of arrays as it is. The others get one flat vector.
-        learns_in_several: Whether it learns in several environments at the same time.
-        package: The optional package that it needs, as (module, name).
-    """
-
-    name: str
-    about: str
-    config: str
-    implementation: str
-    settings: str
-    section: str = "{env_id}"
-    defaults: Mapping[str, Any] = field(default_factory=dict)
-    keeps_dict: bool = False
-    learns_in_several: bool = False
-    package: tuple[str, str] | None = None
+    name: str  # the value of `--algo`, also written into records
+    about: str  # what it trains, for `--help`
+    config: str  # the file with tuned options below `config/`
+    implementation: str  # the module with `make` and `load_policy`; see `algorithm`
+    settings: str  # the dataclass of the algorithm's own options, as `module:Class`
+    section: str = "{env_id}"  # the name of an environment's section in the file
+    defaults: Mapping[str, Any] = field(default_factory=dict)  # common options that differ here
+    keeps_dict: bool = False  # learns from a Dict of arrays as it is, others from one flat vector
+    learns_in_several: bool = False  # environments at the same time
+    package: tuple[str, str] | None = None  # the optional one that it needs, as (module, name)
 
     def hyperparameters(self) -> Any:
         """Returns the dataclass of the algorithm's own options."""
         module, _, name = self.settings.partition(":")
         return getattr(import_module(module), name)
-
-    def check_installed(self) -> None:
-        """Makes sure that the package it needs is installed."""
-        if self.package:
-            need(*self.package, f"the algorithm {self.name}")
 
 
 _EPISODIC = {"episodes": 600, "eval_frequency": 0, "eval_episodes": 20}

@@ -113,32 +113,23 @@ class CurvesPicture(Callback):
 
 
 def load_callbacks(names: str) -> list[Callback]:
-    """Makes callbacks of the user's own.
-
-    Args:
-        names: Module:Class, several with commas.
-    """
-    return [_load(name.strip()) for name in names.split(",") if name.strip()]
-
-
-def _load(name: str) -> Callback:
-    make = imported(name, "--callback")
-    try:
-        made = make()
-    except Exception as error:
-        raise WorkbenchError(f"--callback {name}: {error_line(error)}") from error
-    if not isinstance(made, Callback):
-        raise WorkbenchError(f"--callback {name}: it must be a subclass of rl_workbench.Callback")
-    return made
+    """Makes callbacks of the user's own: module:Class, several with commas."""
+    callbacks = []
+    for name in filter(None, map(str.strip, names.split(","))):
+        make = imported(name, "--callback")
+        try:
+            made = make()
+        except Exception as error:
+            raise WorkbenchError(f"--callback {name}: {error_line(error)}") from error
+        if not isinstance(made, Callback):
+            text = "it must be a subclass of rl_workbench.Callback"
+            raise WorkbenchError(f"--callback {name}: {text}")
+        callbacks.append(made)
+    return callbacks
 
 
 class CallbackList:
-    """Calls the callbacks of a training.
-
-    Args:
-        own: Ours. Their errors propagate as they are.
-        users: The user's. Their errors end the training with one line.
-    """
+    """Calls the callbacks of a training. Errors of the user's end it with one line, ours propagate."""
 
     def __init__(self, own: Sequence[Callback], users: Sequence[Callback]) -> None:
         self._own, self._users = own, users

@@ -15,9 +15,8 @@ from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, own_frames
 from rl_workbench.training.progress import warn
 
-LARGEST_FLOAT32 = float(
-    np.finfo(np.float32).max
-)  # networks and replay buffers hold no larger number
+Env = gymnasium.Env[Any, Any]
+LARGEST_FLOAT32 = float(np.finfo(np.float32).max)  # that networks and replay buffers hold
 COMPUTE_REWARD = "compute_reward"  # method of an environment with a goal
 BEGIN_STEP = "begin_step"  # method of an environment whose step takes time in another process
 SHORT = 32  # numbers of an observation
@@ -32,17 +31,13 @@ _OLD_GYM = re.compile(r"unpack \(expected [25]\b|unexpected keyword argument '(s
 class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Turns NaN, wrong shapes and exceptions of an environment into one-line errors.
 
-    All methods raise WorkbenchError if the environment fails; `reset` and `step` also if an observation or
-    a reward isn't finite in float32. The last info of an episode has the means of numbers, see `CURVES`.
-    An environment that declares no `max_episode_steps` is truncated after `LONGEST` steps.
-
-    Args:
-        env: Its observations are vectors, or a Dict of arrays.
-        env_id: For errors.
-        which: Begins every error, as "environment 2 of 3: ".
+    All methods raise WorkbenchError if the environment fails; `reset` and `step` also if an observation, a
+    vector or a Dict of arrays, or a reward isn't finite in float32. The last info of an episode has the means
+    of numbers, see `CURVES`. An environment that declares no `max_episode_steps` is truncated after `LONGEST`
+    steps. `which` begins every error, as "environment 2 of 3: ".
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any], env_id: str, which: str = "") -> None:
+    def __init__(self, env: Env, env_id: str, which: str = "") -> None:
         super().__init__(env)
         self._id, self._which, self._begin_step = env_id, which, _begin_method(env)
         self._space = env.observation_space  # a property that asks each wrapper
@@ -111,22 +106,8 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         }
         return {**info, CURVES: {tag: mean for tag, mean in means.items() if math.isfinite(mean)}}
 
-    @property
-    def can_compute_reward(self) -> bool:
-        """Whether it can compute rewards for arbitrary goals."""
-        return self.env.has_wrapper_attr(COMPUTE_REWARD)
-
     def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> np.ndarray:
-        """Computes rewards in hindsight: for goals that were achieved while others were desired.
-
-        Args:
-            achieved: Goals (N, n).
-            desired: Goals (N, n).
-            info: A list of N, one of each step.
-
-        Returns:
-            float32, (N,).
-        """
+        """Returns rewards (N,), float32, for goals (N, n) achieved while others were desired; N infos."""
         with self._running(COMPUTE_REWARD):
             found = self.env.get_wrapper_attr(COMPUTE_REWARD)(achieved, desired, info)
             rewards = np.asarray(found, np.float32)
@@ -219,7 +200,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._error(f"the {what} of {self._id} isn't finite in float32: {text}")
 
 
-def _without_checks(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
+def _without_checks(env: Env) -> Env:
     """Takes Gymnasium's checks out of the wrappers of an environment."""
     if not isinstance(env, gymnasium.Wrapper):
         return env
@@ -227,11 +208,8 @@ def _without_checks(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
     return env.env if isinstance(env, OrderEnforcing | PassiveEnvChecker) else env
 
 
-def _begin_method(env: gymnasium.Env[Any, Any]) -> Callable[[Any], object]:
-    """Returns what begins a step of an environment.
-
-    It does nothing if the environment can't, or if a wrapper in between might change the actions.
-    """
+def _begin_method(env: Env) -> Callable[[Any], object]:
+    """Returns what begins a step; nothing if the environment can't, or a wrapper might change the actions."""
     layer: Any = env
     while isinstance(layer, gymnasium.Wrapper):
         is_known = type(layer).__module__.startswith("gymnasium.")

@@ -47,21 +47,13 @@ class Checkpoints:
             return False
 
     def check_place(self) -> None:
-        """Checks the run folder: another run may be in its place by now, and must not be overwritten.
-
-        Raises:
-            OSError: If the folder isn't the one in which the training began.
-        """
+        """Raises OSError if the run folder was moved or removed: another may be in its place."""
         if not self.are_in_place():
             moved = "the folder was moved or removed"
             raise FileNotFoundError(errno.ENOENT, moved, str(self._run))
 
     def save(self, step: int, content: dict[str, Any], best: bool = False) -> Path:
-        """Writes a checkpoint as the last one, and also as the best one if `best`; returns its path.
-
-        Raises:
-            OSError: If it can't be written. The earlier checkpoints are untouched.
-        """
+        """Writes a checkpoint as the last one, also as the best one if `best`; raises OSError if it can't."""
         self.check_place()
         path = self._run / FOLDER / f"step_{step:09d}.pt"
         path.parent.mkdir(exist_ok=True)

@@ -24,7 +24,7 @@ from rl_workbench import errors
 from rl_workbench.env_ids import FORM, import_module_of, module_of, spec_of
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
 from rl_workbench.option import imported
-from rl_workbench.training.checked import CheckedEnvironment
+from rl_workbench.training.checked import CheckedEnvironment, Env
 from rl_workbench.training.options import TrainingOptions
 
 _CODE = re.compile(r"[\w.]+:[\w.]+")  # module:name
@@ -42,17 +42,10 @@ def make_environment(
 ) -> CheckedEnvironment:
     """Makes an environment that refuses observations and rewards that aren't finite.
 
-    Args:
-        env_id: Gymnasium's, also as module:id.
-        options: Of the environment.
-        keep_dict: Leave a Dict of arrays, and images, as they are. Other observations are flattened to a
-            vector (D,).
-        which: Begins the errors while it runs, as "environment 2 of 3: ".
-        wrapper: A function that wraps it, as module:function.
-
-    Raises:
-        WorkbenchError: If there is no such environment, something that it needs isn't installed, its options
-            make no sense, or it observes images that can't be learned from.
+    `keep_dict` leaves a Dict of arrays, and images, as they are; other observations are flattened to a vector
+    (D,). `which` begins the errors while it runs, as "environment 2 of 3: ". `wrapper` is a function that
+    wraps it, as module:function. Raises WorkbenchError if there is no such environment, something that it
+    needs isn't installed, its options make no sense, or it observes images that can't be learned from.
     """
     import_module_of(env_id)
     _check_names(env_id, options or {})
@@ -61,7 +54,7 @@ def make_environment(
         raise WorkbenchError(f"--wrapper {wrapper}: it is no gymnasium.Wrapper")
     with ExitStack() as refused:
         try:
-            env: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **(options or {}))
+            env: Env = gymnasium.make(env_id, **(options or {}))
             refused.callback(env.close)
             env = wrap(env)
             if not isinstance(env, gymnasium.Env):
@@ -96,7 +89,7 @@ def _check_names(env_id: str, options: Mapping[str, Any]) -> None:
             )
 
 
-def _suited(env: gymnasium.Env[Any, Any], env_id: str, keep_dict: bool) -> gymnasium.Env[Any, Any]:
+def _suited(env: Env, env_id: str, keep_dict: bool) -> Env:
     """Returns an environment whose observations are vectors, or in a form that is to be kept."""
     space = env.observation_space
     parts = list(space.values()) if isinstance(space, spaces.Dict) else [space]
@@ -125,10 +118,7 @@ def environment_for(
 
 
 def training_environments(options: TrainingOptions) -> list[CheckedEnvironment]:
-    """Makes the `num_envs` environments of a training, each with a robot of its own.
-
-    The caller closes them with `close_all`.
-    """
+    """Makes the `num_envs` environments of a training, for `close_all`, each with a robot of its own."""
     run, given = options.run, options.run.training_environment
     count = run.num_envs
     first = environment_for(options, given, _which(0, count))
@@ -158,7 +148,7 @@ def _which(index: int, count: int) -> str:
     return f"environment {index + 1} of {count}: " if count > 1 else ""
 
 
-def close_all(envs: Sequence[gymnasium.Env[Any, Any]]) -> None:
+def close_all(envs: Sequence[Env]) -> None:
     """Closes environments, the others too if one fails."""
     if not envs:
         return
@@ -168,7 +158,7 @@ def close_all(envs: Sequence[gymnasium.Env[Any, Any]]) -> None:
 
 
 @contextmanager
-def _side_by_side(env: gymnasium.Env[Any, Any], count: int) -> Iterator[None]:
+def _side_by_side(env: Env, count: int) -> Iterator[None]:
     """Lets environments like `env` start or close at the same time, if they can."""
     waiting = _attribute(env, "side_by_side")
     try:
@@ -178,14 +168,12 @@ def _side_by_side(env: gymnasium.Env[Any, Any], count: int) -> Iterator[None]:
         raise WorkbenchError(str(error) or type(error).__name__) from error
 
 
-def shares_robot(env: gymnasium.Env[Any, Any]) -> bool:
+def shares_robot(env: Env) -> bool:
     """Returns whether another environment of this kind would move the same robot."""
     return bool(_attribute(env, "shares_robot"))
 
 
-def robot_options(
-    env: gymnasium.Env[Any, Any], given: Mapping[str, Any]
-) -> dict[str, list[Any]] | None:
+def robot_options(env: Env, given: Mapping[str, Any]) -> dict[str, list[Any]] | None:
     """Returns the values of options with which other environments move the same robot; None if none does."""
     if not shares_robot(env):
         return None
@@ -193,7 +181,7 @@ def robot_options(
     return {name: [given.get(name), *values] for name, values in named.items()}
 
 
-def source_digest(env: gymnasium.Env[Any, Any]) -> str:
+def source_digest(env: Env) -> str:
     """Returns the digest of the files that the environment's task is written in, or else its class.
 
     Those of Python, Gymnasium and abstract classes don't count: other versions of them are the same task.
@@ -210,11 +198,8 @@ def source_digest(env: gymnasium.Env[Any, Any]) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _attribute(env: gymnasium.Env[Any, Any], name: str) -> Any:
+def _attribute(env: Env, name: str) -> Any:
     return env.get_wrapper_attr(name) if env.has_wrapper_attr(name) else None
-
-
-# --- spaces -------------------------------------------------------------------------------------
 
 
 SMALLEST_IMAGE = 36  # [pixels], of each side, as Stable-Baselines3's CNN needs
@@ -251,12 +236,8 @@ def is_continuous(space: gymnasium.Space[Any]) -> TypeGuard[spaces.Box]:
     return isinstance(space, spaces.Box) and np.issubdtype(space.dtype, np.floating)
 
 
-def discrete_actions(env: gymnasium.Env[Any, Any], env_id: str, algorithm: str) -> int:
-    """Returns the number of discrete actions.
-
-    Raises:
-        WorkbenchError: If the actions aren't the numbers from 0 on. The text names algorithms that fit.
-    """
+def discrete_actions(env: Env, env_id: str, algorithm: str) -> int:
+    """Returns the number of discrete actions; else raises WorkbenchError, which names algorithms that fit."""
     space = env.action_space
     if isinstance(space, spaces.Discrete) and space.start == 0:
         return int(space.n)
@@ -269,9 +250,6 @@ def discrete_actions(env: gymnasium.Env[Any, Any], env_id: str, algorithm: str) 
     )
 
 
-# --- observations and results -------------------------------------------------------------------
-
-
 def as_float32(observation: Any) -> Any:
     """Returns an observation as networks take it: an array, or a dict of arrays."""
     if isinstance(observation, dict):
@@ -280,10 +258,7 @@ def as_float32(observation: Any) -> Any:
 
 
 def as_vector(observation: Any) -> np.ndarray:
-    """Returns all numbers of an observation, (D,), float32.
-
-    It is a copy: an environment may well write into the array that it returned.
-    """
+    """Returns a copy of all numbers of an observation, (D,), float32: an environment may reuse its array."""
     if isinstance(observation, dict):
         return np.concatenate([np.ravel(part) for part in observation.values()], dtype=np.float32)
     return np.array(observation, dtype=np.float32)

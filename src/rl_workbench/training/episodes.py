@@ -4,7 +4,6 @@ from collections.abc import Callable, Generator, Sequence
 from functools import partial
 from typing import Any
 
-import gymnasium
 import numpy as np
 
 from rl_workbench.agents.document import PolicyGradientAgent
@@ -16,28 +15,22 @@ from rl_workbench.states import (
     rewind_random_states,
     set_generator,
 )
-from rl_workbench.training.checked import BEGIN_STEP, CURVES
+from rl_workbench.training.checked import BEGIN_STEP, CURVES, Env
 from rl_workbench.training.environments import as_vector, succeeded
 
 Agent = PolicyGradientAgent | ReinforceAgent
 
 
 def play(
-    env: gymnasium.Env[Any, Any],
+    env: Env,
     act: Callable[[np.ndarray], Any],
     limited: Callable[[Any], Any] = lambda action: action,
     begin: Callable[[Any], object] = lambda action: None,
 ) -> Generator[None, None, Episode]:
-    """Plays one episode. It yields before each step, so that others can be played meanwhile.
+    """Plays one episode, and returns it. It yields before each step, so that others can be played meanwhile.
 
-    Args:
-        env: It was seeded before.
-        act: Draws an action for an observation (D,), float32.
-        limited: Returns the action that the environment takes for one that was drawn.
-        begin: Begins a step, before this yields.
-
-    Returns:
-        The episode.
+    `act` draws an action for an observation (D,), float32; `limited` is what the environment takes for it,
+    and `begin` begins the step. The environment was seeded before.
     """
     episode = Episode()
     observation = as_vector(env.reset()[0])
@@ -59,14 +52,9 @@ def play(
 def play_all(
     playing: list[Generator[None, None, Episode]], should_stop: Callable[[], bool]
 ) -> list[Episode] | None:
-    """Plays several episodes at the same time, a step of each in turn, until all have ended.
+    """Plays what `play` returned of several environments, a step of each in turn, until all have ended.
 
-    Args:
-        playing: What `play` returned, each of an environment of its own.
-        should_stop: Called before each step.
-
-    Returns:
-        The episodes in their order; None if `should_stop()` became true.
+    Returns the episodes in their order; None if `should_stop()`, called before each step, became true.
     """
     episodes: dict[int, Episode] = {}
     for each in playing:
@@ -95,7 +83,7 @@ class EpisodeSource:
     takes its draws back, so that it can be played again as it would have been.
     """
 
-    def __init__(self, envs: Sequence[gymnasium.Env[Any, Any]], agent: Agent, seed: int) -> None:
+    def __init__(self, envs: Sequence[Env], agent: Agent, seed: int) -> None:
         self._envs, self._agent, self._seed = envs, agent, seed
         others = [np.random.default_rng((seed, index)) for index in range(1, len(envs))]
         self._actions = [agent.generator, *others]
@@ -106,11 +94,7 @@ class EpisodeSource:
             env.reset(seed=self._seed + index)
 
     def collect(self, should_stop: Callable[[], bool]) -> list[Episode] | None:
-        """Plays one episode in each environment, all by the agent's present policy.
-
-        Returns:
-            The episodes in the order of the environments; None if `should_stop()` became true.
-        """
+        """Plays one episode in each environment, in this order; None if `should_stop()` became true."""
         agent = self._agent
         # No one else waits while a single environment takes its step.
         begins: list[Callable[[Any], object]] = [lambda action: None]

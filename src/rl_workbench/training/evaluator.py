@@ -3,17 +3,19 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Any, NamedTuple
 
-import gymnasium
 import numpy as np
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import random_states, restore_random_states
 from rl_workbench.training.algorithm import Algorithm, Say
+from rl_workbench.training.checked import Env
 from rl_workbench.training.environments import as_float32, environment_for, shares_robot, succeeded
 from rl_workbench.training.options import TrainingOptions
 
+Act = Callable[[Any], Any]  # an observation to an action
 EVALUATION_SEED = 1_000_000  # added to the training's: other episodes than those learned from
 
 
@@ -39,39 +41,46 @@ class Evaluation:
         return float(np.mean(self.successes)) if self.successes else None
 
 
+class Step(NamedTuple):
+    """The result of a step; the first one is the reset, which has no action."""
+
+    observation: Any
+    action: Any
+    reward: float
+    finished: bool
+    success: bool | None  # None before the end, or if the environment doesn't say
+
+
+def episode_steps(env: Env, act: Act, seed: int | None, max_steps: int = 0) -> Iterator[Step]:
+    """Plays one episode; yields the reset and each step, at most `max_steps` of them unless that is 0."""
+    observation, _ = env.reset(seed=seed)
+    yield Step(observation, None, 0.0, False, None)
+    for length in count(1):
+        action = act(as_float32(observation))
+        observation, reward, terminated, truncated, info = env.step(action)
+        finished = terminated or truncated or length == max_steps
+        success = succeeded(info) if finished else None
+        yield Step(observation, action, float(reward), finished, success)
+        if finished:
+            return
+
+
 def run_greedily(
-    env: gymnasium.Env[Any, Any],
-    act: Callable[[Any], Any],
-    seed: int,
-    episodes: int,
-    should_stop: Callable[[], bool] = lambda: False,
+    env: Env, act: Act, seed: int, episodes: int, should_stop: Callable[[], bool] = lambda: False
 ) -> Evaluation | None:
     """Plays episodes in an environment, seeded once; returns None if `should_stop()` became true."""
     found = Evaluation([], [])
     for index in range(episodes):
-        observation, _ = env.reset(seed=seed if index == 0 else None)
-        length, total, finished = 0, 0.0, False
-        while not finished:
+        length, total = -1, 0.0  # the first step is the reset
+        for step in episode_steps(env, act, None if index else seed):
             if should_stop():
                 return None
-            observation, reward, terminated, truncated, info = env.step(
-                act(as_float32(observation))
-            )
-            length, total = length + 1, total + float(reward)
-            finished = terminated or truncated
+            length, total = length + 1, total + step.reward
         found.lengths.append(length)
         found.returns.append(total)
-        success = succeeded(info)
-        if success is not None:
-            found.successes.append(success)
+        if step.success is not None:
+            found.successes.append(step.success)
     return found
-
-
-class Score(NamedTuple):
-    """An evaluation, and the mean return by which policies are compared."""
-
-    evaluation: Evaluation
-    confirmed: float
 
 
 class Evaluator:
@@ -84,7 +93,7 @@ class Evaluator:
         self,
         options: TrainingOptions,
         algorithm: Algorithm,
-        env: gymnasium.Env[Any, Any],
+        env: Env,
         should_stop: Callable[[], bool],
         say: Say,
     ) -> None:
@@ -103,16 +112,14 @@ class Evaluator:
                     f"evaluating in the training's environment, because a second one can't be made: {error}"
                 )
 
-    def evaluate(self, best: float, say: Say, is_last: bool = False) -> Score | None:
-        """Plays greedy episodes; returns None if interrupted.
+    def evaluate(
+        self, best: float, say: Say, is_last: bool = False
+    ) -> tuple[Evaluation, float] | None:
+        """Plays greedy episodes; also returns the mean by which policies compare; None if interrupted.
 
-        A policy that is perfect in ten episodes may well fail in the next ninety. So one that seems to be the
-        best so far is confirmed over `confirm_episodes`.
-
-        Args:
-            best: The mean return of the best policy so far.
-            say: Called if the current episode can't be restored.
-            is_last: Whether the training is over, so that no episode needs restoring.
+        A policy that is perfect in ten episodes may well fail in the next ninety. So one whose mean return is
+        above `best` is confirmed over `confirm_episodes`. `say` is called if the current episode can't be
+        restored, which isn't tried at the training's end (`is_last`).
         """
         self._algorithm.check_weights()
         with self._undisturbed(say, is_last):
@@ -120,9 +127,9 @@ class Evaluator:
             if found is None:
                 return None
             if found.mean_return <= best or not self._run.confirm_episodes:
-                return Score(found, found.mean_return)
+                return found, found.mean_return
             confirmed = self._episodes(self._run.confirm_episodes, 1)
-            return None if confirmed is None else Score(found, confirmed.mean_return)
+            return None if confirmed is None else (found, confirmed.mean_return)
 
     @contextmanager
     def _undisturbed(self, say: Say, is_last: bool) -> Iterator[None]:

@@ -28,11 +28,8 @@ LIBRARIES = ("python", "numpy", "torch", "gymnasium", EXTRA)  # a training's bit
 def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]:
     """Makes and locks a new run's folder: the one given, or runs/{env}__{experiment}__{seed}__{time}.
 
-    A training that makes a folder and can't begin removes it again.
-
-    Raises:
-        WorkbenchError: If the folder isn't empty, another training runs in it, or it can't be made or
-            written to.
+    A training that makes a folder and can't begin removes it again. Raises WorkbenchError if it isn't empty,
+    another training runs in it, or it can't be made or written to.
     """
     name = as_file_name(f"{env}__{experiment}__{seed}__{int(time.time())}")
     folder = Path(run_dir or Path("runs") / name)
@@ -110,11 +107,7 @@ def library_versions() -> dict[str, str]:
 
 
 def other_versions(before: Any) -> str:
-    """Returns how the versions of now differ from those at a training's start; empty if they don't.
-
-    Args:
-        before: What `versions` returned then. It may be damaged, since no training depends on it.
-    """
+    """Returns how versions differ from those `before`, which may be damaged; empty if they don't."""
     if not isinstance(before, dict):
         return ""
     now = versions()
@@ -123,12 +116,7 @@ def other_versions(before: Any) -> str:
 
 
 def write_record(folder: Path, config: dict[str, Any], resumed: bool) -> None:
-    """Writes config.json. A resumed training keeps its versions and its start.
-
-    Raises:
-        OSError: If it can't be written.
-        WorkbenchError: If the record of a resumed training is damaged.
-    """
+    """Writes config.json; a resumed training keeps its versions and its start. Raises OSError if it can't."""
     record: dict[str, Any] = {"versions": versions(), "began": time.time()}
     if resumed:
         record = read_record(folder)

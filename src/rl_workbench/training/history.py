@@ -51,12 +51,7 @@ class History:
         return bool(self.evaluations) and self.evaluations[-1][0] == steps
 
     def is_complete(self, run: RunOptions, steps: int) -> bool:
-        """Returns whether the training has reached its end.
-
-        Args:
-            run: Its options.
-            steps: So far, those of an unfinished episode included.
-        """
+        """Returns whether the training is at its end, after `steps` with those of an unfinished episode."""
         recent = self.lengths[-WINDOW:]
         return (
             bool(run.total_timesteps and steps >= run.total_timesteps)
@@ -150,16 +145,12 @@ class Outcome(NamedTuple):
         tell(f"all results are in {self.folder}")
         if self.is_interrupted:
             tell(f"interrupted{self._how_to_resume()}")
-        tell(f"watch: {errors.hints.replaying(self.folder)}")
-        tell(f"curves: {errors.hints.watching(self.folder)}")
+        hints, folder = errors.hints, str(self.folder)
+        tell(f"watch: {shlex.join([*hints.workbench, 'view', folder])}")
+        tell(f"curves: {shlex.join([*hints.tensorboard, '--logdir', folder])}")
 
     def failure_text(self, failure: WorkbenchError, saved_at: int) -> str:
-        """Returns the line for a training that failed.
-
-        Args:
-            failure: Why.
-            saved_at: The step of the last checkpoint; -1 if nothing was saved.
-        """
+        """Returns the line for a training that failed; its last checkpoint is of `saved_at`, -1 for none."""
         text = (
             f"{failure}{_write_traceback(self.folder, failure)}; stopped after {self.steps} steps, "
         )

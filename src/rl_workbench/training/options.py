@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from rl_workbench.env_ids import without_module
-from rl_workbench.errors import WorkbenchError
+from rl_workbench.errors import WorkbenchError, need
 from rl_workbench.option import Options, check_options, is_plain, option, unknown
 from rl_workbench.storage import CONFIG_RECORD, read_record
 from rl_workbench.training.algorithms import AlgorithmKind, algorithm
@@ -151,7 +151,8 @@ class TrainingOptions(NamedTuple):
 
 def known_options(kind: AlgorithmKind) -> Options:
     """Returns all recorded options of an algorithm's trainings."""
-    kind.check_installed()
+    if kind.package:
+        need(*kind.package, f"the algorithm {kind.name}")
     return Options(RunOptions, kind.hyperparameters())
 
 
@@ -210,9 +211,6 @@ def _flat(record: Any, origin: str) -> dict[str, Any]:
     return {"algorithm": plain["algorithm"], **plain["hyperparameters"], **plain["run"]}
 
 
-# --- files with tuned options -------------------------------------------------------------------
-
-
 def default_file(name: str) -> Path:
     """Finds the project's own config/NAME: in the source tree, or next to the installed modules."""
     for folder in (TREE, SHARE):
@@ -223,22 +221,21 @@ def default_file(name: str) -> Path:
 
 
 def section_names(form: str, env_id: str | None) -> tuple[str, ...]:
-    """Returns the possible names of an environment's section: with and without the id's module.
-
-    Args:
-        form: The name with `{env_id}`.
-        env_id: None if no environment was named; then there are no names.
-    """
+    """Returns the possible names of an environment's section, with and without the id's module."""
     ids = (env_id, without_module(env_id)) if env_id else ()
     return tuple(dict.fromkeys(form.format(env_id=each) for each in ids))
 
 
 def read_section(path: Path, names: Sequence[str], preset: str | None) -> dict[str, Any]:
-    """Reads the options of a preset, or else of the first section that exists; {} if none does.
-
-    A file without sections holds options for every environment.
-    """
-    content = _read_yaml(path)
+    """Reads the options of a preset, or of the first section that exists; a file without sections is one."""
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+    except OSError as error:
+        raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise WorkbenchError(f"{path} isn't YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(content, dict):
+        raise WorkbenchError(f"{path} isn't a YAML file of options")
     if content and not any(isinstance(value, dict) for value in content.values()):
         if preset:
             raise WorkbenchError(f"{path} has no sections, so no preset {preset!r} either")
@@ -250,15 +247,3 @@ def read_section(path: Path, names: Sequence[str], preset: str | None) -> dict[s
     if not isinstance(section, dict):
         raise WorkbenchError(f"{path}: {name} isn't a section of options")
     return section
-
-
-def _read_yaml(path: Path) -> dict[str, Any]:
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    except OSError as error:
-        raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise WorkbenchError(f"{path} isn't YAML: {' '.join(str(error).split())}") from error
-    if not isinstance(content, dict):
-        raise WorkbenchError(f"{path} isn't a YAML file of options")
-    return content

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 
 from rl_workbench.agents.document import PolicyGradientAgent
@@ -14,6 +13,7 @@ from rl_workbench.agents.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.storage import save_tensors
 from rl_workbench.training.algorithm import Algorithm, Policy, Say
+from rl_workbench.training.checked import Env
 from rl_workbench.training.checkpoints import fitting
 from rl_workbench.training.environments import discrete_actions, is_continuous
 from rl_workbench.training.episodes import Agent, EpisodeSource
@@ -28,7 +28,7 @@ def make(options: TrainingOptions, envs: list[Any]) -> "PolicyGradientTraining":
     return PolicyGradientTraining(agent, source, options.hyperparameters.save_every)
 
 
-def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
+def make_agent(options: TrainingOptions, env: Env) -> Agent:
     """Makes a new agent for an environment."""
     run, settings = options.run, options.hyperparameters
     (size,) = env.observation_space.shape or (0,)
@@ -53,9 +53,7 @@ def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
     return ReinforceAgent(run.seed, scale, settings, actions, run.num_envs)
 
 
-def load_policy(
-    options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
-) -> Policy:
+def load_policy(options: TrainingOptions, content: dict[str, Any], env: Env) -> Policy:
     """Makes the policy of a checkpoint; see `algorithm`."""
     if not isinstance(content["agent"], dict):  # a tensor would be indexed by names
         raise TypeError("it holds no agent")
@@ -65,13 +63,7 @@ def load_policy(
 
 
 class PolicyGradientTraining(Algorithm):
-    """Learns from rounds of one episode from each environment. It can be saved between two rounds.
-
-    Args:
-        agent: Acts and learns.
-        source: Plays the episodes.
-        save_every: Episodes between saves of the networks; 0: at the end only.
-    """
+    """Learns from rounds of one episode from each environment; can be saved between two rounds."""
 
     def __init__(self, agent: Agent, source: EpisodeSource, save_every: int) -> None:
         self._agent, self._source, self._save_every = agent, source, save_every

@@ -25,15 +25,7 @@ def warn(text: str) -> None:
 
 
 class Progress(Callback):
-    """A bar over the training's length, and lines.
-
-    Args:
-        total: Steps or episodes of the whole training.
-        unit: "step" or "episode".
-        done: How many of them were done before.
-        stream: By default standard error.
-        clock: Returns the time [s].
-    """
+    """A bar over the training's length, `total` of a unit ("step" or "episode"), and lines."""
 
     def __init__(
         self,

@@ -29,13 +29,10 @@ Point = tuple[str, float, int, float]  # tag, value, step, wall time [s]
 
 
 class ScalarLog:
-    """Writes points, each with its step, tag and value.
+    """Writes points, each with its step, tag and value, into both files.
 
-    Args:
-        folder: Where both files go.
-        settings: Shown as a table under TEXT, and under HPARAMS next to those of other trainings.
-        length: The CSV's length [bytes] at the checkpoint to continue from; 0 starts a new one.
-        say: Is called if the CSV lacks rows. The training doesn't depend on them.
+    Settings are a table under TEXT, and under HPARAMS next to those of other trainings. `length` is the CSV's
+    [bytes] at the checkpoint to continue from; 0 starts a new one. `say` is called if the CSV lacks rows.
     """
 
     def __init__(
@@ -70,7 +67,7 @@ class ScalarLog:
 
     def sync(self) -> int:
         """Puts the CSV on disk; returns its length [bytes]."""
-        self._events.flush()
+        self._events.file.flush()
         self._file.flush()
         os.fsync(self._file.fileno())
         return os.fstat(self._file.fileno()).st_size
@@ -78,7 +75,7 @@ class ScalarLog:
     def close(self) -> None:
         """Flushes and closes both files."""
         try:
-            self._events.close()
+            self._events.file.close()
         finally:
             self._file.close()
 
@@ -98,8 +95,8 @@ class EventFile:
         self._event, self._summary = Event, summary
         self._shown, now = time.monotonic(), time.time()
         path = folder / f"{EVENTS}{now:.0f}.{socket.gethostname()}.{os.getpid()}"
-        self._file = path.open("wb")
-        self._records = RecordWriter(self._file)
+        self.file = path.open("wb")
+        self._records = RecordWriter(self.file)
         self._write(Event(wall_time=now, file_version=VERSION))
 
     def add_scalar(self, tag: str, value: float, step: int, wall_time: float) -> None:
@@ -122,18 +119,10 @@ class EventFile:
         self._write(self._event(wall_time=wall_time or time.time(), step=step, summary=summary))
         if time.monotonic() - self._shown > SHOWN_AFTER:
             self._shown = time.monotonic()
-            self.flush()
+            self.file.flush()
 
     def _write(self, event: Any) -> None:
         self._records.write(event.SerializeToString())
-
-    def flush(self) -> None:
-        """Writes what is buffered."""
-        self._file.flush()
-
-    def close(self) -> None:
-        """Closes the file."""
-        self._file.close()
 
 
 def _truncated(path: Path, length: int, say: Callable[[str], None]) -> list[Point]:

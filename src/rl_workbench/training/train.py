@@ -36,7 +36,6 @@ from rl_workbench.training.progress import warn
 
 PROGRAM = starting.program("rl_workbench")
 PROG = "rl-workbench train"
-USAGE = "{prog} [--help] [--OPTION VALUE ...]"
 DESCRIPTION = """\
 Trains {about}.
 
@@ -54,7 +53,7 @@ SOURCES = ("config", "preset", "params", "resume")  # flags that name where opti
 
 
 def train(algo: str, callbacks: Sequence[Callback] = (), **options: Any) -> Path:
-    """Trains an agent from Python, like `rl-workbench train`.
+    """Trains an agent from Python, like `rl-workbench train`; returns the run folder.
 
         folder = train("dqn", env_id="CartPole-v1", total_timesteps=5000, callbacks=[Mine()])
 
@@ -63,12 +62,8 @@ def train(algo: str, callbacks: Sequence[Callback] = (), **options: Any) -> Path
         callbacks: Called at the events of the training, see `Callback`.
         options: Options by name, as the flags with underscores; also `config`, `preset` and `resume`.
 
-    Returns:
-        The run folder.
-
-    Raises:
-        WorkbenchError: If an option is wrong, or the training fails. What was learned is saved, up to the
-            step that the text names.
+    Raises WorkbenchError if an option is wrong, or the training fails; what was learned is saved, up to the
+    step that the text names.
     """
     return run_training(choose(algorithm(algo), [], options), Interrupt(), callbacks=callbacks)
 
@@ -79,20 +74,11 @@ def run_training(
     begin: Callable[[Path], object] = lambda _: None,
     callbacks: Sequence[Callback] = (),
 ) -> Path:
-    """Trains into the options' folder, or a new one below runs/.
+    """Trains into the options' folder, or a new one below runs/; returns it.
 
-    Args:
-        options: Of a new training, or of one to resume.
-        interrupt: Says when to stop.
-        begin: Is called with the folder before the training begins, to start what goes beside it.
-        callbacks: Further ones than those that the options name.
-
-    Returns:
-        The folder.
-
-    Raises:
-        WorkbenchError: If something fails that the user can mend. What was learned is saved, up to
-            the step that the text names.
+    `begin` is called with the folder before the training begins, to start what goes beside it. `callbacks`
+    are further ones than those that the options name. Raises WorkbenchError if something fails that the user
+    can mend; what was learned is saved, up to the step that the text names.
     """
     with interrupt.reading():  # both are slow to import, and --help needs neither
         from rl_workbench.training import folder as run_folder
@@ -130,12 +116,8 @@ def main(
 ) -> int:
     """Trains as the arguments say; returns the exit code of the process.
 
-    Args:
-        argv: The arguments without the command.
-        parameters: Options from outside, as a launch file sets them.
-        prog: The command's name, for `--help` and errors.
-        default: The algorithm if none is named.
-        program: Starts the whole command line, for a page in a process of its own.
+    `default` is the algorithm if none is named, `parameters` are options from outside, as a launch file sets
+    them. `program` starts the whole command line, for a page in a process of its own.
     """
 
     def command(interrupt: Interrupt) -> None:
@@ -173,17 +155,8 @@ def choose_training(
 ) -> TrainingOptions:
     """Reads a command line. It finds --algo first, since the other flags depend on it.
 
-    Args:
-        argv: The arguments without the command.
-        parameters: Options from outside, see `choose`.
-        prog: The command, for `--help`.
-        default: The algorithm if none is named.
-        env_id: The environment if none is named.
-        parent: Has further flags to show in `--help`. The caller has parsed them.
-
-    Raises:
-        SystemExit: With code 2 and a usage line if the flags are wrong; with 0 after `--help`.
-        WorkbenchError: If a name is unknown or a value is wrong anywhere else.
+    `default` is the algorithm if none is named. `parent` has further flags to show in `--help`, which the
+    caller has parsed. The other arguments, and what is raised, are `choose`'s.
     """
     parser, parameters = algorithm_parser(prog), dict(parameters or {})
     known, rest = parser.parse_known_args(argv)
@@ -206,18 +179,22 @@ def choose_training(
     return choose(kind, rest, parameters, prog, env_id, parents)
 
 
-def algorithm_parser(prog: str) -> argparse.ArgumentParser:
-    """Makes the parser of --algo alone."""
-    result = argparse.ArgumentParser(
+def new_parser(prog: str, **options: Any) -> argparse.ArgumentParser:
+    """Makes a parser whose result lacks flags that aren't given."""
+    return argparse.ArgumentParser(
         prog,
-        usage=USAGE.format(prog=prog),
-        description="Trains an agent.",
-        epilog=EPILOG,
+        usage=f"{prog} [--help] [--OPTION VALUE ...]",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
-        add_help=False,  # --algo NAME --help is the algorithm's
         argument_default=argparse.SUPPRESS,
+        **options,
     )
+
+
+def algorithm_parser(prog: str) -> argparse.ArgumentParser:
+    """Makes the parser of --algo alone."""
+    # --algo NAME --help is the algorithm's
+    result = new_parser(prog, description="Trains an agent.", epilog=EPILOG, add_help=False)
     names = ", ".join(ALGORITHMS)
     result.add_argument("--algo", metavar="NAME", help=f"one of {names}; each has flags of its own")
     return result
@@ -233,22 +210,20 @@ def choose(
 ) -> TrainingOptions:
     """Reads the options of one algorithm.
 
-    Args:
-        kind: The algorithm.
-        flags: As on the command line.
-        parameters: Options from outside, as a launch file sets them: between --params and the flags.
-        prog: The command, for `--help`.
-        env_id: The environment if none is given.
-        parents: Have further flags to show in `--help`. The caller has parsed them.
-
-    Raises:
-        SystemExit: With code 2 and a usage line if a flag is wrong; with 0 after `--help`.
-        WorkbenchError: If a name is unknown or a value is wrong anywhere else.
+    `parameters` are options from outside, as a launch file sets them: between --params and the flags.
+    `parents` have further flags to show in `--help`, which the caller has parsed. Exits with code 2 and a
+    usage line if a flag is wrong, with 0 after `--help`; raises WorkbenchError if a name is unknown or a
+    value wrong anywhere else.
     """
     options = known_options(kind)
     default = env_id or kind.defaults.get("env_id", RunOptions.env_id)
     known = [*SOURCES, *options.names, *SESSION.names]
-    from_flags = _parse(_parser(kind, options, prog, default, parents), flags, known)
+    parser = _parser(kind, options, prog, default, parents)
+    found, left = parser.parse_known_args(flags)
+    if left:
+        flags = [flag(each) for each in known]
+        parser.error(unknown("flag", left[0].partition("=")[0], flags))
+    from_flags = vars(found)
     parameters = parameters or {}
     if strange := [name for name in parameters if name not in known]:
         raise WorkbenchError(f"parameters: {unknown('parameter', strange[0], known)}")
@@ -264,7 +239,12 @@ def choose(
     given = options.read(key_values(pairs, "--params"), "--params")
     given |= options.read(_of(options, parameters), "parameters") | from_flags
     if "resume" in files:
-        _check_extending([*given, *(name for name in files if name != "resume")])
+        for name in (*given, *files):
+            if name not in (*EXTENDING, "resume"):
+                raise WorkbenchError(
+                    f"a resumed training keeps its settings: --resume allows no {flag(name)}, "
+                    f"only {', '.join(map(flag, EXTENDING))}"
+                )
         return resumed_options(kind, Path(files["resume"]), given)._replace(session=session)
 
     preset = files.get("preset")
@@ -274,16 +254,6 @@ def choose(
     section = read_section(path, section_names(kind.section, env_id), preset)
     merged = ({"env_id": env_id} if env_id else {}) | options.read(section, origin)
     return make_options(kind, until_the_steps(merged, given))._replace(session=session)
-
-
-def _check_extending(given: list[str]) -> None:
-    """Refuses options that a resumed training can't change."""
-    for name in given:
-        if name not in EXTENDING:
-            raise WorkbenchError(
-                f"a resumed training keeps its settings: --resume allows no {flag(name)}, "
-                f"only {', '.join(map(flag, EXTENDING))}"
-            )
 
 
 def _of(options: Options, values: dict[str, Any]) -> dict[str, Any]:
@@ -297,15 +267,8 @@ def _parser(
     env_id: str,
     parents: Sequence[argparse.ArgumentParser],
 ) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog,
-        usage=USAGE.format(prog=prog),
-        description=DESCRIPTION.format(about=kind.about, config=kind.config),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-        argument_default=argparse.SUPPRESS,
-        parents=list(parents),
-    )
+    about = DESCRIPTION.format(about=kind.about, config=kind.config)
+    parser = new_parser(prog, description=about, parents=parents)
     add = parser.add_argument
     add("--config", metavar="FILE", help=f"options in YAML (default config/{kind.config})")
     add("--preset", metavar="NAME", help="section of that file to use, e.g. tutorial")
@@ -314,13 +277,3 @@ def _parser(
     options.add_flags(parser, {"exp_name": kind.name, **kind.defaults, "env_id": env_id})
     SESSION.add_flags(parser)
     return parser
-
-
-def _parse(
-    parser: argparse.ArgumentParser, flags: list[str], known: Sequence[str]
-) -> dict[str, Any]:
-    found, strange = parser.parse_known_args(flags)
-    if strange:
-        name = strange[0].partition("=")[0]
-        parser.error(unknown("flag", name, [flag(each) for each in known]))
-    return vars(found)

@@ -49,16 +49,10 @@ AT_THE_END = "best_at_the_end"  # in a checkpoint: its score after the training'
 
 
 class Training:
-    """One training, new or resumed from its folder.
+    """One training, new in an empty folder, or resumed from its own.
 
-    Args:
-        options: What the user chose.
-        folder: An empty folder for all results, or the one of the resumed training.
-        interrupt: Says when to stop.
-        callbacks: The user's.
-
-    Raises:
-        WorkbenchError: If the environment can't be made or doesn't suit, or there is nothing to resume from.
+    Raises WorkbenchError if the environment can't be made or doesn't suit, or there is nothing to resume
+    from.
     """
 
     log: ScalarLog
@@ -145,7 +139,7 @@ class Training:
         if score is None:  # interrupted: the next resumption evaluates it
             self._task = before
             return None
-        return int(content["steps"]), score.confirmed
+        return int(content["steps"]), score[1]
 
     # --- the course of a training ---------------------------------------------------------------
 
@@ -248,15 +242,10 @@ class Training:
         success: bool | None = None,
         step: int | None = None,
     ) -> None:
-        """Records an episode.
+        """Records an episode and its undiscounted return.
 
-        Args:
-            total_reward: The undiscounted return.
-            length: Its steps.
-            scalars: The algorithm's own figures, logged at the step of the episode's end.
-            note: Shown in the line of every 20th episode, instead of the speed.
-            success: Whether it reached its goal; None if the environment doesn't say.
-            step: The step of its end; None means now.
+        `scalars` are the algorithm's own figures; `note` stands in the line of every 20th episode, instead of
+        the speed. It ended at `step`, or now; `success` is None if the environment doesn't say.
         """
         history, steps = self.history, self._algorithm.steps
         history.returns.append(total_reward)
@@ -316,22 +305,18 @@ class Training:
         score = self._evaluator.evaluate(history.best_return, self._progress.say, is_last)
         if score is None:
             return False
-        self._evaluation = score.evaluation
-        history.evaluations.append((steps, score.evaluation.mean_return))
-        is_best = score.confirmed > history.best_return
+        self._evaluation, confirmed = score
+        history.evaluations.append((steps, self._evaluation.mean_return))
+        is_best = confirmed > history.best_return
         if is_best:
-            history.best = (steps, score.confirmed)
+            history.best = (steps, confirmed)
         was_confirmed = bool(self._run.confirm_episodes)
-        result = EvaluationResult(steps, score.evaluation, score.confirmed, is_best, was_confirmed)
+        result = EvaluationResult(steps, self._evaluation, confirmed, is_best, was_confirmed)
         self._callbacks.call("on_evaluation", self, result)
         return is_best
 
     def _save(self, best: bool = False) -> None:
-        """Writes a checkpoint, unless this step has one already.
-
-        Raises:
-            OSError: If it can't be written. The earlier checkpoints are untouched.
-        """
+        """Writes a checkpoint, unless this step has one already; raises OSError if it can't be written."""
         if self._algorithm.steps != self._saved_at or best:
             self._write_checkpoint(self._content(), best)
 

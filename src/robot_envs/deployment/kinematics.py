@@ -40,7 +40,12 @@ class LinkView:
         """Returns the links that these joints move, each in the frame asked for, by the query's names."""
         if not self._wanted:
             return {}
-        now, before, after = (self._poses(joints, time) for time in (0.0, -INSTANT, INSTANT))
+
+        def at(time: float) -> dict[str, Pose]:  # [s] from now
+            places = {name: each.position + time * each.velocity for name, each in joints.items()}
+            return link_poses(self._links, self._root, places)
+
+        now, before, after = map(at, (0.0, -INSTANT, INSTANT))
 
         def motion(place: tuple[str, Pose]) -> Motion:
             link, offset = place
@@ -51,11 +56,6 @@ class LinkView:
         for key, place, frame in self._wanted:
             motions[key] = motion(place).seen_from(AT_REST if frame is None else motion(frame))
         return motions
-
-    def _poses(self, joints: Mapping[str, JointState], time: float) -> dict[str, Pose]:
-        """Returns the poses of all links at a time from now [s]."""
-        positions = {name: each.position + time * each.velocity for name, each in joints.items()}
-        return link_poses(self._links, self._root, positions)
 
 
 def _twist(before: Pose, after: Pose) -> Twist:

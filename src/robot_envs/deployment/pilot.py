@@ -26,21 +26,10 @@ from robot_sim.control.joint import JointLimits
 
 
 class CommandLimits:
-    """Keeps a controller's commands within the URDF's limits of its joints.
+    """Keeps a controller's commands within its own limits, or the URDF's of its joints (docs/deploying.md).
 
-    | command | limited to |
-    |---|---|
-    | position | `lower` and `upper`, also the soft ones; and moves no faster than `velocity` |
-    | velocity | `velocity` either way |
-    | effort | `effort` either way |
-    | speeds of a vehicle | the controller's own limits |
-
-    Args:
-        robot: With these limits.
-        port: Port of the controller.
-        way: Largest move of a position from one command to the next, as a share of what the joint's velocity
-            limit allows; infinity: no limit.
-        period: From one command to the next [s].
+    `way` is the largest move of a position from one command to the next, `period` later [s], as a share of
+    what the joint's velocity limit allows; infinity: no limit.
     """
 
     def __init__(self, robot: Robot, port: CommandPort, way: float, period: float) -> None:
@@ -116,21 +105,11 @@ class Pilot:
 
     Calls all methods of the task as an environment does, even its reward, so that the task stores the same
     data as in training; of one with a `reward_query` it calls neither `reward` nor `is_terminal`. Joints
-    aren't moved to the task's initial state.
-
-    Args:
-        robot: The robot.
-        task: What the policy has learned.
-        act: The policy: the action for an observation.
-        period: From one step to the next [s].
-        seed: Seed of what the task draws, such as a goal.
-        goal: Goal of a task that has goals; None: it draws one.
-        way: See `CommandLimits`.
-        say: Reports commands beyond their limits, once for each controller.
-
-    Raises:
-        RobotEnvError: If the robot's description is wrong, or the task asks for what joints don't determine.
-        ValueError: If the goal isn't one of the task's.
+    aren't moved to the task's initial state. `act` returns the action for an observation, once in a period
+    [s]; `seed` is of what the task draws, such as a goal if none is given; `way` is that of `CommandLimits`;
+    `say` reports commands beyond these, once for each controller. Raises RobotEnvError if the robot's
+    description is wrong, or the task asks for what joints don't determine; ValueError if the goal isn't one
+    of the task's.
     """
 
     def __init__(
@@ -196,10 +175,7 @@ class Pilot:
     def step(
         self, time: float, joints: Joints, sensors: Sensors = NO_SENSORS
     ) -> dict[str, Command] | None:
-        """Returns commands for a time since the beginning [s]; None if the task's episode would end.
-
-        Raises ValueError if the policy or the task returns something impossible.
-        """
+        """Returns commands for a time since the beginning [s]; None if the task's episode would end."""
         task, state = self._task, self._state(time, joints, sensors)
         over = self._evaluator.is_terminal(state)
         if self._action is not None:
@@ -207,7 +183,10 @@ class Pilot:
         if over:
             self._action = None
             return None
-        self._action = self._read_action(self._act(self._observation(state)))
+        seen = self._read(task.observe(state))
+        if isinstance(task, GoalTask):
+            seen = checks.with_goals(task, seen, state)
+        self._action = self._read_action(self._act(seen))
         return self._limited(self._scene.commands(task.apply(self._action, state)))
 
     def _limited(self, commands: Mapping[str, Command]) -> dict[str, Command]:
@@ -221,10 +200,6 @@ class Pilot:
                 )
             limited[name] = self._held[name] = command
         return limited
-
-    def _observation(self, state: WorldState) -> Any:
-        seen, task = self._read(self._task.observe(state)), self._task
-        return checks.with_goals(task, seen, state) if isinstance(task, GoalTask) else seen
 
     def stop(self, joints: Joints) -> dict[str, Command]:
         """Commands that stop all joints where they are."""

@@ -36,25 +36,13 @@ class PolicyNode:
 
     Each control period of ROS time it passes the newest joint states and readings of sensors to task and
     policy, and publishes their commands. While one of them is late, or the task's episode would have ended,
-    it commands a stop instead (see `CommandLimits.stop`). At the end it stops the robot, also after
-    `rosnode kill`, or an error of policy or task.
+    it commands a stop instead (see `CommandLimits.stop`). At the end it stops the robot, also after `rosnode
+    kill`, or an error of policy or task. The topic `~goal` (std_msgs/Float64MultiArray) changes the goal of a
+    task with goals.
 
-    The topic `~goal` (std_msgs/Float64MultiArray) changes the goal of a task with goals.
-
-    Args:
-        robot: The robot; nothing of it is started, spawned or set.
-        task: What the policy has learned.
-        act: The policy: the action for an observation.
-        period: Period of control [s].
-        late: How long the robot may be without a joint state before it is stopped [s], or without a reading,
-            but at least three of its sensor's periods; None: 5 control periods, but at
-            least 0.1 s, and at most 0.3 s for a vehicle.
-        seed: See `Pilot`.
-        goal: See `Pilot`.
-        way: See `CommandLimits`.
-
-    Raises:
-        RobotEnvError: See `Pilot`.
+    `late` is how long the robot may be without a joint state before it is stopped [s], or without a reading,
+    but at least three of its sensor's periods; None: 5 control periods, but at least 0.1 s, and at most 0.3 s
+    for a vehicle. The other arguments, and what is raised, are `Pilot`'s.
     """
 
     def __init__(
@@ -251,7 +239,13 @@ class PolicyNode:
         for _ in range(2):
             sent = self._sent()
             self._publish(commands)
-            self._wait_until_sent(sent)
+            deadline = time.monotonic() + SENDING
+            # rospy drops what its threads haven't sent when the node ends.
+            while time.monotonic() < deadline:
+                now = self._sent()
+                if all(now[each] > count for each, count in sent.items() if each in now):
+                    break
+                rospy.rostime.wallsleep(0.002)
         rospy.loginfo("the robot is stopped")
 
     def _sent(self) -> dict[tuple[str, int], int]:
@@ -261,15 +255,6 @@ class PolicyNode:
             for name, topic in self._topics.items()
             for connection in topic.impl.connections
         }
-
-    def _wait_until_sent(self, before: Mapping[tuple[str, int], int]) -> None:
-        """Waits, since rospy drops what its threads haven't sent when the node ends."""
-        deadline = time.monotonic() + SENDING
-        while time.monotonic() < deadline:
-            now = self._sent()
-            if all(now[each] > count for each, count in before.items() if each in now):
-                return
-            rospy.rostime.wallsleep(0.002)
 
 
 def _late(robot: Robot, period: float) -> float:
@@ -281,10 +266,7 @@ def _late(robot: Robot, period: float) -> float:
 def run_node(
     name: str, argv: list[str], make: Callable[[], PolicyNode], should_end: Callable[[], bool]
 ) -> None:
-    """Makes this process a node, and runs the `PolicyNode` that `make` makes; see `PolicyNode.run`.
-
-    `argv` has roslaunch's remappings. Raises RobotEnvError without a master, or beside a node of that name.
-    """
+    """Makes this process a node, whose remappings `argv` has, and runs the `PolicyNode` that `make` makes."""
     if not node.master_is_up():
         raise RobotEnvError(
             f"there is no ROS master at {rosgraph.get_master_uri()}: start the robot's"

@@ -1,6 +1,6 @@
 """An environment's pictures, its page in the browser, and its render modes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -12,7 +12,7 @@ from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, WorldState
-from robot_sim.physics.pose import Pose, Vector, add
+from robot_sim.physics.pose import Pose, add
 from robot_sim.pictures.camera import Camera, CameraLike
 
 if TYPE_CHECKING:
@@ -122,7 +122,11 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
             *size,
             camera=camera,
             base=self._base,
-            beside=Surroundings(self.scene, self._poses, self._goal),
+            beside=Surroundings(
+                self.scene,
+                lambda links: self.backend.poses(links),  # noqa: PLW0108 - there is none yet
+                self.task.goal_mark,
+            ),
         )
         self._shown_for = period  # [s] of wall time, of each state in the render mode "human"
         self._page: LivePage | None = None
@@ -157,18 +161,8 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
             return self.scene.stand(self._initial, robot).compose(robot.links.root_pose)
         return self.backend.poses([f"{robot.model}::{robot.links.root}"])[0]
 
-    def _poses(self, links: Sequence[str]) -> Sequence[Pose]:
-        return self.backend.poses(links)
-
-    def _goal(self) -> tuple[Vector, float] | None:
-        return self.task.goal_mark()
-
     def render(self) -> np.ndarray | None:
-        """Returns a picture of the robot, (height, width, 3) of uint8; None in the render mode "human".
-
-        Raises:
-            SimulatorError: If the backend has to be asked where the robot is, and doesn't answer.
-        """
+        """Returns a picture of the robot, (height, width, 3) of uint8; None in the render mode "human"."""
         return self._picture(self._positions()) if self.render_mode == "rgb_array" else None
 
     def draw_on(self, server: "ViserServer", beside: int = 0) -> "RobotOnPage":
@@ -181,16 +175,9 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
             ...  # env.reset(), env.step(action)
             robot()
 
-        Args:
-            server: Server of the page.
-            beside: How many robots of this kind are on the page already; it is drawn beside them.
-
-        Returns:
-            What moves the robot on the page to where it is now: a function, which takes a caption to show
-            below the robot, and may raise `SimulatorError`. Its two halves are `look()`, which returns where
-            the robot is, and `show()`, which moves it there, then or later.
-
-        Raises:
-            SimulatorError: If the backend has to be asked where the robot is, and doesn't answer.
+        `beside` is how many robots of this kind are on the page already. Returns what moves the robot to
+        where it is now: a function, which takes a caption to show below it. Its two halves are `look()`,
+        which returns where the robot is, and `show()`, which moves it there, then or later. They raise
+        SimulatorError if the backend has to be asked where the robot is, and doesn't answer.
         """
         return self._picture.draw_on(server, self._positions, beside)

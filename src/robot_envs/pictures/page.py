@@ -129,7 +129,14 @@ class LivePage:
     def __init__(
         self, title: str, draw_on: Callable[[viser.ViserServer], RobotOnPage], period: float
     ) -> None:
-        self._server = _serve(title)
+        while True:
+            address = find_address(LOOPBACK, None)  # raises if no port is left
+            try:
+                self._server = serve(address, title, (1.0, 1.0, 1.0), ZERO)
+                break
+            except PortInUse:  # another process has looked for one at the same moment
+                continue
+        print(f"the robot is shown on the page {address.url}", flush=True)
         self._move, self._period, self._due = draw_on(self._server), period, time.monotonic()
 
     def show(self) -> None:
@@ -141,17 +148,6 @@ class LivePage:
     def close(self) -> None:
         """Closes the page."""
         stop(self._server)
-
-
-def _serve(title: str) -> viser.ViserServer:
-    while True:
-        address = find_address(LOOPBACK, None)  # raises if no port is left
-        try:
-            server = serve(address, title, (1.0, 1.0, 1.0), ZERO)
-        except PortInUse:  # another process has looked for one at the same moment
-            continue
-        print(f"the robot is shown on the page {address.url}", flush=True)
-        return server
 
 
 def _draw_ground(server: viser.ViserServer) -> None:

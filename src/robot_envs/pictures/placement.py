@@ -93,10 +93,7 @@ QUARTERS = (0.0, pi / 2.0, pi, -pi / 2.0)  # [rad] of a joint without stops
 
 
 class Placement:
-    """A robot on a ground at z = 0, or above it, with its surroundings.
-
-    `base` returns the pose of its root link; None: where it is spawned.
-    """
+    """A robot on a ground at z = 0, or above it, with its surroundings; `base` is its root link's pose."""
 
     def __init__(
         self,
@@ -143,7 +140,7 @@ class Placement:
     def camera(self, camera: CameraLike, aspect: float) -> Camera:
         """Returns `camera`, or one that sees all that joints reach, or a vehicle as a third of the picture.
 
-        A task's goal on the floor is seen from above, with more around the robot. `aspect` is width to
+        A task's goal on the floor is seen from above, with more around the robot; `aspect` is width to
         height.
         """
         if isinstance(camera, Camera):

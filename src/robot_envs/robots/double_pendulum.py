@@ -1,13 +1,10 @@
 """The double pendulum: a cart keeps two rods upright, one on top of the other."""
 
-from functools import partial
-
 import gymnasium
 import numpy as np
 
-from robot_envs.files import own_file
-from robot_envs.robot import Robot
 from robot_envs.robots import actions, numbers
+from robot_envs.robots.own import own_robot
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, WorldState
 
@@ -16,14 +13,7 @@ STRONGEST = 15.0  # [N] that an action asks for
 LEAN = 0.5  # [rad] of a rod from the vertical, at which it counts as fallen
 EDGE = 0.95  # [m] of the cart from the rail's middle
 
-ROBOT = Robot(
-    urdf=partial(own_file, "cartpole", "urdf/double_pendulum.urdf.xacro"),
-    controllers=partial(own_file, "cartpole", "config/robots/double_pendulum.yaml"),
-    run=("joint_state_controller", "cart_controller"),
-    commanded=("cart_controller",),
-    name="double_pendulum",
-    control_period=0.02,
-)
+ROBOT = own_robot("double_pendulum", "cart_controller", control_period=0.02)
 
 
 class Balance(Task):
@@ -51,9 +41,6 @@ class Balance(Task):
     ## End of an episode
     Terminated when a rod is 0.5 rad from the vertical or the cart 0.95 m from the middle; truncated after 500
     steps of 0.02 s.
-
-    Args:
-        noise: See above.
     """
 
     max_steps = 500

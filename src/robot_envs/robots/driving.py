@@ -168,7 +168,8 @@ class DriveToGoal(Task):
         (pose, twist), (fast, round_) = self._motion(state), self.fastest
         x, y, _ = pose.position
         bearing = math.atan2(self.goal[1] - y, self.goal[0] - x) - to_rpy(pose.orientation)[2]
-        ahead = math.fsum(a * b for a, b in zip(heading(pose), twist.linear, strict=True))
+        way = rotate(pose.orientation, (1.0, 0.0, 0.0))
+        ahead = math.fsum(a * b for a, b in zip(way, twist.linear, strict=True))
         return [
             min(self.distance(state) / 4.0, 1.0), math.cos(bearing), math.sin(bearing),
             ahead / fast, twist.angular[2] / round_,
@@ -202,11 +203,6 @@ class DriveToGoal(Task):
         distance, touched = self.distance(state), self.room(state) <= 0.0
         there = distance <= THERE and not touched
         return {"distance": distance, "is_success": there, "touched": touched}
-
-
-def heading(pose: Pose) -> Vector:
-    """Returns the direction in which a vehicle drives ahead."""
-    return rotate(pose.orientation, (1.0, 0.0, 0.0))
 
 
 class Floor:

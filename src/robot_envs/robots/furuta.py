@@ -1,29 +1,20 @@
 """The Furuta pendulum: its arm swings the rod up, and keeps it there."""
 
 import math
-from functools import partial
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from robot_envs.files import own_file
-from robot_envs.robot import Robot
 from robot_envs.robots import actions, numbers
+from robot_envs.robots.own import own_robot
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, WorldState
 
 STRONGEST = 0.3  # [N m] that an action asks for
 TURNS = 2.0 * math.pi  # [rad] that the arm may be away from where it points at the start
 
-ROBOT = Robot(
-    urdf=partial(own_file, "cartpole", "urdf/furuta.urdf.xacro"),
-    controllers=partial(own_file, "cartpole", "config/robots/furuta.yaml"),
-    run=("joint_state_controller", "arm_controller"),
-    commanded=("arm_controller",),
-    name="furuta",
-    control_period=0.02,
-)
+ROBOT = own_robot("furuta", "arm_controller", control_period=0.02)
 
 
 class SwingUp(Task):

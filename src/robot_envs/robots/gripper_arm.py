@@ -1,16 +1,14 @@
 """The arm with a gripper: it picks a cube from a table and lifts it, with a dense reward or to a goal."""
 
 import math
-from functools import partial
 from typing import Any
 
 import gymnasium
 import numpy as np
 
 from robot_envs.errors import TaskError
-from robot_envs.files import own_file
-from robot_envs.robot import Robot
 from robot_envs.robots import actions, numbers
+from robot_envs.robots.own import own_robot
 from robot_envs.task import GoalTask, Object, Task
 from robot_envs.world_state import InitialState, LinkQuery, Pose, StateQuery, WorldState
 
@@ -32,12 +30,10 @@ NEAR = 0.02  # [m] of the way to the cube, which is seen better from there on
 LIFTED = 0.10  # [m]: the cube is up
 CLOSE = 0.05  # [m]: it is at its goal
 
-ROBOT = Robot(
-    urdf=partial(own_file, "cartpole", "urdf/gripper_arm.urdf.xacro"),
-    controllers=partial(own_file, "cartpole", "config/robots/gripper_arm.yaml"),
-    run=("joint_state_controller", "arm_controller", "gripper_controller"),
-    commanded=("arm_controller", "gripper_controller"),
-    name="gripper_arm",
+ROBOT = own_robot(
+    "gripper_arm",
+    "arm_controller",
+    "gripper_controller",
     pose=Pose((0.0, 0.0, TABLE)),
     control_period=0.05,
     physics_step=0.002,

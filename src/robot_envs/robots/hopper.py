@@ -1,15 +1,13 @@
 """The hopper: one leg with a foot, which hops forward without falling over."""
 
 import math
-from functools import partial
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from robot_envs.files import own_file
-from robot_envs.robot import Robot
 from robot_envs.robots import actions, numbers
+from robot_envs.robots.own import own_robot
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, StateQuery, WorldState
 
@@ -19,14 +17,7 @@ SWING = (0.6, 0.7, 0.5)  # [rad] that an action asks for around it, either way
 LOW = -0.25  # [m] of the hip, below that of a stretched leg: it counts as fallen
 LEAN = 0.6  # [rad] of the torso, the same
 
-ROBOT = Robot(
-    urdf=partial(own_file, "cartpole", "urdf/hopper.urdf.xacro"),
-    controllers=partial(own_file, "cartpole", "config/robots/hopper.yaml"),
-    run=("joint_state_controller", "leg_controller"),
-    commanded=("leg_controller",),
-    name="hopper",
-    control_period=0.02,
-)
+ROBOT = own_robot("hopper", "leg_controller", control_period=0.02)
 
 
 class HopForward(Task):

@@ -1,6 +1,5 @@
 """The rover: a robot on two wheels, which drives to a goal by its laser, or by its depth camera."""
 
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -8,20 +7,17 @@ import gymnasium
 import numpy as np
 
 from robot_envs.files import Source, own_file
-from robot_envs.robot import Robot
 from robot_envs.robots.driving import UNIT, DriveToGoal
+from robot_envs.robots.own import own_robot
 from robot_envs.world_state import StateQuery, WorldState
 
 WORLDS = ("room", "maze", "gates")
 WIDTH, HEIGHT = 32, 24  # [pixels]
 MOST = 2.0  # of 0.3 m / depth
 
-ROBOT = Robot(
-    urdf=partial(own_file, "cartpole", "urdf/rover.urdf.xacro"),
-    controllers=partial(own_file, "cartpole", "config/robots/rover.yaml"),
-    run=("joint_state_controller", "drive_controller"),
-    commanded=("drive_controller",),
-    name="rover",
+ROBOT = own_robot(
+    "rover",
+    "drive_controller",
     arguments={"width": str(WIDTH), "height": str(HEIGHT)},
     control_period=0.2,
     physics_step=0.005,

@@ -1,15 +1,13 @@
 """The six-joint arm: its tip reaches a point in space, by positions of its joints."""
 
 import math
-from functools import partial
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from robot_envs.files import own_file
-from robot_envs.robot import Robot
 from robot_envs.robots import actions, numbers
+from robot_envs.robots.own import own_robot
 from robot_envs.task import Task
 from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
@@ -20,14 +18,7 @@ STEP = 0.08  # [rad] that an action moves a joint by, at most
 CENTRE, HALF = (0.45, 0.0, 0.40), (0.15, 0.30, 0.20)  # [m] of the box that targets are drawn in
 CLOSE = 0.02  # [m]: the tip is there
 
-ROBOT = Robot(
-    urdf=partial(own_file, "cartpole", "urdf/six_joint_arm.urdf.xacro"),
-    controllers=partial(own_file, "cartpole", "config/robots/six_joint_arm.yaml"),
-    run=("joint_state_controller", "arm_controller"),
-    commanded=("arm_controller",),
-    name="six_joint_arm",
-    control_period=0.04,
-)
+ROBOT = own_robot("six_joint_arm", "arm_controller", control_period=0.04)
 
 
 class ReachInSpace(Task):

@@ -1,15 +1,13 @@
 """The two-link arm: its tip reaches a point of the plane, with a dense reward or with a goal."""
 
 import math
-from functools import partial
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from robot_envs.files import own_file
-from robot_envs.robot import Robot
 from robot_envs.robots import actions, numbers
+from robot_envs.robots.own import own_robot
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
@@ -20,14 +18,7 @@ NEAR = 0.05  # [m] of the way to the target, which is seen better from there on
 GOAL_UNIT = 0.1  # [m]: numbers of order 1, which networks tell apart
 FASTEST = 3.0  # [rad/s] that an action asks for
 
-ROBOT = Robot(
-    urdf=partial(own_file, "cartpole", "urdf/two_link_arm.urdf.xacro"),
-    controllers=partial(own_file, "cartpole", "config/robots/two_link_arm.yaml"),
-    run=("joint_state_controller", "shoulder_controller", "elbow_controller"),
-    commanded=("shoulder_controller", "elbow_controller"),
-    name="two_link_arm",
-    control_period=0.04,
-)
+ROBOT = own_robot("two_link_arm", "shoulder_controller", "elbow_controller", control_period=0.04)
 
 
 class Reach(Task):

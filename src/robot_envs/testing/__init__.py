@@ -1,10 +1,4 @@
-"""The conformance suite of robot environments, as one call for your own tests.
-
-from robot_envs.testing import check_robot_env
-
-def test_my_arm():
-    check_robot_env("my_arm/Reach-v0", backends=("bullet", "ros"))
-"""
+"""The conformance suite of robot environments, as one call for your own tests."""
 
 from robot_envs.testing.episodes import check_stands
 from robot_envs.testing.rollouts import differences, rollout

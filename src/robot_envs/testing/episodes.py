@@ -32,13 +32,8 @@ TRIES = 20  # episodes, to find one that doesn't end by itself
 def check_stands(robot: Robot, joints: Mapping[str, float], seconds: float = 5.0) -> None:
     """Checks that a robot with a free base stands while its controllers hold where its joints start.
 
-    Args:
-        robot: A robot that is spawned on the ground.
-        joints: Where its joints start [rad, m]; others start at 0.
-        seconds: Simulated time [s].
-
-    Raises:
-        AssertionError: If it sinks or tilts.
+    It is spawned on the ground, with `joints` at these positions [rad, m], others at 0. Raises AssertionError
+    if it sinks or tilts within that simulated time [s].
     """
     root, time, fallen = robot.links.root, 0.0, ""
     backend = make_backend(Scene([robot]), None, robot.control_period)

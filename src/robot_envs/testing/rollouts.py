@@ -65,10 +65,7 @@ PARTS = {
 
 
 def rollout(env: gymnasium.Env[Any, Any], steps: int, seed: int, two_phases: bool = False) -> Given:
-    """Returns the results of seeded random actions; episodes follow one another.
-
-    With `two_phases` it calls `begin_step` before each step.
-    """
+    """Returns the results of seeded random actions, episode after episode, with or without `begin_step`."""
     env.action_space.seed(seed)
     given: Given = [env.reset(seed=seed)]
     for _ in range(steps):

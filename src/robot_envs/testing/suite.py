@@ -1,8 +1,7 @@
 """The conformance suite: runs all checks over all backends, and reports all faults together."""
 
-import contextlib
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium
@@ -31,7 +30,9 @@ def check_robot_env(
     `begin_step`, and over every backend but real time); wrong actions and options are refused and move
     nothing; truncation isn't termination; reset knows its options; the spec can be copied and pickled;
     pictures show motion; a closed environment says so; rewards of goals agree; and Gymnasium's own checker
-    finds nothing. In this process also: vectors are bit-identical to environments alone.
+    finds nothing. In this process also: vectors are bit-identical to environments alone. Raises
+    AssertionError, which lists broken promises and the environment's own errors, a line each; RuntimeError
+    under `python -O`.
 
     Args:
         env: An id, "my_arm/Reach-v0" or "my_module:my_arm/Reach-v0"; or a function that makes an
@@ -39,10 +40,6 @@ def check_robot_env(
         backends: Names of them.
         options: That it is made with.
         steps: Steps of each rollout.
-
-    Raises:
-        AssertionError: Lists broken promises and the environment's own errors, a line each.
-        RuntimeError: Under `python -O`, which removes the checks.
     """
     if not __debug__:
         raise RuntimeError("check_robot_env checks by assert statements: run Python without -O")
@@ -75,23 +72,13 @@ def check_robot_env(
 
 def gymnasiums_checker(subject: Subject) -> None:
     """Gymnasium's own checker finds nothing, and nothing warns."""
-    with _warnings() as texts, subject.made() as env:
-        check_env(env)
-    assert not texts, f"Gymnasium's checker warns: {' '.join(texts)}"
-
-
-@contextlib.contextmanager
-def _warnings() -> Iterator[list[str]]:
-    """Collects warnings, except rospy's about renamed methods of Python, from its own threads."""
-    texts: list[str] = []
-    with warnings.catch_warnings(record=True) as caught:
+    with warnings.catch_warnings(record=True) as caught, subject.made() as env:
         warnings.simplefilter("always")
-        yield texts
-    texts += [
-        str(each.message)
-        for each in caught
-        if "/rospy/" not in each.filename and not any(text in str(each.message) for text in FINE)
-    ]
+        check_env(env)
+    # rospy warns of renamed methods of Python, from its own threads
+    texts = [str(each.message) for each in caught if "/rospy/" not in each.filename]
+    texts = [each for each in texts if not any(text in each for text in FINE)]
+    assert not texts, f"Gymnasium's checker warns: {' '.join(texts)}"
 
 
 CHECKS: tuple[Callable[[Subject], None], ...] = (

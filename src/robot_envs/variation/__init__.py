@@ -1,7 +1,4 @@
-"""Sim-to-real: imperfect sensors and actuators, and robots that differ from episode to episode.
-
-Nothing here knows ROS or a simulator: all backends are bit-identical.
-"""
+"""Sim-to-real, without ROS and simulator: imperfect sensors and actuators, robots that differ."""
 
 from robot_envs.variation.variation import LinkScale, Randomisation, Variation
 

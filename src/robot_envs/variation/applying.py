@@ -49,10 +49,7 @@ class Changeable(Protocol):
 
 
 class Applier:
-    """Applies variations to robots as they were found.
-
-    What the world doesn't report, a joint's own friction, is taken from the robot's file.
-    """
+    """Applies variations to robots as they were found; a joint's own friction is taken from the file."""
 
     def __init__(self, scene: Scene, world: Changeable) -> None:
         self._scene, self._world = scene, world

@@ -25,11 +25,7 @@ def is_number(value: Any) -> bool:
 def by_name(
     option: str, given: Any, names: Sequence[str], kind: str, which: str = ""
 ) -> dict[str, Any]:
-    """Returns an option's values by name, unchecked: one for all, or a mapping, which may leave names out.
-
-    `kind` and `which` describe what has the names ("joint", "that moves") in the ValueError for an unknown
-    one.
-    """
+    """Returns an option's values by name: one for all, or a mapping; ValueError for an unknown name."""
     if not isinstance(given, Mapping):
         return dict.fromkeys(names, given)
     for name in given:
@@ -44,6 +40,12 @@ def at_least_zero(option: str, given: Any) -> float:
     if not is_number(given) or given < 0.0:
         raise ValueError(f"{option} must be a number >= 0, not {given!r}")
     return float(given)
+
+
+def _sizes(option: str, given: Any, names: Sequence[str], kind: str) -> dict[str, float]:
+    """Returns an option's numbers >= 0 by name; see `by_name`."""
+    values = by_name(option, given, names, kind)
+    return {name: at_least_zero(option, each) for name, each in values.items()}
 
 
 def steps(option: str, given: Any, most: int) -> int:
@@ -73,26 +75,23 @@ class Encoder(NamedTuple):
 
 
 class Sensor:
-    """Measures joints with noise, rounding and delay, and sensors with further noise and delay. The rest of
-    a state is only delayed, except the commands, which are the present ones.
+    """Measures joints with noise, rounding and delay, and sensors with further noise and delay.
 
-    The velocity of a joint with an `encoder_step` is the difference of two measured positions over the
-    control period, as drivers compute it: a multiple of step / period, without noise of its own.
+    The rest of a state is only delayed, except the commands, which are the present ones. The velocity of a
+    joint with an `encoder_step` is the difference of two measured positions over the control period, as
+    drivers compute it: a multiple of step / period, without noise of its own. Raises ValueError for an
+    impossible number, or an unknown joint.
 
     Args:
-        joints: Their names.
+        joints: Names of a state's joints.
         period: Period of control [s].
         noise: Standard deviation of the normal noise on positions and velocities [m, m/s, rad, rad/s]: a
             number, or a pair (position, velocity), for all joints, or by joint. It is drawn for all joints,
             those of a mapping first, in its order, and added before an encoder rounds. A mapping may name
             sensors, too: a number for all that one measures, or by attribute of its `Reading`.
-        delay: Age of a measurement [control steps]; until there are any so old, the episode's first is
-            repeated.
+        delay: Age of a measurement [control steps]; until any is so old, the episode's first is repeated.
         encoder_step: Resolution of positions [rad, m]: one for all joints, or by joint; 0: exact.
-        sensors: Names of the sensors of a state.
-
-    Raises:
-        ValueError: For an impossible number, or an unknown joint.
+        sensors: Names of a state's sensors.
     """
 
     def __init__(
@@ -107,13 +106,16 @@ class Sensor:
         self._period = period
         self._sensors: dict[str, dict[str, float]] = {}
         if isinstance(noise, Mapping):
-            self._sensors = {name: _by_part(noise[name]) for name in noise if name in sensors}
+            self._sensors = {
+                name: _sizes("sensor_noise", noise[name], noisy_fields(), "attribute of a reading")
+                for name in noise
+                if name in sensors
+            }
             noise = {name: each for name, each in noise.items() if name not in sensors}
         self._readings: dict[str, tuple[float, Reading]] = {}  # noisy ones, with their times [s]
         by_joint = by_name("sensor_noise", noise, joints, "joint")
         sizes = {name: _pair("sensor_noise", size) for name, size in by_joint.items()}
-        by_joint = by_name("encoder_step", encoder_step, joints, "joint")
-        notches = {name: at_least_zero("encoder_step", size) for name, size in by_joint.items()}
+        notches = _sizes("encoder_step", encoder_step, joints, "joint")
         for size in notches.values():
             if 0.0 < size < LEAST_STEP:
                 raise ValueError(f"encoder_step must be 0 or at least {LEAST_STEP:g}, not {size!r}")
@@ -203,12 +205,6 @@ class Sensor:
         return measured, (measured - before) / self._period
 
 
-def _by_part(given: Any) -> dict[str, float]:
-    """Returns the standard deviations of what a sensor measures, by attribute of its `Reading`."""
-    sizes = by_name("sensor_noise", given, noisy_fields(), "attribute of a reading")
-    return {name: at_least_zero("sensor_noise", size) for name, size in sizes.items()}
-
-
 def _pair(option: str, given: Any) -> tuple[float, float]:
     """Returns the standard deviations of position and velocity."""
     numbers = [given, given] if is_number(given) else np.ravel(given).tolist()
@@ -228,7 +224,8 @@ Rules = dict[str, tuple[Rule, float]]
 class Actuator:
     """Between a task's commands and the controllers: first the delay, then the limit, then the lag.
 
-    Angles are treated as plain numbers: a set-point that jumps from pi to -pi passes 0.
+    Angles are treated as plain numbers: a set-point that jumps from pi to -pi passes 0. Raises ValueError for
+    an impossible number, or an unknown controller.
 
     Args:
         holds: Whether a controller takes positions, or else velocities or efforts, by its name.
@@ -239,9 +236,6 @@ class Actuator:
             either way; positions move no faster than that [m/s, rad/s].
         lag: Time constant of a first-order lag [s]: one for all, or by controller; 0: none. During a control
             period a controller gets what the lag reaches at its end: 1 - exp(-t / lag) of a step.
-
-    Raises:
-        ValueError: For an impossible number, or an unknown controller.
     """
 
     def __init__(
@@ -254,14 +248,12 @@ class Actuator:
     ) -> None:
         names = list(holds)
         self._delay = steps("action_delay", delay, MOST_DELAY)
-        given = {} if limit is None else by_name("actuator_limit", limit, names, "controller")
-        most = {name: at_least_zero("actuator_limit", each) for name, each in given.items()}
+        most = {} if limit is None else _sizes("actuator_limit", limit, names, "controller")
         self._limits: Rules = {
             name: (_follow, each * period) if holds[name] else (_cut, each)
             for name, each in most.items()
         }
-        given = by_name("actuator_lag", lag, names, "controller")
-        lags = {name: at_least_zero("actuator_lag", each) for name, each in given.items()}
+        lags = _sizes("actuator_lag", lag, names, "controller")
         self._lags: Rules = {
             name: (_lag, -math.expm1(-period / each)) for name, each in lags.items() if each > 0.0
         }

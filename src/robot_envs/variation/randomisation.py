@@ -1,6 +1,6 @@
 """Domain randomisation of any robot, from named options."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,20 +64,8 @@ class UniformRange(NamedTuple):
         return self.low + (self.high - self.low) * share
 
 
-def check_names(given: Iterable[str]) -> None:
-    """Raises ValueError for an unknown option, with the nearest name."""
-    known = [option.name for option in OPTIONS]
-    for name in given:
-        if name not in known:
-            hint = nearest_or_all(str(name), known)
-            raise ValueError(f"randomisation has no option {name!r}{hint}")
-
-
 def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, UniformRange]:
-    """Returns an option's intervals by name, from a number, a pair (low, high), or a mapping.
-
-    Raises ValueError for an impossible interval, or an unknown name.
-    """
+    """Returns an option's intervals by name, from a number, a pair (low, high), or a mapping of these."""
     if not names:
         raise ValueError(
             f"randomisation of {option.name}: the robot has no {option.of.name} {option.of.which}"
@@ -120,35 +108,20 @@ Drawn = dict[str, Any]
 
 
 class UniformRandomisation(Shared):
-    """Draws a robot for each episode, uniformly, within the bounds of its options.
-
-    | option | of each | what differs | a number means |
-    |---|---|---|---|
-    | `mass` | link | factor of its mass and moments | half-width: 0.2 is 0.8 to 1.2 |
-    | `length` | link | factor of the distance of its centre of mass, and of its moments | half-width |
-    | `com` | link | its centre of mass [m], each of x, y and z | half-width |
-    | `damping` | joint | viscous friction [N s/m, N m s/rad] in addition to its own | largest value |
-    | `friction` | joint | dry friction [N, N m] in addition to its own | largest value |
-    | `surface_friction` | link | factor of the friction of its surfaces | half-width |
-    | `gains` | controller | factor of p, i and d of its PIDs | half-width |
-    | `gravity` | the world | factor of its gravity | half-width |
+    """Draws a robot for each episode, uniformly, within the bounds of its options (docs/sim_to_real.md).
 
     A value is a number, a pair (low, high), or a mapping with either by name, for some links, joints or
-    controllers only.
-
-    The same count of random numbers is drawn whatever the options, so that later draws don't depend on them.
-
-    Args:
-        scene: The robots; names are as in `Parts`.
-        options: By name.
-
-    Raises:
-        ValueError: For an unknown option or name, or an impossible interval.
-        RobotEnvError: If something in a robot's description is wrong.
+    controllers only; names are as in `Parts`. The same count of random numbers is drawn whatever the options,
+    so that later draws don't depend on them. Raises ValueError for an unknown option or name, or an
+    impossible interval.
     """
 
     def __init__(self, scene: Scene, options: Mapping[str, Any]) -> None:
-        check_names(options)
+        known = [option.name for option in OPTIONS]
+        for name in options:
+            if name not in known:
+                hint = nearest_or_all(str(name), known)
+                raise ValueError(f"randomisation has no option {name!r}{hint}")
         parts = Parts(scene)
         self._axes = parts.axes
         pids = parts.pids() if "gains" in options else {}

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import gymnasium
 import torch
 from gymnasium import spaces
 from torch import nn
@@ -15,15 +14,14 @@ from rl_workbench.agents.greedy import (
     Switches,
 )
 from rl_workbench.training.algorithm import Policy
+from rl_workbench.training.checked import Env
 from rl_workbench.training.environments import is_image
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.sb3.hyperparameters import ON_POLICY
 from rl_workbench.training.sb3.models import make_acting_model
 
 
-def load_policy(
-    options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
-) -> Policy:
+def load_policy(options: TrainingOptions, content: dict[str, Any], env: Env) -> Policy:
     """Makes the policy of a checkpoint; see `algorithm`.
 
     The checkpoint holds plain tensors, and the model is made from the recorded options. So a foreign file
@@ -44,12 +42,7 @@ def load_policy(
 
 
 def greedy_network(model: Any, algorithm: str) -> nn.Module:
-    """Returns what `model.predict(..., deterministic=True)` computes, for observations (N, D).
-
-    Args:
-        model: With the policy MlpPolicy, or MultiInputPolicy on vectors.
-        algorithm: The value of --algo.
-    """
+    """Returns what `model.predict(..., deterministic=True)` computes for observations (N, D), by an MLP."""
     policy, actions = model.policy, model.action_space
     if algorithm == "dqn-sb3":
         return SingleChoice(policy.q_net.q_net)

@@ -1,7 +1,4 @@
-"""Stable-Baselines3 as an algorithm of the training loop: its own loop, with a callback for ours.
-
-It is evaluated and saved between two rollouts, and continues from there bit-identical.
-"""
+"""Stable-Baselines3 as an algorithm of the training loop: its own loop, with a callback for ours."""
 
 import math
 from operator import attrgetter

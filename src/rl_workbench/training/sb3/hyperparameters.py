@@ -74,8 +74,6 @@ class OnPolicyOptions(ExplorationOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class PPOOptions(OnPolicyOptions):
-    """PPO."""
-
     library_class = "PPO"
 
     batch_size: int = option(64, "steps of a minibatch", 1, inf)
@@ -87,8 +85,6 @@ class PPOOptions(OnPolicyOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class A2COptions(OnPolicyOptions):
-    """A2C."""
-
     library_class = "A2C"
 
     learning_rate: float = option(7e-4, "learning rate", 0, inf)
@@ -123,8 +119,6 @@ class OffPolicyOptions(SB3Options):
 
 @dataclass(frozen=True, kw_only=True)
 class SACOptions(OffPolicyOptions, ExplorationOptions):
-    """SAC."""
-
     library_class = "SAC"
 
     action_noise: float | None = option(None, "standard deviation of noise on the actions")
@@ -136,8 +130,6 @@ class SACOptions(OffPolicyOptions, ExplorationOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class DDPGOptions(OffPolicyOptions):
-    """DDPG."""
-
     library_class = "DDPG"
 
     learning_rate: float = option(1e-3, "learning rate", 0, inf)
@@ -146,8 +138,6 @@ class DDPGOptions(OffPolicyOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class TD3Options(DDPGOptions):
-    """TD3."""
-
     library_class = "TD3"
 
     policy_delay: int = option(2, "updates of the critics for each of the policy", 1, inf)
@@ -157,8 +147,6 @@ class TD3Options(DDPGOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class DQNOptions(OffPolicyOptions):
-    """DQN of Stable-Baselines3."""
-
     library_class = "DQN"
 
     learning_rate: float = option(1e-4, "learning rate", 0, inf)

@@ -1,7 +1,6 @@
 """Stable-Baselines3's models, made from our options."""
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 import gymnasium
@@ -20,7 +19,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import imported
-from rl_workbench.training.checked import BEGIN_STEP, COMPUTE_REWARD, CheckedEnvironment
+from rl_workbench.training.checked import BEGIN_STEP, COMPUTE_REWARD, CheckedEnvironment, Env
 from rl_workbench.training.environments import has_goal, is_image
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.repeatable import RepeatableEnvironment
@@ -67,23 +66,16 @@ class StoppableOffPolicy(OffPolicyAlgorithm):
 
 
 class ParallelVecEnv(DummyVecEnv):
-    """Begins a step in all environments before it waits for the first.
+    """Begins a step in all environments before it waits: those in other processes run at the same time."""
 
-    So steps that take time in other processes run at the same time.
-    """
-
-    def __init__(self, envs: Sequence[gymnasium.Env[Any, Any]]) -> None:
-        super().__init__([partial(_given, env) for env in envs])
+    def __init__(self, envs: Sequence[Env]) -> None:
+        super().__init__([lambda env=env: env for env in envs])  # type: ignore[misc]
         self._begins = [env.get_wrapper_attr(BEGIN_STEP) for env in envs] if len(envs) > 1 else []
 
     def step_async(self, actions: np.ndarray) -> None:
         super().step_async(actions)
         for begin, action in zip(self._begins, actions, strict=False):
             begin(action)
-
-
-def _given(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
-    return env
 
 
 def make_learning_model(options: TrainingOptions, envs: Sequence[CheckedEnvironment]) -> Any:
@@ -97,7 +89,7 @@ def make_learning_model(options: TrainingOptions, envs: Sequence[CheckedEnvironm
     return _model_in(vector, options, arguments, type(own.__name__, (mixin, own), {}))
 
 
-def make_acting_model(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Any:
+def make_acting_model(options: TrainingOptions, env: Env) -> Any:
     """Makes a model that only acts, in another environment than those that it learned in."""
     vector = DummyVecEnv([lambda: env])
     _check_fit(options, vector.action_space)
@@ -140,9 +132,13 @@ def _model_in(
         arguments["action_noise"] = NormalActionNoise(np.zeros(shape), deviation)
     if isinstance(arguments.get("train_freq"), list):  # a number and a unit
         arguments["train_freq"] = tuple(arguments["train_freq"])
+    space = vector.observation_space
+    suits = "CnnPolicy" if is_image(space) else "MlpPolicy"
+    suits = "MultiInputPolicy" if isinstance(space, spaces.Dict) else suits
+    policy = _named(options.hyperparameters.policy or suits, "--policy")
     try:
         model = made_class(
-            _policy(options, vector.observation_space), vector, seed=run.seed, device=run.device,
+            policy, vector, seed=run.seed, device=run.device,
             policy_kwargs=network or None, **arguments,
         )  # fmt: skip
     except WorkbenchError:
@@ -152,13 +148,6 @@ def _model_in(
         raise WorkbenchError(f"{options.kind.name} can't be made: {text}") from error
     model.set_logger(Logger(None, []))  # it keeps what the model records
     return model
-
-
-def _policy(options: TrainingOptions, space: gymnasium.Space[Any]) -> Any:
-    """Returns the policy's name or class: the one asked for, or what suits the observations."""
-    suits = "CnnPolicy" if is_image(space) else "MlpPolicy"
-    suits = "MultiInputPolicy" if isinstance(space, spaces.Dict) else suits
-    return _named(options.hyperparameters.policy or suits, "--policy")
 
 
 def _named(value: Any, flag: str) -> Any:
@@ -181,7 +170,7 @@ def _hindsight(options: TrainingOptions, env: CheckedEnvironment) -> dict[str, A
             f"her needs goals: a Dict of observation, achieved_goal and desired_goal; {env_id} observes "
             f"{' '.join(str(env.observation_space).split())}"
         )
-    if not env.can_compute_reward:
+    if not env.env.has_wrapper_attr(COMPUTE_REWARD):
         raise WorkbenchError(
             f"her needs {env_id}'s method {COMPUTE_REWARD}(achieved_goal, desired_goal, info)"
         )

@@ -123,13 +123,13 @@ def test_epsilon_by_step_and_by_episode() -> None:
     by_episode = Epsilon(DQNSettings(epsilon_schedule="episode", epsilon_decay=0.995))
     for each in (by_step, by_episode):
         each.step_done(1000)
-    by_step.episode_done()
-    by_episode.learned()
+    by_step.ended("episode")
+    by_episode.ended("step")
     assert by_step.value == by_episode.value == 1.0
     for _ in range(2):
-        by_step.learned()
+        by_step.ended("step")
     for _ in range(20):
-        by_episode.episode_done()
+        by_episode.ended("episode")
     assert by_step.value == 0.3
     assert f"{by_episode.value:.3f}" == "0.905", "the DQN tutorial's first line"
 
