@@ -12,7 +12,7 @@ def test_its_programs_run(tmp_path, monkeypatch, capsys):
     for program in re.findall(
         r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.M | re.S
     ):
-        exec(program, known)  # noqa: S102 - our own page
+        exec(program, known)
     assert repr(known["first"]) == repr(known["again"]) and (tmp_path / "hard.snapshot").exists()
     assert "environment/steps: 0 and 1" in capsys.readouterr().out
     starts = {known["env"].reset(seed=seed)[0].tobytes() for seed in range(8)}
