@@ -23,10 +23,10 @@ class EnvSnapshot:
     """All that decides the future of an environment.
 
     Attributes:
-        fits: the task's class and the control period [s], which have to be the same where it is restored.
-        state: of episode, task, generators, noise, delays and variation, by name, as plain data.
-        world: the backend's part.
-        is_foreign: whether it was read, so that nobody knows who has written it.
+        fits: The task's class and the control period [s], which have to be the same where it is restored.
+        state: Of episode, task, generators, noise, delays and variation, by name, as plain data.
+        world: The backend's part.
+        is_foreign: Whether it was read, so that nobody knows who has written it.
     """
 
     fits: dict[str, Any]
@@ -87,7 +87,7 @@ def episode_of(snapshot: Snapshot) -> tuple[int, dict[str, Any]]:
     """Returns when the episode of an environment's snapshot has begun [ns], and what controllers hold.
 
     Raises:
-        SimulatorError: if it doesn't say.
+        SimulatorError: If it doesn't say.
     """
     episode = snapshot.state.get("episode")
     if isinstance(episode, dict):

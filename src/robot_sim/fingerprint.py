@@ -53,8 +53,8 @@ def misfits(given: Mapping[str, Any], here: Mapping[str, Any]) -> str:
     """Returns in what a world differs from that of a snapshot; "" if it fits.
 
     Args:
-        given: fingerprint of the snapshot.
-        here: fingerprint of the world.
+        given: Fingerprint of the snapshot.
+        here: Fingerprint of the world.
     """
     if given.get("engine") != here["engine"]:
         return f"the snapshot is of the engine {given.get('engine')!r:.50}, and here is {here['engine']!r}"
@@ -82,7 +82,7 @@ def check_foreign(
     Values of controllers and plugins may still be wrong: then these fail, and nothing else.
 
     Raises:
-        SnapshotError: if something is of another type, or a tick would fail.
+        SnapshotError: If something is of another type, or a tick would fail.
     """
     faults = [misfit(before, state)]
     if not all(is_finite(own["motion"]) for own in state["world"]["models"].values()):

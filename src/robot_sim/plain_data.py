@@ -45,7 +45,7 @@ def pack(value: Any) -> bytes:
     """Returns the bytes of plain data.
 
     Raises:
-        StateError: if something isn't plain data.
+        StateError: If something isn't plain data.
     """
     try:
         return bytes(msgpack.packb(value, default=_extension, strict_types=True))
@@ -57,7 +57,7 @@ def unpack(data: bytes) -> Any:
     """Returns the plain data of bytes that `pack` has returned.
 
     Raises:
-        StateError: if they are damaged, or refer to a class that isn't imported.
+        StateError: If they are damaged, or refer to a class that isn't imported.
     """
     return _unpack(data, 0)
 
@@ -66,7 +66,7 @@ def resolve(value: Any) -> Any:
     """Returns the same plain data, with the records of classes that have been imported since.
 
     Raises:
-        StateError: if a class is still unknown.
+        StateError: If a class is still unknown.
     """
     resolved = unpack(pack(value))
     if record := next(_unknown(resolved), None):
@@ -183,10 +183,10 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
     """Returns where a state can't take the place of the one that is there, by its types; "" if it may.
 
     Args:
-        there: the present state.
-        given: the other one.
-        place: of both in a larger state.
-        exactly: whether names and lengths have to be the same, too.
+        there: The present state.
+        given: The other one.
+        place: Of both in a larger state.
+        exactly: Whether names and lengths have to be the same, too.
     """
     if there is None or given is None:
         return ""

@@ -52,15 +52,15 @@ class ControlledRobot:
     ) -> None:
         """
         Args:
-            model: the robot in the world.
-            hardware: its joints as ros_control sees them.
-            manager: of its controllers.
-            control_period: of the controllers [s]; they are updated on each step if that is longer.
-            namespace: the manager's, to look up controllers by their full names.
-            log: logs what is wrong with gains.
+            model: The robot in the world.
+            hardware: Its joints as ros_control sees them.
+            manager: Of its controllers.
+            control_period: Of the controllers [s]; they are updated on each step if that is longer.
+            namespace: The manager's, to look up controllers by their full names.
+            log: Logs what is wrong with gains.
 
         Raises:
-            ControlError: if the model lacks a joint that a transmission names, or has a wrong setting.
+            ControlError: If the model lacks a joint that a transmission names, or has a wrong setting.
         """
         self.model = model
         self.hardware = hardware

@@ -54,9 +54,9 @@ class Simulator(Shared):
     ) -> None:
         """
         Args:
-            lockstep: whether only advance() moves time.
-            max_update_rate: ticks a second of wall time; 0 is as fast as possible.
-            relatch: whether controllers start over when a service moves joints or resets the world.
+            lockstep: Whether only advance() moves time.
+            max_update_rate: Ticks a second of wall time; 0 is as fast as possible.
+            relatch: Whether controllers start over when a service moves joints or resets the world.
         """
         self.world = world
         self.lock = FairLock()
@@ -297,9 +297,9 @@ class Simulator(Shared):
         The caller holds the lock.
 
         Raises:
-            SnapshotError: if engine, models, running controllers or properties aren't those of the
+            SnapshotError: If engine, models, running controllers or properties aren't those of the
                 snapshot, or a foreign one is wrong; nothing changes then.
-            StateError: if a user's `load_state_dict` has raised; all else is restored then.
+            StateError: If a user's `load_state_dict` has raised; all else is restored then.
         """
         if snapshot.fits is not self.fits and (fault := misfits(snapshot.fits, self.fits)):
             raise SnapshotError(fault)

@@ -23,9 +23,9 @@ class Snapshot:
     """All that decides the future of a simulation.
 
     Attributes:
-        fits: what has to be the same where it is restored: engine, models, controllers that run.
-        state: the state of each part, by name: numbers, texts, bytes, arrays, lists and dictionaries.
-        is_foreign: whether it was read, so that nobody knows who has written it.
+        fits: What has to be the same where it is restored: engine, models, controllers that run.
+        state: The state of each part, by name: numbers, texts, bytes, arrays, lists and dictionaries.
+        is_foreign: Whether it was read, so that nobody knows who has written it.
     """
 
     fits: dict[str, Any]
@@ -40,7 +40,7 @@ class Snapshot:
         """Returns it as bytes, of this version of the format.
 
         Raises:
-            StateError: if something in it isn't plain data.
+            StateError: If something in it isn't plain data.
         """
         content = pack([self.fits, self.state])
         return MAGIC + hashlib.sha256(content).digest() + content
@@ -50,7 +50,7 @@ class Snapshot:
         """Returns the snapshot of bytes that `to_bytes` has returned, here or in another process.
 
         Raises:
-            SnapshotError: if they are damaged, or of another version.
+            SnapshotError: If they are damaged, or of another version.
         """
         begin = len(MAGIC) + DIGEST
         digest, content = data[len(MAGIC) : begin], data[begin:]
@@ -70,8 +70,8 @@ class Snapshot:
         """Writes it to a file.
 
         Raises:
-            StateError: if something in it isn't plain data.
-            OSError: if the file can't be written.
+            StateError: If something in it isn't plain data.
+            OSError: If the file can't be written.
         """
         Path(path).write_bytes(self.to_bytes())
 
@@ -80,7 +80,7 @@ class Snapshot:
         """Returns the snapshot of a file.
 
         Raises:
-            SnapshotError: if it can't be read, is damaged, too large, or of another version.
+            SnapshotError: If it can't be read, is damaged, too large, or of another version.
         """
         try:
             return cls.from_bytes(read_file(Path(path), LARGEST))

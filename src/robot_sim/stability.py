@@ -52,7 +52,7 @@ class StabilityWatch(Stateful):
     ) -> None:
         """
         Raises:
-            ControlError: if the model's `<pOnlyDamping>` isn't a number from 0 to 1.
+            ControlError: If the model's `<pOnlyDamping>` isn't a number from 0 to 1.
         """
         self.shares: dict[str, float] = {}  # of efforts, for joints whose gains are too high
         self._model = model

@@ -57,7 +57,7 @@ def state_of(part: Any) -> Any:
     """Returns the state of an object: by its own methods, or else by its attributes.
 
     Raises:
-        StateError: if it can't be saved.
+        StateError: If it can't be saved.
     """
     kind = type(part)
     method = getattr(kind, "state_dict", None)
@@ -80,7 +80,7 @@ def load(parts: Iterable[tuple[Any, Any]]) -> None:
     """Puts states back into their objects, into all of them.
 
     Raises:
-        StateError: if one can't take its state.
+        StateError: If one can't take its state.
     """
     faults = []
     for part, state in parts:
@@ -117,7 +117,7 @@ def attributes_of(part: Any) -> dict[str, Any]:
     """Returns the state of an object by its attributes.
 
     Raises:
-        StateError: if one can't be saved.
+        StateError: If one can't be saved.
     """
     kind: Any = type(part)
     slots, left = _layout(kind)

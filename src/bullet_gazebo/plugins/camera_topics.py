@@ -50,11 +50,11 @@ class CameraTopics(Shared):
     """Image, JPEG and camera_info of one camera, all below `scope`.
 
     Args:
-        names: of the image and of its camera_info.
+        names: Of the image and of its camera_info.
         baseline: [m] to the camera on the left.
-        own: prefix of its service, if the plugin has several cameras.
+        own: Prefix of its service, if the plugin has several cameras.
         frame: `<frameName>` if None.
-        latch: whether a new subscriber gets the last picture.
+        latch: Whether a new subscriber gets the last picture.
     """
 
     def __init__(

@@ -49,8 +49,8 @@ class PluginContext(Mount):
     Publish fast topics as a `ThinnedTopic` of `thinner`, measurements by a clock of `sensing`.
 
     Attributes:
-        namespace: its `<robotNamespace>`, else that of the spawn request, else the model's name.
-        given_namespace: the first two of these; None if there is neither.
+        namespace: Its `<robotNamespace>`, else that of the spawn request, else the model's name.
+        given_namespace: The first two of these; None if there is neither.
     """
 
     namespace: str

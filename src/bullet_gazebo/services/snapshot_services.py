@@ -40,9 +40,9 @@ class SnapshotServices:
     """The services; in lock-step only.
 
     Args:
-        sim: the simulator.
-        steps: whose answers report contacts and measurements.
-        one_at_a_time: see `StepService`.
+        sim: The simulator.
+        steps: Whose answers report contacts and measurements.
+        one_at_a_time: See `StepService`.
     """
 
     def __init__(self, sim: Simulator, steps: StepService, one_at_a_time: threading.Lock) -> None:

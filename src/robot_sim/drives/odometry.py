@@ -120,9 +120,9 @@ class Period(Stateful):
     """Says once a period that something is due.
 
     Args:
-        rate: in Hz of simulated time; 0 is every step.
-        now: time [ns] at which the first period begins.
-        late: whether a period has to be over, so that the first step is one behind it.
+        rate: In Hz of simulated time; 0 is every step.
+        now: Time [ns] at which the first period begins.
+        late: Whether a period has to be over, so that the first step is one behind it.
     """
 
     def __init__(self, rate: float, now: int, late: bool = False) -> None:

@@ -29,12 +29,12 @@ class Camera:
     """A camera that looks at a point; z is up.
 
     Args:
-        target: the point [m].
-        distance: from the camera to the target [m].
+        target: The point [m].
+        distance: From the camera to the target [m].
         yaw: [degrees]; at 0 it looks along +y, with x to the right, at 90 along -x.
         pitch: [degrees]; negative looks down.
-        view: vertical field of view [degrees].
-        follows: whether it follows a robot that drives, in an environment's pictures.
+        view: Vertical field of view [degrees].
+        follows: Whether it follows a robot that drives, in an environment's pictures.
     """
 
     target: Vector = (0.0, 0.0, 0.0)

@@ -58,8 +58,8 @@ class Imu(Stateful):
     """Derives accelerations from the velocities of two measurements.
 
     Args:
-        feels_gravity: whether it measures +9.8 m/s² upwards at rest, as real ones do.
-        rate: of the measurements [Hz]; 0 is every step. An older one is not compared with.
+        feels_gravity: Whether it measures +9.8 m/s² upwards at rest, as real ones do.
+        rate: Of the measurements [Hz]; 0 is every step. An older one is not compared with.
     """
 
     def __init__(self, feels_gravity: bool, rate: float = 0.0) -> None:
@@ -77,9 +77,9 @@ class Imu(Stateful):
         """Returns a measurement; None for the first one, which has none to compare with.
 
         Args:
-            now: time [ns].
-            moves: counts what has moved bodies besides time: across such a move there is no acceleration.
-            motion, gravity: of the sensor, and of the world [m/s²].
+            now: Time [ns].
+            moves: Counts what has moved bodies besides time: across such a move there is no acceleration.
+            motion, gravity: Of the sensor, and of the world [m/s²].
         """
         last, self._last = self._last, (now, moves, motion.linear)
         if last is None or (last[1] == moves and now - last[0] > self._longest):

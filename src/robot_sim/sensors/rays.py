@@ -104,8 +104,8 @@ class RayScene:
         Args:
             origin: (3,) in the world [m].
             directions: (n, 3) of length 1, in world axes.
-            near: where rays start, as a distance from the origin [m]; of each ray (n,), or of all.
-            far: where they end.
+            near: Where rays start, as a distance from the origin [m]; of each ray (n,), or of all.
+            far: Where they end.
         """
         if not self._is_fresh:
             self._refresh()

@@ -102,11 +102,11 @@ class Schedule(Shared, Stateful):
         """Returns a clock that calls `measure` with the time [ns]; the caller holds the simulator's lock.
 
         Args:
-            model: that carries the sensor.
-            rate: in Hz of simulated time; 0 is every step.
-            measure: takes a measurement and sends it.
-            listens: returns whether somebody listens; called under the simulator's lock.
-            at_once: whether it measures as soon as somebody listens, if a period has passed since the last
+            model: That carries the sensor.
+            rate: In Hz of simulated time; 0 is every step.
+            measure: Takes a measurement and sends it.
+            listens: Returns whether somebody listens; called under the simulator's lock.
+            at_once: Whether it measures as soon as somebody listens, if a period has passed since the last
                 measurement or something was moved.
         """
         clock = SensorClock(self, model, measure, listens, at_once)

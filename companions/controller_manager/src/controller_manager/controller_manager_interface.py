@@ -37,9 +37,9 @@ def reload_libraries(force_kill: bool, restore: bool = False) -> bool:
     """Makes the manager search for controller types again.
 
     Args:
-        force_kill: stop and unload all controllers first; without it the manager refuses if there
+        force_kill: Stop and unload all controllers first; without it the manager refuses if there
             are any.
-        restore: load them again afterwards, and start those that ran.
+        restore: Load them again afterwards, and start those that ran.
     """
     print(f"Restore: {restore}")
     before = loaded_controllers() if restore else []

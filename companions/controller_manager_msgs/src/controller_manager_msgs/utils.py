@@ -39,12 +39,12 @@ def get_controller_managers(
     """Returns the namespaces of all managers in or below a namespace, sorted.
 
     Args:
-        namespace: where to look.
-        initial_guess: what an earlier call returned. These are only looked up again, so that
+        namespace: Where to look.
+        initial_guess: What an earlier call returned. These are only looked up again, so that
             frequent calls are cheap.
 
     Raises:
-        OSError, rosgraph.MasterException: there is no master.
+        OSError, rosgraph.MasterException: There is no master.
     """
     known = {rospy.resolve_name(each) for each in initial_guess or ()}
     return [
@@ -145,9 +145,9 @@ def filter_by_resources(
 
     Args:
         ctrl_list: controllers.
-        resources: what they must claim, all of it through one hardware interface.
-        hardware_interface: the only one to look at; None for all.
-        match_any: one of the resources is enough.
+        resources: What they must claim, all of it through one hardware interface.
+        hardware_interface: The only one to look at; None for all.
+        match_any: One of the resources is enough.
     """
     wanted = set(resources)
 

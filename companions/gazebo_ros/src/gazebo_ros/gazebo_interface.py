@@ -58,7 +58,7 @@ def wait_for_service(name: str) -> None:
     """Waits without limit, with a message every 10 s.
 
     Raises:
-        rospy.ROSInterruptException: the node was shut down meanwhile.
+        rospy.ROSInterruptException: The node was shut down meanwhile.
     """
     while not service_comes_up(name, REMIND):
         rospy.logwarn("Still waiting for service %s: is the simulator running?", name)

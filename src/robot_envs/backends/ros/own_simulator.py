@@ -52,12 +52,12 @@ class OwnSimulator:
     The constructor only starts them; `wait` returns once they can be used.
 
     Args:
-        slot: its place among the simulators that start together.
-        world: the robot's world file, or its text, which is written next to the log.
-        seed: of random numbers that plugins draw.
+        slot: Its place among the simulators that start together.
+        world: The robot's world file, or its text, which is written next to the log.
+        seed: Of random numbers that plugins draw.
 
     Raises:
-        RobotEnvError: if no process can be started.
+        RobotEnvError: If no process can be started.
     """
 
     def __init__(self, slot: Slot, world: Source | None, seed: int) -> None:
@@ -140,7 +140,7 @@ class OwnSimulator:
         """Kills a simulator that has failed; returns how it ended, and the last line of its log.
 
         Args:
-            hangs: whether it hangs, and so won't end by itself.
+            hangs: Whether it hangs, and so won't end by itself.
         """
         how = ""
         if not hangs and self.has_died():

@@ -59,11 +59,11 @@ class Journal:
         """Brings another simulator to the same state.
 
         Args:
-            world: of that simulator, just brought up.
-            step: simulated time of one action [ns].
+            world: Of that simulator, just brought up.
+            step: Simulated time of one action [ns].
 
         Raises:
-            SimulatorFault: if it fails, or comes to another state.
+            SimulatorFault: If it fails, or comes to another state.
         """
         if not self.variation.is_nominal:
             world.vary(self.variation)
@@ -113,11 +113,11 @@ def checked(state: WorldState, expected: int) -> WorldState:
     """Returns a simulator's answer if it is plausible.
 
     Args:
-        state: the answer.
-        expected: simulated time since the episode began [ns].
+        state: The answer.
+        expected: Simulated time since the episode began [ns].
 
     Raises:
-        SimulatorFault: if it is of another time, or a joint isn't finite and within bounds.
+        SimulatorFault: If it is of another time, or a joint isn't finite and within bounds.
     """
     if not abs(state.time * NANOSECONDS - expected) < 0.5:  # NaN isn't
         raise SimulatorFault(
@@ -139,13 +139,13 @@ class OwnWorld(RobotBackend):
     next reset begins with a new simulator.
 
     Args:
-        scene: the robots and objects.
-        control_period: simulated time of one action [s].
-        deadline: wall time that an answer may take, on top of 10 ms for each tick [s]; None: 30 s.
+        scene: The robots and objects.
+        control_period: Simulated time of one action [s].
+        deadline: Wall time that an answer may take, on top of 10 ms for each tick [s]; None: 30 s.
 
     Raises:
-        ValueError: if the period isn't a whole number of physics steps.
-        RobotEnvError: if there is no memory for the simulator, it doesn't start, or the robots can't be
+        ValueError: If the period isn't a whole number of physics steps.
+        RobotEnvError: If there is no memory for the simulator, it doesn't start, or the robots can't be
             brought up.
     """
 
@@ -178,8 +178,8 @@ class OwnWorld(RobotBackend):
         """Waits for the simulator, and brings the robots up.
 
         Raises:
-            ValueError: if the period isn't a whole number of its physics steps.
-            RobotEnvError: if something doesn't start.
+            ValueError: If the period isn't a whole number of its physics steps.
+            RobotEnvError: If something doesn't start.
         """
         self._perform(lambda world: None)
 

@@ -42,11 +42,11 @@ class BulletBody(Body):
         """
         Args:
             client, body: PyBullet's numbers of world and body.
-            description: in the engine's form.
-            pose: of the root link.
-            weightless: bodies and links of the world on which gravity doesn't act.
-            separation: of what overlaps in the world.
-            offsets: frames of links, as seen from PyBullet's, where they differ.
+            description: In the engine's form.
+            pose: Of the root link.
+            weightless: Bodies and links of the world on which gravity doesn't act.
+            separation: Of what overlaps in the world.
+            offsets: Frames of links, as seen from PyBullet's, where they differ.
         """
         self.id = body
         self._client = client

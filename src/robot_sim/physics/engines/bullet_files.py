@@ -23,8 +23,8 @@ def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
     from an OBJ file is written as one.
 
     Args:
-        concave: whether to write its triangles instead of its hulls.
-        objects: whether it came from an OBJ file, or is in pieces.
+        concave: Whether to write its triangles instead of its hulls.
+        objects: Whether it came from an OBJ file, or is in pieces.
     """
     path = folder / f"{mesh.digest}.{'stl' if concave or not objects else 'obj'}"
     if path.exists():

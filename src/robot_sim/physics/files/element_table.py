@@ -22,10 +22,10 @@ class Row:
 
     Attributes:
         answer: READ, WARNED, BY_DESIGN, or "" for an element that only holds others.
-        why: it has no effect.
-        default: values that need no warning, with | between them; "" for none.
-        section: where the rows of what is below it are; "" for in `below`.
-        below: its children's rows, and its attributes' with an @.
+        why: It has no effect.
+        default: Values that need no warning, with | between them; "" for none.
+        section: Where the rows of what is below it are; "" for in `below`.
+        below: Its children's rows, and its attributes' with an @.
     """
 
     answer: str = ""

@@ -102,7 +102,7 @@ def read_mesh(path: Path, selection: Selection = None) -> Mesh:
     """Returns the mesh of an STL, COLLADA or OBJ file, or of one named part of it, or a height map.
 
     Raises:
-        DescriptionError: if it can't be simulated: the file, the place in it and the fault, in one line.
+        DescriptionError: If it can't be simulated: the file, the place in it and the fault, in one line.
     """
     check_mesh(path, (*SUFFIXES, *IMAGES))
     with place(f"mesh '{path}'"):
@@ -153,7 +153,7 @@ def in_pieces(mesh: Mesh) -> Mesh:
     several objects has its pieces already.
 
     Raises:
-        DescriptionError: if they can't be computed; one line.
+        DescriptionError: If they can't be computed; one line.
     """
     if len(mesh.hulls) > 1:
         return _of_pieces(mesh, mesh.hulls) if all(map(is_solid, mesh.hulls)) else mesh
@@ -179,7 +179,7 @@ def read_look(path: str) -> MeshLook:
     """Reads the mesh file of a visual; the same one, unchanged, is read once.
 
     Raises:
-        DescriptionError: it can't be shown; one line with the file and what is wrong.
+        DescriptionError: It can't be shown; one line with the file and what is wrong.
     """
     check_mesh(Path(path), (*SUFFIXES, *IMAGES))
     found = Path(path).stat()

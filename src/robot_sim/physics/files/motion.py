@@ -15,10 +15,10 @@ def read_link_motion(link: Link, element: Element, warnings: list[str]) -> None:
     A share that is not between 0 and 1 is a warning. Of several elements Gazebo takes the first.
 
     Args:
-        link: what is changed.
-        element: the `<link>` of an SDF file, or URDF's `<gazebo reference=…>`, which may have a
+        link: What is changed.
+        element: The `<link>` of an SDF file, or URDF's `<gazebo reference=…>`, which may have a
             `<dampingFactor>` for both velocities.
-        warnings: receives a line for what is left out.
+        warnings: Receives a line for what is left out.
     """
     where = f"link '{link.name}', velocity_decay"
     link.kinematic = link.kinematic or truth(element.findtext("kinematic"))

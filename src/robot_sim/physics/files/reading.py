@@ -122,7 +122,7 @@ class Reading:
     def __init__(self, cancelled: Callable[[], bool] = lambda: False) -> None:
         """
         Args:
-            cancelled: ends the reading when it returns true. The reading thread makes this object, since
+            cancelled: Ends the reading when it returns true. The reading thread makes this object, since
                 its processor time counts.
         """
         self._cancelled = cancelled

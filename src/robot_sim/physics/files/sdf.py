@@ -169,7 +169,7 @@ def parse_sdf(
     """Returns the first model of an SDF text, in the file's pose if it gives one (`initial_pose`).
 
     Raises:
-        DescriptionError: if it can't be simulated: `source`, the place and the fault, in one line.
+        DescriptionError: If it can't be simulated: `source`, the place and the fault, in one line.
     """
     with elements.place(source):
         reading = Reading()

@@ -121,11 +121,11 @@ def read_sensors(
     """Yields the sensors of `link` that `parent` has; a faulty one is a warning.
 
     Args:
-        parent: a `<link>` or `<joint>`, or URDF's `<gazebo reference=…>` of one.
-        link: its name.
-        warnings: receives a line for each sensor that is left out.
-        frames: those of the model, for poses that are relative to another one than the link.
-        joint: the one whose sensors they are, if `link` is its child.
+        parent: A `<link>` or `<joint>`, or URDF's `<gazebo reference=…>` of one.
+        link: Its name.
+        warnings: Receives a line for each sensor that is left out.
+        frames: Those of the model, for poses that are relative to another one than the link.
+        joint: The one whose sensors they are, if `link` is its child.
     """
     for element in parent.findall("sensor"):
         where = f"link '{shown(link)}', sensor '{shown(element.get('name', ''))}'"

@@ -277,7 +277,7 @@ def parse_urdf(
     `resources` finds mesh files.
 
     Raises:
-        DescriptionError: if it can't be simulated: `source`, the place and the fault, in one line.
+        DescriptionError: If it can't be simulated: `source`, the place and the fault, in one line.
     """
     reading = Reading()
     with elements.place(source):

@@ -86,7 +86,7 @@ def load_world(
     """Reads a world file. A model that can't be read is left out, with a warning.
 
     Raises:
-        DescriptionError: in one line, if the file as a whole can't be used.
+        DescriptionError: In one line, if the file as a whole can't be used.
     """
     reading = reading or Reading()
     root = reading.open(path)
@@ -295,9 +295,9 @@ def read_entity(
     """Returns the first model or light of `text`, under the given name.
 
     Raises:
-        UnknownFormat: if it is neither.
-        DescriptionError: if it can't be simulated: the place and the fault, in one line.
-        LimitExceeded: if it exceeds the limits of one model (docs/gazebo.md).
+        UnknownFormat: If it is neither.
+        DescriptionError: If it can't be simulated: the place and the fault, in one line.
+        LimitExceeded: If it exceeds the limits of one model (docs/gazebo.md).
     """
     try:
         root = reading.parse(text)
