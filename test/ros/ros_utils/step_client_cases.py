@@ -74,12 +74,6 @@ class OneRobot(Clients):
         self.assertAlmostEqual(client.step(100_000).sim_time, 100.0, places=6)
         self.assertGreater(time.monotonic() - begin, 0.4)
 
-    def test_the_world_survives_a_client_that_goes_in_the_middle(self):
-        gone = self.client()
-        gone.step(100, {CART: 0.1})
-        gone.close()
-        self.assertAlmostEqual(self.client().step(1).sim_time, 0.101, places=9)
-
 
 class OwnSimulators(Clients):
     def simulate(self, **arguments):

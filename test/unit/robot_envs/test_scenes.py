@@ -162,6 +162,16 @@ def test_an_arm_hits_the_ball_off_its_plinth_and_contacts_say_so(make):
     assert hit.models["plinth"].pose.position == (0.0, 0.0, 0.125)
 
 
+def test_limits_of_the_parameters_hold(make):
+    env = make()
+    seen = Seen(env.task)
+    env.reset(seed=0)
+    for _ in range(20):
+        env.step(np.ones(4))
+    efforts = [abs(state.joints["right::elbow"].effort) for state in seen.states]
+    assert max(efforts) == 1.5
+
+
 def test_an_arm_stops_at_the_files_wall(make, tmp_path):
     """The right arm, turned round by a quarter, swings towards it."""
     task = Volley(tmp_path)

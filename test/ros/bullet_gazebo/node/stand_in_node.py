@@ -220,18 +220,6 @@ class StandInTest(unittest.TestCase):
         )
         self.assertEqual(states.messages[-1].velocity, (0.0, 0.0))
 
-    def test_an_episode_starts_without_a_kick(self):
-        self.start_controllers()
-        command = rospy.Publisher("/stand_cart_position_controller/command", Float64, queue_size=1)
-        self.assertTrue(wait_until(command.get_num_connections))
-        call("/gazebo/unpause_physics", Empty)
-        # A single message could go to the connection of the controller of the test before.
-        self.assertTrue(
-            wait_until(lambda: command.publish(0.3) or joint("stand_cart").position[0] > 0.2)
-        )
-        place(0.0, 0.0)
-        self.assertFalse(wait_until(lambda: abs(joint("stand_cart").position[0]) > 1e-6, bound=0.3))
-
 
 if __name__ == "__main__":
     rospy.init_node("stand_in_test")

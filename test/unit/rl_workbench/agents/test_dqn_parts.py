@@ -71,11 +71,6 @@ def test_replay_draws_uniformly_and_never_twice() -> None:
     assert counts == pytest.approx(1000, rel=0.15)
 
 
-def test_a_replay_of_size_one_is_the_last_transition() -> None:
-    batch = filled(1, 3).sample(64, np.random.default_rng(0), rounds=2)
-    assert batch.actions.tolist() == [[2], [2]]
-
-
 @pytest.mark.parametrize("count", [3, 12])
 def test_replay_from_its_state(count: int) -> None:
     buffer, copy = filled(5, count), ReplayBuffer(5, 2)
