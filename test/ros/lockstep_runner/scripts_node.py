@@ -83,9 +83,6 @@ class LockstepTest(unittest.TestCase):
         gaps = [round(later - earlier, 9) for earlier, later in itertools.pairwise(times)]
         self.assertEqual(set(gaps), {0.02})
 
-    def test_sleep_and_read(self):
-        self.assertEqual(len(self.twice("sleep_read.py").stdout.splitlines()), 200)
-
     def test_unpause_publish_wait_pause(self):
         run = self.twice("pause_environment.py")
         self.assertNotIn("no joint states", run.stdout)

@@ -71,8 +71,8 @@ class OneRobot(Clients):
     def test_a_long_step_is_given_its_time(self):
         client = self.client(timeout=0.2)
         begin = time.monotonic()
-        self.assertAlmostEqual(client.step(100_000).sim_time, 100.0, places=6)
-        self.assertGreater(time.monotonic() - begin, 0.4)
+        self.assertAlmostEqual(client.step(40_000).sim_time, 40.0, places=6)
+        self.assertGreater(time.monotonic() - begin, 0.2)
 
 
 class OwnSimulators(Clients):

@@ -51,10 +51,7 @@ def backend():
 
 
 def run(backend, start=MOVING, steps=100):
-    return [
-        backend.reset(start),
-        *(backend.act(0.1 + 0.02 * (step % 7)) for step in range(steps)),
-    ]
+    return [backend.reset(start), *(backend.act(0.1 + 0.02 * (step % 7)) for step in range(steps))]
 
 
 def test_an_episode_starts_without_a_kick(backend):

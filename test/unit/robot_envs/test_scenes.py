@@ -12,15 +12,7 @@ from support.scenes.two_arms import LEFT, RIGHT, SKIN, Volley
 
 from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
-from robot_envs import (
-    InitialState,
-    LinkQuery,
-    Motion,
-    Pose,
-    RobotEnv,
-    RobotEnvError,
-    StateQuery,
-)
+from robot_envs import InitialState, LinkQuery, Motion, Pose, RobotEnv, RobotEnvError, StateQuery
 from robot_envs.testing import differences, rollout
 
 

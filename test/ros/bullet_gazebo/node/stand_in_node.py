@@ -213,11 +213,7 @@ class StandInTest(unittest.TestCase):
         self.start_controllers()
         states = self.listen("/joint_states", JointState)
         place(0.1, 0.05)
-        self.assertTrue(
-            states.wait_for(
-                lambda m: m and m[-1].position == (0.05, 0.1),
-            )
-        )
+        self.assertTrue(states.wait_for(lambda m: m and m[-1].position == (0.05, 0.1)))
         self.assertEqual(states.messages[-1].velocity, (0.0, 0.0))
 
 

@@ -5,12 +5,7 @@ import pytest
 import torch
 from torch import nn
 
-from rl_workbench.agents.dqn_agent import (
-    DuelingQNetwork,
-    Epsilon,
-    QNetwork,
-    fast_values,
-)
+from rl_workbench.agents.dqn_agent import DuelingQNetwork, Epsilon, QNetwork, fast_values
 from rl_workbench.agents.normalisation import Normaliser
 from rl_workbench.agents.replay import NStepReturns, ReplayBuffer, Transition
 from rl_workbench.agents.settings import DQNSettings

@@ -12,13 +12,7 @@ from pathlib import Path
 
 import pytest
 from support.stress.trainings import OPTIONS, forked, new, wait_for_newer_checkpoint
-from support.training.training_runs import (
-    EXACT,
-    assert_no_doubles,
-    assert_same_run,
-    summary,
-    train,
-)
+from support.training.training_runs import EXACT, assert_no_doubles, assert_same_run, summary, train
 
 pytestmark = pytest.mark.slow
 
@@ -52,8 +46,7 @@ def test_killed_at_random_moments(whole, tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "number"),
-    [("dqn", signal.SIGINT), ("dqn", signal.SIGTERM), ("reinforce", signal.SIGHUP),
-     ("reinforce-document", signal.SIGINT),
+    [("dqn", signal.SIGTERM), ("reinforce", signal.SIGHUP),
      pytest.param("ppo", signal.SIGINT, marks=pytest.mark.extras("stable_baselines3"))],
 )  # fmt: skip
 def test_a_signal_saves_and_tells_how_to_go_on(
