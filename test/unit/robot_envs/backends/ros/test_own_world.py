@@ -20,6 +20,7 @@ from support.robots.cartpole import RICH
 from support.scenes.rover import ROVER, Roll
 from support.scenes.two_arms import LEFT, RIGHT, Volley
 
+import cartpole  # noqa: F401  # registers the environments
 from robot_envs import RobotEnv
 from robot_envs.backends.backend import Slot, side_by_side
 from robot_envs.backends.ros import own_simulator
