@@ -13,32 +13,25 @@ import numpy as np
 import rosgraph
 import rosservice
 import rostest
-from support.training.environment_conformance import IDS, RICH, EnvironmentConformance
+from support.robots.cartpole import IDS, RICH
 
 import cartpole  # noqa: F401 - registers the environments
 from cartpole.robot import CONTROLLER
 from robot_envs.backends.ros import realtime
 from robot_envs.errors import RobotEnvError, SimulatorError
-from robot_envs.testing import differences, rollout
+from robot_envs.testing import check_robot_env, differences, rollout
 from ros_utils import ros_gazebo
 
 BACKEND = next((argument for argument in sys.argv if argument in ("ros", "ros-realtime")), "ros")
 REALTIME = BACKEND == "ros-realtime"
 
 
-class OverRos(EnvironmentConformance):
-    backend = BACKEND
-    steps = 30
-    deterministic = has_velocities = not REALTIME
-
-
-class Balance(OverRos, unittest.TestCase):
-    identifier = "cartpole/Balance-v0"
-
-
-@unittest.skipIf(REALTIME, "one kind of action is enough, as each test starts a simulator")
-class SwingUp(OverRos, unittest.TestCase):
-    identifier = "cartpole/SwingUp-v0"
+class Conformance(unittest.TestCase):
+    def test_they_keep_what_environments_of_robots_promise(self):
+        for identifier in IDS[:1] if REALTIME else (IDS[0], IDS[2]):  # one of each kind of actions
+            for options in ({}, RICH):
+                with self.subTest(identifier, options=options):
+                    check_robot_env(identifier, (BACKEND,), options=options, steps=30)
 
 
 class Killed(unittest.TestCase):

@@ -137,7 +137,6 @@ class Session(unittest.TestCase):
         self.assertEqual(MASTER.lookupNode("/gazebo"), address)
         self.spawn()
         self.put_the_joints()
-        self.start_a_spawner()
         self.assertTrue(ros_gazebo.gazebo_delete_model("cartpole"))
         self.assertFalse(ros_gazebo.gazebo_delete_model("cartpole"))
         self.assertTrue(ros_gazebo.close_Gazebo())
@@ -178,19 +177,6 @@ class Session(unittest.TestCase):
         self.assertFalse(ros_gazebo.gazebo_set_model_configuration("nix", *joints))
         self.assertTrue(ros_controllers.reset_controllers_srv(CONTROLLERS))
         self.assertTrue(ros_controllers.kill_controllers_srv(CONTROLLERS))
-
-    def start_a_spawner(self):
-        """The executable of package controller_manager; it unloads what it loaded."""
-        started = ros_node.ros_node_from_pkg(
-            "controller_manager", "spawner", name="spawner", args=" ".join(CONTROLLERS)
-        )
-        self.assertTrue(started)
-        for states in (dict.fromkeys(CONTROLLERS, "running"), {}):
-            found = wait_until(
-                lambda s=states: ros_controllers.list_controllers_srv() == s, 60.0, str(states)
-            )
-            self.assertTrue(found, ros_controllers.list_controllers_srv())
-            self.assertTrue(ros_node.ros_kill_node("/spawner"))
 
 
 if __name__ == "__main__":

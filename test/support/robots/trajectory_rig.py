@@ -2,11 +2,7 @@
 
 from robot_sim.control.controllers import built_in
 from robot_sim.control.hardware import RobotHardware
-from robot_sim.control.trajectory_goals import (
-    GoalRequest,
-    Trajectory,
-    TrajectoryPoint,
-)
+from robot_sim.control.trajectory_goals import GoalRequest, Trajectory, TrajectoryPoint
 from robot_sim.control.transmissions import read_description
 
 MS, S = 1_000_000, 1_000_000_000  # [ns]

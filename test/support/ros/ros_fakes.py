@@ -78,11 +78,7 @@ class FakeService:
 
     def __init__(self, answer=None, header=None, kind=SetBool):
         self._answer = answer or (lambda request: [ok(request.data)])
-        self._header = header or {
-            "callerid": "/fake",
-            "md5sum": kind._md5sum,
-            "type": kind._type,
-        }
+        self._header = header or {"callerid": "/fake", "md5sum": kind._md5sum, "type": kind._type}
         self._kind = kind
         self._listener = socket.create_server((LOOPBACK, 0))
         self.address = f"rosrpc://{LOOPBACK}:{self._listener.getsockname()[1]}"

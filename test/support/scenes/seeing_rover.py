@@ -52,10 +52,7 @@ SENSORS = [
     """<gazebo><plugin name="old_imu" filename="libgazebo_ros_imu.so"><bodyName>hull</bodyName>
         <topicName>old_imu</topicName><updateRate>60</updateRate></plugin></gazebo>""",
 ]  # fmt: skip
-SEEING = replace(
-    ROVER,
-    urdf=f'<robot name="seeing">{"".join([*PARTS, *SENSORS])}</robot>',
-)
+SEEING = replace(ROVER, urdf=f'<robot name="seeing">{"".join([*PARTS, *SENSORS])}</robot>')
 NAMES = ("front_laser", "sonar", "imu", "camera", "deep", "bumper", "old_imu")
 
 

@@ -185,12 +185,7 @@ def test_a_slider_that_is_dragged_leaves_its_joint_where_it_was_left(server):
             commanded.append(positions[joint])
 
     panel = ModelPanel(
-        server,
-        server.scene.add_frame("/world"),
-        None,
-        Slow(),
-        lambda act: act(),
-        lambda: False,
+        server, server.scene.add_frame("/world"), None, Slow(), lambda act: act(), lambda: False
     )
     picture = Picture(server, pytest.fail)
     picture.draw([VisibleModel(1, "arm", [Link("base")], [joint("elbow")])], [])

@@ -5,7 +5,6 @@ import sys
 
 import pytest
 
-from cartpole import dqn_train
 from cartpole.workbench import ros_options
 from robot_envs.backends.ros import node
 from robot_envs.errors import RobotEnvError
@@ -80,10 +79,3 @@ def test_a_master_that_does_not_answer_matters_to_launched_nodes_only(monkeypatc
     assert ros_options(["_gamma:=0.9"], "learner")[1] == {"gamma": 0.9}
     with pytest.raises(RobotEnvError, match="no ROS master"):
         ros_options(["_gamma:=0.9", "__name:=learner"], "learner")
-
-
-@pytest.mark.slow
-def test_dqn_train_needs_no_master(tmp_path):
-    run = tmp_path / "run"
-    assert dqn_train.main([f"--run-dir={run}", "--total-timesteps=150", "--eval-frequency=0"]) == 0
-    assert (run / "last.pt").is_file()

@@ -15,7 +15,6 @@ from support.training.training_runs import (
 )
 
 import cartpole
-from cartpole.environment import CartPoleEnv
 
 NAMES = {"dqn": "Classic", "reinforce": "Balance", "reinforce-document": "Balance"}
 
@@ -53,14 +52,3 @@ def test_in_two_simulators_it_comes_to_the_bits_of_two_worlds_here(tmp_path: Pat
         mine, other = (checkpoint(run).get(name) for run in (here, there))
         assert_same(mine, other, name)
     assert rows(here) == rows(there)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["dqn", "reinforce"])
-def test_one_robot_for_training_and_evaluation(tmp_path: Path, monkeypatch, name: str) -> None:
-    """Over ROS there is one; the episode under way goes on as if nobody had moved the robot."""
-    whole = train(tmp_path / "whole", name, **options(name), eval_frequency=30)
-    monkeypatch.setattr(CartPoleEnv, "shares_robot", True)
-    run = train(tmp_path / "run", name, InterruptAfter(150), **options(name), eval_frequency=30)
-    assert rows(run) != rows(whole), "interrupted"
-    assert_same_run(whole, resume(run))

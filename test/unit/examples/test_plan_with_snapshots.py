@@ -21,10 +21,18 @@ def example(monkeypatch: pytest.MonkeyPatch) -> Any:
     return importlib.import_module("plan_with_snapshots")
 
 
-@pytest.mark.parametrize("name", ["cart-pole", "rover"])
+@pytest.mark.parametrize(
+    ("name", "fewer"), [("cart-pole", {"rounds": 1}), ("rover", {"plans": 8})], ids=str
+)
 def test_it_gets_there(
-    example: Any, name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    example: Any,
+    name: str,
+    fewer: dict[str, int],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    """With less thought than it takes by itself."""
+    monkeypatch.setitem(example.PROBLEMS, name, example.PROBLEMS[name]._replace(**fewer))
     monkeypatch.setattr(sys, "argv", ["plan_with_snapshots.py", name])
     example.main()
     assert capsys.readouterr().out.startswith("done after ")

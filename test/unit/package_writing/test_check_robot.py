@@ -132,11 +132,7 @@ def test_controllers_are_served_or_named(check, tmp_path):
         ("x.urdf", robot(LINK.format("a", ""), LINK.format("b", "")), "x.urdf: model 'theirs': "),
         ("x.sdf", "<sdf version='1.6'><light name='l' type='point'/></sdf>", "describes a light"),
         ("x.world", "<sdf version='1.6'/>", "there is no <model>"),
-        (
-            "x.urdf",
-            robot(LINK.format("base", MESH)),
-            "'no.stl' is not found",
-        ),
+        ("x.urdf", robot(LINK.format("base", MESH)), "'no.stl' is not found"),
     ],
 )
 def test_a_file_that_cannot_be_used_is_one_line(check, name, text, fault):

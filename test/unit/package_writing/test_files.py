@@ -8,13 +8,7 @@ from pathlib import Path
 
 import pytest
 from support.mutations.mesh_files import binary_stl
-from support.robots.new_robots import (
-    BARE,
-    FIXED,
-    LINK,
-    SWING,
-    robot,
-)
+from support.robots.new_robots import BARE, FIXED, LINK, SWING, robot
 
 from package_writing.urdf_files import copy_urdf
 

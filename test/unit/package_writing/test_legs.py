@@ -47,7 +47,7 @@ def heights(made, angle, seconds):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mass", [2, 10, 20])
+@pytest.mark.parametrize("mass", [2, 20])
 def test_a_quadruped_crouches_where_it_is_told_and_stays_there(new, mass):
     """The body's weight is on the legs: gains for the legs alone let it sink to a third of its height."""
     text = QUADRUPED.read_text().replace('mass value="10"', f'mass value="{mass}"')
@@ -138,7 +138,7 @@ def test_knees_that_can_be_straight_are(new):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("forward", [-0.05, 0.02, 0.06])
+@pytest.mark.parametrize("forward", [-0.05, 0.06])
 def test_a_humanoid_stands_on_level_soles_below_its_centre_of_mass(new, forward):
     """Its ankles hold an inverted pendulum, and its sway dies away."""
     folder, made, _, told = new("my_biped", BIPED, f"forward:={forward}", "--base", "free")

@@ -11,17 +11,7 @@ from xml.sax.saxutils import quoteattr
 
 import pytest
 import yaml
-from support.robots.new_robots import (
-    BARE,
-    FIXED,
-    JOINT,
-    LINK,
-    MOTOR,
-    PLUGIN,
-    SWING,
-    reaches,
-    robot,
-)
+from support.robots.new_robots import BARE, FIXED, JOINT, LINK, MOTOR, PLUGIN, SWING, reaches, robot
 
 from package_writing import package
 from package_writing.cli import main

@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 import yaml
 from support.mutations.mesh_files import binary_stl
-from support.robots.new_robots import (
-    BARE,
-    JOINT,
-    LIMIT,
-    LINK,
-    MOTOR,
-    reaches,
-    robot,
-)
+from support.robots.new_robots import BARE, JOINT, LIMIT, LINK, MOTOR, reaches, robot
 from support.robots.vehicles import TRACK, four_wheels, three_wheels, two_wheels, wheel
 
 from package_writing.standing import standing_height

@@ -88,10 +88,7 @@ def nested(root, workspace, *command):
     return sourced_before(root, workspace, root / "ws", *command)
 
 
-EACH_WAY = pytest.mark.parametrize("way", [sourced_before, sourced_after, nested])
-
-
-@EACH_WAY
+@pytest.mark.parametrize("way", [sourced_after, nested])  # nested has it sourced before, too
 def test_the_callers_packages_modules_and_programs_come_first(root, workspace, way):
     find = f"for p in {' '.join(THEIRS)}; do rospack find $p; done"
     found = way(root, workspace, "bash", "-c", find).split()

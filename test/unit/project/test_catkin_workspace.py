@@ -73,7 +73,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """Made by the commands of the page, but for Debian's packages, which are there.
 
     The Python packages aren't fetched again: a .pth file shows those of this workspace's environment,
-    where pip finds them installed.
+    where pip finds them installed. catkin_make installs as well, in the call that builds.
     """
     workspace = Workspace(tmp_path_factory.mktemp("home"))
     sources = workspace.home / "repository"
@@ -86,6 +86,8 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     )
     assert made.returncode == 0, made.stderr
     script = "".join(blocks()[1:3]).replace("<this repository>", str(sources))
+    assert script.splitlines()[-1].startswith("catkin_make ")
+    script = f"{script.rstrip()} install\n"
     pip = "venv/bin/pip install"
     assert pip in script
     shown = f"echo {PACKAGES} > $(echo venv/lib/python3*/site-packages)/shown.pth\n"
@@ -128,47 +130,40 @@ def test_what_the_page_starts_then(workspace: Workspace) -> None:
     assert "success: True" in asked.stdout, printed
 
 
-@pytest.fixture(scope="module")
-def installed(workspace: Workspace) -> Workspace:
-    made = workspace.bash('cd "$1" && catkin_make install', str(workspace.path))
-    assert made.returncode == 0, made.stderr
-    return workspace
-
-
 @pytest.mark.parametrize("space", ["devel", "install"])
-def test_built_workspace(installed: Workspace, space: str) -> None:
-    helped = installed.inside("rosrun", "cartpole", "pg_train.py", "--help", space=space)
+def test_built_workspace(workspace: Workspace, space: str) -> None:
+    helped = workspace.inside("rosrun", "cartpole", "pg_train.py", "--help", space=space)
     assert "--episodes" in helped.stdout, helped.stderr
-    imported = installed.inside(str(installed.python), "-c", MODULES, space=space)
+    imported = workspace.inside(str(workspace.python), "-c", MODULES, space=space)
     assert imported.returncode == 0, imported.stderr
     for package in ("cartpole", "cartpole_gazebo", "cartpole_controller", "gazebo_ros"):
-        found = installed.inside("rospack", "find", package, space=space).stdout.strip()
-        expected = installed.path / ("install/share" if space == "install" else "src")
+        found = workspace.inside("rospack", "find", package, space=space).stdout.strip()
+        expected = workspace.path / ("install/share" if space == "install" else "src")
         assert found.startswith(str(expected))
-    listed = installed.inside(
+    listed = workspace.inside(
         "roslaunch", "--files", "gazebo_ros", "empty_world.launch", space=space
     )
     assert listed.returncode == 0, listed.stderr
 
 
 @pytest.mark.parametrize("space", ["devel", "install"])
-def test_scripts_have_the_builds_interpreter(installed: Workspace, space: str) -> None:
-    folders = [*(installed.path / space / "lib").glob("*"), installed.path / space / "bin"]
+def test_scripts_have_the_builds_interpreter(workspace: Workspace, space: str) -> None:
+    folders = [*(workspace.path / space / "lib").glob("*"), workspace.path / space / "bin"]
     found = [path for folder in folders for path in folder.glob("*")]
     scripts = [path for path in found if path.is_file() and os.access(path, os.X_OK)]
     ours = {"gz", "gzserver", "gzclient", "spawner", "unspawner"}
     ours |= {"controller_manager", "controller_group"}
     assert ours <= {each.name for each in scripts}
     for script in scripts:
-        assert script.read_text().startswith(f"#!{installed.python}\n"), script
+        assert script.read_text().startswith(f"#!{workspace.python}\n"), script
 
 
 @pytest.fixture
-def bare(installed: Workspace):
+def bare(workspace: Workspace):
     """The same workspace, for somebody who has left out pip's step."""
-    (shown,) = (installed.path / "venv").glob("lib/python3*/site-packages/shown.pth")
+    (shown,) = (workspace.path / "venv").glob("lib/python3*/site-packages/shown.pth")
     hidden = shown.rename(shown.with_suffix(".hidden"))
-    yield installed
+    yield workspace
     hidden.rename(shown)
 
 

@@ -10,15 +10,14 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
+from support.pages.code_blocks import blocks
 
 from cartpole import dqn_train, workbench
 
 ROOT = Path(__file__).resolve().parents[3]
 ENGLISH, CHINESE = (ROOT / "docs" / name for name in ("tutorial_dqn.md", "tutorial_dqn.zh.md"))
-BLOCK = re.compile(r"^( *)```(\S+)(?: (\S+))?\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 DQN = ("--total-timesteps 400 --eval-frequency 200 --eval-episodes 1 --confirm-episodes 1 "
        "--learning-starts 50 --checkpoint-frequency 200")  # fmt: skip
 SHORTER = {  # command: flags behind its own
@@ -35,19 +34,6 @@ MADE = ["cartpole_training.png", "episode.gif", "episode.mp4", "policy.png", "la
         "compare.json", "both.png", "runs/sweep/trials.json", "robot.gif", "swing_up.gif",
         "gamma.png"]  # fmt: skip
 MAINS = {"dqn_train.py": dqn_train.main, "workbench.py": workbench.main}
-
-
-class Block(NamedTuple):
-    language: str
-    mark: str
-    text: str
-
-
-def blocks(path: Path) -> list[Block]:
-    return [
-        Block(match[2], match[3] or "", re.sub(f"^{match[1]}", "", match[4], flags=re.MULTILINE))
-        for match in BLOCK.finditer(path.read_text(encoding="utf-8"))
-    ]
 
 
 def shortened(line: str) -> list[str]:

@@ -17,9 +17,9 @@ import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
+from support.pages.code_blocks import Block, blocks
 
 from cartpole import workbench
 
@@ -28,7 +28,6 @@ ENGLISH, CHINESE, VEHICLE, TESTS = (
     ROOT / "docs" / f"{name}.md"
     for name in ("tutorial_robot", "tutorial_robot.zh", "mobile", "testing")
 )
-BLOCK = re.compile(r"^```(\S+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LIMIT = 300.0  # [s] for one command
 SHORT = "--total-timesteps 300 --eval-frequency 300 --eval-episodes 1 --confirm-episodes 1"
 SHORTER = {
@@ -38,17 +37,6 @@ SHORTER = {
     "record": "--max-steps 10 --size 160x120",
     "train.launch": f"'more:={SHORT} --learning-starts 100'",
 }
-
-
-class Block(NamedTuple):
-    language: str
-    mark: str
-    text: str
-
-
-def blocks(page: Path) -> list[Block]:
-    found = BLOCK.finditer(page.read_text(encoding="utf-8"))
-    return [Block(match[1], match[2] or "", match[3]) for match in found]
 
 
 @pytest.fixture(scope="module")

@@ -1,31 +1,14 @@
 """The command line as a whole: who is asked, by which name, and what --help and wrong words come to."""
 
-import json
 import os
 import re
 import subprocess
 from pathlib import Path
 
 import pytest
-from support.training.training_runs import SMALL, flags, summary
 
 from rl_workbench.cli import COMMANDS, main
 from rl_workbench.training.train import PROGRAM
-
-SHORT = {"total_timesteps": 60, "eval_episodes": 1, "confirm_episodes": 0}
-
-
-def test_a_training_its_resumption_and_its_policy(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    run = tmp_path / "run"
-    assert main(["train", "--algo=dqn", *flags(SMALL["dqn"] | SHORT), f"--run-dir={run}"]) == 0
-    assert summary(run)["steps"] == 60
-    assert main(["train", f"--resume={run}", "--total-timesteps=70"]) == 0
-    assert summary(run)["steps"] == 70
-    capsys.readouterr()
-    assert main(["eval", str(run), "--episodes=1", "--json=-"]) == 0
-    assert json.loads(capsys.readouterr().out)["run"] == str(run)
 
 
 def test_ctrl_c_while_it_is_still_being_read(tmp_path: Path) -> None:

@@ -26,11 +26,7 @@ except KeyboardInterrupt:
 
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
-    [
-        (["inside"], 130, "-c: interrupted\n"),
-        ([], 0, "as ever\n"),
-        (["inside", "ignored"], 0, ""),
-    ],
+    [(["inside"], 130, "-c: interrupted\n"), ([], 0, "as ever\n"), (["inside", "ignored"], 0, "")],
     ids=["inside", "afterwards", "ignored"],
 )
 def test_ctrl_c(arguments: list[str], code: int, told: str) -> None:

@@ -12,15 +12,7 @@ from support.scenes.two_arms import LEFT, RIGHT, SKIN, Volley
 
 from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
-from robot_envs import (
-    InitialState,
-    LinkQuery,
-    Motion,
-    Pose,
-    RobotEnv,
-    RobotEnvError,
-    StateQuery,
-)
+from robot_envs import InitialState, LinkQuery, Motion, Pose, RobotEnv, RobotEnvError, StateQuery
 from robot_envs.testing import differences, rollout
 
 
@@ -213,18 +205,6 @@ def test_what_nobody_drives_begins_each_episode_anew_as_well(make, tmp_path):
     assert abs(swung[0] - turned[0]) > 0.05
 
 
-def test_what_isnt_placed_stands_where_it_was_spawned(make):
-    env = make()
-    seen = Seen(env.task)
-    env.reset(seed=0)
-    for _ in range(30):
-        env.step(HIT)
-    env.reset(options={"initial_state": InitialState()})
-    assert seen.last.models["ball"] == Motion(Pose((0.0, 0.0, 2.0)))
-    assert [each.position for each in seen.last.joints.values()] == [0.0] * 4
-    assert seen.last.links["right::tip"].pose.position == pytest.approx((1.0, 0.0, 0.0), abs=1e-6)
-
-
 def test_the_rover_rolls_to_the_crate_and_pushes_it(make):
     env = make("rover")
     seen = Seen(env.task)
@@ -257,14 +237,6 @@ def test_the_same_seed_gives_the_same_bits_whatever_was_before(make, name, engin
     expected, found = rollout(first, 130, seed=5), rollout(again, 130, seed=5)
     assert not differences(expected, found)
     assert differences(expected, rollout(other, 130, seed=6))
-
-
-def test_the_next_episode_touches_the_ground_as_the_first_one_did(make):
-    """A rover that begins on the ground; Bullet remembers where things touched."""
-    env = make("rover")
-    runs = [rollout(env, steps, seed=3) for steps in (4, 4, 40, 4)]
-    assert not differences(runs[0], runs[1])
-    assert not differences(runs[0], runs[3])
 
 
 def test_names_that_are_there_twice_are_told(tmp_path):

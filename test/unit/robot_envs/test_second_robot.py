@@ -1,8 +1,5 @@
 """A robot of one joint with an effort controller, through all of robot_envs, which knows no cart-pole."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from support.robots.pendulum import MOTOR, PENDULUM, hanging, make_pendulum
@@ -10,7 +7,6 @@ from support.robots.pendulum import MOTOR, PENDULUM, hanging, make_pendulum
 from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.scene import Scene
 from robot_envs.testing import rollout
-from robot_envs.variation import LinkScale, Variation
 
 MASS, LENGTH, DAMPING, GRAVITY = 0.5, 0.4, 0.01, 9.8  # kg, m, N m s/rad, m/s²
 INERTIA = MASS * LENGTH**2 / 3.0  # [kg m²] of the rod about its hinge
@@ -53,18 +49,6 @@ def test_it_moves_as_the_equations_say(backend):
     assert turning.velocity == pytest.approx(10.0 - lost + gained, abs=0.1 * lost)
 
 
-def test_friction_comes_on_top_of_the_joints_own_and_goes_again(backend):
-    rates = []
-    heavier = Variation({"rod": LinkScale()}, {"hinge": DAMPING})
-    for variation in (heavier.undone, heavier, heavier.undone):
-        backend.vary(variation)
-        backend.reset(0.0, 10.0)
-        rates.append(backend.act(0.0).velocity)
-    lost = DAMPING * 10.0 / INERTIA * PERIOD
-    assert rates[0] - rates[1] == pytest.approx(lost, rel=0.1)
-    assert rates[2] == rates[0]
-
-
 @pytest.mark.extras("mujoco")
 def test_on_mujoco_it_moves_nearly_the_same():
     runs = []
@@ -73,19 +57,3 @@ def test_on_mujoco_it_moves_nearly_the_same():
         runs.append(np.array([row[0] for row in rollout(env, 10, seed=2)[1:]]))
         env.close()
     assert 0.0 < np.abs(runs[0] - runs[1]).max() < 1e-3
-
-
-def test_nothing_of_the_cart_pole_nor_of_ros_is_loaded():
-    script = (
-        "import sys; from support.robots.pendulum import make_pendulum;"
-        "env = make_pendulum(varied=True); env.reset(seed=0);"
-        "print([m for m in sys.modules if m.split('.')[0] in ('cartpole', 'rospy', 'ros_utils')])"
-    )
-    shown = subprocess.run(
-        [sys.executable, "-c", script],
-        env={"PYTHONPATH": ":".join(entry for entry in sys.path if entry)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert shown.stdout.splitlines()[-1] == "[]"

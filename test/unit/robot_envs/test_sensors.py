@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -74,19 +73,6 @@ def test_an_impossible_sensor_is_told() -> None:
     wrong = replace(SEEING, urdf=str(SEEING.urdf).replace("<samples>24", "<samples>0"))
     with pytest.raises(SimulatorError, match="'front_laser' can't be simulated: .* 0 samples"):
         RobotEnv(wrong, Look())
-
-
-def observed(**options: Any) -> list[np.ndarray]:
-    env = RobotEnv(SEEING, Look(), **options)
-    given = [env.reset(seed=5)[0]]
-    given += [env.step(np.ones(2, np.float32))[0] for _ in range(20)]
-    env.close()
-    return given
-
-
-def test_a_delay_shows_older_readings() -> None:
-    exact, late = observed(), observed(sensor_delay=3)
-    assert np.array_equal(late[:4], [exact[0]] * 4) and np.array_equal(late[4:], exact[1:-3])
 
 
 def test_worlds_of_a_process_share_what_never_moves() -> None:

@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import data_equivalence as same
-from support.training.environment_conformance import IDS, RICH
+from support.robots.cartpole import IDS, RICH
 
 import cartpole  # noqa: F401 - registers the environments
 import robot_envs.robots  # noqa: F401 - the same of others

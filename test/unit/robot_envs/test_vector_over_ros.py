@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import data_equivalence as same
 from gymnasium.vector import AutoresetMode
+from support.robots.cartpole import RICH
 from support.robots.pendulum import make_pendulum
-from support.training.environment_conformance import RICH
 
 import cartpole  # noqa: F401 - registers the environments
 import robot_envs.robots  # noqa: F401 - the same of others

@@ -73,12 +73,3 @@ def test_nothing_but_tasks_and_robots_is_called(tmp_path):
     with pytest.raises(RobotEnvError, match="threading.Thread.* is not a robot_envs.Robot"):
         make_environment("threading:Thread", "support.scenes.solo_arm:Hold")
     assert not made.exists()
-
-
-def test_an_option_that_nobody_knows():
-    with pytest.raises(
-        RobotEnvError, match="no option 'sensor_noize'; did you mean 'sensor_noise'"
-    ):
-        make_environment(
-            "support.scenes.solo_arm:SOLO", "support.scenes.solo_arm:Hold", sensor_noize=1
-        )

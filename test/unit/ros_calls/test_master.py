@@ -111,10 +111,7 @@ def test_another_master_is_for_the_block_and_the_thread_only(monkeypatch):
 
 @pytest.mark.parametrize(
     ("modules", "absent"),
-    [
-        ("ros_calls.master", "rospy"),
-        ("ros_calls.service, ros_calls.waiting", "std_srvs"),
-    ],
+    [("ros_calls.master", "rospy"), ("ros_calls.service, ros_calls.waiting", "std_srvs")],
 )
 def test_what_an_import_brings_along(modules, absent):
     """`gz` must start at once; and nothing here needs a master or a node to be imported."""

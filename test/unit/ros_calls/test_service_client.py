@@ -13,13 +13,7 @@ from support.ros.ros_fakes import FakeService, failed, ok
 
 from ros_calls import master as ros_master
 from ros_calls import service as service_module
-from ros_calls.service import (
-    LOOK,
-    ServiceClient,
-    ServiceFailed,
-    ServiceGone,
-    ServiceHangs,
-)
+from ros_calls.service import LOOK, ServiceClient, ServiceFailed, ServiceGone, ServiceHangs
 from ros_calls.waiting import wait_and_call
 
 NAME = "/fake/set"

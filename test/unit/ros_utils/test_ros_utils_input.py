@@ -23,16 +23,6 @@ from ros_utils._internal.gazebo import launch as _gazebo_launch
 
 
 @pytest.fixture
-def no_master(monkeypatch, tmp_path):
-    """A master address where nobody listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{probe.getsockname()[1]}")
-    monkeypatch.setenv("ROS_HOME", str(tmp_path))
-    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
-
-
-@pytest.fixture
 def mute_master(monkeypatch, tmp_path):
     """A master address where somebody listens and never answers."""
     with socket.socket() as listener:

@@ -3,7 +3,6 @@
 import contextlib
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -23,14 +22,7 @@ BOUND = 60.0  # [s] for anything that a test waits for
 
 
 @pytest.fixture(autouse=True)
-def place(tmp_path, monkeypatch):
-    """A master address where nobody listens, and folders of this test's own."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{port}")
-    monkeypatch.setenv("ROS_HOME", str(tmp_path / "home"))
-    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
+def place(no_master, tmp_path, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr(
         _processes, "LEFTOVERS", 0.3

@@ -3,7 +3,6 @@
 import inspect
 import math
 import re
-import socket
 
 import pytest
 from geometry_msgs.msg import Pose
@@ -58,16 +57,6 @@ ARGUMENTS = {
 }
 
 
-@pytest.fixture(scope="module")
-def nowhere(tmp_path_factory):
-    """A master address where nobody listens."""
-    with pytest.MonkeyPatch.context() as patch, socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))  # and doesn't listen
-        patch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{probe.getsockname()[1]}")
-        patch.setenv("ROS_HOME", str(tmp_path_factory.mktemp("ros")))
-        yield
-
-
 def call(name):
     """The answer of a function that is given what isn't there."""
     required = [
@@ -87,18 +76,18 @@ def test_all_functions_of_the_contract_are_looked_at(root):
 
 
 @pytest.mark.parametrize("name", sorted(set(FUNCTIONS) - NO_FAILURE - QUANTITIES))
-def test_a_failure_is_false(nowhere, name):
+def test_a_failure_is_false(no_master, name):
     assert not call(name)
 
 
 @pytest.mark.parametrize("name", sorted(QUANTITIES - {"gazebo_get_ODE_physics"}))
-def test_an_unknown_quantity_is_no_number(nowhere, name):
+def test_an_unknown_quantity_is_no_number(no_master, name):
     answer = call(name)
     assert math.isnan(getattr(answer, "x", answer))
 
 
 @pytest.mark.parametrize("name", sorted(TUPLES))
-def test_a_failure_is_still_the_tuple_of_the_contract(nowhere, name):
+def test_a_failure_is_still_the_tuple_of_the_contract(no_master, name):
     answer = call(name)
     assert isinstance(answer, tuple)
     assert answer._fields == TUPLES[name]

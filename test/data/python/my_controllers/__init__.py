@@ -2,13 +2,7 @@
 
 from geometry_msgs.msg import Vector3
 
-from robot_sim.control.controllers.base import (
-    Controller,
-    Input,
-    Output,
-    joint_param,
-    number_param,
-)
+from robot_sim.control.controllers.base import Controller, Input, Output, joint_param, number_param
 
 
 class Spring(Controller):

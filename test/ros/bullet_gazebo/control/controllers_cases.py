@@ -6,7 +6,6 @@ See docs/contract/ros_control.md 3.
 import math
 
 from geometry_msgs.msg import Vector3
-from sensor_msgs.msg import JointState
 from slides_client import SlidesTest, listen
 from std_msgs.msg import Bool, Float64, Float64MultiArray
 from std_srvs.srv import Empty
@@ -71,33 +70,6 @@ class ControllersTest(SlidesTest):
                 ),
             )
 
-    def test_joint_states_list_all_joints_alphabetically_at_the_rate(self):
-        self.assertTrue(self.manager.load("states"))
-        topic = listen("joint_states", JointState)
-        self.assertTrue(self.manager.switch(["states"]))
-        self.step(2)  # the queue holds four: one message at a time
-        for count in range(1, 7):  # beyond real time topics are thinned
-            self.assertTrue(topic.wait_for(lambda got, count=count: len(got) >= count))
-            self.step(10)
-        stamps = [m.header.stamp.to_nsec() // 1_000_000 for m in topic.messages]
-        self.assertEqual({b - a for a, b in zip(stamps, stamps[1:], strict=False)}, {10})
-        names = ["effort_a", "effort_b", "position_a", "position_b", "velocity_a", "velocity_b"]
-        self.assertEqual(topic.messages[0].name, names)
-        topic.close()
-
-    def test_joint_states_of_some_joints_and_of_extra_ones(self):
-        self.assertTrue(self.manager.load("some_states"))
-        topic = listen("joint_states", JointState)
-        self.assertTrue(self.manager.switch(["some_states"]))
-        self.step(2)
-        self.assertTrue(topic.wait_for(len))
-        message = topic.messages[0]
-        self.assertEqual(message.name, ["velocity_a", "effort_a", "finger", "thumb"])
-        self.assertEqual(message.position, (0.0, 0.0, 0.25, 0.0))
-        self.assertEqual(message.velocity, (0.0, 0.0, 0.5, 0.0))
-        self.assertEqual(message.effort, (0.0, 0.0, -1.0, 0.0))
-        topic.close()
-
     def test_a_reset_relatches_and_position_joints_stay_where_they_are_put(self):
         self.run_controllers("position_joint", "effort_position", "states")
         self.step(1000, position_joint=0.4, effort_position=0.3)
@@ -106,15 +78,6 @@ class ControllersTest(SlidesTest):
             joints = self.step(ticks)
             self.assertAlmostEqual(joints["position_a"][0], 0.0, places=6)
             self.assertEqual(joints["effort_a"], (0.0, 0.0, 0.0))  # no kick
-
-    def test_what_cannot_be_loaded(self):
-        before = self.manager.types().types
-        for name in ("no_joint", "wrong_interface", "no_gains", "nan_gains", "empty_group", "twice",
-                     "text_group", "no_class", "broken"):  # fmt: skip
-            self.assertFalse(self.manager.load(name), name)
-        self.assertEqual(len(self.manager.listed()), 0)
-        self.assertEqual(self.manager.types().types, before)
-        self.run_controllers("position_joint")  # the manager goes on
 
     def test_a_users_own_controller(self):
         self.run_controllers("spring")

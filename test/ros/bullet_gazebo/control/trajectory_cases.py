@@ -103,14 +103,6 @@ class TrajectoryTest(unittest.TestCase):
         # The way goes on all the same.
         self.assertTrue(wait_until(lambda: abs(position("effort_a") - 2.0) < 0.05))
 
-    def test_goal_tolerance(self):
-        arm = self.arm()
-        unpause()
-        tolerance = [JointTolerance(name="effort_a", position=1e-9)]
-        plan = trajectory(EFFORT, (0.1, [7.0, 0.0]))  # the rail ends at 5 m
-        pursuit = arm.pursue(plan, goal=tolerance, goal_time=0.1)
-        self.check(pursuit, "ABORTED", "GOAL", "effort_a goal error")
-
     def test_wrong_joints(self):
         arm = self.arm()
         for joints in (["effort_a"], ["effort_a", "elbow"], ["effort_a", "effort_b", "x"], []):
@@ -242,21 +234,6 @@ class TrajectoryTest(unittest.TestCase):
                 self.assertTrue(wait_until(lambda: not topics_below("/slides/effort_arm")))
                 self.assertNotIn("effort_arm", rosnode.get_node_info_description("/gazebo"))
                 pause()
-
-    def test_stopping_ends_the_goal_and_starting_begins_where_the_joints_are(self):
-        arm = self.arm()
-        unpause()
-        pursuit = arm.pursue(trajectory(EFFORT, (5.0, [1.0, 1.0])))
-        self.assertTrue(wait_until(lambda: position("effort_a") > 0.01))
-        self.assertTrue(self.manager.switch([], ["effort_arm"], STRICT))
-        self.check(pursuit, "PREEMPTED", "SUCCEEDED", "stopped")
-        self.assertTrue(self.manager.unload("effort_arm"))
-        self.assertTrue(self.manager.load("effort_arm"))
-        self.assertTrue(self.manager.switch(["effort_arm"], [], STRICT))
-        arm.states.clear()
-        self.assertTrue(arm.wait_connected())
-        self.assertTrue(wait_until(lambda: len(arm.states) > 2))
-        self.assertGreater(arm.states[-1].desired.positions[1], 0.005)
 
     def test_deleting_the_robot_ends_the_goal(self):
         arm = self.arm()

@@ -213,24 +213,8 @@ class StandInTest(unittest.TestCase):
         self.start_controllers()
         states = self.listen("/joint_states", JointState)
         place(0.1, 0.05)
-        self.assertTrue(
-            states.wait_for(
-                lambda m: m and m[-1].position == (0.05, 0.1),
-            )
-        )
+        self.assertTrue(states.wait_for(lambda m: m and m[-1].position == (0.05, 0.1)))
         self.assertEqual(states.messages[-1].velocity, (0.0, 0.0))
-
-    def test_an_episode_starts_without_a_kick(self):
-        self.start_controllers()
-        command = rospy.Publisher("/stand_cart_position_controller/command", Float64, queue_size=1)
-        self.assertTrue(wait_until(command.get_num_connections))
-        call("/gazebo/unpause_physics", Empty)
-        # A single message could go to the connection of the controller of the test before.
-        self.assertTrue(
-            wait_until(lambda: command.publish(0.3) or joint("stand_cart").position[0] > 0.2)
-        )
-        place(0.0, 0.0)
-        self.assertFalse(wait_until(lambda: abs(joint("stand_cart").position[0]) > 1e-6, bound=0.3))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ import math
 import numpy as np
 import rospy
 import rostest
-from bullet_gazebo_msgs.srv import StepWorldRequest
 from contract_cases import Contract
 from dynamic_reconfigure.client import Client as DynamicClient
 from gazebo_msgs.msg import ContactsState
@@ -45,22 +44,6 @@ class Sensors(SensorCase):
         self.assertEqual(scan.intensities[0], 5.0)
         self.assertAlmostEqual(scan.angle_increment, math.pi / 2.0, places=6)
         self.assertEqual((scan.time_increment, scan.scan_time), (0.0, 0.0))
-
-    def test_a_seed_draws_the_same_noise_again(self):
-        runs = []
-        for seed in (5, 6, 5):
-            heard = self.hear("/scan", LaserScan)
-            self.step(0, reset=StepWorldRequest.SIMULATION, seed=seed)
-            self.step(300)
-            heard.from_time(300 * MS)
-            found = {
-                message.header.stamp.to_nsec(): message.ranges[0] for message in heard.messages
-            }
-            runs.append([found[each * 100 * MS] for each in (1, 2, 3)])
-            heard.close()
-        self.assertEqual(len(set(runs[0])), 3)
-        self.assertEqual(runs[0], runs[2])
-        self.assertNotEqual(runs[0], runs[1])
 
     def test_clouds_and_ranges_of_a_laser(self):
         cloud = self.newest("/cloud", PointCloud2)

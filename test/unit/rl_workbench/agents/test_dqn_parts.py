@@ -5,12 +5,7 @@ import pytest
 import torch
 from torch import nn
 
-from rl_workbench.agents.dqn_agent import (
-    DuelingQNetwork,
-    Epsilon,
-    QNetwork,
-    fast_values,
-)
+from rl_workbench.agents.dqn_agent import DuelingQNetwork, Epsilon, QNetwork, fast_values
 from rl_workbench.agents.normalisation import Normaliser
 from rl_workbench.agents.replay import NStepReturns, ReplayBuffer, Transition
 from rl_workbench.agents.settings import DQNSettings
@@ -69,11 +64,6 @@ def test_replay_draws_uniformly_and_never_twice() -> None:
     assert all(len(set(row)) == 5 for row in batch.actions.tolist())
     counts = np.bincount(batch.actions.ravel(), minlength=20)
     assert counts == pytest.approx(1000, rel=0.15)
-
-
-def test_a_replay_of_size_one_is_the_last_transition() -> None:
-    batch = filled(1, 3).sample(64, np.random.default_rng(0), rounds=2)
-    assert batch.actions.tolist() == [[2], [2]]
 
 
 @pytest.mark.parametrize("count", [3, 12])

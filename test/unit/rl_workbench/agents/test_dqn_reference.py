@@ -103,10 +103,7 @@ def test_the_weights_go_the_way_of_the_definitions(
             learner.learn()
             reference.learn(batch, index + 1)
     assert reference.updates > 8
-    for mine, theirs in (
-        (learner.q_net, reference.net),
-        (learner.target_net, reference.target),
-    ):
+    for mine, theirs in ((learner.q_net, reference.net), (learner.target_net, reference.target)):
         for one, other in zip(mine.parameters(), theirs.parameters(), strict=True):
             assert torch.allclose(one, other, atol=2e-5)
     probe = np.random.default_rng(9).normal(size=(50, 3)).astype(np.float32)

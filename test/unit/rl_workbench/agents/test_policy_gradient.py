@@ -8,9 +8,7 @@ import torch
 from support.training.learning_fakes import learned_lengths
 from torch import nn
 
-from rl_workbench.agents.document import (
-    PolicyGradientAgent,
-)
+from rl_workbench.agents.document import PolicyGradientAgent
 from rl_workbench.agents.policy_gradient import Episode
 from rl_workbench.agents.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError

@@ -15,11 +15,7 @@ from support.training.workbench_runs import record as bare_run
 import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli
 from rl_workbench.tools.record import Film, SideBySide, write_video
-from rl_workbench.tools.recording import (
-    PictureView,
-    draw_without_display,
-    record_episode,
-)
+from rl_workbench.tools.recording import PictureView, draw_without_display, record_episode
 
 RATE = 40.0  # [Hz]
 

@@ -31,7 +31,6 @@ CASES = {
     "dqn": ("dqn", {"env_kwargs": MOVES, "total_timesteps": 200, "learning_starts": 50}),
     "reinforce": ("reinforce", {"env_kwargs": MOVES, "episodes": 10}),
     "ppo": ("ppo", {"n_steps": 64, "batch_size": 32, "net_arch": "8", "total_timesteps": 128}),
-    "sac": ("sac", OFF),
     "sac-her": ("sac", HER),
     "td3-her": ("td3", {**HER, "goal_selection_strategy": "final"}),
     "ddpg-her": ("ddpg", {**HER, "n_sampled_goal": 2}),
@@ -80,7 +79,7 @@ def test_successes_are_those_of_the_last_steps(tmp_path: Path) -> None:
 
 
 @SB3
-@pytest.mark.parametrize("strategy", ("future", "final", "episode"))
+@pytest.mark.parametrize("strategy", ("future", "episode"))
 def test_a_resumed_hindsight_has_its_episodes(tmp_path: Path, monkeypatch, strategy: str) -> None:
     """Interrupted in the midst of an episode that doesn't come back, of a buffer that is full."""
     folder = made(
@@ -109,7 +108,7 @@ def test_hindsight_waits_for_the_first_whole_episode(tmp_path: Path) -> None:
 @SB3
 def test_hindsight_learns(tmp_path: Path) -> None:
     options = {"gamma": 0.9, "learning_rate": 0.003, "batch_size": 64, "net_arch": "32,32",
-               "action_noise": 0.3, "learning_starts": 100, "total_timesteps": 1500,
+               "action_noise": 0.3, "learning_starts": 100, "total_timesteps": 1000,
                "buffer_size": 1500}  # fmt: skip
     told = summary(made(tmp_path, "ddpg-her", **options, eval_frequency=0, eval_episodes=20))
     assert np.mean(told["evaluation"]["successes"]) >= 0.7

@@ -5,22 +5,14 @@ import random
 import re
 import shlex
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
 import pytest
-from support.stress.trainings import BOUND, OPTIONS, forked, new, wait_for_newer_checkpoint
-from support.training.training_runs import (
-    EXACT,
-    assert_no_doubles,
-    assert_same_run,
-    summary,
-    train,
-)
+from support.stress.trainings import OPTIONS, forked, new, wait_for_newer_checkpoint
+from support.training.training_runs import EXACT, assert_no_doubles, assert_same_run, summary, train
 
 pytestmark = pytest.mark.slow
 
@@ -54,8 +46,7 @@ def test_killed_at_random_moments(whole, tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "number"),
-    [("dqn", signal.SIGINT), ("dqn", signal.SIGTERM), ("reinforce", signal.SIGHUP),
-     ("reinforce-document", signal.SIGINT),
+    [("dqn", signal.SIGTERM), ("reinforce", signal.SIGHUP),
      pytest.param("ppo", signal.SIGINT, marks=pytest.mark.extras("stable_baselines3"))],
 )  # fmt: skip
 def test_a_signal_saves_and_tells_how_to_go_on(
@@ -74,23 +65,3 @@ def test_a_signal_saves_and_tells_how_to_go_on(
     with forked(["--resume", str(run)], tmp_path) as training:
         training.ended()
     assert_same_run(whole(name), run)
-
-
-def test_two_trainings_in_one_folder(tmp_path: Path) -> None:
-    run = tmp_path / "run"
-    command = [sys.executable, "-m", "rl_workbench", "train", *new("dqn", run)]
-    with subprocess.Popen(
-        [*command, "--total-timesteps=1000000"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-        text=True, cwd=tmp_path,
-    ) as process:  # fmt: skip
-        try:
-            wait_for_newer_checkpoint(run, lambda: process.poll() is None)
-            for arguments in (["--resume", str(run)], new("dqn", run)):
-                with forked(arguments, tmp_path / "second") as second:
-                    assert f"is running in {run}" in second.ended(1)
-            assert process.poll() is None
-            process.send_signal(signal.SIGTERM)
-            _, told = process.communicate(timeout=BOUND)
-            assert process.returncode == 143 and "Traceback" not in told
-        finally:
-            process.kill()

@@ -9,7 +9,6 @@ from support.robots.rig import INERTIA, MASS, PERIOD, RIG, Watch, make_both, mak
 
 from robot_envs import RobotEnv, SimulatorError
 from robot_envs.variation import LinkScale, Variation
-from robot_envs.vector import RobotVectorEnv
 
 G = 9.8  # [m/s²]
 REST = np.zeros(3)
@@ -105,16 +104,6 @@ def test_surfaces_brake_so_many_times_as_much(engine, factor):
     assert 1.0 - seen[-2] == pytest.approx(factor * 0.2 * G * 20 * PERIOD, rel=0.05)
 
 
-def test_a_limit_cuts_efforts_and_slows_set_points():
-    limited = joints_after(
-        make_rig(actuator_limit={"motors": 2.0, "servo_position": 0.5}), (5.0, -9.0, 1.0), 10
-    )
-    asked = joints_after(make_rig(), (2.0, -2.0, 1.0), 10)
-    assert limited["rail"] == asked["rail"]
-    assert limited["drop"] == asked["drop"]
-    assert 0.0 < limited["servo"][0] < 0.5 * 10 * PERIOD < asked["servo"][0]
-
-
 def test_a_task_that_adds_to_set_points_sees_those_that_it_has_sent():
     class Adding(Watch):
         def apply(self, action, state):
@@ -143,34 +132,6 @@ def test_another_environments_robot_is_its_own(engine):
     assert (rows[0] == rows[2]).all()
     assert (rows[1] == rows[3]).all()
     assert rows[0][1] == pytest.approx(rows[1][1] / 2, rel=1e-3)
-
-
-def test_robots_that_share_a_world_are_named_with_their_model():
-    options = {"mass": {"rig::cart": 0.5}, "gains": {"/rig/servo_position": 0.5}, "gravity": 0.1}
-    env = make_both(randomisation=options)
-    told = env.reset(seed=0)[1]["variation"]
-    env.close()
-    assert list(told) == list(options)
-    assert list(told["mass"]) == ["rig::cart"]
-    assert list(told["gains"]) == ["/rig/servo_position"]
-    assert 0.9 <= told["gravity"] <= 1.1
-
-
-def test_a_vector_of_environments_gives_each_its_own_robot():
-    options = {"randomisation": {"mass": 0.2, "com": {"cart": 0.01}}, "actuator_lag": 0.02}
-    many = RobotVectorEnv(3, make_rig, **options)
-    infos = many.reset(seed=4)[1]["variation"]
-    pushed = [many.step(np.tile([5.0, 0.0, 0.0], (3, 1)))[0] for _ in range(3)][-1]
-    many.close()
-    for index in range(3):
-        env = make_rig(**options)
-        info = env.reset(seed=4 + index)[1]["variation"]
-        for _ in range(3):
-            alone, *_ = env.step(np.array([5.0, 0.0, 0.0]))
-        env.close()
-        assert (pushed[index] == alone).all()
-        assert infos["mass"]["cart"][index] == info["mass"]["cart"]
-        assert (infos["com"]["cart"][index] == info["com"]["cart"]).all()
 
 
 @pytest.mark.parametrize(

@@ -54,25 +54,6 @@ def test_what_cannot_be_loaded_is_refused_and_leaves_no_trace(manager, name, par
     assert manager.listed() == before
 
 
-@pytest.mark.parametrize(
-    ("start", "stop"),
-    [
-        (["nobody"], []),
-        ([], ["nobody"]),
-        ([], ["pole"]),
-        (["cart"], []),
-        (["cart"], ["cart"]),
-        (["cart2"], []),
-    ],
-)
-def test_strict_refuses_and_changes_nothing(manager, start, stop):
-    manager.switch(["cart"], [], STRICT)
-    before = states(manager)
-    with pytest.raises(ControlError):
-        manager.switch(start, stop, STRICT)
-    assert states(manager) == before
-
-
 def test_moved_joints_relatch_running_controllers(manager):
     manager.switch(["cart"], [], STRICT)
     joint, cart = manager.hardware.joints["stand_cart"], manager.get("cart")

@@ -145,18 +145,6 @@ def test_no_points_hold_the_joints_where_they_are():
     assert rig.controller.sample().desired == ((0.4,), (0.0,), (0.0,))
 
 
-def test_a_ramp_goes_on_from_what_was_wanted():
-    rig = Rig("Effort", stop_trajectory_duration=1.0).start()
-    rig.controller.follow(move((1.0, (1.0,))))
-    rig.run(501)
-    (position,), (velocity,), _ = rig.controller.sample().desired
-    rig.controller.follow(Trajectory((), ()))
-    rig.run(2000)
-    assert rig.controller.sample().desired[0][0] == pytest.approx(
-        position + 0.625 * velocity, abs=5e-3
-    )
-
-
 # time
 
 
@@ -241,10 +229,3 @@ def test_a_tolerance_that_is_no_number_is_refused():
         with pytest.raises(TrajectoryRefused, match="not a number") as refusal:
             rig.pursue(move((1.0, (1.0,))), **tolerances)
         assert refusal.value.code == INVALID_GOAL
-
-
-def test_a_continuous_joint_goes_the_short_way():
-    rig = Rig(joints=("wrist",)).start()
-    rig.controller.follow(move((1.0, (2 * math.pi - 0.5,)), names=("wrist",)))
-    rig.run(1100)
-    assert rig.joints["wrist"].position == pytest.approx(-0.5)

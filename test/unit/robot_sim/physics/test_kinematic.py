@@ -95,10 +95,7 @@ def test_it_pushes_and_carries_others(world):
 
 
 def test_kinematic_and_static_ones_do_not_touch(world):
-    wall = [
-        box("a", kinematic=False),
-        box("b", kinematic=False, more="<pose>3 0 0 0 0 0</pose>"),
-    ]
+    wall = [box("a", kinematic=False), box("b", kinematic=False, more="<pose>3 0 0 0 0 0</pose>")]
     world.spawn("wall", sdf(*wall, static=True), Pose((0.0, 0.0, 1.0)))
     models = [
         world.spawn(f"m{x}", sdf(box("link")), Pose((x, 0.1, 1.05))) for x in (0.0, 3.0, 3.05)

@@ -14,11 +14,7 @@ from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.engines import bullet_engine as bullet
 from robot_sim.physics.files.urdf import parse_urdf
 from robot_sim.physics.pose import Pose
-from robot_sim.physics.properties import (
-    JointProperties,
-    set_joint_properties,
-    set_link_properties,
-)
+from robot_sim.physics.properties import JointProperties, set_joint_properties, set_link_properties
 from robot_sim.physics.world import World, ground_plane
 
 pytestmark = pytest.mark.slow

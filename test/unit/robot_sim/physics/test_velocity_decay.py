@@ -144,9 +144,7 @@ def test_urdf(blocks, decay):
 
 @pytest.mark.parametrize("factor", ["-0.1", "1.5"])
 def test_a_share_that_is_none(factor):
-    model = urdf(
-        f'<gazebo reference="base"><dampingFactor>{factor}</dampingFactor></gazebo>',
-    )
+    model = urdf(f'<gazebo reference="base"><dampingFactor>{factor}</dampingFactor></gazebo>')
     assert model.links["base"].decay is None
     assert "link 'base', velocity_decay: " in model.warnings[0]
     assert "not between 0 and 1" in model.warnings[0]

@@ -31,14 +31,3 @@ def run(world, watched):
 def test_who_watches_changes_no_bit(make_world):
     alone, watched = (run(make_world(ground=True), watched) for watched in (False, True))
     assert alone == watched
-
-
-def test_the_version_counts_what_comes_and_goes(world):
-    first = world.version
-    box = world.spawn("box", parse_urdf(BOX), Pose((0.5, 0.0, 0.1)))
-    assert box.number == world.version > first
-    world.step()
-    version = world.version
-    world.delete("box")
-    again = world.spawn("box", parse_urdf(BOX), Pose((0.5, 0.0, 0.1)))
-    assert again.number > version > first

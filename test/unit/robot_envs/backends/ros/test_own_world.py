@@ -16,16 +16,17 @@ from types import SimpleNamespace
 import gymnasium
 import pytest
 import rospy
+from support.robots.cartpole import RICH
 from support.scenes.rover import ROVER, Roll
 from support.scenes.two_arms import LEFT, RIGHT, Volley
-from support.training.environment_conformance import RICH, EnvironmentConformance
 
+import cartpole  # noqa: F401  # registers the environments
 from robot_envs import RobotEnv
 from robot_envs.backends.backend import Slot, side_by_side
 from robot_envs.backends.ros import own_simulator
 from robot_envs.backends.ros.own_simulator import OwnSimulator
 from robot_envs.errors import RobotEnvError, SimulatorError
-from robot_envs.testing import differences, rollout
+from robot_envs.testing import check_robot_env, differences, rollout
 
 pytestmark = pytest.mark.slow
 BALANCE = "cartpole/Balance-v0"
@@ -317,9 +318,6 @@ def test_no_simulator_outlives_its_client() -> None:
 
 
 @pytest.mark.long
-class TestConformance(EnvironmentConformance):
-    """The suite of all environments, which makes some hundred simulators."""
-
-    identifier = BALANCE
-    backend = "ros-own"
-    steps = 30
+def test_it_keeps_what_environments_of_robots_promise() -> None:
+    """Which makes some hundred simulators."""
+    check_robot_env(BALANCE, ("ros-own",), steps=30)

@@ -4,13 +4,7 @@ import math
 
 import pytest
 
-from robot_envs.backends.backend import (
-    Slot,
-    connect_in_turn,
-    join_in_turn,
-    next_slot,
-    side_by_side,
-)
+from robot_envs.backends.backend import Slot, connect_in_turn, join_in_turn, next_slot, side_by_side
 from robot_envs.backends.ros.own_world import Journal, checked
 from robot_envs.errors import RobotEnvError, SimulatorFault
 from robot_envs.variation import LinkScale, Variation
