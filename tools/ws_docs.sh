@@ -15,7 +15,7 @@ API=(
     "ros_utils ros_utils.readiness ros_utils.ros_controllers ros_utils.ros_gazebo ros_utils.ros_launch
         ros_utils.ros_node ros_utils.ros_params ros_utils.ros_spawn ros_utils.ros_urdf ros_utils.simulation
         ros_utils.step_client ros_utils.testing ros_calls.service"
-    "cartpole.environment cartpole.robot"
+    "cartpole.environment cartpole.robot cartpole.tasks"
 )
 
 mkdocs() {  # command, argument...

@@ -18,7 +18,7 @@ PAGE = "docs/catkin.md"
 # and embreex have no wheels.
 PHYSICS = ("embreex", "pybullet") if platform.machine() == "x86_64" else ("mujoco",)
 SIMULATOR = (
-    *PHYSICS, "collada", "manifold3d", "numpy", "psutil", "trimesh", "vhacdx", "xacro", "yaml",
+    *PHYSICS, "collada", "manifold3d", "msgpack", "numpy", "psutil", "trimesh", "vhacdx", "xacro", "yaml",
 )  # fmt: skip
 WINDOW = (*SIMULATOR, "PIL", "viser", "websockets")
 ALL = (*WINDOW, "gymnasium", "jinja2", "matplotlib", "pygame", "tensorboard", "torch", "tqdm")

@@ -111,6 +111,10 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     option("--video-size", type=int, nargs=2, default=(640, 480), help="width, height [pixels]")
     option("--video-model", default="", help="keep this model in the middle; default: all movable")
     option("--seed", type=int, help="seed of Python's and NumPy's random numbers")
+    option(
+        "--camera-scale", type=_scale, default=1.0, metavar="SCALE",
+        help="size of cameras' pictures, beside the one in the robot's file: 0.25 is a quarter of the width",
+    )  # fmt: skip
     for names in INERT:
         option(*names.split(), action="store_true", help="accepted, without effect")
     for names in INERT_WITH_VALUE:
@@ -122,6 +126,13 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     args.world = worlds[-1] if worlds else EMPTY_WORLD
     args.ignored = [argument for argument in left if argument != args.world]
     return args
+
+
+def _scale(text: str) -> float:
+    scale = float(text)
+    if not 0.0 < scale <= 1.0:
+        raise ValueError
+    return scale
 
 
 class GazeboNode:
@@ -166,7 +177,7 @@ class GazeboNode:
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
-        plugins = PluginRegistry(self.sim, thinner, args.seed or 0, sensors)
+        plugins = PluginRegistry(self.sim, thinner, args.seed or 0, sensors, args.camera_scale)
         load_plugins(self.sim, plugins, of_world if network else ())
         if not network:
             return

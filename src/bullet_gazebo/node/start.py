@@ -12,7 +12,7 @@ from file_access.xml_text import decode
 HASHES = "PYTHONHASHSEED"  # decides the order of sets
 KINDS: dict[str, tuple[type, ...]] = {
     "physics": (str,), "paused": (bool,), "seed": (int, type(None)), "hashes": (str, type(None)),
-    "world": (str,), "world_text": (str, type(None)), "series": (int,),
+    "world": (str,), "world_text": (str, type(None)), "series": (int,), "camera_scale": (float,),
 }  # fmt: skip
 
 
@@ -27,7 +27,7 @@ def facts_of(args: argparse.Namespace, series: int) -> dict[str, Any]:
         "physics": args.physics, "paused": args.paused, "seed": args.seed,
         "hashes": os.environ.get(HASHES),
         "world": str(args.world if path is None else path.absolute()), "world_text": text,
-        "series": series,
+        "series": series, "camera_scale": args.camera_scale,
     }  # fmt: skip
 
 
@@ -35,6 +35,7 @@ def check_facts(facts: object) -> None:
     """Raises ValueError unless these are facts of `facts_of`, from a file of unknown origin."""
     if not isinstance(facts, dict):
         raise ValueError("it doesn't say how the simulator was started")
+    facts.setdefault("camera_scale", 1.0)  # older bags have none
     for name, kinds in KINDS.items():
         if name not in facts or type(facts[name]) not in kinds:
             raise ValueError(f"of the simulator's start, {name} is {facts.get(name)!a}")
@@ -56,7 +57,8 @@ def arguments_of(facts: dict[str, Any], folder: Path) -> list[str]:
             path.write_text(text, encoding="utf-8", errors="surrogatepass")
     seed = [] if facts["seed"] is None else [f"--seed={facts['seed']}"]
     paused = ["-u"] if facts["paused"] else []
-    return ["--lockstep", f"--physics={facts['physics']}", *paused, *seed, str(path)]
+    scale = f"--camera-scale={facts['camera_scale']}"
+    return ["--lockstep", f"--physics={facts['physics']}", scale, *paused, *seed, str(path)]
 
 
 def _has(path: Path, text: str) -> bool:

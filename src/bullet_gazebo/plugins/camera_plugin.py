@@ -54,7 +54,7 @@ class CameraPlugin(ContextPlugin):
                 context, camera, topics, scope, (side + names[0], side + names[1]),
                 0.0 if side == SIDES[0] else baseline, side, latch=self.latch,
             ))
-            for side, camera in _cameras(sensor)
+            for side, camera in _cameras(sensor, context.sensing.camera_scale)
         ]  # fmt: skip
 
     def _on_clock(self, now: int) -> None:
@@ -111,10 +111,10 @@ class TriggeredMulticameraPlugin(TriggeredCameraPlugin):
     kind = MULTICAMERA
 
 
-def _cameras(sensor: Sensor) -> Iterator[tuple[str, PinholeCamera]]:
+def _cameras(sensor: Sensor, scale: float) -> Iterator[tuple[str, PinholeCamera]]:
     """Yields each camera that has topics, with the prefix of its topics."""
     if sensor.kind != MULTICAMERA:
-        yield "", camera_of(sensor)
+        yield "", camera_of(sensor, scale)
         return
     names = [(element, element.get("name", "")) for element in sensor.element.findall("camera")]
     sides = [(side, *each) for each in names for side in SIDES if side[:-1] in each[1]]
@@ -122,7 +122,7 @@ def _cameras(sensor: Sensor) -> Iterator[tuple[str, PinholeCamera]]:
         raise DescriptionError("no <camera> has left or right in its name")
     for side, element, name in sides:
         where = f"sensor '{sensor.name}', camera '{name}'"
-        yield side, PinholeCamera(element, sensor.pose, where, sensor.link)
+        yield side, PinholeCamera(element, sensor.pose, where, sensor.link, scale)
 
 
 LIBRARIES = {

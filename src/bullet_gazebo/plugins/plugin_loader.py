@@ -205,13 +205,13 @@ class PluginRegistry:
 
     def __init__(
         self, sim: Simulator, thinner: Thinner, seed: int = 0,
-        shown: list[SceneSensor] | None = None,
+        shown: list[SceneSensor] | None = None, camera_scale: float = 1.0,
     ) -> None:  # fmt: skip
-        """`seed` is that of the sensors' noise; to `shown` come the topics that windows can draw."""
+        """`seed` and `camera_scale` as of `Sensing`; to `shown` come the topics that windows can draw."""
         self._sim = sim
         self._shown = [] if shown is None else shown
         self._thinner = thinner
-        self.sensing = Sensing(sim, seed)
+        self.sensing = Sensing(sim, seed, camera_scale)
         # Imported now, so that no spawn waits for it.
         self._built_in = built_in("LIBRARIES")
         self._of_worlds = built_in("WORLD_LIBRARIES")

@@ -46,7 +46,7 @@ class _Eye(Shared):
 
     def __init__(self, context: PluginContext, name: str, sensor: Sensor) -> None:
         self.context, self._link = context, sensor.link
-        self.camera = camera_of(sensor)
+        self.camera = camera_of(sensor, context.sensing.camera_scale)
         self.element, topic = EYES[name]
         rate = context.rate(f"{self.element.rstrip('12')}UpdateRate", sensor.rate)
         self.topics = SensorTopics(context, rate, self.take)

@@ -33,14 +33,17 @@ class PinholeCamera:
     """A camera, made from a `<camera>`; `pose` is that of what holds it in `link`, `where` is for errors.
 
     `across` (width,) and `down` (height, 1) are a pixel's point to the right and down, for each metre of
-    depth. Raises DescriptionError if it can't be simulated.
+    depth. Raises DescriptionError if it can't be simulated. Pictures have `scale` times the size that the
+    file says.
     """
 
-    def __init__(self, element: Element, pose: Pose, where: str, link: str) -> None:
+    def __init__(
+        self, element: Element, pose: Pose, where: str, link: str, scale: float = 1.0
+    ) -> None:
         self.link = link
         self.pose = pose.compose(read_pose(element, f"{where}, <camera>")[0])
         self.width, self.height = (
-            _pixels(element, f"image/{tag}", where, default)
+            max(1, round(scale * _pixels(element, f"image/{tag}", where, default)))
             for tag, default in (("width", 320), ("height", 240))
         )
         if self.width * self.height > MOST_PIXELS:
@@ -99,8 +102,8 @@ def noisy(
     return np.rint(255.0 * np.clip(values, 0.0, 1.0)).astype(np.uint8)
 
 
-def camera_of(sensor: Sensor) -> PinholeCamera:
-    """Returns the only camera of a sensor.
+def camera_of(sensor: Sensor, scale: float = 1.0) -> PinholeCamera:
+    """Returns the only camera of a sensor; `scale` as of `PinholeCamera`.
 
     Raises DescriptionError if it has none, or it can't be simulated.
     """
@@ -108,7 +111,7 @@ def camera_of(sensor: Sensor) -> PinholeCamera:
     element = sensor.element.find("camera")
     if element is None:
         raise DescriptionError(f"{where} has no <camera>")
-    return PinholeCamera(element, sensor.pose, where, sensor.link)
+    return PinholeCamera(element, sensor.pose, where, sensor.link, scale)
 
 
 def with_noise(
@@ -136,7 +139,7 @@ class CameraSensor(Measurement):
     def __init__(self, mount: Mount) -> None:
         super().__init__(mount)
         self._sensor = sensor_of(mount, self.kinds)
-        self.camera = camera_of(self._sensor)
+        self.camera = camera_of(self._sensor, mount.sensing.camera_scale)
         self.rate = rate_of(mount, self._sensor)
 
     def view(self, in_colour: bool = True) -> CameraView:

@@ -21,11 +21,14 @@ LARGEST_NUMBER = 1e30  # number of a plugin: messages have 32-bit floats
 
 
 class Sensing(Shared, Stateful):
-    """The sensors of a simulator; `seed` is that of their noise."""
+    """The sensors of a simulator; `seed` is that of their noise, `camera_scale` the size of pictures beside
+    that in the file.
+    """
 
-    non_persistent = ("collisions", "visuals")
+    non_persistent = ("collisions", "visuals", "camera_scale")
 
-    def __init__(self, sim: Simulator, seed: int = 0) -> None:
+    def __init__(self, sim: Simulator, seed: int = 0, camera_scale: float = 1.0) -> None:
+        self.camera_scale = camera_scale
         self.schedule = Schedule(sim)
         self.collisions = RayScene(sim.world)
         self.visuals = RayScene(sim.world, visuals=True)

@@ -12,7 +12,7 @@ from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import Vector3
 from hector_gazebo_plugins.srv import SetBiasRequest
 from hypothesis import HealthCheck, Phase, given, settings
-from sensor_msgs.msg import Imu, LaserScan
+from sensor_msgs.msg import CameraInfo, Image, Imu, LaserScan
 from support.mutations.xml_trees import mutated_xml
 from support.ros.silent_topics import SilentPublisher, SilentService, SilentSubscriber, silence
 
@@ -265,3 +265,19 @@ def test_mutated_sensors_measure_or_are_refused(root):
         look()
         node.sim.world.close()
     assert seen[True] > 10
+
+
+@pytest.mark.parametrize(("scale", "size"), [(1.0, (40, 30)), (0.25, (10, 8)), (0.001, (1, 1))])
+def test_pictures_are_made_smaller_where_that_is_asked_for(monkeypatch, scale, size):
+    node = Node(silence(monkeypatch))
+    node.plugins = PluginRegistry(node.sim, None, camera_scale=scale)
+    plugin = '<plugin name="p" filename="libgazebo_ros_camera.so"/>'
+    camera = (
+        '<sensor name="s" type="camera"><update_rate>1000</update_rate><camera><image><width>40</width>'
+        f"<height>30</height></image></camera>{plugin}</sensor>"
+    )
+    assert not node.spawn(MODEL.format(camera, ""))
+    [image, *_], [info, *_] = published(Image), published(CameraInfo)
+    assert (image.width, image.height) == (info.width, info.height) == size
+    assert info.K[0] == pytest.approx(size[0] / (2.0 * math.tan(1.047 / 2.0)))
+    node.sim.world.close()
