@@ -1,4 +1,4 @@
-"""The scene for windows: what the world looks like, where its links are, and where they touch.
+"""The scene for windows: looks, link poses, and contacts of the world.
 
 An empty world offers exactly what Gazebo's does (docs/contract/gazebo.md 7), so the service and the topics
 come when a window asks for them through the node's XML-RPC server (`world_services.WorldControl`).

@@ -1,4 +1,4 @@
-"""Fingerprints of worlds: what has to be the same where a snapshot is restored."""
+"""Fingerprints of worlds: whether a snapshot fits."""
 
 import hashlib
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What grippers have besides controllers, without ROS.
+"""Mimic PIDs, vacuum grippers and grasp fixing, without ROS.
 
 A PID for a joint that follows another one, suction, and a hold on what opposing fingers press on.
 """

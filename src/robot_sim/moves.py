@@ -1,4 +1,4 @@
-"""Moves of bodies by something other than time, and who is told of them."""
+"""Moves of bodies by something other than time, and their listeners."""
 
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager

@@ -1,4 +1,4 @@
-"""The clockwork: ties physics and control together, tick by tick (docs/architecture.md, "One tick")."""
+"""The clockwork: physics and control, tick by tick (docs/architecture.md, "One tick")."""
 
 import threading
 from collections.abc import Callable, Mapping

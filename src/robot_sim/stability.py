@@ -1,4 +1,4 @@
-"""Finds gains that are too high for the physics step, and damps joints that a P gain alone would let ring.
+"""Stability of gains at the physics step, and damping of joints that a P gain alone would let ring.
 
 The engines step semi-implicitly, v' = v - dt/M (p x + d v), x' = x + dt v', with the effort of the state
 before the step. Such a loop diverges, alternating from step to step, if an eigenvalue of

@@ -1,4 +1,4 @@
-"""What a client asks of a world besides its joints: models, links in any frame, contacts.
+"""State queries beyond joints: models, links in any frame, contacts.
 
 `step_world` and in-process environments share this code. Names are looked up once for each query; one that
 refers to nothing, or to several entities, raises UnknownName.

@@ -1,4 +1,4 @@
-"""What decides the future of controllers, sensors, plugins and tasks, as plain data by name.
+"""State dictionaries of controllers, sensors, plugins and tasks: plain data by name.
 
 Whatever lives through ticks has the pair that PyTorch's modules have:
 

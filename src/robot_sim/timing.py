@@ -1,4 +1,4 @@
-"""Who holds the world, what keeps time from passing, and its pace against the wall clock."""
+"""The world's lock, holds on its time, and its pace against the wall clock."""
 
 import math
 import threading

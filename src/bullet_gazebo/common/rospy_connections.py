@@ -1,4 +1,4 @@
-"""Changes of rospy that protect the node from clients that send nothing, too much or nonsense.
+"""Patches of rospy against clients that send nothing, too much or nonsense.
 
 - `Reception`: a client that sends nothing keeps all others out; many of them, or a lack of file
   descriptors, end the thread that accepts connections (gazebo_clients.test, test_rospy_connections.py)

@@ -1,4 +1,4 @@
-"""Changes of rospy's topics, of its time, its XML-RPC server, and its registration at the master.
+"""Patches of rospy's topics, time, XML-RPC server, and registration at the master.
 
 - `free_polls_at_once`: file descriptors of closed topics pile up (test_rospy_internals.py)
 - `wait_until_sent`: a message published just before its topic closes is lost (test_rospy_internals.py)

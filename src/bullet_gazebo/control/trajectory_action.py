@@ -1,4 +1,4 @@
-"""What controllers of trajectories and grippers serve (docs/contract/ros_control.md 3.5, sensors.md 13.1)."""
+"""Actions of trajectory and gripper controllers (docs/contract/ros_control.md 3.5, sensors.md 13.1)."""
 
 from collections.abc import Iterable
 from typing import Any

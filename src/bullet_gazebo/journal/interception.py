@@ -1,4 +1,4 @@
-"""What rospy does for the journal: it passes requests, messages and reads of parameters by it.
+"""Hooks that record rospy's requests, messages and parameter reads in the journal.
 
 Plugins and controllers of users offer services, subscribe and read parameters with rospy alone (replay.test).
 """

@@ -1,4 +1,4 @@
-"""Where the journal goes: the topic ~journal, for recorders, and a bag that the simulator itself writes."""
+"""Outputs of the journal: the topic ~journal for recorders, and a bag that the simulator writes."""
 
 import os
 import threading

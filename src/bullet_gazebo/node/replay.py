@@ -1,4 +1,4 @@
-"""Repeats a recorded run in this process's simulator, entry by entry, and compares (docs/replay.md)."""
+"""The replay of a recorded run in this process's simulator, compared entry by entry (docs/replay.md)."""
 
 import json
 import re
@@ -28,7 +28,7 @@ ENTRY_PATIENCE = 60.0  # [s of wall time] for an entry during which no time pass
 
 
 class Changes:
-    """What is to be otherwise than recorded: models' texts, and parameters."""
+    """Overrides of what was recorded: models, and parameters."""
 
     def __init__(
         self, models: Mapping[str, str], parameters: Sequence[tuple[dict[str, Any], str]]
@@ -38,7 +38,7 @@ class Changes:
         self._parameters = parameters
 
     def set_parameters(self, entry: JournalEntry, request: Any = None) -> None:
-        """Sets the parameters that the entry's handler read, and then those that are to be otherwise."""
+        """Sets the parameters that the entry's handler read, and then the overrides."""
         spawned = isinstance(request, SpawnModel._request_class)
         for name, value in json.loads(entry.parameters or "{}").items():
             if not value:

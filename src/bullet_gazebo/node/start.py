@@ -1,4 +1,4 @@
-"""How a simulator was started: facts in its journal's first entry, and the arguments that repeat it."""
+"""The start of a recorded simulator: facts in the journal's first entry, and gzserver's arguments."""
 
 import argparse
 import os

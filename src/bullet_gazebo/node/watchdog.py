@@ -1,4 +1,4 @@
-"""The thread that moves the world, and what notices that it has failed or stands still.
+"""The thread that moves the world, and its watchdog.
 
 A world whose time silently stands still is worse than one that ends, so a fault in it ends the node. Where a
 plugin or controller never returns and keeps the world's lock, the log says whose code it is.

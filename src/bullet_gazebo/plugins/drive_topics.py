@@ -1,4 +1,4 @@
-"""What the plugins of vehicles have in common: commands, odometry, tf, driven wheels."""
+"""Common base of vehicle plugins: commands, odometry, tf, driven wheels."""
 
 import math
 from collections.abc import Sequence

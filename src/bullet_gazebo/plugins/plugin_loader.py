@@ -1,4 +1,4 @@
-"""Finds, starts and ends the plugins that a model file names by their shared libraries.
+"""Discovery, start and end of the plugins that a model file names by their shared libraries.
 
 A user's plugin is registered by a parameter (docs/plugins.md). Its exceptions are caught wherever it is
 called, SystemExit and KeyboardInterrupt included: a Ctrl-C raises nothing in this process
@@ -152,7 +152,7 @@ class PluginContext(Mount):
             with self.sim.lock:
                 end()
 
-        fault = "is not told of moves any more, because it raised"
+        fault = "raised; its on_move is disabled"
         with self.sim.lock:
             listener = self.sim.moves.on_move_of(self.model, self._guarded(moved, fault, end))
         self._updates.append(listener)

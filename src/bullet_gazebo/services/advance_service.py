@@ -1,4 +1,4 @@
-"""advance_world: lets time pass for a node in lock-step, and carries its messages (AdvanceWorld.srv)."""
+"""advance_world: simulated time for a node in lock-step, and its messages (AdvanceWorld.srv)."""
 
 import threading
 import time

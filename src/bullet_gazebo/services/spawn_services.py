@@ -1,4 +1,4 @@
-"""What comes into the world: the world file, spawn_urdf_model, spawn_sdf_model, and delete_model.
+"""Spawning: the world file, spawn_urdf_model, spawn_sdf_model, and delete_model.
 
 See docs/contract/gazebo.md 2.3 to 2.5, and gazebo_launch.md 4.1 and 4.2 for the search paths.
 """

@@ -1,4 +1,4 @@
-"""Checks step requests as a whole before any of it is carried out, and finds what they name.
+"""Validation of step requests, as a whole, before anything is carried out.
 
 A request that can't be carried out raises ControlError, or UnknownName; the text says why.
 """

@@ -182,7 +182,7 @@ class StepService:
         self._readers = SensorReaders(self._sim, self._sensing, names)
 
     def _end_unread(self) -> None:
-        """Ends the readers when somebody else lets time pass: who asked for them may be gone."""
+        """Ends the readers when another client steps: their owner may have disconnected."""
         if not self._is_reading:
             self._end_readers()
 

@@ -1,4 +1,4 @@
-"""What ros_control reads from a robot description: transmissions, kinds of joints, limits."""
+"""Transmissions, joint types and limits of a robot description, as ros_control reads them."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Where a vehicle is by its own measure, and when it says so (docs/contract/sensors.md 1 and 7)."""
+"""Wheel odometry, and its publishing period (docs/contract/sensors.md 1 and 7)."""
 
 import math
 from collections import deque

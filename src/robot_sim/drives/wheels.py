@@ -1,4 +1,4 @@
-"""From a vehicle's velocity to its wheels' and back, and what limits the way there."""
+"""Wheel kinematics: a vehicle's velocity, its wheels' velocities, and their limits."""
 
 import math
 from collections.abc import Sequence

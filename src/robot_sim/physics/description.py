@@ -1,4 +1,4 @@
-"""What a model consists of, whatever file it came from and whatever engine simulates it."""
+"""The description of a model, independent of file format and engine."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""What a physics engine has to do. To add one: subclasses of Engine and Body, named in `engines`."""
+"""The interface of a physics engine. To add one: subclasses of Engine and Body, named in `engines`."""
 
 import math
 from abc import ABC, abstractmethod

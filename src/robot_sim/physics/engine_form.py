@@ -1,4 +1,4 @@
-"""Prepares a model for an engine: checks bounds, moves link frames onto joints, sets one friction a link.
+"""The form of a model that engines take: bounds checked, link frames on joints, one friction a link.
 
 A value out of bounds raises DescriptionError, which names the place.
 """

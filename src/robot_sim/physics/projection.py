@@ -1,4 +1,4 @@
-"""Places one link of an articulated model, as near to the wanted pose as its joints allow.
+"""Placing one link of an articulated model as near to a pose as its joints allow.
 
 Gazebo's links are free bodies, which joints pull back together; PyBullet's can't come apart. So the pose is
 projected onto the joints that carry the link, and the velocity onto their speeds.

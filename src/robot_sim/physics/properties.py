@@ -1,4 +1,4 @@
-"""Properties of links and joints that change while the world runs."""
+"""Properties of links and joints that can be changed at run time."""
 
 import math
 from dataclasses import dataclass

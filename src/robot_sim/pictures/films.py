@@ -1,4 +1,4 @@
-"""Draws what `recording.py` sends: a video, a page in 3-D, or a picture; in a process of its own."""
+"""The renderer process of recordings: a video, a 3-D page, or a picture."""
 
 import logging
 import pickle

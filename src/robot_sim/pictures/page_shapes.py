@@ -1,4 +1,4 @@
-"""Draws visuals, collision shapes and joint frames on a page, most of them as instances in batches."""
+"""Visuals, collision shapes and joint frames on a page, most of them instances in batches."""
 
 import math
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Records a simulation as it runs: poses are copied within ticks, frames are drawn in another process.
+"""Recording of a running simulation: ticks copy poses, another process draws the frames.
 
 The simulator sends the visible shapes once, and poses for each frame, through a pipe. The other process
 lives in a session of its own and ends with the pipe, so that even a killed simulator leaves a video that

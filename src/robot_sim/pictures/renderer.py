@@ -1,4 +1,4 @@
-"""Draws models by PyBullet's software renderer: no display, no OpenGL.
+"""Pictures of models by PyBullet's software renderer: no display, no OpenGL.
 
 A renderer has a world of its own, where nothing moves until it is placed. So a picture never changes
 a simulation, whatever its engine, and the same poses give the same picture everywhere.

@@ -1,4 +1,4 @@
-"""Where rays first meet a box, ball or cylinder: exact, for many pairs of ray and shape at once.
+"""Exact ray intersections with boxes, balls and cylinders, for many pairs at once.
 
 Shapes are centred in their own frames, and rays are given there: origins (k, 3) [m] and directions (k, 3) of
 length 1. A ray that starts inside a shape meets it where it leaves. A ray that misses has distance inf.

@@ -1,4 +1,4 @@
-"""What rays of light or sound meet first in a world, by Embree where it is installed.
+"""Ray casting in a world, by Embree where it is installed.
 
 All shapes that never move are one Embree scene, which is built when one comes, goes or is moved. What moves,
 balls, and large meshes are met in their own frames, into which rays are brought: meshes by Embree scenes that

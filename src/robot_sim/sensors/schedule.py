@@ -1,4 +1,4 @@
-"""When sensors measure: at the first tick that is due, in the file's order, if somebody listens.
+"""The sensor schedule: each measures at the first tick that is due, in the file's order, if somebody listens.
 
 Due times are whole multiples of a sensor's period after it was made or time was reset (in ns, without
 drift), whoever listens: a late or second listener changes no measurement. A reset with a seed begins them

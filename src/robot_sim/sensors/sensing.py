@@ -1,4 +1,4 @@
-"""What all sensors of a world share: their schedule, what rays meet, and the seed of their noise."""
+"""Shared context of a world's sensors: schedule, ray scenes, seed of the noise."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Measures sensors for those who ask by name, over ROS with a step and in-process, and for controllers."""
+"""Sensor readings by name: for steps over ROS, in-process environments, and controllers."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, partial

@@ -1,4 +1,4 @@
-"""What a sensor measured, for those who ask for it by the sensor's name."""
+"""The reading of a sensor."""
 
 import hashlib
 from collections.abc import Mapping

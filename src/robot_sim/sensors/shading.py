@@ -1,4 +1,4 @@
-"""Colours of what rays meet: flat shading by the world's directional lights, with the textures of meshes."""
+"""Flat shading of ray hits by the world's directional lights, with the textures of meshes."""
 
 from collections.abc import Iterable
 

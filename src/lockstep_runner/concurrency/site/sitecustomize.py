@@ -1,4 +1,4 @@
-"""Read by every Python process below a script in lock-step, and by no other (see ../following.py)."""
+"""The start of every Python process below a script in lock-step, and of no other (see ../following.py)."""
 
 import importlib.machinery
 import importlib.util

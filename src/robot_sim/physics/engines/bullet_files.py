@@ -1,4 +1,4 @@
-"""Writes models as the URDF and mesh files that PyBullet loads."""
+"""URDF and mesh files for PyBullet."""
 
 from dataclasses import replace
 from pathlib import Path

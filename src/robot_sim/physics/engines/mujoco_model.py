@@ -1,4 +1,4 @@
-"""Writes a ModelDescription into MuJoCo's model of the whole world."""
+"""A ModelDescription as part of MuJoCo's model of the whole world."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Imports pybullet without its greeting. Import it only from here.
+"""pybullet without its greeting; the only place that imports it.
 
 pybullet greets every process with its build time, written in C to the C library's `stderr`, where Python
 can't filter it.

@@ -1,4 +1,4 @@
-"""What a URDF's `<mimic>` and plugins add to a model: joints that follow others, links that are off.
+"""Mimic joints and disabled links, from a URDF's `<mimic>` and plugins.
 
 In this process it is the same as over ROS, so it belongs to the model, not to plugins at work. A fault is a
 warning, and what has it is left out.

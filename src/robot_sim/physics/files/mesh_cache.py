@@ -1,4 +1,4 @@
-"""What takes long to compute from meshes, kept on disk by their content."""
+"""The mesh cache: results that take long to compute, on disk, by the mesh's content."""
 
 import math
 import os

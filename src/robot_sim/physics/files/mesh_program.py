@@ -1,4 +1,4 @@
-"""What the child process of `meshes` runs: STL, COLLADA and OBJ files into arrays that engines can take.
+"""The child process of `meshes`: STL, COLLADA and OBJ files into arrays for engines.
 
 trimesh reads COLLADA, OBJ and binary STL. What it leaves to its caller is done here: units and axes, named
 parts, and the check that every face has finite corners.

@@ -1,4 +1,4 @@
-"""The models of a `<population>`, and where they stand."""
+"""The models of a `<population>`, and their poses."""
 
 import math
 from collections.abc import Iterator

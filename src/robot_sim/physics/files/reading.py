@@ -1,4 +1,4 @@
-"""What reading one model or world needs: the files that it names, and limits on their number and size."""
+"""The context of reading a model or world: files that it names, and limits on their number and size."""
 
 import logging
 import os

@@ -1,4 +1,4 @@
-"""The `<state>` of a saved world: where its models, links and lights begin.
+"""The `<state>` of a saved world: initial poses of models, links and lights.
 
 Gazebo places the links and joins them afterwards. Here they are joined already, so joints take the positions
 that the poses of their links give.

@@ -1,4 +1,4 @@
-"""Reads SDF models, version 1.4 to 1.7 (sdformat.org), into a ModelDescription.
+"""The reader of SDF models, versions 1.4 to 1.7 (sdformat.org).
 
 Links keep their frames; joints become parent-relative. Nested and included models become part of the outer
 one, with links and joints named `nested::name`. Links of a static model need no joints.

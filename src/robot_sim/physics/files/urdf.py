@@ -1,4 +1,4 @@
-"""Reads URDF text (wiki.ros.org/urdf/XML) into a ModelDescription, its fixed joints lumped as Gazebo does.
+"""The reader of URDF (wiki.ros.org/urdf/XML); lumps fixed joints as Gazebo does.
 
 Faults are treated as urdfdom and sdformat do (docs/differences.md lists exceptions): a shape or inertial
 that can't be read is left out of its link with a warning; a joint that can't be read refuses the robot.

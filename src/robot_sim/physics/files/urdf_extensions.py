@@ -1,4 +1,4 @@
-"""A URDF's `<gazebo>` elements: what they add to links, joints and the model, and joints of SDF in them.
+"""A URDF's `<gazebo>` extensions of links, joints and the model, SDF joints included.
 
 sdformat copies those into the model that it makes of the URDF, once fixed joints are lumped. They close
 loops, or fix the robot to the world.

@@ -1,4 +1,4 @@
-"""Reads SDF world files, and the models and lights of spawn requests, URDF or SDF."""
+"""The reader of SDF worlds, and of models and lights in spawn requests."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
