@@ -62,7 +62,7 @@ debian_list() {  # file
         [[ -n $ROS_PREFIX ]] || debian_list ros.txt
         ! uses_debians_torch || echo python3-torch
     fi
-    sed 's/#.*//' -- "$ROOT/requirements/$1" | xargs -n 1
+    sed -E 's/#.*//; s/^[[:space:]]+|[[:space:]]+$//g; /^$/d; s/[[:space:]]+/\n/g' -- "$ROOT/requirements/$1"
 }
 
 debian_missing() {  # file
