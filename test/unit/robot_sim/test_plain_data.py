@@ -1,5 +1,6 @@
 """Plain data as bytes: what comes back, and what damaged, forged and endless input leads to."""
 
+import itertools
 import random
 import struct
 import subprocess
@@ -96,7 +97,26 @@ def test_what_is_not_plain_is_refused(value):
         pack(value)
 
 
+@pytest.mark.parametrize(
+    "value",
+    [2**3000, np.zeros(2, "M8[s]"), np.zeros(2, [("a", "f4")]), np.array(["a" * 12000])],
+    ids=("an integer", "dates", "a structure", "a long text"),
+)
+def test_what_could_not_be_read_is_not_written(value):
+    with pytest.raises(StateError, match="it has an"):
+        pack(value)
+
+
+def alike(keys):
+    """A dictionary whose keys all have the same hash."""
+    assert len(set(map(hash, keys))) == 1
+    return b"\xdf" + struct.pack(">I", len(keys)) + b"".join(pack(key) + b"\xc0" for key in keys)
+
+
 FORGED = {
+    "integers with one hash": alike([each * (2**61 - 1) for each in range(1, 20_000)]),
+    "tuples with one hash": alike([*itertools.product((-1, -2), repeat=14)]),
+    "more than memory bears": b"\x96" + 6 * (b"\xdd\x00\x10\x00\x00" + b"\x90" * 2**20),
     "a huge array": b"\xdd\xff\xff\xff\xff",
     "a huge map": b"\xdf\xff\xff\xff\xff",
     "a huge text": b"\xdb\xff\xff\xff\xff",
