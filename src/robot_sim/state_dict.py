@@ -12,11 +12,13 @@ that its class, or one that it is derived from, names as `non_persistent` are le
     non_persistent = ("publisher",)
 """
 
+import contextlib
 import copy
 import dataclasses
 import random
 from collections import defaultdict, deque
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from contextvars import ContextVar
 from functools import cache
 from itertools import zip_longest
 from typing import Any, ClassVar, NamedTuple
@@ -28,6 +30,10 @@ GENERATORS = (np.random.Generator, random.Random)
 ATOMS = frozenset((type(None), bool, int, float, str, bytes))
 LARGEST_POOL = 1024  # of a seed sequence; NumPy's has 4
 BIT_GENERATORS = ("PCG64", "PCG64DXSM", "Philox", "SFC64", "MT19937")
+
+
+# Objects that loads within `undoable` have changed, with the attributes that they had.
+_CHANGED: ContextVar[list[tuple[Any, dict[str, Any]]] | None] = ContextVar("_CHANGED", default=None)
 
 
 class StateError(TypeError):
@@ -108,6 +114,22 @@ def load(parts: Iterable[tuple[Any, Any]]) -> None:
         raise StateError("; ".join(faults))
 
 
+@contextlib.contextmanager
+def undoable() -> Iterator[None]:
+    """Gives objects back the attributes that they had, other objects too, where a load within it fails."""
+    changed = [] if (outer := _CHANGED.get()) is None else outer
+    token = _CHANGED.set(changed)
+    try:
+        yield
+    except BaseException:
+        for part, held in reversed(changed):
+            for name, value in held.items():
+                object.__setattr__(part, name, value)
+        raise
+    finally:
+        _CHANGED.reset(token)
+
+
 @cache
 def _layout(kind: Hashable) -> tuple[tuple[str, ...], frozenset[str]]:
     """Returns the slots of a class, and the names of attributes that are left as they are."""
@@ -150,6 +172,8 @@ def put_attributes(part: Any, state: Mapping[str, Any]) -> None:
     slots, left = _layout(kind)
     own = getattr(part, "__dict__", {})
     held = {**own, **{name: getattr(part, name, None) for name in slots}} if slots else own
+    if (changed := _CHANGED.get()) is not None:
+        changed.append((part, {**held}))
     faults = []
     for name, saved in state.items():
         value = saved
@@ -236,14 +260,9 @@ def _saved(value: Any) -> Any:
     raise _Unknown(f"a {kind.__module__}.{kind.__qualname__}")
 
 
-@cache
-def _fields_of(kind: Hashable) -> tuple[str, ...]:
-    return tuple([each.name for each in dataclasses.fields(kind)])  # type: ignore[arg-type]
-
-
 def fields_of(kind: Any) -> tuple[str, ...]:
     """Returns the names of a data class's fields."""
-    return _fields_of(kind)
+    return tuple([each.name for each in dataclasses.fields(kind)])
 
 
 def _key(key: Any) -> Any:

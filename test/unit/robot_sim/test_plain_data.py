@@ -116,7 +116,6 @@ def alike(keys):
 FORGED = {
     "integers with one hash": alike([each * (2**61 - 1) for each in range(1, 20_000)]),
     "tuples with one hash": alike([*itertools.product((-1, -2), repeat=14)]),
-    "more than memory bears": b"\x96" + 6 * (b"\xdd\x00\x10\x00\x00" + b"\x90" * 2**20),
     "a huge array": b"\xdd\xff\xff\xff\xff",
     "a huge map": b"\xdf\xff\xff\xff\xff",
     "a huge text": b"\xdb\xff\xff\xff\xff",
@@ -130,6 +129,14 @@ def test_forged_input_is_one_error(data):
     with pytest.raises(StateError) as error:
         unpack(data)
     assert "\n" not in str(error.value)
+
+
+def test_entries_have_an_end_also_those_within_others(monkeypatch):
+    monkeypatch.setattr("robot_sim.plain_data.MOST", 1000)
+    value = [[[None] * 10] * 10, ((None,) * 90,) * 10]
+    assert unpack(pack([value[0]])) and unpack(pack(value[1]))
+    with pytest.raises(StateError, match="more than 1000 entries"):
+        unpack(pack(value))
 
 
 def nested(depth):

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from robot_sim.state_dict import Held, Shared, StateError, Stateful, load, state_of
+from robot_sim.state_dict import Held, Shared, StateError, Stateful, load, state_of, undoable
 
 
 class Part(Stateful):
@@ -308,3 +308,11 @@ def test_circles_are_named():
     items.append(items)
     with pytest.raises(StateError, match="Part.items refers to itself"):
         state_of(Part(items=items))
+
+
+def test_what_fails_as_a_whole_leaves_objects_where_they_were():
+    inner, slotted = Part(x=1), Slotted(3)
+    outer = Part(inner=inner, parts=[(inner, slotted)])
+    with pytest.raises(StateError, match="load_state_dict is a method"), undoable(), undoable():
+        load([(outer, {"parts": [], "load_state_dict": 1}), (slotted, {"size": 5})])
+    assert outer.inner is inner and outer.parts == [(inner, slotted)] and slotted.size == 3
