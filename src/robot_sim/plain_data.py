@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import msgpack
 import numpy as np
 
-from robot_sim.state_dict import StateError, fields_of
+from robot_sim.state_dict import Held, StateError, fields_of
 
 DEEPEST = 100
 MOST = 2**22  # entries of lists and dictionaries, those of records and arrays included
@@ -212,7 +212,7 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
         place: of both in a larger state.
         exactly: whether names and lengths have to be the same, too.
     """
-    if there is None or given is None:
+    if there is None or (given is None and not (exactly and isinstance(there, Held))):
         return ""
     numbers = (int, float)
     if type(there) in numbers and type(given) in numbers:

@@ -365,7 +365,7 @@ def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
     bits: Any = target.bit_generator
     seeds = saved["seeds"]
     if seeds is None or seeds == _seeds(bits):
-        bits.state = state
+        bits.state = checked_bits(state)
         return target
     entropy, spawn_key, pool_size, spawned = seeds
     if pool_size > LARGEST_POOL:
@@ -373,5 +373,17 @@ def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
     again = np.random.SeedSequence(
         entropy, spawn_key=spawn_key, pool_size=pool_size, n_children_spawned=spawned
     )
-    bits.__setstate__((state, again))
+    bits.__setstate__((checked_bits(state), again))
     return target
+
+
+def checked_bits(state: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Returns the state of one of NumPy's bit generators, which would read beyond its numbers otherwise.
+
+    Raises:
+        StateError: if the next number is none of them.
+    """
+    places = (state["state"].get("pos", 0), 624), (state.get("buffer_pos", 0), 4)
+    if all(0 <= place <= count for place, count in places):
+        return state
+    raise StateError("there is no such state of a generator")

@@ -155,6 +155,20 @@ def test_a_refused_one_changes_nothing():
     same.close()
 
 
+def test_no_controller_loses_what_it_regulates_with():
+    env = begun("robot_envs/PickCube-v0", "bullet")
+    good = env.save_state().to_bytes()
+    fits, state = unpack(good[BEGIN:])
+    pids = state["robots"][0]["manager"]["controllers"]["gripper_controller"]["pids"]
+    pids["left_finger/pid"] = None
+    content = pack([fits, state])
+    data = MAGIC + hashlib.sha256(content).digest() + content
+    with pytest.raises(SimulatorError, match="left_finger/pid is a NoneType, not a Held"):
+        env.restore_state(EnvSnapshot.from_bytes(data))
+    env.restore_state(EnvSnapshot.from_bytes(good))
+    env.close()
+
+
 @pytest.mark.parametrize(
     "change",
     [

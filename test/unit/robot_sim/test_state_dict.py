@@ -192,6 +192,20 @@ def test_random_numbers_come_again(generator):
     assert [part.generator.random() for _ in range(5)] == drawn
 
 
+@pytest.mark.parametrize(("kind", "place"), [("MT19937", "pos"), ("Philox", "buffer_pos")])
+@pytest.mark.parametrize(
+    "seed", [1, 2]
+)  # the latter has another seed sequence than the present one
+@pytest.mark.parametrize("number", [-1, 10**9])
+def test_a_generator_never_reads_beyond_its_numbers(kind, place, seed, number):
+    state = state_of(np.random.Generator(getattr(np.random, kind)(seed)))
+    (state["state"]["state"] if place == "pos" else state["state"])[place] = number
+    generator = np.random.Generator(getattr(np.random, kind)(1))
+    with pytest.raises(StateError, match="no such state of a generator"):
+        load([(generator, state)])
+    generator.random()
+
+
 @pytest.mark.extras("torch")
 def test_torchs_random_numbers_come_again():
     import torch
