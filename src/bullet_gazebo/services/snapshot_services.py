@@ -33,7 +33,7 @@ class GlobalGenerators:
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         random.setstate(state["python"])
-        np.random.set_state(checked_bits(state["numpy"]))
+        np.random.set_state(dict(checked_bits(state["numpy"])))
 
 
 class SnapshotServices:

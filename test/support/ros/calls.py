@@ -10,7 +10,7 @@ from gazebo_msgs.srv import DeleteModel, GetWorldProperties, SpawnModel, SpawnMo
 BOUND = 60.0  # [s of wall time]
 
 
-def call(name, kind, *args, **kwargs):
+def call(name, kind, /, *args, **kwargs):
     rospy.wait_for_service(name, BOUND)
     return rospy.ServiceProxy(name, kind)(*args, **kwargs)
 
