@@ -230,6 +230,8 @@ class RobotEnv(SavedEnv):
         if self._randomisation is not None:
             variation, info["variation"] = self._randomisation.draw(self.np_random)
             self._vary(variation)
+        elif not self._variation.is_nominal:  # an episode before began at a snapshot
+            self._vary(Variation())
         # Drawn even if it isn't used: streams stay the same.
         drawn = self.task.initial_state(self.np_random)
         start = options.get("snapshot", options.get("initial_state", drawn))

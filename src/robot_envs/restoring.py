@@ -156,8 +156,9 @@ class SavedEnv(DrawnEnv):
         return fits
 
     def _vary(self, variation: Variation) -> None:
+        changed = self._variation.undone.merged(variation)  # what it doesn't name is nominal again
         self._variation = variation
-        self.backend.vary(variation)
+        self.backend.vary(changed)
 
     def _check_open(self) -> None:
         if self._closed:

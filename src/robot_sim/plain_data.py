@@ -212,7 +212,8 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
         place: of both in a larger state.
         exactly: whether names and lengths have to be the same, too.
     """
-    if there is None or (given is None and not (exactly and isinstance(there, Held))):
+    is_held = exactly and isinstance(there, Held)
+    if there is None or (given is None and not (is_held or _refers(there))):
         return ""
     numbers = (int, float)
     if type(there) in numbers and type(given) in numbers:
@@ -229,6 +230,10 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
         )
         if set(keys) != set(others):
             return f"{place} has {list(others)!s:.200}, not {list(keys)!s:.200}"
+    entries = there.items() if isinstance(there, dict) else ()
+    lost = any(key not in given and _refers(each) for key, each in entries)
+    if lost or (isinstance(there, (list, tuple)) and len(there) != len(given) and _refers(there)):
+        return f"{place} lacks joints, or other parts that are here"
     pairs: Iterable[tuple[Any, Any, Any]] = ()
     if isinstance(there, dict):
         pairs = ((key, there[key], given[key]) for key in there if key in given)
@@ -242,6 +247,14 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
         for key, one, other in pairs
     )
     return next(filter(None, found), "")
+
+
+def _refers(value: Any) -> bool:
+    """Returns whether it refers to what others save, such as joints, which can't be found again."""
+    if isinstance(value, Held):
+        return value.state is None
+    values = value.values() if isinstance(value, dict) else value
+    return isinstance(value, (list, tuple, dict)) and any(map(_refers, values))
 
 
 def is_finite(value: Any) -> bool:

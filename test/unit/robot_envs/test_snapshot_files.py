@@ -155,17 +155,44 @@ def test_a_refused_one_changes_nothing():
     same.close()
 
 
-def test_no_controller_loses_what_it_regulates_with():
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("gripper_controller", lambda own: own["pids"].update({"left_finger/pid": None})),
+        ("joint_state_controller", lambda own: own.pop("_joints")),
+        ("joint_state_controller", lambda own: own["_joints"].pop()),
+        ("joint_state_controller", lambda own: own.update(_joints=None)),
+    ],
+)
+def test_no_controller_loses_what_it_refers_to(name, change):
     env = begun("robot_envs/PickCube-v0", "bullet")
     good = env.save_state().to_bytes()
     fits, state = unpack(good[BEGIN:])
-    pids = state["robots"][0]["manager"]["controllers"]["gripper_controller"]["pids"]
-    pids["left_finger/pid"] = None
+    change(state["robots"][0]["manager"]["controllers"][name])
     content = pack([fits, state])
     data = MAGIC + hashlib.sha256(content).digest() + content
-    with pytest.raises(SimulatorError, match="left_finger/pid is a NoneType, not a Held"):
+    with pytest.raises(SimulatorError, match="can't be restored: .*(pid|_joints|controller)"):
         env.restore_state(EnvSnapshot.from_bytes(data))
     env.restore_state(EnvSnapshot.from_bytes(good))
+    env.close()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda robot: robot["efforts"].__setitem__(0, None),
+        lambda robot: robot["hardware"]["joints"]["wrist"].update(command=None),
+        lambda robot: robot["hardware"]["drives"]["wrist"].update(_most=None),
+    ],
+)
+def test_joints_and_drives_lose_no_numbers(change):
+    env = begun("robot_envs/PickCube-v0", "bullet")
+    fits, state = unpack(env.save_state().to_bytes()[BEGIN:])
+    change(state["robots"][0])
+    content = pack([fits, state])
+    data = MAGIC + hashlib.sha256(content).digest() + content
+    with pytest.raises(SimulatorError, match="numbers of gripper_arm's joints are missing"):
+        env.restore_state(EnvSnapshot.from_bytes(data))
     env.close()
 
 

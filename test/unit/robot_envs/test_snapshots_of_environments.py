@@ -352,3 +352,20 @@ def test_a_task_with_an_environment_among_what_is_saved_is_refused():
     with pytest.raises(SimulatorError, match=r"^BalanceTask.env: a snapshot can't save a .*Env;"):
         env.save_state()
     env.close()
+
+
+def test_a_robot_that_was_varied_for_a_snapshots_episode_is_nominal_again(made):
+    varied = gymnasium.make("cartpole/Balance-v0", randomisation={"mass": 0.3}).unwrapped
+    varied.reset(seed=1)
+    snapshot, env, same = varied.save_state(), made(), made()
+    varied.close()
+    same.reset(seed=2)
+    there = same.save_state()
+    first = returns(same)
+    for options in ({}, {"snapshot": there}):
+        env.reset(options={"snapshot": snapshot})
+        env.reset(seed=2, options=options)
+        assert returns(env) == first
+    env.reset(options={"snapshot": snapshot})
+    env.restore_state(there)
+    assert returns(env) == first
