@@ -230,9 +230,13 @@ class RobotEnv(SavedEnv):
         if self._randomisation is not None:
             variation, info["variation"] = self._randomisation.draw(self.np_random)
             self._vary(variation)
+        elif not self._variation.is_nominal:  # an episode before began at a snapshot
+            self._vary(Variation())
         # Drawn even if it isn't used: streams stay the same.
         drawn = self.task.initial_state(self.np_random)
         start = options.get("snapshot", options.get("initial_state", drawn))
+        if isinstance(start, EnvSnapshot):
+            info.clear()  # it is varied as it was
         seed = int(self.np_random.integers(1, MOST_SEED)) if self._has_sensors else 0
         self._state = state = self._begin(start, seed)
         if self._actuator is not None:
@@ -251,10 +255,11 @@ class RobotEnv(SavedEnv):
 
     def _begin(self, start: InitialState | EnvSnapshot, seed: int) -> WorldState:
         if isinstance(start, EnvSnapshot):
-            return self._begin_at(start, seed)
-        self._initial = start
-        state = self.backend.reset(start, seed)
-        self._first = self.scene.commands(start.commands)
+            state = self._begin_at(start, seed)
+        else:
+            self._initial = start
+            state = self.backend.reset(start, seed)
+            self._first = self.scene.commands(start.commands)
         return state._replace(commands={**state.commands, **self._first}) if self._first else state
 
     def _shown(self, state: WorldState) -> WorldState:

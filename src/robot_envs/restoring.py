@@ -15,7 +15,7 @@ from robot_envs.variation.imperfections import Actuator, Sensor
 from robot_envs.world_state import InitialState, WorldState
 from robot_sim.plain_data import misfit, resolve
 from robot_sim.snapshot import SnapshotError
-from robot_sim.state_dict import StateError, load, state_of
+from robot_sim.state_dict import StateError, load, state_of, undoable
 
 
 class SavedEnv(DrawnEnv):
@@ -49,9 +49,11 @@ class SavedEnv(DrawnEnv):
             parts = {name: state_of(part) for name, part in self._parts().items()}
         except StateError as error:
             raise SimulatorError(str(error)) from error
+        own = parts["task"] if isinstance(parts["task"], dict) else ()
         state = {
             "variation": self._variation, "state": self._state, "first": self._first,
             "initial": self._initial, "steps": self._steps, "parts": parts,
+            "lent": [name for name in own if getattr(self.task, name, None) is self._np_random],
         }  # fmt: skip
         return EnvSnapshot(self._fits, state, self.backend.save_state())
 
@@ -83,7 +85,8 @@ class SavedEnv(DrawnEnv):
             state = resolve(snapshot.state)
             if before and (fault := misfit(before.state, state)):
                 raise SimulatorError(f"the snapshot can't be restored: {fault}")
-            self._load(EnvSnapshot(snapshot.fits, state, snapshot.world))
+            with undoable():
+                self._load(EnvSnapshot(snapshot.fits, state, snapshot.world))
         except Exception as error:  # whatever a forged state leads to
             if before is not None:
                 with contextlib.suppress(SimulatorError):  # a reset comes next
@@ -94,28 +97,42 @@ class SavedEnv(DrawnEnv):
 
     def _load(self, snapshot: EnvSnapshot) -> None:
         state = snapshot.state
+        is_varied = state["variation"] != self._variation
+        steps = None if is_varied or self._begun else self._steps
         self._steps = self._begun = None
-        if state["variation"] != self._variation:
+        if is_varied:
             self._vary(state["variation"])
-        self.backend.restore_state(snapshot.world)
+        try:
+            self.backend.restore_state(snapshot.world)
+        except SimulatorError as error:
+            if isinstance(error.__cause__, SnapshotError):  # nothing has changed
+                self._steps = steps
+            raise
         self._state, self._first, self._initial = state["state"], state["first"], state["initial"]
         self._steps, parts = state["steps"], state["parts"]
         try:
             load((part, parts[name]) for name, part in self._parts().items())
         except StateError as error:  # all else is restored
             raise SimulatorError(str(error)) from error
+        for name in set(state["lent"]) & parts["task"].keys():
+            setattr(self.task, name, self.np_random)
         self._show()
 
     def _begin_at(self, snapshot: EnvSnapshot, seed: int) -> WorldState:
         """Begins an episode in the snapshot's world; task, noise and random numbers are this one's own."""
-        variation = resolve(snapshot.state["variation"])
-        if variation != self._variation:
-            self._vary(variation)
-        self._initial, self._first = resolve(snapshot.state["initial"]), {}
+        here = {"variation": self._variation, "first": self._first, "initial": self._initial}
         try:
+            given = resolve({name: snapshot.state[name] for name in here})
+            if fault := misfit(here, given):
+                raise SnapshotError(fault)
+            if given["variation"] != self._variation:
+                self._vary(given["variation"])
+            self._first, self._initial = given["first"], given["initial"]
             return self.backend.begin_at(snapshot.world, seed)
-        except SnapshotError as error:
-            raise SimulatorError(str(error)) from error
+        except SimulatorError:
+            raise
+        except Exception as error:  # whatever a forged state leads to
+            raise SimulatorError(f"no episode can begin at the snapshot: {error!s:.300}") from error
 
     def _parts(self) -> dict[str, Any]:
         """Returns all but the world that has a state, by name."""
@@ -130,14 +147,18 @@ class SavedEnv(DrawnEnv):
         """What has to be the same where its snapshots are restored."""
         kind = type(self.task)
         parts = (self._sensor, self._actuator, self._randomisation)
-        return {
+        fits = {
             "task": f"{kind.__module__}.{kind.__qualname__}", "control period": self.control_period,
             "imperfections": [type(part).__name__ for part in parts if part is not None],
         }  # fmt: skip
+        for part in (self._sensor, self._actuator):
+            fits |= part.settings if part is not None else {}
+        return fits
 
     def _vary(self, variation: Variation) -> None:
+        changed = self._variation.undone.merged(variation)  # what it doesn't name is nominal again
         self._variation = variation
-        self.backend.vary(variation)
+        self.backend.vary(changed)
 
     def _check_open(self) -> None:
         if self._closed:

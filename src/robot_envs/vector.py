@@ -128,6 +128,7 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
         """Returns to a snapshot of this vector; see `RobotEnv.restore_state`."""
         if not isinstance(snapshot, VectorSnapshot) or len(snapshot.states) != self.num_envs:
             raise ValueError(f"it is no snapshot of a vector of {self.num_envs} environments")
+        self._interrupted = True
         for robot, state in zip(self._robots, snapshot.states, strict=True):
             robot.restore_state(state)
         self._autoreset_envs = snapshot.ended.copy()

@@ -91,6 +91,8 @@ def check_foreign(
     faults += [f"it lacks '{each}'" for each in state["world"]["order"] if each not in there]
     for robot, one, other in zip(robots, before["robots"], state["robots"], strict=True):
         faults.append(misfit(_needed(one), _needed(other), robot.model.name, exactly=True))
+        if not faults[-1] and _absent(one) != _absent(other):
+            faults.append(f"numbers of {robot.model.name}'s joints are missing")
     for name, part in parts.items():
         if name in state["parts"] and isinstance(part, (Shared, Stateful)):
             own, given = (dict.fromkeys(each["parts"][name]) for each in (before, state))
@@ -105,6 +107,13 @@ def _needed(robot: Mapping[str, Any]) -> dict[str, Any]:
     loops = {name: own.get("pids") for name, own in controllers if isinstance(own, dict)}
     pids = {name: own for name, own in loops.items() if own}
     return {"hardware": robot["hardware"], "efforts": robot["efforts"], "pids": pids}
+
+
+def _absent(robot: Mapping[str, Any]) -> list[list[Any]]:
+    """Returns what of joints, drives and efforts is None; limiters begin with it."""
+    joints, drives = (robot["hardware"][name].values() for name in ("joints", "drives"))
+    tables = [*joints, *drives, dict(enumerate(robot["efforts"]))]
+    return [[name for name, each in table.items() if each is None] for table in tables]
 
 
 def _digest(value: Any) -> str:

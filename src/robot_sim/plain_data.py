@@ -1,22 +1,24 @@
 """MessagePack of plain data: numbers, texts, bytes, NumPy arrays, and containers and records of these.
 
 Records are named tuples and data classes, written with their class's name and their fields. Reading imports
-nothing and runs no code of theirs: what this process doesn't know stays a `Record`. What is read takes no
-more than some hundred times the memory of its bytes, and is nested at most `DEEPEST` times.
+nothing and runs no code of theirs: what this process doesn't know stays a `Record`. What is read has at most
+`MOST` entries, and is nested at most `DEEPEST` times.
 """
 
 import re
 import sys
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 import msgpack
 import numpy as np
 
-from robot_sim.state_dict import StateError
+from robot_sim.state_dict import Held, StateError, fields_of
 
 DEEPEST = 100
+MOST = 2**22  # entries of lists and dictionaries, those of records and arrays included
+ALIKE = 100  # keys of a dictionary with the same hash: finding one takes longer with each
 TUPLE, ARRAY, SCALAR, RECORD, DEQUE, INTEGER = range(1, 7)  # codes of MessagePack's extensions
 LARGEST = 2**63  # what counts nanoseconds stays below
 LONGEST_INTEGER = 256  # [bytes]; states of generators have 16 to 64
@@ -59,7 +61,7 @@ def unpack(data: bytes) -> Any:
     Raises:
         StateError: If they are damaged, or refer to a class that isn't imported.
     """
-    return _unpack(data, 0)
+    return _unpack(data, 0, Counter())
 
 
 def resolve(value: Any) -> Any:
@@ -84,7 +86,7 @@ def _unknown(value: Any) -> Iterator[Record]:
         for each in value:
             yield from _unknown(each)
     elif hasattr(value, "__dataclass_fields__"):
-        for name in value.__dataclass_fields__:
+        for name in fields_of(type(value)):
             yield from _unknown(getattr(value, name))
 
 
@@ -93,12 +95,16 @@ def _extension(value: Any) -> msgpack.ExtType:
     if kind is tuple:
         return msgpack.ExtType(TUPLE, pack(list(value)))
     if kind is np.ndarray:
+        _dtype(value.dtype.str)
         content = [value.dtype.str, list(value.shape), value.flags.writeable, value.tobytes()]
         return msgpack.ExtType(ARRAY, pack(content))
     if isinstance(value, np.generic):
+        _dtype(value.dtype.str)
         return msgpack.ExtType(SCALAR, pack([value.dtype.str, value.tobytes()]))
     if kind is int:
         size = value.bit_length() // 8 + 1
+        if size > LONGEST_INTEGER:
+            raise StateError(f"it has an integer of {size} bytes")
         return msgpack.ExtType(INTEGER, value.to_bytes(size, "little", signed=True))
     if kind is deque:
         return msgpack.ExtType(DEQUE, pack([value.maxlen, list(value)]))
@@ -109,20 +115,33 @@ def _extension(value: Any) -> msgpack.ExtType:
     elif hasattr(kind, "_fields"):
         fields = list(value)
     elif hasattr(kind, "__dataclass_fields__"):
-        fields = [getattr(value, name) for name in kind.__dataclass_fields__]
+        fields = [getattr(value, name) for name in fields_of(kind)]
     else:
         raise StateError(f"a {kind.__qualname__} isn't plain data")
     return msgpack.ExtType(RECORD, pack([kind.__module__, kind.__qualname__, fields]))
 
 
-def _unpack(data: bytes, depth: int) -> Any:
+def _unpack(data: bytes, depth: int, count: Counter[str]) -> Any:
     if depth > DEEPEST:
         raise StateError("it is nested too deeply")
+
+    def counted(entries: list[Any]) -> list[Any]:
+        count["entries"] += len(entries)
+        if count["entries"] > MOST:
+            raise StateError(f"it has more than {MOST} entries")
+        return entries
+
+    def dictionary(pairs: list[Any]) -> dict[Any, Any]:
+        if len(counted(pairs)) > ALIKE:
+            hashes = Counter([hash(key) for key, _ in pairs])
+            if max(hashes.values()) > ALIKE:
+                raise StateError("it has a dictionary whose keys are too much alike")
+        return dict(pairs)
 
     def extension(code: int, content: bytes) -> Any:
         if code == INTEGER and len(content) <= LONGEST_INTEGER:
             return int.from_bytes(content, "little", signed=True)
-        given = _unpack(content, depth + 1)
+        given = _unpack(content, depth + 1, count)
         if code == TUPLE:
             return tuple(given)
         if code == ARRAY:
@@ -140,15 +159,18 @@ def _unpack(data: bytes, depth: int) -> Any:
         raise StateError(f"it has an extension {code}")
 
     try:
-        return msgpack.unpackb(data, ext_hook=extension, strict_map_key=False)
-    except (TypeError, ValueError, msgpack.exceptions.UnpackException) as error:
+        return msgpack.unpackb(
+            data, ext_hook=extension, list_hook=counted, object_pairs_hook=dictionary,
+            strict_map_key=False, max_array_len=MOST, max_map_len=MOST,
+        )  # fmt: skip
+    except (TypeError, ValueError, MemoryError, msgpack.exceptions.UnpackException) as error:
         if isinstance(error, StateError):
             raise
         raise StateError(f"it is damaged: {error!r:.200}") from error
 
 
 def _dtype(name: Any) -> np.dtype[Any]:
-    if not (isinstance(name, str) and re.fullmatch(r"[<>|][biufSU]\d{1,4}", name)):
+    if not (isinstance(name, str) and re.fullmatch(r"[<>|][biufcSU]\d{1,4}", name)):
         raise StateError(f"it has an array of type {name!r:.50}")
     return np.dtype(name)
 
@@ -167,7 +189,9 @@ def _record(module: Any, name: Any, fields: Any) -> Any:
             entries: dict[Any, Any] = dict.__new__(kind)
             dict.update(entries, fields)
             return entries
-        names = getattr(kind, "_fields", None) or getattr(kind, "__dataclass_fields__", ())
+        names = getattr(kind, "_fields", ())
+        if hasattr(kind, "__dataclass_fields__"):
+            names = fields_of(kind)
         if names and isinstance(fields, list) and len(fields) == len(names):
             if issubclass(kind, tuple):
                 return tuple.__new__(kind, fields)
@@ -188,7 +212,8 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
         place: Of both in a larger state.
         exactly: Whether names and lengths have to be the same, too.
     """
-    if there is None or given is None:
+    is_held = exactly and isinstance(there, Held)
+    if there is None or (given is None and not (is_held or _refers(there))):
         return ""
     numbers = (int, float)
     if type(there) in numbers and type(given) in numbers:
@@ -205,19 +230,31 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
         )
         if set(keys) != set(others):
             return f"{place} has {list(others)!s:.200}, not {list(keys)!s:.200}"
+    entries = there.items() if isinstance(there, dict) else ()
+    lost = any(key not in given and _refers(each) for key, each in entries)
+    if lost or (isinstance(there, (list, tuple)) and len(there) != len(given) and _refers(there)):
+        return f"{place} lacks joints, or other parts that are here"
     pairs: Iterable[tuple[Any, Any, Any]] = ()
     if isinstance(there, dict):
         pairs = ((key, there[key], given[key]) for key in there if key in given)
     elif isinstance(there, (list, tuple)) and len(there) == len(given):
         pairs = zip(range(len(there)), there, given, strict=True)
     elif hasattr(there, "__dataclass_fields__"):
-        names = there.__dataclass_fields__
+        names = fields_of(type(there))
         pairs = ((name, getattr(there, name), getattr(given, name)) for name in names)
     found = (
         misfit(one, other, f"{place}/{key}".lstrip("/"), exactly=exactly)
         for key, one, other in pairs
     )
     return next(filter(None, found), "")
+
+
+def _refers(value: Any) -> bool:
+    """Returns whether it refers to what others save, such as joints, which can't be found again."""
+    if isinstance(value, Held):
+        return value.state is None
+    values = value.values() if isinstance(value, dict) else value
+    return isinstance(value, (list, tuple, dict)) and any(map(_refers, values))
 
 
 def is_finite(value: Any) -> bool:
@@ -239,7 +276,7 @@ def differences(first: Any, second: Any, place: str = "") -> Iterator[Difference
         for name, one, other in zip(names, first, second, strict=True):
             yield from differences(one, other, f"{place}/{name}".lstrip("/"))
     elif hasattr(first, "__dataclass_fields__"):
-        for name in first.__dataclass_fields__:
+        for name in fields_of(type(first)):
             one, other = getattr(first, name), getattr(second, name)
             yield from differences(one, other, f"{place}/{name}".lstrip("/"))
     elif pack(first) != pack(second):  # tells -0.0 from 0.0, and finds NaN equal to itself

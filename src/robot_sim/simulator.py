@@ -16,7 +16,7 @@ from robot_sim.physics.world import World
 from robot_sim.plain_data import resolve
 from robot_sim.robot import ControlledRobot
 from robot_sim.snapshot import Snapshot, SnapshotError
-from robot_sim.state_dict import Shared, StateError, load, state_of
+from robot_sim.state_dict import Shared, StateError, load, state_of, undoable
 from robot_sim.timing import FairLock, Holds, Pacer
 
 STALL_CHECK = 100_000_000  # [ns]
@@ -312,7 +312,8 @@ class Simulator(Shared):
             state = resolve(snapshot.state)
             check_foreign(self.robots, self.parts, before, state)
             self.world.check_state(state["world"])
-            self._load(state)
+            with undoable():
+                self._load(state)
         except Exception as error:  # whatever a forged state leads to
             self._load(before)
             raise SnapshotError(f"the snapshot can't be restored: {error!s:.300}") from error

@@ -12,12 +12,16 @@ that its class, or one that it is derived from, names as `non_persistent` are le
     non_persistent = ("publisher",)
 """
 
+import contextlib
 import copy
+import dataclasses
 import random
-from collections import deque
-from collections.abc import Hashable, Iterable, Mapping
+from collections import defaultdict, deque
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from contextvars import ContextVar
 from functools import cache
-from typing import Any, ClassVar
+from itertools import zip_longest
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -26,6 +30,10 @@ GENERATORS = (np.random.Generator, random.Random)
 ATOMS = frozenset((type(None), bool, int, float, str, bytes))
 LARGEST_POOL = 1024  # of a seed sequence; NumPy's has 4
 BIT_GENERATORS = ("PCG64", "PCG64DXSM", "Philox", "SFC64", "MT19937")
+
+
+# Objects that loads within `undoable` have changed, with the attributes that they had.
+_CHANGED: ContextVar[list[tuple[Any, dict[str, Any]]] | None] = ContextVar("_CHANGED", default=None)
 
 
 class StateError(TypeError):
@@ -51,6 +59,13 @@ class Shared:
     """Has no state, or one that its owner saves: others that refer to it don't."""
 
     __slots__ = ()
+
+
+class Held(NamedTuple):
+    """The state of an object among plain data: it goes to the one that is in the same place."""
+
+    kind: str
+    state: Any
 
 
 def state_of(part: Any) -> Any:
@@ -99,6 +114,22 @@ def load(parts: Iterable[tuple[Any, Any]]) -> None:
         raise StateError("; ".join(faults))
 
 
+@contextlib.contextmanager
+def undoable() -> Iterator[None]:
+    """Gives objects back the attributes that they had, other objects too, where a load within it fails."""
+    changed = [] if (outer := _CHANGED.get()) is None else outer
+    token = _CHANGED.set(changed)
+    try:
+        yield
+    except BaseException:
+        for part, held in reversed(changed):
+            for name, value in held.items():
+                object.__setattr__(part, name, value)
+        raise
+    finally:
+        _CHANGED.reset(token)
+
+
 @cache
 def _layout(kind: Hashable) -> tuple[tuple[str, ...], frozenset[str]]:
     """Returns the slots of a class, and the names of attributes that are left as they are."""
@@ -141,6 +172,8 @@ def put_attributes(part: Any, state: Mapping[str, Any]) -> None:
     slots, left = _layout(kind)
     own = getattr(part, "__dict__", {})
     held = {**own, **{name: getattr(part, name, None) for name in slots}} if slots else own
+    if (changed := _CHANGED.get()) is not None:
+        changed.append((part, {**held}))
     faults = []
     for name, saved in state.items():
         value = saved
@@ -148,7 +181,7 @@ def put_attributes(part: Any, state: Mapping[str, Any]) -> None:
             try:
                 value = _loaded(held.get(name), saved)
             except StateError as error:  # the rest is put back
-                faults.append(str(error))
+                faults.append(f"{kind.__qualname__}.{name}: {error}")
                 continue
         if name not in held and callable(getattr(kind, name, None)):
             faults.append(f"{kind.__qualname__}.{name} is a method")
@@ -191,7 +224,7 @@ def _saved(value: Any) -> Any:
         return [_saved(each) for each in value]
     if kind is tuple:
         return tuple([_saved(each) for each in value])
-    if kind is dict:
+    if kind is dict or kind is defaultdict:
         return {_key(key): _saved(each) for key, each in value.items()}
     if kind is deque:
         return deque(map(_saved, value), value.maxlen)
@@ -204,15 +237,20 @@ def _saved(value: Any) -> Any:
     if isinstance(value, np.generic) and not value.dtype.hasobject:
         return value
     if isinstance(value, Shared):
-        return None
+        return Held(kind.__qualname__, None)
     if isinstance(value, GENERATORS) or _is_torchs(value):
         return _of_generator(value)
     if hasattr(kind, "state_dict") and hasattr(kind, "load_state_dict"):
-        return state_of(value)
+        return Held(kind.__qualname__, state_of(value))
     if isinstance(value, tuple) and hasattr(kind, "_fields"):
         return tuple.__new__(kind, map(_saved, value))
     if hasattr(kind, "__dataclass_fields__"):
-        held = {name: getattr(value, name) for name in kind.__dataclass_fields__}
+        names = fields_of(kind)
+        held = {name: getattr(value, name) for name in names if hasattr(value, name)}
+        if len(held) < len(names) or not held.keys() >= getattr(value, "__dict__", {}).keys():
+            raise _Unknown(
+                f"a {kind.__module__}.{kind.__qualname__} whose attributes aren't its fields"
+            )
         if kind.__dataclass_params__.frozen and ATOMS.issuperset(map(type, held.values())):
             return value
         made = copy.copy(value)
@@ -220,6 +258,11 @@ def _saved(value: Any) -> Any:
             object.__setattr__(made, name, _saved(each))
         return made
     raise _Unknown(f"a {kind.__module__}.{kind.__qualname__}")
+
+
+def fields_of(kind: Any) -> tuple[str, ...]:
+    """Returns the names of a data class's fields."""
+    return tuple([each.name for each in dataclasses.fields(kind)])
 
 
 def _key(key: Any) -> Any:
@@ -267,30 +310,34 @@ def _takes(kind: Hashable) -> Any:
 
 def _loaded(current: Any, saved: Any) -> Any:
     """Returns what takes the place of `current`: `saved`, with the objects that are there already."""
-    kind: Any = type(current)
-    if (takes := _takes(kind)) is not None:
-        if takes is Stateful.load_state_dict:
-            put_attributes(current, saved)
-        elif takes is not _nothing:
-            load([(current, saved)])
-        return current
-    kind = type(saved)
+    kind: Any = type(saved)
     if kind in ATOMS:
         return saved
+    if kind is Held:
+        own: Any = type(current)
+        if own.__qualname__ != saved.kind or (takes := _takes(own)) is None:
+            raise StateError(f"there is no {saved.kind:.100} here to take the state of one")
+        if takes is Stateful.load_state_dict:
+            put_attributes(current, saved.state)
+        elif takes is not _nothing:
+            load([(current, saved.state)])
+        return current
     if kind is list or kind is tuple:
         there = current if isinstance(current, (list, tuple)) else ()
-        if len(there) != len(saved):
-            there = [None] * len(saved)
-        return kind([_loaded(each, own) for each, own in zip(there, saved, strict=True)])
+        return kind([_loaded(each, own) for own, each in zip_longest(saved, there[: len(saved)])])
     if kind is dict:
         if GENERATOR in saved:
             return _put_generator(current, saved)
-        known = current if type(current) is dict else {}
-        return {key: _loaded(known.get(key), each) for key, each in saved.items()}
+        known = current if type(current) in (dict, defaultdict) else {}
+        entries = {key: _loaded(known.get(key), each) for key, each in saved.items()}
+        if type(current) is defaultdict:
+            return defaultdict(current.default_factory, entries)
+        return entries
     if kind is np.ndarray:
         return saved.copy() if saved.flags.writeable else saved
     if kind is deque:
-        return deque([_loaded(None, each) for each in saved], saved.maxlen)
+        there = [*current] if isinstance(current, deque) else ()
+        return deque(_loaded(there, [*saved]), saved.maxlen)
     return _saved(saved)
 
 
@@ -318,7 +365,7 @@ def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
     bits: Any = target.bit_generator
     seeds = saved["seeds"]
     if seeds is None or seeds == _seeds(bits):
-        bits.state = state
+        bits.state = checked_bits(state)
         return target
     entropy, spawn_key, pool_size, spawned = seeds
     if pool_size > LARGEST_POOL:
@@ -326,5 +373,17 @@ def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
     again = np.random.SeedSequence(
         entropy, spawn_key=spawn_key, pool_size=pool_size, n_children_spawned=spawned
     )
-    bits.__setstate__((state, again))
+    bits.__setstate__((checked_bits(state), again))
     return target
+
+
+def checked_bits(state: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Returns the state of one of NumPy's bit generators, which would read beyond its numbers otherwise.
+
+    Raises:
+        StateError: if the next number is none of them.
+    """
+    places = (state["state"].get("pos", 0), 624), (state.get("buffer_pos", 0), 4)
+    if all(0 <= place <= count for place, count in places):
+        return state
+    raise StateError("there is no such state of a generator")

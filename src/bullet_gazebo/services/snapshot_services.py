@@ -20,7 +20,7 @@ from bullet_gazebo.services.step_service import StepService
 from file_access.text import did_you_mean
 from robot_sim.simulator import Simulator
 from robot_sim.snapshot import Snapshot, SnapshotError
-from robot_sim.state_dict import StateError
+from robot_sim.state_dict import StateError, checked_bits
 
 MOST = 1000  # names
 
@@ -33,7 +33,7 @@ class GlobalGenerators:
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         random.setstate(state["python"])
-        np.random.set_state(state["numpy"])
+        np.random.set_state(dict(checked_bits(state["numpy"])))
 
 
 class SnapshotServices:
@@ -60,12 +60,12 @@ class SnapshotServices:
                 self._kept.pop(name, None)
             done = "nothing saved, without a name"
             if request.name:
+                self._check_room(request.name)
                 self._sim.await_holds()
                 try:
-                    snapshot = self._sim.save_state()
+                    self._kept[request.name] = self._sim.save_state()
                 except StateError as error:
                     raise ServiceRefused(str(error)) from error
-                self._keep(request.name, snapshot)
                 done = "state saved"
             read = self._find(request.read) if request.read else None
         try:
@@ -74,12 +74,11 @@ class SnapshotServices:
             raise ServiceRefused(str(error)) from error
         return SaveStateResponse(True, f"SaveState: {done}", data)
 
-    def _keep(self, name: str, snapshot: Snapshot) -> None:
+    def _check_room(self, name: str) -> None:
         if len(self._kept) >= MOST and name not in self._kept:
             raise ServiceRefused(
                 f"{MOST} states are kept already: name some that are to be forgotten"
             )
-        self._kept[name] = snapshot
 
     def _find(self, name: str) -> Snapshot:
         if name not in self._kept:
@@ -91,6 +90,8 @@ class SnapshotServices:
 
     def _restore(self, request: RestoreStateRequest) -> str:
         with self._one_at_a_time, self._sim.lock:
+            if request.data and request.name:
+                self._check_room(request.name)
             try:
                 given = (
                     Snapshot.from_bytes(request.data) if request.data else self._find(request.name)
@@ -103,5 +104,5 @@ class SnapshotServices:
             except (SnapshotError, StateError) as error:
                 raise ServiceRefused(str(error)) from error
             if request.data and request.name:
-                self._keep(request.name, given)
+                self._kept[request.name] = given
         return "RestoreState: state restored"

@@ -112,6 +112,7 @@ class InProcessWorld(RobotBackend):
         self._reads_more = False  # than the joints
         self._held: dict[str, Any] = {}
         self._begin = 0  # [ns] of the episode
+        self._knows_contacts = False
 
     def _add(self, robot: Robot) -> tuple[Model, RobotHardware, Loaded]:
         """Spawns a robot and starts its controllers."""
@@ -167,7 +168,7 @@ class InProcessWorld(RobotBackend):
             if seed:
                 self._sim.reseed(seed)
             self._sim.reset(everything=False)
-            self._begin = self._sim.now
+            self._begin, self._knows_contacts = self._sim.now, False
             for model, (pose, twist) in models:
                 upright = Pose(pose.position, normalized(pose.orientation))
                 self._sim.place_model(model, upright, twist)
@@ -191,6 +192,7 @@ class InProcessWorld(RobotBackend):
             receivers[name](command)
         self._held = {**self._held, **commands}
         self._sim.advance(self._ticks)
+        self._knows_contacts = True
         return self._state()
 
     def _state(self) -> WorldState:
@@ -204,7 +206,7 @@ class InProcessWorld(RobotBackend):
         passed = self._sim.now - self._begin
         if not self._reads_more:
             return WorldState(passed / NANOSECONDS, joints, self._held)
-        answer = self._reader.read(stepped=passed > 0)
+        answer = self._reader.read(stepped=self._knows_contacts)
         return WorldState(
             passed / NANOSECONDS,
             joints,
@@ -230,7 +232,7 @@ class InProcessWorld(RobotBackend):
         with _refusals():
             snapshot = self._sim.save_state()
         snapshot.state["episode"] = {"held": self._held, "begun": self._begin}
-        snapshot.state["parts"]["steps"] = {"knows_contacts": self._sim.now > self._begin}
+        snapshot.state["parts"]["steps"] = {"knows_contacts": self._knows_contacts}
         return snapshot
 
     def restore_state(self, state: WorldSnapshot) -> None:
@@ -239,6 +241,7 @@ class InProcessWorld(RobotBackend):
         with _refusals():
             self._sim.restore_state(snapshot)
         self._begin, self._held = begun, held
+        self._knows_contacts = snapshot.state["parts"]["steps"]["knows_contacts"]
 
     def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
         self.restore_state(state)

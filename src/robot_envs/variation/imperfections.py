@@ -128,6 +128,16 @@ class Sensor:
         self._seen: deque[WorldState] = deque(maxlen=steps("sensor_delay", delay, MOST_DELAY) + 1)
         self._before: dict[str, float] = {}  # measured positions of joints with encoder steps
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Its options, for all joints, as plain data."""
+        joints = self._encoders.items()
+        return {
+            "sensor_delay": (self._seen.maxlen or 1) - 1,
+            "encoder_step": {name: e.step for name, e in joints},
+            "sensor_noise": [{name: e[:2] for name, e in joints}, self._sensors],
+        }  # fmt: skip
+
     def state_dict(self) -> dict[str, Any]:
         """Returns what it remembers of the episode."""
         return {"seen": [*self._seen], "before": {**self._before}, "readings": {**self._readings}}
@@ -260,6 +270,13 @@ class Actuator:
         self._sent: deque[Commands] = deque(maxlen=self._delay + 1)
         self._limited: Commands = {}
         self._reached: Commands = {}
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Its options, as plain data."""
+        rules = {"actuator_limit": self._limits, "actuator_lag": self._lags}
+        numbers = {each: {name: own for name, (_, own) in rules[each].items()} for each in rules}
+        return {"action_delay": self._delay, **numbers}
 
     def state_dict(self) -> dict[str, Any]:
         """Returns what it remembers of the episode."""

@@ -123,7 +123,7 @@ class JointSpline(Stateful):
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         made = [Segment.__new__(Segment) for _ in state["_segments"]]
-        load(zip(made, state["_segments"], strict=True))
+        load((one, each.state) for one, each in zip(made, state["_segments"], strict=True))
         self._lay(made)
 
     def at(self, time: int) -> State:

@@ -138,6 +138,11 @@ def test_a_refused_one_changes_nothing():
         lambda fits, state: state["environment"]["parts"].pop("task"),
         lambda fits, state: state["world"].update(models={}),
         lambda fits, state: state.pop("now"),
+        lambda fits, state: [
+            each.update(_joints=[], update=1)
+            for each in state["robots"][0]["manager"]["controllers"].values()
+            if "_commands" in each
+        ],
     ):
         fits, content = unpack(pack(state))
         change(fits, content)
@@ -148,6 +153,65 @@ def test_a_refused_one_changes_nothing():
     assert play(env) == play(same)  # noqa: F821
     env.close()
     same.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("gripper_controller", lambda own: own["pids"].update({"left_finger/pid": None})),
+        ("joint_state_controller", lambda own: own.pop("_joints")),
+        ("joint_state_controller", lambda own: own["_joints"].pop()),
+        ("joint_state_controller", lambda own: own.update(_joints=None)),
+    ],
+)
+def test_no_controller_loses_what_it_refers_to(name, change):
+    env = begun("robot_envs/PickCube-v0", "bullet")
+    good = env.save_state().to_bytes()
+    fits, state = unpack(good[BEGIN:])
+    change(state["robots"][0]["manager"]["controllers"][name])
+    content = pack([fits, state])
+    data = MAGIC + hashlib.sha256(content).digest() + content
+    with pytest.raises(SimulatorError, match="can't be restored: .*(pid|_joints|controller)"):
+        env.restore_state(EnvSnapshot.from_bytes(data))
+    env.restore_state(EnvSnapshot.from_bytes(good))
+    env.close()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda robot: robot["efforts"].__setitem__(0, None),
+        lambda robot: robot["hardware"]["joints"]["wrist"].update(command=None),
+        lambda robot: robot["hardware"]["drives"]["wrist"].update(_most=None),
+    ],
+)
+def test_joints_and_drives_lose_no_numbers(change):
+    env = begun("robot_envs/PickCube-v0", "bullet")
+    fits, state = unpack(env.save_state().to_bytes()[BEGIN:])
+    change(state["robots"][0])
+    content = pack([fits, state])
+    data = MAGIC + hashlib.sha256(content).digest() + content
+    with pytest.raises(SimulatorError, match="numbers of gripper_arm's joints are missing"):
+        env.restore_state(EnvSnapshot.from_bytes(data))
+    env.close()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda own: own.pop("variation"), lambda own: own.update(variation=[1]),
+        lambda own: own.pop("initial"), lambda own: own.update(initial=5),
+    ],
+)  # fmt: skip
+def test_no_episode_begins_at_a_forged_one(change):
+    env = begun("cartpole/Balance-v0", "bullet")
+    fits, state = unpack(env.save_state().to_bytes()[BEGIN:])
+    change(state["environment"])
+    content = pack([fits, state])
+    data = MAGIC + hashlib.sha256(content).digest() + content
+    with pytest.raises(SimulatorError, match="^no episode can begin at the snapshot: "):
+        env.reset(options={"snapshot": EnvSnapshot.from_bytes(data)})
+    env.close()
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import cartpole  # noqa: F401 - registers the environments
+import robot_envs.robots  # noqa: F401
 from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
-from robot_envs import EnvSnapshot, InitialStates, RobotEnv, SimulatorError, diff
+from robot_envs import EnvSnapshot, InitialState, InitialStates, RobotEnv, SimulatorError, diff
 from robot_envs.variation import Variation
 from robot_sim.snapshot import SnapshotError
 
@@ -202,6 +203,59 @@ def test_refusals_name_the_reason(made):
         unreadable.save_state()
 
 
+@pytest.mark.parametrize(
+    ("option", "one", "other"),
+    [
+        ("sensor_noise", 0.1, 0.2), ("sensor_delay", 3, 1), ("encoder_step", 0.01, 0.02),
+        ("action_delay", 3, 1), ("actuator_limit", 1.0, 2.0), ("actuator_lag", 0.1, 0.2),
+    ],
+)  # fmt: skip
+def test_imperfections_of_another_size_are_refused(made, option, one, other):
+    first, same, second = made(**{option: one}), made(**{option: one}), made(**{option: other})
+    for env in (first, same, second):
+        env.reset(seed=1)
+    same.restore_state(EnvSnapshot.from_bytes(first.save_state().to_bytes()))
+    with pytest.raises(ValueError, match=f"another environment: its {option} is"):
+        second.restore_state(first.save_state())
+
+
+def test_a_refused_one_leaves_the_episode_as_it_is(made):
+    env, other = made(), made(backend="mujoco")
+    env.reset(seed=1)
+    other.reset(seed=1)
+    with pytest.raises(SimulatorError, match="the engine .Mujoco., and here"):
+        env.restore_state(other.save_state())
+    env.step(1)
+
+
+class Borrowing(BalanceTask):
+    """Draws from the environment's generator in each step."""
+
+    def __init__(self):
+        super().__init__()
+        self.rng = None
+
+    def initial_state(self, rng):
+        self.rng = rng
+        return super().initial_state(rng)
+
+    def reward(self, state, action):
+        return self.rng.random()
+
+
+def test_a_task_shares_the_environments_generator_again(made):
+    env, other = made(Borrowing, sensor_noise=0.01), made(Borrowing, sensor_noise=0.01)
+    env.reset(seed=1)
+    returns(env, 3)
+    snapshot = EnvSnapshot.from_bytes(env.save_state().to_bytes())
+    other.restore_state(snapshot)  # before any reset
+    assert returns(other) == returns(env) and other.task.rng is other.np_random
+    other.reset(seed=3)
+    other.restore_state(snapshot)
+    env.restore_state(snapshot)
+    assert returns(other) == returns(env)
+
+
 def test_another_environment_goes_on_from_a_file(made, tmp_path):
     env, other = made(sensor_noise=0.01, sensor_delay=2), made(sensor_noise=0.01, sensor_delay=2)
     env.reset(seed=1)
@@ -230,6 +284,23 @@ def test_an_episode_begins_at_a_snapshot(made):
     for wrong in (None, snapshot.to_bytes()):
         with pytest.raises(ValueError, match="snapshot is what save_state"):
             env.reset(options={"snapshot": wrong})
+
+
+@pytest.mark.parametrize("touches", [False, True])
+def test_it_begins_with_the_commands_and_contacts_of_the_snapshot(touches):
+    env = gymnasium.make("robot_envs/Hopper-v0").unwrapped
+    held = {} if touches else dict.fromkeys(env.scene.ports, (0.1, 0.2, 0.3))
+    env.reset(seed=1, options={"initial_state": InitialState(commands=held)})
+    action = np.zeros(3)
+    while touches and not env.state.contacts:
+        assert not env.step(action)[2]
+    snapshot, there = env.save_state(), env.state
+    env.reset(seed=2, options={"snapshot": snapshot})
+    assert env.state.contacts == there.contacts and env.state.commands == there.commands
+    first = env.step(action)[1:4]
+    env.restore_state(snapshot)
+    assert env.step(action)[1:4] == first
+    env.close()
 
 
 class HardPlaces(BalanceTask):
@@ -281,3 +352,20 @@ def test_a_task_with_an_environment_among_what_is_saved_is_refused():
     with pytest.raises(SimulatorError, match=r"^BalanceTask.env: a snapshot can't save a .*Env;"):
         env.save_state()
     env.close()
+
+
+def test_a_robot_that_was_varied_for_a_snapshots_episode_is_nominal_again(made):
+    varied = gymnasium.make("cartpole/Balance-v0", randomisation={"mass": 0.3}).unwrapped
+    varied.reset(seed=1)
+    snapshot, env, same = varied.save_state(), made(), made()
+    varied.close()
+    same.reset(seed=2)
+    there = same.save_state()
+    first = returns(same)
+    for options in ({}, {"snapshot": there}):
+        env.reset(options={"snapshot": snapshot})
+        env.reset(seed=2, options=options)
+        assert returns(env) == first
+    env.reset(options={"snapshot": snapshot})
+    env.restore_state(there)
+    assert returns(env) == first

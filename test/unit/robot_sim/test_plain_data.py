@@ -1,5 +1,6 @@
 """Plain data as bytes: what comes back, and what damaged, forged and endless input leads to."""
 
+import itertools
 import random
 import struct
 import subprocess
@@ -96,7 +97,25 @@ def test_what_is_not_plain_is_refused(value):
         pack(value)
 
 
+@pytest.mark.parametrize(
+    "value",
+    [2**3000, np.zeros(2, "M8[s]"), np.zeros(2, [("a", "f4")]), np.array(["a" * 12000])],
+    ids=("an integer", "dates", "a structure", "a long text"),
+)
+def test_what_could_not_be_read_is_not_written(value):
+    with pytest.raises(StateError, match="it has an"):
+        pack(value)
+
+
+def alike(keys):
+    """A dictionary whose keys all have the same hash."""
+    assert len(set(map(hash, keys))) == 1
+    return b"\xdf" + struct.pack(">I", len(keys)) + b"".join(pack(key) + b"\xc0" for key in keys)
+
+
 FORGED = {
+    "integers with one hash": alike([each * (2**61 - 1) for each in range(1, 20_000)]),
+    "tuples with one hash": alike([*itertools.product((-1, -2), repeat=14)]),
     "a huge array": b"\xdd\xff\xff\xff\xff",
     "a huge map": b"\xdf\xff\xff\xff\xff",
     "a huge text": b"\xdb\xff\xff\xff\xff",
@@ -110,6 +129,14 @@ def test_forged_input_is_one_error(data):
     with pytest.raises(StateError) as error:
         unpack(data)
     assert "\n" not in str(error.value)
+
+
+def test_entries_have_an_end_also_those_within_others(monkeypatch):
+    monkeypatch.setattr("robot_sim.plain_data.MOST", 1000)
+    value = [[[None] * 10] * 10, ((None,) * 90,) * 10]
+    assert unpack(pack([value[0]])) and unpack(pack(value[1]))
+    with pytest.raises(StateError, match="more than 1000 entries"):
+        unpack(pack(value))
 
 
 def nested(depth):

@@ -3,16 +3,16 @@
 import io
 import random
 import threading
-from collections import deque
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections import defaultdict, deque
+from dataclasses import InitVar, dataclass, field
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from robot_sim.state_dict import Shared, StateError, Stateful, load, state_of
+from robot_sim.state_dict import Held, Shared, StateError, Stateful, load, state_of, undoable
 
 
 class Part(Stateful):
@@ -40,6 +40,20 @@ class Slotted(Stateful):
 @dataclass
 class Mutable:
     items: list
+    known: ClassVar[list] = []
+
+
+@dataclass
+class Unset:
+    later: int = field(init=False)
+
+
+@dataclass
+class Initialised:
+    size: InitVar[int]
+
+    def __post_init__(self, size):
+        self.cells = [0] * size
 
 
 class Pair(NamedTuple):
@@ -87,13 +101,58 @@ def test_parts_stay_the_same_objects_and_what_is_shared_is_left():
     inner, shared = Part(x=1), Shared()
     outer = Part(inner=inner, listed=[(inner, shared)], by_name={"a": inner}, shared=shared)
     state = state_of(outer)
+    held = Held("Part", {"x": 1})
     assert state == {
-        "inner": {"x": 1}, "listed": [({"x": 1}, None)], "by_name": {"a": {"x": 1}},
+        "inner": held, "listed": [(held, Held("Shared", None))], "by_name": {"a": held},
     }  # fmt: skip
     inner.x = 2
     load([(outer, state)])
     assert outer.inner is inner and inner.x == 1 and outer.shared is shared
     assert outer.listed == [(inner, shared)] and outer.by_name == {"a": inner}
+
+
+@pytest.mark.parametrize(
+    "hold",
+    [lambda each: each, lambda *each: [*each], lambda *each: deque(each), lambda a: {"a": a}],
+)
+def test_a_part_that_is_no_longer_there_is_named_and_never_becomes_plain_data(hold):
+    inner = Part(x=1)
+    outer = Part(held=hold(inner))
+    state, inner.x = state_of(outer), 2
+    load([(outer, state)])
+    assert inner.x == 1 and outer.held == hold(inner)
+    for other in (None, hold(None), hold(Slotted(1))):
+        outer.held = other
+        with pytest.raises(
+            StateError, match=r"^Part.held: there is no Part here to take the state"
+        ):
+            load([(outer, state)])
+
+
+def test_parts_that_have_come_since_go_again():
+    inner = Part(x=1)
+    outer = Part(listed=[inner], queue=deque([inner]), place=[None])
+    state = state_of(outer)
+    outer.listed.append(Part(x=2))
+    outer.queue.append(Part(x=2))
+    outer.place[0] = Part(x=2)
+    load([(outer, state)])
+    assert outer.listed == [inner] and [*outer.queue] == [inner] and outer.place == [None]
+
+
+def test_dictionaries_with_defaults_keep_them():
+    part = Part(counts=defaultdict(int, a=1))
+    state = state_of(part)
+    part.counts["b"] += 1
+    load([(part, state)])
+    assert part.counts == {"a": 1} and part.counts["new"] == 0
+
+
+def test_attributes_of_data_classes_are_no_fields_of_theirs():
+    part = Part(mutable=Mutable([1]))
+    state = state_of(part)
+    load([(part, state)])
+    assert vars(part.mutable) == {"items": [1]}
 
 
 def test_containers_keep_their_order_and_limits():
@@ -133,6 +192,20 @@ def test_random_numbers_come_again(generator):
     assert [part.generator.random() for _ in range(5)] == drawn
 
 
+@pytest.mark.parametrize(("kind", "place"), [("MT19937", "pos"), ("Philox", "buffer_pos")])
+@pytest.mark.parametrize(
+    "seed", [1, 2]
+)  # the latter has another seed sequence than the present one
+@pytest.mark.parametrize("number", [-1, 10**9])
+def test_a_generator_never_reads_beyond_its_numbers(kind, place, seed, number):
+    state = state_of(np.random.Generator(getattr(np.random, kind)(seed)))
+    (state["state"]["state"] if place == "pos" else state["state"])[place] = number
+    generator = np.random.Generator(getattr(np.random, kind)(1))
+    with pytest.raises(StateError, match="no such state of a generator"):
+        load([(generator, state)])
+    generator.random()
+
+
 @pytest.mark.extras("torch")
 def test_torchs_random_numbers_come_again():
     import torch
@@ -168,7 +241,7 @@ def test_a_class_may_say_itself_what_counts():
     part = Part(own=Own())
     for state in (state_of(part), state_of(part.own)):
         part.own.counts.append(2)  # the state is not what the object holds
-        load([(part.own, state["own"] if isinstance(state, dict) else state)])
+        load([(part.own, state["own"].state if isinstance(state, dict) else state)])
         assert part.own.counts == [1]
 
 
@@ -222,6 +295,8 @@ def test_attributes_that_are_not_persistent_stay_also_those_of_a_base():
     [
         ((each for each in "abc"), "builtins.generator"),
         (io.StringIO(), "_io.StringIO"),
+        (Unset(), "Unset whose attributes aren't its fields"),
+        (Initialised(2), "Initialised whose attributes aren't its fields"),
         (lambda: 0, "builtins.function"),
         (threading.Lock(), "_thread.lock"),
         ({1}, "builtins.set"),
@@ -247,3 +322,11 @@ def test_circles_are_named():
     items.append(items)
     with pytest.raises(StateError, match="Part.items refers to itself"):
         state_of(Part(items=items))
+
+
+def test_what_fails_as_a_whole_leaves_objects_where_they_were():
+    inner, slotted = Part(x=1), Slotted(3)
+    outer = Part(inner=inner, parts=[(inner, slotted)])
+    with pytest.raises(StateError, match="load_state_dict is a method"), undoable(), undoable():
+        load([(outer, {"parts": [], "load_state_dict": 1}), (slotted, {"size": 5})])
+    assert outer.inner is inner and outer.parts == [(inner, slotted)] and slotted.size == 3

@@ -152,6 +152,11 @@ class SnapshotsTest(unittest.TestCase):
             kept += 1
         self.assertLessEqual(kept, MOST)
         self.assertFalse(save("one more").success)
+        data = call("/gazebo/save_state", SaveState, read="state_0").data
+        before = step(1)[0]
+        answer = call("/gazebo/restore_state", RestoreState, data=data, name="one more")
+        self.assertFalse(answer.success)
+        self.assertAlmostEqual(step(1)[0], before + 0.001, places=9)  # nothing has changed
         self.assertTrue(save("state_0").success)  # a new one in the place of the old one
         names = [f"state_{number}" for number in range(kept)]
         self.assertTrue(save("one more", forget=[*names, "never saved"]).success)
