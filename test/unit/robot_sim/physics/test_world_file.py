@@ -156,7 +156,7 @@ def test_places_of_models_may_be_relative_to_models_and_frames_of_the_world():
         [
             '<frame name="corner" attached_to="table"><pose>1 0 0 0 0 0</pose></frame>',
             box("cup").replace("<pose>", '<pose relative_to="corner">'),
-            '<include><uri>model://unit_box</uri><name>book</name>'
+            "<include><uri>model://unit_box</uri><name>book</name>"
             '<pose relative_to="cup">0 0 1 0 0 0</pose></include>',
             box("table", "5 0 0 0 0 1.5707963267948966"),
             box("lost").replace("<pose>", '<pose relative_to="nothing">'),
