@@ -52,6 +52,8 @@ class BulletBody(Body):
         self._client = client
         self._weightless = weightless
         self._separation = separation
+        # Whether it was put elsewhere: points of contacts that are kept would push as hard as before.
+        self.displaced = False
         self._description = description
         self._offsets = offsets
         self._fixed = description.fixed_base
@@ -112,6 +114,7 @@ class BulletBody(Body):
 
         Setting a link's collision filter has that effect.
         """
+        self.displaced = False
         for name, index in self._links.items():
             fixed = self._fixed and index == BASE
             group, mask = groups_of(self._description, name, fixed)
@@ -304,7 +307,7 @@ class BulletBody(Body):
         )  # fmt: skip
 
     def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
-        self.moved = self._separation.placed = True
+        self.moved = self.displaced = self._separation.placed = True
         pybullet.resetJointState(self.id, self._indices[index], position, velocity, self._client)
 
     def reset_base(self, pose: Pose, twist: Twist = (ZERO, ZERO)) -> None:
@@ -326,7 +329,8 @@ class BulletBody(Body):
             )
 
     def _put_base(self, com: Pose) -> None:
-        self._base, self.moved, self._separation.placed = com, True, True
+        self._base = com
+        self.moved = self.displaced = self._separation.placed = True
         pybullet.resetBasePositionAndOrientation(self.id, *com, physicsClientId=self._client)
 
     def motion(self) -> BulletMotion:

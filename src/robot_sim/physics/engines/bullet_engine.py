@@ -194,6 +194,9 @@ class BulletEngine(Engine):
 
     def step(self) -> None:
         if self._separation.placed:
+            for body in self._bodies.values():
+                if body.displaced:
+                    body.forget_contacts()
             self._separation.ease(self._settings.time_step)
         if self._weightless:
             self._hold_up()

@@ -58,7 +58,7 @@ NEWEST = (1, 7)
 class FileContext:
     """The file of an element: how its URIs are resolved, and its version of SDF.
 
-    `unread` collects what has no effect in the model that is read.
+    `unread` collects what has no effect in the model that is read, `frames` the places of a world's models.
     """
 
     resources: Resources
@@ -66,6 +66,7 @@ class FileContext:
     version: tuple[int, int]
     folder: Path | None = None
     unread: WithoutEffect = field(default_factory=WithoutEffect)
+    frames: Frames | None = None
 
 
 def open_include(include: Element, context: FileContext) -> tuple[Element, FileContext]:
@@ -220,7 +221,7 @@ def read_model(element: Element, context: FileContext) -> ModelDescription:
             parts.warnings.append("it has a height map, so it is static, as in Gazebo")
         model = _assemble(name, parts, static)
         model.initial_pose, frame = read_pose(element, "model")
-        if frame not in ("", WORLD):
+        if context.frames is None and frame not in ("", WORLD):
             model.warnings.append(f"<pose>: it is the world's, not relative to '{shown(frame)}'")
         context.reading.split_meshes(model)
         return model
@@ -345,7 +346,12 @@ def _name_frames(model: Element, frames: Frames) -> None:
         name = named(element, "joint")
         pose, relative_to = read_pose(element, f"joint '{name}'")
         frames.add(name, pose, relative_to or joint_end(element, "child"))
-    for element in model.findall("frame"):
+    add_frames(model, frames)
+
+
+def add_frames(parent: Element, frames: Frames) -> None:
+    """Adds the `<frame>`s of a model or world to its frames."""
+    for element in parent.findall("frame"):
         name = named(element, "frame")
         pose, relative_to = read_pose(element, f"frame '{name}'")
         frames.add(name, pose, relative_to or element.get("attached_to", ""))

@@ -26,6 +26,7 @@ from robot_sim.physics.files.reading import LoadProgress, MeshFinder, Reading, R
 from robot_sim.physics.files.saved_state import begin_as_saved, saved_time
 from robot_sim.physics.files.sdf import (
     FileContext,
+    add_frames,
     first_entity,
     open_include,
     read_model,
@@ -109,6 +110,9 @@ def _read(root: Element, context: FileContext) -> WorldDescription:
     world = WorldDescription(element.get("name", "") or "default")
     world.warnings += without_effect(root, "sdf")
     _read_physics(world, element)
+    frames = Frames()
+    frames.add(WORLD, Pose(), "")
+    context = replace(context, frames=frames)
     progress = LoadProgress("entities of the world file are read", len(element))
     for child in element:
         progress.one_more()
@@ -120,10 +124,11 @@ def _read(root: Element, context: FileContext) -> WorldDescription:
     for child in element.findall("actor"):  # Gazebo lists them after the models
         context.reading.begin()
         _add(world, child, context)
+    for child in element.iterfind("state[1]/insertions/*"):
+        _add(world, child, context)
+    _place(world, element, frames)
     state = element.find("state")  # the first one
     if state is not None:
-        for child in state.iterfind("insertions/*"):
-            _add(world, child, context)
         world.start = saved_time(state, world.warnings)
         world.warnings += begin_as_saved(state, world.models, world.lights)
         for name in [(each.text or "").strip() for each in state.iterfind("deletions/name")]:
@@ -237,6 +242,21 @@ def _keep(world: WorldDescription, element: Element, context: FileContext) -> No
     if entity.name in kept:
         raise DescriptionError(f"'{shown(entity.name)}' is there twice")
     kept[entity.name] = entity
+    if context.frames is not None and kept is world.models:
+        context.frames.add(entity.name, *read_pose(element, "model"))
+
+
+def _place(world: WorldDescription, element: Element, frames: Frames) -> None:
+    """Places models whose `<pose>` is relative to another one, or to a `<frame>` of the world."""
+    try:
+        add_frames(element, frames)
+    except DescriptionError as error:
+        world.warnings.append(f"{error}; frames from there on are left out")
+    for name, model in world.models.items():
+        try:
+            model.initial_pose = frames.resolve(name)
+        except DescriptionError as error:
+            model.warnings.append(f"<pose>: {error}; it is the world's")
 
 
 def _read_physics(world: WorldDescription, element: Element) -> None:

@@ -62,6 +62,20 @@ def test_what_is_put_into_the_ground_comes_out_at_max_vel(world, kind, depth):
     assert heights.max() < SIDE / 2 + 1e-4
 
 
+@pytest.mark.parametrize("times", [1, 3])
+@pytest.mark.parametrize("kind", list(SHAPES))
+def test_what_rests_and_is_put_into_the_ground_comes_out_at_max_vel(world, kind, times):
+    """Points of the contacts that it had would push it as a spring."""
+    model = world.spawn("solid", solid(kind, SHAPES[kind]), Pose((0.0, 0.0, SIDE / 2)))
+    run(world, model, 500)
+    for _ in range(times):
+        model.place(Pose((0.0, 0.0, SIDE / 2 - 0.02)))
+        heights, speeds = run(world, model, 1990)
+        assert speeds.max() < 1.05 * MAX_VEL
+    heights, speeds = run(world, model, 500)
+    assert heights[-1] == pytest.approx(SIDE / 2, abs=1e-4)
+
+
 def test_a_mesh_comes_out_of_the_ground_at_max_vel(world, tmp_path):
     path = tmp_path / "box.obj"
     corners = [(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)]

@@ -26,8 +26,9 @@ BY_KIND = {kind: each for each in measurements() if each.fields for kind in each
 # The multi-camera's plugin reads it; it needs a picture; it needs another kind of noise.
 ELSEWHERE = [("camera", "@name"), ("geometry", "heightmap/pos"), ("ray", "noise/precision")]
 OF_SENSORS = ("sensor", "vector", "noise", "ray", "camera")
-# What is looked at but dropped: the frame of any pose, and the kind of a shape that is refused.
-IN_VAIN = ("pose/@relative_to", "pose/@frame", "image")
+# What is looked at but dropped: the frame of any pose, the kind of a shape that is refused, and of a sensor
+# that isn't measured.
+IN_VAIN = ("pose/@relative_to", "pose/@frame", "image", "@type")
 SEEN: list[Any] = []  # elements, and pairs of elements and attributes
 
 

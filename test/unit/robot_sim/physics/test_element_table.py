@@ -226,6 +226,13 @@ def test_a_friction_in_one_direction_alone_is_told(friction, warned):
         assert model.warnings == lines
 
 
+@pytest.mark.parametrize("kind", ["gps", "thermal_camera", "wireless_receiver", "rya"])
+def test_a_sensor_of_a_type_that_is_not_measured_is_told(kind):
+    link = f'<link name="m"><sensor name="s" type="{kind}"/></link>'
+    [line] = parse_sdf(f'<sdf version="1.6"><model name="m">{link}</model></sdf>').warnings
+    assert line == "no effect here: <sensor type> of link 'm', sensor 's' (docs/files.md)"
+
+
 def test_names_of_other_namespaces_are_for_others():
     assert parse_sdf(MODEL.format("")).warnings == []
 

@@ -151,6 +151,30 @@ def test_an_include_overrides_name_pose_and_static(tmp_path):
     assert (found.models["crate"].static, found.models["c2"].static) == (False, True)
 
 
+def test_places_of_models_may_be_relative_to_models_and_frames_of_the_world():
+    text = "".join(
+        [
+            '<frame name="corner" attached_to="table"><pose>1 0 0 0 0 0</pose></frame>',
+            box("cup").replace("<pose>", '<pose relative_to="corner">'),
+            "<include><uri>model://unit_box</uri><name>book</name>"
+            '<pose relative_to="cup">0 0 1 0 0 0</pose></include>',
+            box("table", "5 0 0 0 0 1.5707963267948966"),
+            box("lost").replace("<pose>", '<pose relative_to="nothing">'),
+            box("here").replace("<pose>", '<pose relative_to="world">'),
+            '<light name="sun" type="point"><pose relative_to="table">0 0 9 0 0 0</pose></light>',
+        ]
+    )
+    read = parse_world(f'<sdf version="1.7"><world name="w">{text}</world></sdf>', Resources())
+    places = {name: model.initial_pose.position for name, model in read.models.items()}
+    assert places["cup"] == pytest.approx((5.0, 1.0, 0.5))
+    assert places["book"] == pytest.approx((5.0, 1.0, 1.5))
+    assert places["lost"] == places["here"] == pytest.approx((0.0, 0.0, 0.5))
+    assert "".join(read.models["cup"].warnings + read.models["here"].warnings) == ""
+    (warning,) = read.models["lost"].warnings
+    assert warning == "<pose>: frame 'nothing' does not exist; it is the world's"
+    assert "<pose relative_to> of world 'w', light 'sun'" in "".join(read.warnings)
+
+
 def test_lights_keep_what_the_file_says():
     found = world(
         '<light name="lamp" type="spot"><pose>1 2 3 0 0 0</pose><diffuse>1 0 0</diffuse>'
