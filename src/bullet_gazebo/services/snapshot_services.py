@@ -29,10 +29,13 @@ class GlobalGenerators:
     """The generators of `random` and of NumPy's legacy functions, which plugins may use."""
 
     def state_dict(self) -> dict[str, Any]:
-        return {"python": random.getstate(), "numpy": np.random.get_state(legacy=False)}
+        version, words, gauss = random.getstate()
+        python = version, np.array(words, np.uint32), gauss
+        return {"python": python, "numpy": np.random.get_state(legacy=False)}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        random.setstate(state["python"])
+        version, words, gauss = state["python"]
+        random.setstate((version, tuple(words.tolist()), gauss))
         np.random.set_state(dict(checked_bits(state["numpy"])))
 
 
