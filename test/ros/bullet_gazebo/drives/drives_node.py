@@ -122,7 +122,7 @@ class Drives(unittest.TestCase):
         self.assertTrue(self.follow(publisher, command, odometry))
         self.step(200)
         begin = self.now
-        self.assertTrue(call("/gazebo/save_state", SaveState, "driving", []).success)
+        self.assertTrue(call("/gazebo/save_state", SaveState, name="driving").success)
         runs = []
         for _ in range(2):
             odometry.messages.clear()
@@ -133,7 +133,7 @@ class Drives(unittest.TestCase):
             runs.append((told, repr(now.pose), repr(now.twist)))
             call("/gazebo/reset_world", Empty)
             self.step(30)
-            self.assertTrue(call("/gazebo/restore_state", RestoreState, "driving").success)
+            self.assertTrue(call("/gazebo/restore_state", RestoreState, name="driving").success)
         self.assertEqual(runs[0], runs[1])
 
     def test_a_diff_drive_controller_drives_and_tells(self):
