@@ -215,6 +215,9 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
     is_held = exactly and isinstance(there, Held)
     if there is None or (given is None and not (is_held or _refers(there))):
         return ""
+    there, given = (
+        each.item() if isinstance(each, np.generic) else each for each in (there, given)
+    )
     numbers = (int, float)
     if type(there) in numbers and type(given) in numbers:
         counts = isinstance(given, int) and abs(there) < LARGEST  # generators have larger numbers

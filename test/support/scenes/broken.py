@@ -11,11 +11,14 @@ def of(task, environment=RobotEnv, **own):
     return lambda **options: environment(SOLO, task(), **{**own, **options})
 
 
+class Wobbling(Hold):
+    def initial_state(self, rng):
+        return InitialState({"elbow": rng.uniform(-0.1, 0.1)})
+
+
 def wobbling(**parts):
     """A task whose episodes begin somewhere, so that seeds matter."""
-    return Hold(
-        **{"initial_state": lambda rng: InitialState({"elbow": rng.uniform(-0.1, 0.1)}), **parts}
-    )
+    return Wobbling(**parts)
 
 
 class Numbers(RobotEnv):

@@ -185,3 +185,8 @@ print(read)
     )
     assert done.returncode == 0, done.stderr
     assert 0 < int(done.stdout) < 10_000
+
+
+def test_numpys_numbers_take_the_place_of_pythons():
+    assert misfit((1.0, [2]), (np.float64(3.0), [np.int32(4)])) == ""
+    assert misfit({"a": np.float64(1.0)}, {"a": "x"}) == "a is a str, not a float"

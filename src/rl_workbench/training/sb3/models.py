@@ -1,6 +1,7 @@
 """Stable-Baselines3's models, made from our options."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -65,11 +66,15 @@ class StoppableOffPolicy(OffPolicyAlgorithm):
         return super().collect_rollouts(env, callback, *arguments, **named)
 
 
+def _given(env: Env) -> Env:
+    return env
+
+
 class ParallelVecEnv(DummyVecEnv):
     """Begins a step in all environments before it waits: those in other processes run at the same time."""
 
     def __init__(self, envs: Sequence[Env]) -> None:
-        super().__init__([lambda env=env: env for env in envs])  # type: ignore[misc]
+        super().__init__([partial(_given, env) for env in envs])
         self._begins = [env.get_wrapper_attr(BEGIN_STEP) for env in envs] if len(envs) > 1 else []
 
     def step_async(self, actions: np.ndarray) -> None:
