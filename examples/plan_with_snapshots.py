@@ -88,6 +88,7 @@ def tried(env: Any, snapshot: EnvSnapshot, plans: np.ndarray, repeat: int) -> li
 def work(pipe: Connection, problem: Problem) -> None:
     """Tries plans in a process of its own: snapshots come as bytes."""
     env: Any = gymnasium.make(problem.env_id).unwrapped
+    pipe.send("ready")
     for snapshot, plans in iter(pipe.recv, None):
         pipe.send(tried(env, EnvSnapshot.from_bytes(snapshot), plans, problem.repeat))
     env.close()
@@ -141,6 +142,8 @@ def main() -> None:
         pipes.append(pipe)
     env: Any = gymnasium.make(problem.env_id, backend=args.backend).unwrapped
     problem.begin(env, args.seed)
+    for pipe in pipes:
+        pipe.recv()  # "ready"
     states, total, done, begin = [], 0.0, False, time.perf_counter()
     for reward in rewards(env, planned(env, problem, args.seed, pipes)):
         states.append(env.state)
