@@ -198,9 +198,7 @@ class StepService:
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Takes back what `state_dict` has returned, after the simulator's state; models are the same."""
         self._knows_contacts = state["knows_contacts"]
-        if (
-            "readers" not in state
-        ):  # it is an environment's; the simulator has restored those that read
+        if "readers" not in state:  # an environment's: the simulator has restored the readers
             return
         if state["readers"] is None:
             self._end_readers()

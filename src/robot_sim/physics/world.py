@@ -315,12 +315,8 @@ class World(Shared):
 
         Raises SnapshotError if models, or their properties, are others now.
         """
-        settings = {
-            "gravity": self.gravity,
-            "time_step": self.time_step,
-            "solver": vars(self.solver),
-        }
-        if any(state[name] != value for name, value in settings.items()):
+        now = self.gravity, self.time_step, vars(self.solver)
+        if now != (state["gravity"], state["time_step"], state["solver"]):
             raise SnapshotError("gravity, time step or solver have changed since the snapshot")
         if self._order() != state["order"]:
             raise SnapshotError(
@@ -334,8 +330,8 @@ class World(Shared):
             if name not in self.models:  # a plane
                 continue
             model = self.models[name]
-            now = zip(PROPERTIES, model.properties(), own["properties"], strict=True)
-            if changed := [name for name, one, other in now if one != other]:
+            properties = zip(PROPERTIES, model.properties(), own["properties"], strict=True)
+            if changed := [name for name, one, other in properties if one != other]:
                 raise SnapshotError(
                     f"model '{name}' has another {' and '.join(changed)} than in the snapshot"
                 )
