@@ -90,7 +90,8 @@ def work(pipe: Connection, problem: Problem) -> None:
     env: Any = gymnasium.make(problem.env_id).unwrapped
     pipe.send("ready")
     for snapshot, plans in iter(pipe.recv, None):
-        pipe.send(tried(env, EnvSnapshot.from_bytes(snapshot), plans, problem.repeat))
+        env.restore_state(EnvSnapshot.from_bytes(snapshot))  # checks what comes from elsewhere, once
+        pipe.send(tried(env, env.save_state(), plans, problem.repeat))
     env.close()
 
 
@@ -98,8 +99,9 @@ def in_parallel(
     pipes: Sequence[Connection], snapshot: EnvSnapshot, plans: np.ndarray
 ) -> list[float]:
     """Returns the return of each plan, which as many processes have tried as there are pipes."""
+    data = snapshot.to_bytes()
     for pipe, part in zip(pipes, np.array_split(plans, len(pipes)), strict=True):
-        pipe.send((snapshot.to_bytes(), part))
+        pipe.send((data, part))
     return [each for pipe in pipes for each in pipe.recv()]
 
 
