@@ -90,7 +90,7 @@ def work(pipe: Connection, problem: Problem) -> None:
     env: Any = gymnasium.make(problem.env_id).unwrapped
     pipe.send("ready")
     for snapshot, plans in iter(pipe.recv, None):
-        env.restore_state(EnvSnapshot.from_bytes(snapshot))  # checks what comes from elsewhere, once
+        env.restore_state(EnvSnapshot.from_bytes(snapshot))  # checked here, once
         pipe.send(tried(env, env.save_state(), plans, problem.repeat))
     env.close()
 

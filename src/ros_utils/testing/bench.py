@@ -54,7 +54,8 @@ def tell(folder: Path, seed: int, failure: str, message: str, again: str) -> str
     if ws or "CARTPOLE_WS_MASTER" in os.environ:
         ws.insert(0, "./ws")
     replay = " ".join([*ws, "rosrun cartpole replay.py", shlex.quote(str(folder / BAG))])
-    text = f"recorded in {folder}\nreplayed by: {replay}"
+    text = f"recorded in {folder}\nreplayed by: {replay}\n"
+    text += f"the page of that moment, to step on: {replay} --gui"
     if _ADDRESS.sub("", again) != _ADDRESS.sub("", message):
         how = f"fails otherwise ({again})" if again else "passes"
         text = f"it {how} when it runs once more: it isn't repeatable; that run is {text}"

@@ -46,6 +46,10 @@ PLACEHOLDERS = {"your_script.py", "my_arm"}  # the reader's own
 RUN_BY_TESTS = (
     "examples/own_task.py", "examples/plot_policy.py", "examples/ppo_over_ros.py",
     "examples/episode_over_services.py", "examples/test_robot_without_gazebo.py",
+    *(f"examples/{name}.py" for name in (
+        "first_episode", "own_robot", "many_worlds", "varied_robot", "sensor_readings", "record_gif",
+        "snapshot_file", "steps_over_ros",
+    )),
 )  # fmt: skip
 TRAININGS = {"pg_train.py": pg_train.main, "dqn_train.py": dqn_train.main}
 THEIR_ENVIRONMENT = """

@@ -136,8 +136,9 @@ def test_a_failure_leaves_its_recording_and_seed(tmp_path):
     with rosbag.Bag(str(folder / "world.bag")) as bag:
         seen = [message.position for _, message, _ in bag.read_messages("/joint_states")]
         assert min(seen) != max(seen) and 0.9 < bag.get_end_time() < 2.1
-    line = f"--with '/a b' --with /c rosrun cartpole replay.py {folder / 'world.bag'}\n"
-    assert f"replayed by: ./ws {line}" in (folder / "failure.txt").read_text()
+    line = f"--with '/a b' --with /c rosrun cartpole replay.py {folder / 'world.bag'}"
+    told = (folder / "failure.txt").read_text()
+    assert f"replayed by: ./ws {line}\n" in told and f": ./ws {line} --gui\n" in told
     replay = executable("cartpole", "replay.py")
     again = run(tmp_path, replay, str(folder / "world.bag"))
     assert again.returncode == 0 and "equal to the bit" in again.stdout, again.stdout
