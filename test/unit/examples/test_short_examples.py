@@ -20,8 +20,9 @@ LIMIT = 300.0  # [s] for a process
 def printed(name: str, *words: object) -> str:
     uri = f"http://127.0.0.1:{reserved_port()}"
     ended = subprocess.run(
-        [sys.executable, EXAMPLES / f"{name}.py", *map(str, words)], env={**os.environ, "ROS_MASTER_URI": uri},
-        timeout=LIMIT, capture_output=True, text=True, check=False,
+        [sys.executable, EXAMPLES / f"{name}.py", *map(str, words)],
+        env={**os.environ, "ROS_MASTER_URI": uri}, timeout=LIMIT, capture_output=True, text=True,
+        check=False,
     )  # fmt: skip
     assert ended.returncode == 0, ended.stdout + ended.stderr
     return ended.stdout

@@ -1,0 +1,258 @@
+"""Walking at a commanded velocity, for robots with legs of any package."""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+
+from robot_envs.errors import TaskError
+from robot_envs.robot import Robot
+from robot_envs.robots import actions, numbers
+from robot_envs.task import Task
+from robot_envs.world_state import Commands, InitialState, Motion, StateQuery, Twist, WorldState
+from robot_sim.physics.pose import Pose, Vector, conjugate, from_rpy, rotate, to_rpy
+
+DOWN = (0.0, 0.0, -1.0)
+FALLEN = (
+    0.5  # share of the height at the start, below which it has fallen; cosine of the largest tilt
+)
+COMMANDS = 4  # of an episode
+STANDING = 0.1  # share of commands that ask to stand still
+LEAST = 0.1  # [m/s] or [rad/s]; below it a command asks to stand still
+
+
+class WalkByCommand(Task):
+    """A legged robot walks at a commanded velocity without falling.
+
+    It observes what a robot can measure: its joints, an IMU, its last action and the command.
+    `policy_node.py` takes them from /joint_states, the IMU's topic and /cmd_vel.
+
+    ## Action space
+    `Box(-1, 1, (joints,))`: the joints' set-points around the stance, `reach` [rad] either way.
+
+    ## Observation space
+    `Box((3 * joints + 11,))`
+
+    | numbers | what they are | unit |
+    |---|---|---|
+    | 3 | direction of gravity, seen from the trunk | 1 |
+    | 3 | angular velocity of the trunk | 4 rad/s |
+    | 3 | the command: speed ahead, to the left, about | m/s, rad/s |
+    | joints | positions relative to the stance | rad |
+    | joints | velocities | 20 rad/s |
+    | joints | the last action | 1 |
+    | 2 | sine and cosine of the gait's phase; 0 while the command asks to stand | 1 |
+
+    ## Rewards
+    The sum of the terms below, each times its weight and the control period; `info["rewards"]` has them.
+
+    | term | what it is | weight |
+    |---|---|---|
+    | `linear` | exp(-(error of the speeds ahead and to the left)² / 0.06 m²/s²) | 1.5 |
+    | `angular` | exp(-(error of the speed about)² / 0.25 rad²/s²) | 0.75 |
+    | `gait` | share of feet that touch the ground when their phase asks for it | 0.5 |
+    | `vertical` | square of the trunk's vertical speed [m²/s²] | -1 |
+    | `tilting` | square of the trunk's other angular velocities [rad²/s²] | -0.05 |
+    | `orientation` | squared sine of the trunk's tilt | -2 |
+    | `height` | square of the height's error, in units of that of the stance | -10 |
+    | `smoothness` | mean square of the action's change | -0.3 |
+    | `posture` | mean square of the action | -0.1 |
+    | `fallen` | it has fallen | -50 |
+
+    ## Start of an episode
+    In the stance, up to `push` fast in any direction, heading anywhere; the command changes three times.
+
+    ## End of an episode
+    Terminated when it falls: the trunk is below half its height, or tilted by 60 degrees. Truncated after
+    1000 steps.
+
+    ## Info
+    `command`, `velocity` (ahead, to the left, about), `is_success` (never fell so far), `rewards`.
+
+    Args:
+        robot: The robot, whose controllers hold joints at positions.
+        stance: Positions of its joints [rad]; others are 0.
+        height: Height of its trunk in the stance, its feet on the ground [m].
+        imu: Its IMU; None: it has none, and the trunk's own motion takes its place, in simulation alone.
+        feet: Links of its feet, in the order of their phases.
+        phases: When each foot is put down, as a share of the gait's period.
+        period: Period of the gait [s].
+        reach: What an action of 1 moves a joint [rad].
+        ahead: Range of commanded speeds ahead [m/s].
+        aside: Largest commanded speed to either side [m/s].
+        about: Largest commanded angular speed [rad/s].
+        push: Largest speed of the trunk at the start [m/s].
+        weights: Other weights of terms, by name.
+    """
+
+    non_persistent = ("robot", "stance", "feet", "phases", "weights")
+    max_steps = 1000
+    WEIGHTS: ClassVar[Mapping[str, float]] = {
+        "linear": 1.5, "angular": 0.75, "gait": 0.5, "vertical": -1.0, "tilting": -0.05,
+        "orientation": -2.0, "height": -10.0, "smoothness": -0.3, "posture": -0.1, "fallen": -50.0,
+    }  # fmt: skip
+
+    def __init__(
+        self,
+        robot: Robot,
+        stance: Mapping[str, float],
+        height: float,
+        imu: str | None,
+        feet: Sequence[str],
+        phases: Sequence[float],
+        period: float = 0.5,
+        reach: float = 0.5,
+        ahead: tuple[float, float] = (-0.3, 0.6),
+        aside: float = 0.3,
+        about: float = 0.8,
+        push: float = 0.2,
+        weights: Mapping[str, float] | None = None,
+    ) -> None:
+        unknown = set(weights or ()) - set(self.WEIGHTS)
+        if unknown or len(feet) != len(phases):
+            raise TaskError(
+                f"weights has {', '.join(sorted(unknown))}; terms are {', '.join(self.WEIGHTS)}"
+                if unknown
+                else f"{len(feet)} feet have {len(phases)} phases"
+            )
+        self.robot, self.stance, self.height, self.imu = robot, stance, height, imu
+        self.feet, self.phases, self.period = tuple(feet), np.array(phases), period
+        self.joints = tuple(joint for port in robot.ports for joint in port.joints)
+        self.reach, self.ahead, self.aside, self.about, self.push = reach, ahead, aside, about, push
+        self.weights = {**self.WEIGHTS, **(weights or {})}
+        self.middle = np.array([stance.get(each, 0.0) for each in self.joints])
+        self.query = StateQuery(sensors=(imu,)) if imu else StateQuery(models=(robot.model,))
+        self.reward_query = StateQuery(models=(robot.model,), contacts_of=self.feet)
+        self.commands = np.zeros((COMMANDS, 3))
+        self.last = self.action = np.zeros(len(self.joints))
+
+    def action_space(self) -> gymnasium.spaces.Box:
+        return actions(len(self.joints))
+
+    def observation_space(self) -> gymnasium.spaces.Box:
+        return numbers(3 * len(self.joints) + 11)
+
+    def initial_state(self, rng: np.random.Generator) -> InitialState:
+        low = (self.ahead[0], -self.aside, -self.about)
+        high = (self.ahead[1], self.aside, self.about)
+        self.commands = rng.uniform(low, high, (COMMANDS, 3))
+        self.commands[rng.random(COMMANDS) < STANDING] = 0.0
+        self.last = self.action = np.zeros(len(self.joints))
+        heading, way, fast = rng.uniform((-math.pi, -math.pi, 0.0), (math.pi, math.pi, self.push))
+        x, y, _ = self.robot.pose.position
+        pose = Pose((x, y, self.height + 0.01), from_rpy(0.0, 0.0, float(heading)))
+        twist = Twist((float(fast * math.cos(way)), float(fast * math.sin(way)), 0.0))
+        off = rng.uniform(-0.05, 0.05, len(self.joints))
+        joints = dict(zip(self.joints, (self.middle + off).tolist(), strict=True))
+        held = self._commands(self.middle)
+        return InitialState(joints, {self.robot.model: Motion(pose, twist)}, held)
+
+    def aim(self, goal: Sequence[float]) -> None:
+        """Gives it another command: ahead, to the left [m/s], about [rad/s]; raises ValueError else."""
+        if len(goal) != 3 or not all(map(math.isfinite, goal)):
+            raise ValueError(f"a command is (ahead, left, about) [m/s, rad/s], not {tuple(goal)}")
+        low = (self.ahead[0], -self.aside, -self.about)
+        self.commands[:] = np.clip(goal, low, (self.ahead[1], self.aside, self.about))
+
+    def command(self, state: WorldState) -> np.ndarray:
+        """Returns the command at a state: ahead, to the left [m/s], about [rad/s]."""
+        length = self.max_steps * self.robot.control_period / COMMANDS
+        return self.commands[min(int(state.time / length), COMMANDS - 1)]
+
+    def phase(self, state: WorldState) -> float | None:
+        """Returns the gait's phase in [0, 1); None while the command asks to stand."""
+        if float(np.abs(self.command(state)).max()) < LEAST:
+            return None
+        return state.time / self.period % 1.0
+
+    def apply(self, action: np.ndarray, state: WorldState) -> Commands:
+        self.last, self.action = self.action, action.astype(float)
+        return self._commands(self.middle + self.reach * self.action)
+
+    def _commands(self, positions: np.ndarray) -> dict[str, float | tuple[float, ...]]:
+        """Returns the commands that hold joints at positions [rad]."""
+        numbers, given = iter(positions.tolist()), {}
+        for port in self.robot.ports:
+            values = tuple(itertools.islice(numbers, len(port.joints)))
+            given[port.name] = values[0] if port.single else values
+        return given
+
+    def observe(self, state: WorldState) -> np.ndarray:
+        phase = self.phase(state)
+        turn = 0.0 if phase is None else math.tau * phase
+        clock = (0.0, 0.0) if phase is None else (math.sin(turn), math.cos(turn))
+        joints = [state.joints[name] for name in self.joints]
+        places = np.array([each.position for each in joints]) - self.middle
+        speeds = np.array([each.velocity for each in joints]) / 20.0
+        down, turning = self._balance(state)
+        parts = (down, np.array(turning) / 4.0, self.command(state), places, speeds)
+        return np.concatenate((*parts, self.action, clock)).astype(np.float32)
+
+    def _balance(self, state: WorldState) -> tuple[Vector, Sequence[float]]:
+        """Returns the direction of gravity and the angular velocity [rad/s], in the trunk's frame."""
+        if self.imu is None:
+            pose, twist = state.models[self.robot.model]
+            into = conjugate(pose.orientation)
+            return rotate(into, DOWN), rotate(into, twist.angular)
+        seen = state.sensors[self.imu]
+        x, y, z, w = seen.orientation.tolist()
+        return rotate(conjugate((x, y, z, w)), DOWN), seen.angular_velocity
+
+    def velocity(self, state: WorldState) -> Vector:
+        """Returns the trunk's speed ahead and to the left [m/s], and about [rad/s]."""
+        pose, twist = state.models[self.robot.model]
+        yaw = to_rpy(pose.orientation)[2]
+        ahead, left, _ = rotate(from_rpy(0.0, 0.0, -yaw), twist.linear)
+        return ahead, left, twist.angular[2]
+
+    def touching(self, state: WorldState) -> list[bool]:
+        """Returns which feet touch something."""
+        links = {
+            name.rpartition("::")[0]
+            for each in state.contacts
+            for name in (each.first, each.second)
+        }
+        return [f"{self.robot.model}::{foot}" in links for foot in self.feet]
+
+    def terms(self, state: WorldState) -> dict[str, float]:
+        """Returns the reward's terms, without weights."""
+        pose, twist = state.models[self.robot.model]
+        ahead, left, about = self.velocity(state)
+        wanted, phase = self.command(state), self.phase(state)
+        sway = rotate(conjugate(pose.orientation), DOWN)
+        down = np.full(len(self.feet), True)
+        if phase is not None:
+            down = (phase - self.phases) % 1.0 < 0.5 + 1e-9
+        return {
+            "linear": math.exp(-((ahead - wanted[0]) ** 2 + (left - wanted[1]) ** 2) / 0.06),
+            "angular": math.exp(-((about - wanted[2]) ** 2) / 0.25),
+            "gait": float(np.mean(down == np.array(self.touching(state)))),
+            "vertical": twist.linear[2] ** 2,
+            "tilting": twist.angular[0] ** 2 + twist.angular[1] ** 2,
+            "orientation": sway[0] ** 2 + sway[1] ** 2,
+            "height": (pose.position[2] / self.height - 1.0) ** 2,
+            "smoothness": float(np.square(self.action - self.last).mean()),
+            "posture": float(np.square(self.action).mean()),
+            "fallen": float(self.is_terminal(state)) / self.robot.control_period,
+        }
+
+    def reward(self, state: WorldState, action: np.ndarray) -> float:
+        terms = self.terms(state)
+        total = math.fsum(self.weights[name] * terms[name] for name in terms)
+        return total * self.robot.control_period
+
+    def is_terminal(self, state: WorldState) -> bool:
+        pose = state.models[self.robot.model].pose
+        upright = -rotate(conjugate(pose.orientation), DOWN)[2]
+        return pose.position[2] < FALLEN * self.height or upright < FALLEN
+
+    def info(self, state: WorldState) -> dict[str, Any]:
+        return {
+            "command": tuple(self.command(state).tolist()),
+            "velocity": self.velocity(state),
+            "is_success": not self.is_terminal(state),
+            "rewards": self.terms(state),
+        }

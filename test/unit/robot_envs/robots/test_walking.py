@@ -1,0 +1,119 @@
+"""The walking task: what it measures and rewards, in the trunk's own frame."""
+
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+
+import robot_envs.robots  # noqa: F401 - registers the environments
+from robot_envs import RobotEnv
+from robot_envs.errors import TaskError
+from robot_envs.robots.quadruped import HEIGHT, ROBOT, Walk
+from robot_envs.world_state import Motion, Pose, Twist
+from robot_sim.physics.pose import from_rpy
+
+
+def env_of(**options):
+    return gymnasium.make("robot_envs/Quadruped-v0", **options).unwrapped
+
+
+def state_with(env, pose, twist):
+    return env.state._replace(models=type(env.state.models)({"quadruped": Motion(pose, twist)}))
+
+
+@pytest.fixture(scope="module")
+def env():
+    made = env_of()
+    made.reset(seed=0)
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.2, -2.8])
+def test_the_velocity_is_that_of_the_trunks_own_heading(env, yaw):
+    moving = Twist(
+        (math.cos(yaw) - 0.5 * math.sin(yaw), math.sin(yaw) + 0.5 * math.cos(yaw), 0.0), (0, 0, 0.3)
+    )
+    state = state_with(env, Pose((3.0, 1.0, HEIGHT), from_rpy(0.0, 0.0, yaw)), moving)
+    assert env.task.velocity(state) == pytest.approx((1.0, 0.5, 0.3))
+
+
+def test_who_moves_as_commanded_gets_all_of_both_terms(env):
+    env.task.aim((0.4, -0.1, 0.2))
+    there = state_with(env, Pose((0, 0, HEIGHT)), Twist((0.4, -0.1, 0.0), (0.0, 0.0, 0.2)))
+    terms = env.task.terms(there)
+    assert terms["linear"] == pytest.approx(1.0) and terms["angular"] == pytest.approx(1.0)
+    assert terms["height"] == terms["orientation"] == terms["fallen"] == 0.0
+    stands = env.task.terms(state_with(env, Pose((0, 0, HEIGHT)), Twist()))
+    assert stands["linear"] == pytest.approx(math.exp(-0.17 / 0.06))
+
+
+def test_commands_are_clipped_to_their_ranges(env):
+    env.task.aim((9.0, -9.0, 9.0))
+    assert tuple(env.task.command(env.state)) == (0.6, -0.3, 0.8)
+    for wrong in ((1.0,), (math.nan, 0.0, 0.0)):
+        with pytest.raises(ValueError, match="a command is"):
+            env.task.aim(wrong)
+
+
+@pytest.mark.parametrize(
+    "pose, fell",
+    [
+        (Pose((0, 0, HEIGHT)), False),
+        (Pose((0, 0, 0.49 * HEIGHT)), True),
+        (Pose((0, 0, HEIGHT), from_rpy(0.9, 0.0, 2.0)), False),
+        (Pose((0, 0, HEIGHT), from_rpy(1.1, 0.0, 2.0)), True),
+        (Pose((0, 0, HEIGHT), from_rpy(0.0, -1.1, 0.0)), True),
+    ],
+)
+def test_it_has_fallen_when_it_is_low_or_tilted_by_60_degrees(env, pose, fell):
+    assert env.task.is_terminal(state_with(env, pose, Twist())) is fell
+
+
+def test_it_stands_when_nothing_is_done_and_its_feet_touch(env):
+    env.reset(seed=1)
+    env.task.aim((0.0, 0.0, 0.0))
+    for _ in range(100):
+        seen, reward, terminated, *_, info = env.step(np.zeros(12, np.float32))
+    assert not terminated and env.task.touching(env.state) == [True] * 4
+    np.testing.assert_allclose(seen[:3], (0.0, 0.0, -1.0), atol=0.06)  # gravity
+    assert not seen[-2:].any()  # no gait while it stands
+    assert info["rewards"]["gait"] == 1.0 and reward > 0.04
+
+
+def test_an_episode_has_four_commands_of_which_some_ask_to_stand():
+    made = env_of()
+    drawn = []
+    for seed in range(50):
+        made.reset(seed=seed)
+        drawn.append(made.task.commands.copy())
+    drawn = np.array(drawn).reshape(-1, 3)
+    assert 5 <= (drawn == 0.0).all(axis=1).sum() <= 40
+    assert drawn[:, 0].min() < -0.2 and drawn[:, 0].max() > 0.5
+    made.close()
+
+
+def test_other_weights_change_the_reward_and_unknown_terms_are_named():
+    calm, plain = env_of(weights={"posture": 0.0}), env_of()
+    action = np.full(12, 0.5, np.float32)
+    for each in (calm, plain):
+        each.reset(seed=0)
+    difference = calm.step(action)[1] - plain.step(action)[1]
+    assert difference == pytest.approx(0.1 * 0.25 * 0.02)
+    with pytest.raises(TaskError, match="weights has speed; terms are linear"):
+        Walk(weights={"speed": 1.0})
+
+
+def test_without_an_imu_the_trunks_own_motion_says_the_same():
+    tasks = Walk(), Walk()
+    blind = tasks[1]
+    blind.imu, blind.query = None, tasks[0].reward_query
+    envs = [RobotEnv(ROBOT, task) for task in tasks]
+    for each in envs:
+        each.reset(seed=4)
+    for _ in range(20):
+        one, other = (each.step(np.full(12, 0.2, np.float32))[0] for each in envs)
+    np.testing.assert_allclose(one, other, atol=0.02)  # the IMU's are of up to 5 ms ago
+    for each in envs:
+        each.close()
