@@ -80,6 +80,8 @@ def _parser() -> argparse.ArgumentParser:
     add("--standalone", action="store_true",
         help="write the robot's URDF expanded, with all its meshes but without their textures, so that it "
         "needs no other package")  # fmt: skip
+    add("--task", choices=("reach", "walk"), default="reach",
+        help="what legs learn: postures, or to walk where a command says")  # fmt: skip
     # What the robot's file doesn't say
     add("--base", choices=("fixed", "free"),
         help="fix a robot to the world that its file doesn't fix (an arm), or let it stand or "
@@ -109,7 +111,7 @@ def _write(args: argparse.Namespace, parent: Path) -> str:
         )
     request = package.PackageRequest(
         args.name, folder, args.urdf, package.read_arguments(args.arguments), args.base, args.height,
-        args.interface, tuple(args.passive), args.standalone,
+        args.interface, tuple(args.passive), args.standalone, args.task == "walk",
     )  # fmt: skip
     made = parent / f".{args.name}.{secrets.token_hex(4)}"
     try:

@@ -57,7 +57,7 @@ def render(template: str, **values: Any) -> str:
 
 def fill(folder: Path, package: str, values: Mapping[str, Any]) -> None:
     """Writes the template's files, except the default robot, and those of the task."""
-    tops = (TEMPLATE, HERE / ("drive" if values["base"] else "reach"))
+    tops = (TEMPLATE, HERE / values["task"].lower())
     for top, source in ((each, file) for each in tops for file in sorted(each.rglob(f"*{FILLED}"))):
         place = source.relative_to(top).with_suffix("")
         parts = [package if part == "package" else part for part in place.parts]

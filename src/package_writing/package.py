@@ -13,7 +13,7 @@ import yaml
 
 from package_writing import CannotWrite, contents
 from package_writing.gains import VELOCITY, effort_gains, wheel_gains
-from package_writing.standing import feet, stance, standing_height
+from package_writing.standing import feet, gait, stance, standing_height
 from package_writing.survey import EFFORT, Survey, height_note, look_at, root_link
 from package_writing.trial import stands_note, try_out
 from package_writing.urdf_files import Copied, copy_urdf, expanded
@@ -45,6 +45,7 @@ class PackageRequest:
     interface: str | None
     passive: tuple[str, ...] = ()
     standalone: bool = False
+    walks: bool = False
 
 
 def read_arguments(texts: Sequence[str]) -> dict[str, str]:
@@ -171,15 +172,24 @@ def _values(request: PackageRequest, copied: Copied, survey: Survey, urdf: str) 
     starts, height = stance(model), request.height
     if height is None:
         height = 0.0 if model.fixed_base else standing_height(model, starts) or 0.0
-    task, algo = ("Drive", "sac") if base else ("Reach", "ppo")
+    on = feet(model)
+    if request.walks and not on:
+        raise CannotWrite(
+            "--task walk: it has no legs to stand on: it is fixed, or stands on wheels or its base"
+        )
+    task, algo = (
+        ("Drive", "sac") if base else ("Walk", "sac") if request.walks else ("Reach", "ppo")
+    )
+    imus = (each.name for each in model.sensors if each.kind == "imu")
     gains = {True: wheel_gains(model), False: effort_gains(model)}
     return {
         "name": name, "urdf": urdf, "arguments": request.arguments, "folder": request.folder,
         "needed": [each for each in copied.packages if each not in OURS], "outside": copied.outside,
-        "survey": survey, "base": base, "held": held, "feet": feet(model), "starts": starts, "height": height,
+        "survey": survey, "base": base, "held": held, "feet": on, "starts": starts, "height": height,
         "drive": DRIVE, "run": [DRIVE] * bool(base) + [each.controller for each in held],
         "task": task, "algo": algo, "env_id": f"{name}.environment:{name}/{task}-v0",
         "gains": {e.joint: gains[e.wheel][e.joint] for e in held if e.interface == EFFORT},
+        "gait": gait(model, on) if request.walks else {}, "imu": next(imus, None),
         "velocity_gain": VELOCITY, "goals": contents.goals(survey, starts),
         "ranges": {  # the stance included; wheels start at 0
             each.joint: (min(each.low, start), max(each.high, start))

@@ -153,6 +153,20 @@ def feet(model: ModelDescription) -> list[str]:
     ]
 
 
+def gait(model: ModelDescription, feet: Sequence[str]) -> dict[str, float]:
+    """Returns when feet are put down, as shares of a period: neighbours of a side, and of both, in turn.
+
+    Two legs step one after the other, four trot, six walk on three.
+    """
+    poses = link_poses(model, Pose(), {})
+    phases = {}
+    for side, sign in enumerate((1.0, -1.0)):
+        row = [each for each in feet if sign * poses[each].position[1] > 0.0]
+        row.sort(key=lambda each: -poses[each].position[0])
+        phases.update({each: (place + side) % 2 / 2.0 for place, each in enumerate(row)})
+    return phases | {each: 0.0 for each in feet if each not in phases}
+
+
 def lows_of(model: ModelDescription, positions: Mapping[str, float]) -> dict[str, float]:
     """Returns how low each link with a collision reaches, seen from the model [m]."""
     return {

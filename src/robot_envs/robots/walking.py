@@ -60,7 +60,7 @@ class WalkByCommand(Task):
     | `height` | square of the height's error, in units of that of the stance | -10 |
     | `smoothness` | mean square of the action's change | -0.3 |
     | `posture` | mean square of the action | -0.1 |
-    | `fallen` | it has fallen | -50 |
+    | `fallen` | it has fallen; once | -5 |
 
     ## Start of an episode
     In the stance, up to `push` fast in any direction, heading anywhere; the command changes three times.
@@ -75,7 +75,7 @@ class WalkByCommand(Task):
     Args:
         robot: The robot, whose controllers hold joints at positions.
         stance: Positions of its joints [rad]; others are 0.
-        height: Height of its trunk in the stance, its feet on the ground [m].
+        height: Height of the model in the stance, its feet on the ground [m].
         imu: Its IMU; None: it has none, and the trunk's own motion takes its place, in simulation alone.
         feet: Links of its feet, in the order of their phases.
         phases: When each foot is put down, as a share of the gait's period.
@@ -88,11 +88,11 @@ class WalkByCommand(Task):
         weights: Other weights of terms, by name.
     """
 
-    non_persistent = ("robot", "stance", "feet", "phases", "weights")
+    non_persistent = ("robot", "feet", "phases", "weights")
     max_steps = 1000
     WEIGHTS: ClassVar[Mapping[str, float]] = {
         "linear": 1.5, "angular": 0.75, "gait": 0.5, "vertical": -1.0, "tilting": -0.05,
-        "orientation": -2.0, "height": -10.0, "smoothness": -0.3, "posture": -0.1, "fallen": -50.0,
+        "orientation": -2.0, "height": -10.0, "smoothness": -0.3, "posture": -0.1, "fallen": -5.0,
     }  # fmt: skip
 
     def __init__(
@@ -118,7 +118,11 @@ class WalkByCommand(Task):
                 if unknown
                 else f"{len(feet)} feet have {len(phases)} phases"
             )
-        self.robot, self.stance, self.height, self.imu = robot, stance, height, imu
+        self.robot, self.height, self.imu = robot, height, imu
+        links, root = robot.links, robot.links.links[robot.links.root]
+        com = root.inertia.com.position if root.inertia else (0.0, 0.0, 0.0)
+        self.centre = links.root_pose.compose(Pose(com))  # of the trunk's mass
+        self.stands = height + self.centre.position[2]  # [m], of it in the stance
         self.feet, self.phases, self.period = tuple(feet), np.array(phases), period
         self.joints = tuple(joint for port in robot.ports for joint in port.joints)
         self.reach, self.ahead, self.aside, self.about, self.push = reach, ahead, aside, about, push
@@ -233,7 +237,7 @@ class WalkByCommand(Task):
             "vertical": twist.linear[2] ** 2,
             "tilting": twist.angular[0] ** 2 + twist.angular[1] ** 2,
             "orientation": sway[0] ** 2 + sway[1] ** 2,
-            "height": (pose.position[2] / self.height - 1.0) ** 2,
+            "height": (pose.compose(self.centre).position[2] / self.stands - 1.0) ** 2,
             "smoothness": float(np.square(self.action - self.last).mean()),
             "posture": float(np.square(self.action).mean()),
             "fallen": float(self.is_terminal(state)) / self.robot.control_period,
@@ -247,7 +251,7 @@ class WalkByCommand(Task):
     def is_terminal(self, state: WorldState) -> bool:
         pose = state.models[self.robot.model].pose
         upright = -rotate(conjugate(pose.orientation), DOWN)[2]
-        return pose.position[2] < FALLEN * self.height or upright < FALLEN
+        return pose.compose(self.centre).position[2] < FALLEN * self.stands or upright < FALLEN
 
     def info(self, state: WorldState) -> dict[str, Any]:
         return {

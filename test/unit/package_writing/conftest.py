@@ -8,6 +8,8 @@ import pytest
 
 from package_writing.cli import main
 
+TASKS = ("Drive", "Walk", "Reach")
+
 
 @pytest.fixture
 def new(tmp_path, monkeypatch, capsys):
@@ -27,7 +29,7 @@ def new(tmp_path, monkeypatch, capsys):
         monkeypatch.syspath_prepend(target / name / "src")
         made = importlib.import_module(f"{name}.robot").ROBOT
         tasks = importlib.import_module(f"{name}.tasks")
-        task = tasks.Drive if hasattr(tasks, "Drive") else tasks.Reach
+        task = next(getattr(tasks, each) for each in TASKS if hasattr(tasks, each))
         return target / name, made, task, told.out
 
     before = set(sys.modules)
