@@ -1,5 +1,7 @@
 """new_robot.py --task walk: legs walk where a command says."""
 
+import dataclasses
+import importlib
 from pathlib import Path
 
 import gymnasium
@@ -8,7 +10,12 @@ import pytest
 
 from package_writing.cli import main
 from package_writing.standing import gait
+from robot_envs import LinkQuery, StateQuery
+from robot_envs.backends import make_backend
+from robot_envs.scene import Scene
 from robot_envs.testing import check_robot_env
+from robot_envs.world_state import InitialState
+from robot_sim.applied_forces import ActingTime, AppliedWrench
 from robot_sim.physics.files.urdf import parse_urdf
 
 QUADRUPED = Path(__file__).resolve().parents[2] / "data/robots/quadruped.urdf"
@@ -72,3 +79,56 @@ def test_the_gait_of_legs_is_by_where_they_stand(places, phases):
     )
     model = parse_urdf(f'<robot name="r"><link name="trunk">{mass}</link>{legs}</robot>')
     assert gait(model, list(places)) == phases
+
+
+ROOT = Path(__file__).resolve().parents[3]
+PUSHED, OVER = 5.0, 10.0  # [s]
+WALKERS = {  # joints and mass [kg]
+    ("biped",): (29, 42.6),
+    ("quadruped", "abduction:=false"): (8, 12.4),
+    ("quadruped",): (12, 12.4),
+    ("quadruped", "size:=1.5"): (12, 41.9),
+    ("biped", "arms:=false"): (12, 22.4),
+    ("biped", "arms:=false", "size:=0.8"): (12, 11.5),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "file, arguments",
+    [
+        pytest.param(
+            *each[:1], each[1:], marks=() if number < 2 else pytest.mark.long, id=" ".join(each)
+        )
+        for number, each in enumerate(WALKERS)
+    ],
+)
+def test_it_stands_at_first_launch_and_under_a_push(new, tmp_path, file, arguments):
+    """For 10 s, on both engines, with 10 % of the weight for 0.1 s ahead and aside."""
+    (folder, robot, *_) = new(
+        "my_legs", ROOT / f"urdf/{file}.urdf.xacro", *arguments, "--base", "free"
+    )
+    stance = importlib.import_module("my_legs.robot").STANCE
+    mass = sum(each.inertia.mass for each in robot.links.links.values() if each.inertia)
+    assert (len(robot.joints), round(mass, 1)) == WALKERS[file, *arguments]
+    force, root = 0.1 * 9.81 * mass, robot.links.root
+    for engine in ("bullet", "mujoco")[: 2 if importlib.util.find_spec("mujoco") else 1]:
+        world = make_backend(
+            Scene([dataclasses.replace(robot, engine=engine)]), None, robot.control_period
+        )
+        world.look(StateQuery(links=(LinkQuery(root),)))
+        start = world.reset(InitialState(joints=stance)).links[root].pose.position[2]
+        heights = []
+        for step in range(round(OVER / robot.control_period)):
+            if step == round(PUSHED / robot.control_period):
+                push(world, robot.model, root, (force, force, 0.0))
+            heights.append(world.act({}).links[root].pose.position[2])
+        world.close()
+        assert min(heights) > 0.97 * start and heights[-1] == pytest.approx(start, rel=0.01)
+
+
+def push(world, model, link, force):
+    sim = world._sim
+    time = ActingTime(sim.now, 100_000_000)  # [ns]
+    wrench = force, (0.0, 0.0, 0.0)
+    sim.applied.wrenches.append(AppliedWrench(sim.world.models[model], link, wrench, time))
