@@ -70,7 +70,8 @@ class WalkByCommand(Task):
     1000 steps.
 
     ## Info
-    `command`, `velocity` (ahead, to the left, about), `is_success` (never fell so far), `rewards`.
+    `command`, `velocity` (ahead, to the left, about), `is_success` (never fell so far), `rewards` of the
+    last step.
 
     Args:
         robot: The robot, whose controllers hold joints at positions.
@@ -131,6 +132,7 @@ class WalkByCommand(Task):
         self.query = StateQuery(sensors=(imu,)) if imu else StateQuery(models=(robot.model,))
         self.reward_query = StateQuery(models=(robot.model,), contacts_of=self.feet)
         self.commands = np.zeros((COMMANDS, 3))
+        self.rewarded: dict[str, float] = {}  # the terms of the last step
         self.last = self.action = np.zeros(len(self.joints))
 
     def action_space(self) -> gymnasium.spaces.Box:
@@ -142,6 +144,7 @@ class WalkByCommand(Task):
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         low = (self.ahead[0], -self.aside, -self.about)
         high = (self.ahead[1], self.aside, self.about)
+        self.rewarded = {}
         self.commands = rng.uniform(low, high, (COMMANDS, 3))
         self.commands[rng.random(COMMANDS) < STANDING] = 0.0
         self.last = self.action = np.zeros(len(self.joints))
@@ -244,7 +247,7 @@ class WalkByCommand(Task):
         }
 
     def reward(self, state: WorldState, action: np.ndarray) -> float:
-        terms = self.terms(state)
+        self.rewarded = terms = self.terms(state)
         total = math.fsum(self.weights[name] * terms[name] for name in terms)
         return total * self.robot.control_period
 
@@ -258,5 +261,5 @@ class WalkByCommand(Task):
             "command": tuple(self.command(state).tolist()),
             "velocity": self.velocity(state),
             "is_success": not self.is_terminal(state),
-            "rewards": self.terms(state),
+            "rewards": dict(self.rewarded),
         }
