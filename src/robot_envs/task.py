@@ -42,6 +42,7 @@ class Task(Stateful, ABC):
     | `reward_query` | further ones that only `reward`, `is_terminal` and `info` see |
     | `objects` | what is spawned besides the robots |
     | `world` | a world file in place of the first robot's; None: that one |
+    | `aims_at_velocity` | whether `aim` takes a velocity (ahead, to the left, about), as `cmd_vel` has it |
 
     Names of joints in states and of controllers in commands are plain in a world with one robot; see
     `WorldState` for several. A world of joints alone, as a real robot's, can't tell what the `reward_query`
@@ -55,6 +56,7 @@ class Task(Stateful, ABC):
     reward_query: StateQuery = StateQuery()
     objects: Sequence[Object] = ()
     world: Source | None = None
+    aims_at_velocity: ClassVar[bool] = False
 
     @abstractmethod
     def action_space(self) -> gymnasium.Space[Any]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import rosgraph
 import rospy
+from geometry_msgs.msg import Twist
 from std_msgs.msg import Float64MultiArray
 
 from robot_envs.backends.ros import node
@@ -38,7 +39,7 @@ class PolicyNode:
     policy, and publishes their commands. While one of them is late, or the task's episode would have ended,
     it commands a stop instead (see `CommandLimits.stop`). At the end it stops the robot, also after `rosnode
     kill`, or an error of policy or task. The topic `~goal` (std_msgs/Float64MultiArray) changes the goal of a
-    task with goals.
+    task with goals, `cmd_vel` (geometry_msgs/Twist) that of one that walks at a velocity, first 0.
 
     `late` is how long the robot may be without a joint state before it is stopped [s], or without a reading,
     but at least three of its sensor's periods; None: 5 control periods, but at least 0.1 s, and at most 0.3 s
@@ -63,6 +64,7 @@ class PolicyNode:
         except ValueError as error:
             raise RobotEnvError(str(error)) from error
         self._wanted: Any = None  # a goal that has come
+        self._told: Any = None  # the one logged last
         self._reason = self._reported = ""  # why the robot stands still, now and in the last line
         self._unreported = 0  # changes since that line
         self._next_report = 0.0  # [s of wall time] of the next one
@@ -82,9 +84,16 @@ class PolicyNode:
         self._pushing = {port.name for port in robot.ports if port.quantity != "position"}
         if isinstance(task, GoalTask) or type(task).aim is not Task.aim:
             rospy.Subscriber("~goal", Float64MultiArray, self._take_goal, queue_size=1)
+        if task.aims_at_velocity:
+            if goal is None:
+                self._wanted = (0.0, 0.0, 0.0)
+            rospy.Subscriber(full_name(robot, "cmd_vel"), Twist, self._take_velocity, queue_size=1)
 
     def _take_goal(self, message: Float64MultiArray) -> None:
         self._wanted = message.data
+
+    def _take_velocity(self, message: Twist) -> None:
+        self._wanted = message.linear.x, message.linear.y, message.angular.z
 
     def run(self, should_end: Callable[[], bool]) -> None:
         """Runs until `should_end`, which is polled, or the node is shut down.
@@ -209,7 +218,9 @@ class PolicyNode:
             return
         try:
             self._pilot.aim(goal)
-            rospy.loginfo(f"the goal is {list(goal)}")
+            if goal != self._told:
+                rospy.loginfo(f"the goal is {list(goal)}")
+                self._told = goal
         except ValueError as error:
             rospy.logwarn(f"{error}; it keeps the one it has")
 

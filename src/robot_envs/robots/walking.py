@@ -91,6 +91,7 @@ class WalkByCommand(Task):
 
     non_persistent = ("robot", "feet", "phases", "weights")
     max_steps = 1000
+    aims_at_velocity = True
     WEIGHTS: ClassVar[Mapping[str, float]] = {
         "linear": 1.5, "angular": 0.75, "gait": 0.5, "vertical": -1.0, "tilting": -0.05,
         "orientation": -2.0, "height": -10.0, "smoothness": -0.3, "posture": -0.1, "fallen": -5.0,

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import rospy
-from geometry_msgs.msg import Quaternion, Vector3
+from geometry_msgs.msg import Quaternion, Twist, Vector3
 from gymnasium.spaces import Box
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, LaserScan
@@ -20,6 +20,8 @@ from robot_envs.deployment import policy_node
 from robot_envs.deployment.policy_node import PolicyNode
 from robot_envs.robots.furuta import ROBOT as FURUTA
 from robot_envs.robots.furuta import SwingUp
+from robot_envs.robots.quadruped import ROBOT as QUADRUPED
+from robot_envs.robots.quadruped import Walk
 from robot_envs.robots.rover import ROBOT as ROVER
 from robot_envs.robots.rover import Navigate
 from robot_envs.world_state import JointState
@@ -204,6 +206,23 @@ def test_a_vehicle_drives_to_its_goal_by_laser_and_odometry_and_stops_when_they_
     node._take_goal(SimpleNamespace(data=(1.1, 0.0)))
     node._step(clock.now, 1.0)
     assert drives(node)[-1] == (0.0, 0.0), "it is there"
+
+
+def test_a_walker_stands_until_cmd_vel_says_where_to(clock: SimpleNamespace) -> None:
+    seen: list[np.ndarray] = []
+    act = lambda observed: seen.append(observed) or np.zeros(12, np.float32)  # noqa: E731
+    node = PolicyNode(QUADRUPED, Walk(), act, 0.02, late=1.0)
+    know_joints(node, QUADRUPED)
+    header = Header(stamp=rospy.Time(clock.now))
+    SilentSubscriber.send("/imu", Imu(header=header, orientation=Quaternion(0.0, 0.0, 0.0, 1.0)))
+    node._step(node._begin(), 0.0)
+    for x, y, turn in ((0.5, 0.1, -0.3), (9.0, 0.0, 0.0)):
+        message = Twist(Vector3(x, y, 0.0), Vector3(0.0, 0.0, turn))
+        SilentSubscriber.send("/cmd_vel", message)
+        node._step(clock.now, 0.02)
+    wanted = [(0.0, 0.0, 0.0), (0.5, 0.1, -0.3), (0.6, 0.0, 0.0)]
+    assert [tuple(each[6:9]) for each in seen] == [pytest.approx(each) for each in wanted]
+    assert not seen[0][-2:].any() and seen[1][-2:].any(), "its gait begins"
 
 
 @pytest.mark.parametrize(
