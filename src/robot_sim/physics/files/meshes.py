@@ -30,7 +30,7 @@ FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute"
 MOST_BYTES = 200_000_000  # of a file: a million triangles as COLLADA writes them
 LARGE = 50_000  # [bytes] of a file that is kept
 # Begin the names of what is kept; others when others would come out.
-KEPT, PIECES = "mesh-2", "v-hacd-1"
+KEPT, PIECES = "mesh-3", "v-hacd-1"
 
 # It stays for further meshes: starting Python and importing trimesh takes longer than most files.
 _process = LimitedProcess("robot_sim.physics.files.mesh_program:answer", LIMITS)
