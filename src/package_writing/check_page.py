@@ -15,12 +15,7 @@ from package_writing.check_motion import observe
 from package_writing.trial import ENGINES
 from robot_envs import Robot, RobotEnvError, controllers
 from robot_sim.control.errors import ControlError
-from robot_sim.physics.description import (
-    ModelDescription,
-    Plugin,
-    is_control_plugin,
-    library_of,
-)
+from robot_sim.physics.description import ModelDescription, Plugin, is_control_plugin, library_of
 from robot_sim.physics.engines import installing
 from robot_sim.physics.files.elements import truth
 from robot_sim.physics.files.sdf_parts import MOMENTS

@@ -7,13 +7,7 @@ from functools import cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from robot_sim.physics.description import (
-    Color,
-    DescriptionError,
-    Inertia,
-    Joint,
-    Sensor,
-)
+from robot_sim.physics.description import Color, DescriptionError, Inertia, Joint, Sensor
 from robot_sim.physics.files.elements import (
     direction,
     finite,
@@ -24,13 +18,7 @@ from robot_sim.physics.files.elements import (
     shown,
     truth,
 )
-from robot_sim.physics.pose import (
-    Pose,
-    Vector,
-    conjugate,
-    from_rpy,
-    rotate,
-)
+from robot_sim.physics.pose import Pose, Vector, conjugate, from_rpy, rotate
 
 MATERIALS = Path(__file__).with_name("materials.toml")
 MODEL = "__model__"
@@ -112,11 +100,7 @@ def read_inertia(link: Element, where: str, static: bool) -> Inertia:
 
 
 def read_sensors(
-    parent: Element,
-    link: str,
-    warnings: list[str],
-    frames: Frames | None = None,
-    joint: str = "",
+    parent: Element, link: str, warnings: list[str], frames: Frames | None = None, joint: str = ""
 ) -> Iterator[Sensor]:
     """Yields the sensors of `link` that `parent` has; a faulty one is a warning.
 
