@@ -3,7 +3,7 @@
 import math
 import os
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
@@ -354,6 +354,13 @@ class ModelDescription:
         for joint in self.joints.values():
             joints[joint.parent].append(joint)
         return joints
+
+    def joints_below(self, *links: str) -> Iterator[Joint]:
+        """Yields the joints that links carry, and those below them, each after the one above it."""
+        below, order = self.joints_by_parent(), list(links)
+        for link in order:
+            yield from below[link]
+            order += [joint.child for joint in below[link]]  # the list grows while it is walked
 
     def carriers(self, link: str) -> list[Joint]:
         """Returns the joints between the root and `link`, from the root on."""

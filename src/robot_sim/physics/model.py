@@ -1,7 +1,7 @@
 """A model in the world: its description, its body in the engine, and its state."""
 
 import logging
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
@@ -124,7 +124,7 @@ class Model(Shared):
         for name in sorted(set(positions) & set(self._joints)):
             joint = self.description.joints[name]
             self.body.reset_joint(self._joints[name], self.clamped(name, positions[name]))
-            self._rest(self._below(joint.child))
+            self._rest(below.name for below in self.description.joints_below(joint.child))
         self.put_followers()
         self.close_loops(positions, before)
 
@@ -318,7 +318,7 @@ class Model(Shared):
 
     def rest_joints(self) -> None:
         """Stops all joints; the root link keeps its velocity."""
-        self._rest(list(self._joints))
+        self._rest(self._joints)
 
     def reset(self, joints: bool) -> None:
         """Returns to the initial pose, at rest; with `joints`, also every joint to zero."""
@@ -328,14 +328,9 @@ class Model(Shared):
             self.put_followers()
             self.close_loops((), [(0.0, 0.0)] * len(self._joints))
         self.place(self.initial_pose)
-        self._rest(list(self._joints))
+        self.rest_joints()
 
-    def _rest(self, names: list[str]) -> None:
+    def _rest(self, names: Iterable[str]) -> None:
         states = self.body.joint_states()
         for index in (self._joints[name] for name in names if name in self._joints):
             self.body.reset_joint(index, states[index][0])
-
-    def _below(self, link: str) -> list[str]:
-        """Names of the joints on the child side of `link`."""
-        below = self.description.joints_by_parent()[link]
-        return [name for joint in below for name in (joint.name, *self._below(joint.child))]
