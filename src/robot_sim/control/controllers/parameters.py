@@ -6,6 +6,7 @@ from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, NamedTuple, Self, dataclass_transform
 
 from robot_sim.control.errors import ControlError
+from robot_sim.control.pid import is_number
 
 EACH = "<joint>"  # in a key: the name of each joint
 
@@ -89,11 +90,6 @@ def are_names(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(each, str) for each in value)
 
 
-def _is_number(value: Any) -> bool:
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return is_number and math.isfinite(value)
-
-
 def of_type(kind: type) -> Callable[[Any, str], Any]:
     """Returns a reader of values of one type; a float is finite."""
     if kind is float:
@@ -105,7 +101,7 @@ def of_type(kind: type) -> Callable[[Any, str], Any]:
 
 
 SLOWEST = 1e-6  # [Hz]; below it, as at 0, nothing is ever published
-number = reader(_is_number, "is missing or is not a finite number", float)
+number = reader(is_number, "is missing or is not a finite number", float)
 truth = reader(lambda value: isinstance(value, bool), "must be true or false")
 mapping = reader(lambda value: isinstance(value, Mapping), "must hold parameters by name")
 length = reader(lambda value: 0.0 < value < math.inf, "must be above 0 and finite")

@@ -16,7 +16,7 @@ from robot_sim.control.controllers.parameters import (
     reader,
 )
 from robot_sim.control.errors import ControlError
-from robot_sim.control.transmissions import is_number
+from robot_sim.control.pid import is_number
 from robot_sim.drives.odometry import DeadReckoning, OdometrySample, Period, RollingMean, Triple
 from robot_sim.drives.wheels import SpeedLimits
 
