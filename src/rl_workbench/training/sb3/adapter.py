@@ -18,8 +18,7 @@ from rl_workbench.training.checked import CURVES
 from rl_workbench.training.checkpoints import fitting
 from rl_workbench.training.environments import succeeded
 from rl_workbench.training.options import TrainingOptions
-from rl_workbench.training.sb3.acting import load_policy
-from rl_workbench.training.sb3.models import make_learning_model
+from rl_workbench.training.sb3.models import load_policy, make_learning_model
 from rl_workbench.training.sb3.positions import ModelMark, Positions, buffer_state, restore_buffer
 from rl_workbench.training.training import Training
 
