@@ -271,14 +271,10 @@ def _placed_joints(addresses: Addresses, request: StepWorldRequest) -> dict[Mode
 def _check_ticks(request: StepWorldRequest, asks: bool) -> None:
     begins = request.reset != StepWorldRequest.NONE or bool(request.joints or request.models)
     if not (0 if begins or asks else 1) <= request.ticks <= MAX_TICKS:
-        raise ControlError(
-            f"ticks is {request.ticks}: 1 to {MAX_TICKS} can be done in one call"
-            + (
-                ", or 0 with a reset, joints or models to place, or states to report"
-                if request.ticks == 0
-                else ""
-            )
-        )
+        text = f"ticks is {request.ticks}: 1 to {MAX_TICKS} can be done in one call"
+        if request.ticks == 0:
+            text += ", or 0 with a reset, joints or models to place, or states to report"
+        raise ControlError(text)
     if request.reset > StepWorldRequest.SIMULATION:
         raise ControlError(f"reset is {request.reset}: 0 (none), 1 (world) or 2 (simulation)")
     if request.seed and request.reset == StepWorldRequest.NONE:

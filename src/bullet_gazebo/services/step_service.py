@@ -214,11 +214,8 @@ class StepService:
 
     def _check_layout(self, prepared: _Prepared) -> None:
         """Raises UnknownName if the numbers would belong to other names now."""
-        models = list(prepared.reader.read(stepped=False).models)
-        if (prepared.addresses.joint_names, prepared.models) != (
-            self._addresses().joint_names,
-            models,
-        ):
+        now = self._addresses().joint_names, list(prepared.reader.read(stepped=False).models)
+        if (prepared.addresses.joint_names, prepared.models) != now:
             raise UnknownName("robots or models have come or gone")
 
     def _refused(self, fault: str) -> srv.PreparedStepResponse:

@@ -180,9 +180,8 @@ class JointReader:
         joint.pose = child.relative_to(parent)
         pose, relative_to = read_pose(element, where)
         if joint.kind != "fixed" and (pose != Pose() or relative_to not in ("", joint.child)):
-            frame = self._link(
-                relative_to or joint.child, where
-            )  # not the joint's: a link may have its name
+            # Not the joint's: a link may have its name.
+            frame = self._link(relative_to or joint.child, where)
             joint.anchor = frame.compose(pose).relative_to(child)
 
     def _link(self, name: str, where: str) -> Pose:

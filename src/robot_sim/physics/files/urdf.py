@@ -149,9 +149,7 @@ class LinkReader:
         for material in robot.findall("material"):
             name = material.get("name", "")
             self._materials[name] = self._or_none(_rgba, material, f"material '{shown(name)}'")
-        for material in robot.iterfind(
-            "link/visual/material"
-        ):  # the first link that gives a colour
+        for material in robot.iterfind("link/visual/material"):  # the first that gives a colour
             name = material.get("name", "")
             if name and name not in self._materials:
                 with suppress(DescriptionError):  # reading its link will report it
