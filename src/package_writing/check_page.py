@@ -79,8 +79,8 @@ def examine(file: RobotFile, parameters: str | None) -> Findings:
         if importlib.util.find_spec(module) is None:
             page.notes.append(f"not tried with {name}: '{installing(module)}' installs it")
             continue
-        page.lines[name], found = observe(content, interfaces, engine)
-        for text in found:
+        page.lines[name], texts = observe(content, interfaces, engine)
+        for text in texts:
             faults[text].append(name)
     page.wrong += [f"{text} ({' and '.join(names)})" for text, names in faults.items()]
     return page

@@ -323,9 +323,9 @@ class StepService:
 
     def _set_friction(self, request: srv.SetLinkFrictionRequest) -> str:
         with self._sim.lock:
-            found = existing(self._sim.world.link(request.link_name), NO_LINK)
+            link = existing(self._sim.world.link(request.link_name), NO_LINK)
             try:
-                set_link_friction(*found, request.factor)
+                set_link_friction(*link, request.factor)
             except PropertyError as error:
                 raise ServiceRefused(str(error)) from error
         return "SetLinkFriction: friction set"

@@ -185,11 +185,11 @@ class ReinforceAgent(TwoNetworks):
         advantages, targets = [], []
         for episode in batch:
             values = self._values(episode)
-            found = generalised_advantages(
+            gains = generalised_advantages(
                 episode.rewards, values, self.settings.gamma, self.settings.gae_lambda
             )
-            advantages.append(found)
-            targets.append(found + values[:-1])
+            advantages.append(gains)
+            targets.append(gains + values[:-1])
         return tuple(  # type: ignore[return-value]
             torch.from_numpy(np.concatenate(each).astype(np.float32))
             for each in (advantages, targets)

@@ -113,13 +113,13 @@ def find_runs(patterns: Sequence[str], warn: Callable[[str], None]) -> list[Run]
 
     Matches that aren't runs are skipped; `warn` receives a line for each whose record is damaged.
     """
-    found: dict[Path, Run] = {}
+    unique: dict[Path, Run] = {}
     for pattern in patterns:
         runs = _matching(pattern, warn)
         if not runs:
             raise WorkbenchError(f"there is no run folder at {pattern}")
-        found.update((run.folder, run) for run in runs)
-    return list(found.values())
+        unique.update((run.folder, run) for run in runs)
+    return list(unique.values())
 
 
 def _matching(pattern: str, warn: Callable[[str], None]) -> list[Run]:
@@ -129,14 +129,14 @@ def _matching(pattern: str, warn: Callable[[str], None]) -> list[Run]:
     inside = list(map(Path, glob.glob(pattern)))
     if path.is_dir():  # a benchmark's has a folder for each variant
         inside = list(path.glob("*/*" if (path / SUITE_RECORD).is_file() else "*"))
-    found = []
+    matching = []
     for folder in sorted(inside):
         if is_run(folder):
             try:
-                found.append(open_run(folder))
+                matching.append(open_run(folder))
             except WorkbenchError as error:  # one damaged run mustn't stop the others
                 warn(f"{error}; skipped")
-    return found
+    return matching
 
 
 def training_curve(run: Run) -> Curve:

@@ -229,9 +229,9 @@ def _compare(
     """Compares the file's actions with the policy's; raises WorkbenchError if more than rounding differs."""
     wanted = np.stack([np.asarray(policy.act(each)) for each in observations])
     with torch.no_grad():
-        found = file(batch(observations)).numpy()
+        actions = file(batch(observations)).numpy()
     space = policy.env.action_space
-    equal, distances = _differences(found, wanted, space)
+    equal, distances = _differences(actions, wanted, space)
     is_continuous = isinstance(space, spaces.Box)
     wrong = distances > ROUNDING if is_continuous else ~equal
     if wrong.any() and not is_continuous:

@@ -139,11 +139,11 @@ def candidates(run: Path, best_first: bool = False) -> list[Path]:
     the start.
     """
     best, others = [run / BEST], [run / LAST, *_numbered(run)]
-    found: dict[object, Path] = {}
+    paths: dict[object, Path] = {}
     for path in best + others if best_first else others + best:
         try:
             status = path.stat()
         except OSError:
             continue
-        found.setdefault((status.st_dev, status.st_ino), path)
-    return list(found.values())
+        paths.setdefault((status.st_dev, status.st_ino), path)
+    return list(paths.values())

@@ -157,15 +157,15 @@ class Model(Shared):
         old = {name: state[0] for name, state in zip(self._joints, before, strict=True)}
         starts = {name: (old[name], state[1]) for name, state in states.items()}
         goals = {name: states[name][0] for name in states if name in held}
-        found = closed(self.description, starts if goals else states, goals)
-        if found is None:
+        solution = closed(self.description, starts if goals else states, goals)
+        if solution is None:
             loose = in_loops(self.description)
-            found = states | {name: (old[name], 0.0) for name in states if name in loose}
+            solution = states | {name: (old[name], 0.0) for name in states if name in loose}
             logger.warning(
                 "Model '%s': its loops don't close on the way to %s; they stay as they were",
                 self.name, ", ".join(f"{name} = {goals[name]:g}" for name in sorted(goals) if name in loose),
             )  # fmt: skip
-        for name, state in found.items():
+        for name, state in solution.items():
             if state != states[name]:
                 self.body.reset_joint(self._joints[name], *state)
 

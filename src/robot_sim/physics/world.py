@@ -187,14 +187,14 @@ class World(Shared):
 
     def with_attached(self, models: Iterable[Model]) -> set[Model]:
         """Returns models, and all that is attached to them, also by way of others."""
-        found = set(models)
-        waiting = list(found)
+        reached = set(models)
+        waiting = list(reached)
         while waiting:
             for each in self._of(waiting.pop()):
-                fresh = {each.first[0], each.second[0]} - found
-                found |= fresh
+                fresh = {each.first[0], each.second[0]} - reached
+                reached |= fresh
                 waiting += fresh
-        return found
+        return reached
 
     def set_gravity(self, gravity: Vector) -> None:
         """Sets the acceleration of gravity [m/s²]."""

@@ -212,12 +212,12 @@ class FrameCallback(BaseCallback):
         return self._can_go_back
 
     def _log_losses(self, model: Any) -> None:
-        found = {LOSSES[name]: value for name, value in _pending_losses(model).items()}
-        for tag, value in found.items():
+        losses = {LOSSES[name]: value for name, value in _pending_losses(model).items()}
+        for tag, value in losses.items():
             _check_finite(tag, value)
         steps, frequency = self._arrived, self._log_frequency
-        if found and steps // frequency > (steps - model.stride) // frequency:
-            self._frame.log.add(steps, found)
+        if losses and steps // frequency > (steps - model.stride) // frequency:
+            self._frame.log.add(steps, losses)
             model.logger.dump(steps)  # the logger has no outputs, so this only clears it
 
     def _on_step(self) -> bool:

@@ -168,10 +168,10 @@ def _named(value: Any, flag: str) -> Any:
     """Returns the class that a text names as module:Class; other values as they are."""
     if not isinstance(value, str) or ":" not in value:
         return value
-    found = imported(value, flag)  # a foreign record mustn't have anything else called
-    if not (isinstance(found, type) and issubclass(found, torch.nn.Module | torch.optim.Optimizer)):
+    named = imported(value, flag)  # a foreign record mustn't have anything else called
+    if not (isinstance(named, type) and issubclass(named, torch.nn.Module | torch.optim.Optimizer)):
         raise WorkbenchError(f"{flag} {value}: it is neither a torch Module nor an Optimizer")
-    return found
+    return named
 
 
 def _hindsight(options: TrainingOptions, env: CheckedEnvironment) -> dict[str, Any]:

@@ -46,8 +46,8 @@ class Parameters:
     @classmethod
     def declared(cls) -> dict[str, Declared]:
         """Returns what is said of each, by the name of the field."""
-        found = {each.name: each.metadata[""] for each in fields(cls)}  # type: ignore[arg-type]
-        return {name: each._replace(key=each.key or name) for name, each in found.items()}
+        said = {each.name: each.metadata[""] for each in fields(cls)}  # type: ignore[arg-type]
+        return {name: each._replace(key=each.key or name) for name, each in said.items()}
 
     @classmethod
     def read(cls, params: Mapping[str, object], name: str, joint: str = "") -> Self:
@@ -55,7 +55,7 @@ class Parameters:
 
         Raises ControlError if one is missing or wrong.
         """
-        found = {}
+        values = {}
         for attribute, declared in cls.declared().items():
             tree, place = params, name
             parts = [joint if each == EACH else each for each in declared.key.split("/")]
@@ -64,8 +64,8 @@ class Parameters:
                 tree = mapping(tree.get(part, {}), place)
             value, key = tree.get(parts[-1]), f"{place}/{parts[-1]}"
             is_absent = parts[-1] not in tree and declared.default is not MISSING
-            found[attribute] = declared.default if is_absent else declared.read(value, key)
-        return cls(**found)
+            values[attribute] = declared.default if is_absent else declared.read(value, key)
+        return cls(**values)
 
 
 def reader(

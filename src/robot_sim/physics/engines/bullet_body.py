@@ -205,11 +205,11 @@ class BulletBody(Body):
 
     def _overlap(self, a: Link, b: Link) -> bool:
         """Returns whether two links overlap in the present pose."""
-        found = pybullet.getClosestPoints(
+        points = pybullet.getClosestPoints(
             self.id, self.id, 0.0, self._links[a.name], self._links[b.name],
             physicsClientId=self._client,
         )  # fmt: skip
-        return any(point[8] < -OVERLAP for point in found)
+        return any(point[8] < -OVERLAP for point in points)
 
     def _keep_moments(self, index: int, inertia: Inertia) -> None:
         """Sets moments that no real body has (a > b + c): PyBullet drops them, ODE doesn't.

@@ -204,8 +204,8 @@ class BulletEngine(Engine):
 
     def contacts(self) -> list[Contact]:
         # Without those that were only near.
-        found = pybullet.getContactPoints(physicsClientId=self._client)
-        return [_contact(each, self._sides) for each in found if each[9] > 0.0]
+        points = pybullet.getContactPoints(physicsClientId=self._client)
+        return [_contact(each, self._sides) for each in points if each[9] > 0.0]
 
     def fastened(self) -> dict[int, Any]:
         places = {body: place for place, body in enumerate(self._bodies)}

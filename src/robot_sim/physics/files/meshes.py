@@ -182,8 +182,8 @@ def read_look(path: str) -> MeshLook:
         DescriptionError: It can't be shown; one line with the file and what is wrong.
     """
     check_mesh(Path(path), (*SUFFIXES, *IMAGES))
-    found = Path(path).stat()
-    return _look(Path(path), found.st_mtime_ns, found.st_size)
+    status = Path(path).stat()
+    return _look(Path(path), status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(MOST_KEPT)

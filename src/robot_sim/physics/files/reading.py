@@ -175,24 +175,24 @@ class Reading:
         """
         if not model.collides_with_itself:
             return
-        found: dict[Mesh, Mesh] = {}
+        split: dict[Mesh, Mesh] = {}
         end = time.monotonic() + MAX_SPLITTING
         for link in model.links.values():
             for number, shape in enumerate(link.collisions):
                 if shape.solid is None or shape.solid.is_heightmap:
                     continue
                 self.check()
-                if shape.solid not in found:
-                    found[shape.solid] = shape.solid
+                if shape.solid not in split:
+                    split[shape.solid] = shape.solid
                     try:
                         if time.monotonic() > end:
                             raise DescriptionError(f"others took {MAX_SPLITTING:g} s")
-                        found[shape.solid] = in_pieces(shape.solid)
+                        split[shape.solid] = in_pieces(shape.solid)
                     except DescriptionError as error:
                         model.warnings.append(
                             f"mesh '{shape.mesh}' collides by its convex hull: {error}"
                         )
-                link.collisions[number] = replace(shape, solid=found[shape.solid])
+                link.collisions[number] = replace(shape, solid=split[shape.solid])
 
     def model(self) -> None:
         """Counts one more model."""

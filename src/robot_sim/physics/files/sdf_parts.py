@@ -90,8 +90,8 @@ def read_inertia(link: Element, where: str, static: bool) -> Inertia:
     where = f"{where}, inertial"
     inertial = link.find("inertial")
     mass = value(inertial, "mass", where, 1.0)
-    found = {key: value(inertial, f"inertia/{key}", where, d) for key, d in MOMENTS.items()}
-    tensor = mended(found)
+    moments = {key: value(inertial, f"inertia/{key}", where, d) for key, d in MOMENTS.items()}
+    tensor = mended(moments)
     least = min(mass, tensor["ixx"], tensor["iyy"], tensor["izz"])
     if least < 0.0 or (mass == 0.0 and not static):
         raise DescriptionError(f"{where}: the mass must be above 0, and no moment below it")
@@ -143,11 +143,11 @@ def _material_colors() -> dict[str, Color]:
 
 def material_color(name: str, warnings: list[str]) -> Color | None:
     """Returns the colour of one of Gazebo's materials; None, and a warning, for another one."""
-    found = _material_colors().get(name)
+    color = _material_colors().get(name)
     warning = f"the colour of material '{shown(name)}' is not known"
-    if found is None and name and warning not in warnings:
+    if color is None and name and warning not in warnings:
         warnings.append(warning)
-    return found
+    return color
 
 
 @dataclass(frozen=True)
