@@ -11,7 +11,7 @@ import numpy as np
 
 from file_access.content import open_text
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.storage import CONFIG_RECORD, read_json, read_record
+from rl_workbench.storage import CONFIG_RECORD, read_json, read_record, reading
 from rl_workbench.training.scalar_log import RETURN
 from web_viewer.table import NAME as SCALARS
 
@@ -152,16 +152,12 @@ def curve_of(run: Run, tag: str) -> Curve:
     path = run.folder / SCALARS
     if not path.exists():
         return Curve(*np.empty((2, 0)))
-    try:
-        with open_text(path) as file:
-            points = [
-                (float(row["step"]), float(row["value"]))
-                for row in csv.DictReader(file)
-                # A running training may not have completed the last line yet.
-                if row["tag"] == tag and row["wall_time"]
-            ]
-    except OSError as error:
-        raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
-    except (KeyError, ValueError, TypeError, csv.Error) as error:
-        raise WorkbenchError(f"{path} isn't the table of a training: {error}") from error
+    wrong = (KeyError, ValueError, TypeError, csv.Error)
+    with reading(path, "isn't the table of a training: {}", wrong), open_text(path) as file:
+        points = [
+            (float(row["step"]), float(row["value"]))
+            for row in csv.DictReader(file)
+            # A running training may not have completed the last line yet.
+            if row["tag"] == tag and row["wall_time"]
+        ]
     return Curve(*np.array(points, dtype=float).reshape(-1, 2).T)
