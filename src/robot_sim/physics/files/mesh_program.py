@@ -6,6 +6,7 @@ parts, and the check that every face has finite corners.
 
 import hashlib
 import json
+import math
 import re
 import struct
 from collections.abc import Callable, Iterable
@@ -214,10 +215,13 @@ def _read_obj(data: bytes, only: str) -> list[Part]:
         words = line.split()
         kind = words[0] if words else ""
         if kind == "v":  # a weight or a colour may follow
-            vertices.append(numbers(" ".join(words[1:4]), f"line {number}: a vertex", 3))
+            vertices.append(_obj_vertex(words[1:4], number))
         elif kind == "f":
             corners = _obj_corners(words[1:], len(vertices), number)
-            parts[-1][1].append(corners)
+            fan = pairwise(corners[1:])
+            parts[-1][1].extend(
+                [[corners[0], b, c] for b, c in fan] if len(corners) > 3 else [corners]
+            )
             if max(corners) > highest:
                 highest, place = max(corners), number
         elif kind in ("o", "g") and words != header:
@@ -230,28 +234,35 @@ def _read_obj(data: bytes, only: str) -> list[Part]:
     if only and not chosen:
         raise _not_found(only, [name for name, faces in parts if faces])
     points = np.array(vertices).reshape(-1, 3)
-    return [
-        (points, np.array([(a, b, c) for a, *rest in faces for b, c in pairwise(rest)]))
-        for faces in chosen
-    ]
+    return [(points, np.array(faces)) for faces in chosen]
+
+
+def _obj_vertex(words: list[str], number: int) -> tuple[float, ...]:
+    """Returns a vertex of line `number`; the slower `numbers` says what is wrong with one."""
+    try:
+        x, y, z = map(float, words)
+    except ValueError:
+        x = y = z = math.nan
+    if math.isfinite(x + y + z):
+        return x, y, z
+    return numbers(" ".join(words), f"line {number}: a vertex", 3)
 
 
 def _obj_corners(words: list[str], count: int, number: int) -> list[int]:
     """Returns the vertices of a face in line `number`, before which there are `count` vertices."""
-    corners = []
-    for word in words:
-        try:
-            index = int(word.partition("/")[0])
-        except ValueError as error:
-            raise DescriptionError(
-                f"line {number}: '{shown(word)}' is not a corner of a face"
-            ) from error
+    indices: list[int] = []
+    try:
+        for word in words:
+            indices.append(int(word.partition("/")[0]))
+    except ValueError as error:
+        what = shown(words[len(indices)])
+        raise DescriptionError(f"line {number}: '{what}' is not a corner of a face") from error
+    for index in indices:
         if index == 0 or index < -count:
             raise DescriptionError(f"line {number}: a face names vertex {index} of {count}")
-        corners.append(index - 1 if index > 0 else count + index)
-    if len(corners) < 3:
-        raise DescriptionError(f"line {number}: a face has {len(corners)} corners")
-    return corners
+    if len(indices) < 3:
+        raise DescriptionError(f"line {number}: a face has {len(indices)} corners")
+    return [index - 1 if index > 0 else count + index for index in indices]
 
 
 def _read_collada(data: bytes, only: str) -> list[Part]:
