@@ -36,9 +36,9 @@ class Moved(MetaPathFinder, Loader):
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         """Returns the module itself, so that its classes are the same by both names."""
-        found = importlib.import_module(str(spec.origin))
-        self._own = found.__spec__
-        return found
+        module = importlib.import_module(str(spec.origin))
+        self._own = module.__spec__
+        return module
 
     def exec_module(self, module: ModuleType) -> None:
         """Puts back the spec that the import by the old name has replaced."""

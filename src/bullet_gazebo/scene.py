@@ -81,14 +81,14 @@ class SceneServer:
             models = list(world.models.values())
             lights = [copy(light) for light in world.lights.values()]
             sensors = list(self._sensors)
-        found = []
+        described = []
         for model in models:
             number = self._number(model.number)
             if number in known:
-                found.append(SceneModel(number=number, name=model.name, known=True))
+                described.append(SceneModel(number=number, name=model.name, known=True))
             else:
-                found.append(to_model(model, number, request.collisions))
-        return GetSceneResponse(version, found, [to_light(light) for light in lights], sensors)
+                described.append(to_model(model, number, request.collisions))
+        return GetSceneResponse(version, described, [to_light(light) for light in lights], sensors)
 
     def _advertise(self, name: str, kind: type) -> tuple[rospy.Publisher, SubscriberCount]:
         count = SubscriberCount(self._news.set)

@@ -26,12 +26,12 @@ def recommend_ws() -> None:
     if workspace := os.environ.get("CARTPOLE_WS"):  # its path
         folders = filter(None, os.environ.get("CARTPOLE_WITH", "").split(":"))
         # Each where it really is: ws may name a link.
-        found = [word for each in folders for word in ("--with", os.path.realpath(each))]
+        options = [word for each in folders for word in ("--with", os.path.realpath(each))]
         errors.hints = errors.Hints(
             shlex.join([workspace, "extras"]),
             f"{shlex.quote(workspace)} --with FOLDER ... finds those in FOLDER",
             [workspace, "tensorboard"],
-            [workspace, *found, "rosrun", "cartpole", "workbench.py"],
+            [workspace, *options, "rosrun", "cartpole", "workbench.py"],
         )
 
 

@@ -89,13 +89,13 @@ def answer(data: bytes) -> bytes:
         return xacro_parse(given, name)
 
     xacro_parse, xacro.parse = xacro.parse, parse
-    with _heard() as told, _in_one_line(xacro, path):
+    with _heard() as warnings, _in_one_line(xacro, path):
         document = xacro.process_file(path, mappings=request["mappings"])
         if request["wanted"] == "files":
             text = "\n".join(sorted(set(xacro.all_includes)))
         else:
             text = document.toprettyxml(indent="  ")
-    return json.dumps({"text": text, "warnings": told}).encode()
+    return json.dumps({"text": text, "warnings": warnings}).encode()
 
 
 def main() -> int:
@@ -126,9 +126,9 @@ def _run_program() -> NoReturn:
     if options.root_dir:
         xacro.root_dir = options.root_dir
     try:
-        with _heard() as told, _in_one_line(xacro, path):
+        with _heard() as warnings, _in_one_line(xacro, path):
             document = xacro.process_file(path, **vars(options))
-        for line, more in told.items():
+        for line, more in warnings.items():
             print(line, *more, sep="\n", file=sys.stderr)
         with _in_one_line(xacro, path):
             if options.just_deps:
@@ -151,17 +151,17 @@ def _heard() -> Iterator[dict[str, list[str]]]:
 
     Whatever else it writes to stderr is passed on.
     """
-    found: dict[str, list[str]] = {}
+    lines: dict[str, list[str]] = {}
     heard = io.StringIO()
     try:
         with redirect_stderr(heard):
-            yield found
+            yield lines
     finally:
         said, *warnings = re.split(r"^(?=warning: )", heard.getvalue(), flags=re.MULTILINE)
         sys.stderr.write(said)
         for each in warnings:
             line, *more = each.rstrip("\n").split("\n")
-            found.setdefault(line, more)
+            lines.setdefault(line, more)
 
 
 @contextmanager

@@ -113,10 +113,10 @@ def _count(value: Any, known: dict[int, int | None], depth: int) -> int:
     if depth > MAX_DEPTH:
         raise TooLarge(f"values are nested more than {MAX_DEPTH} deep (MAX_DEPTH)")
     if id(value) in known:
-        found = known[id(value)]
-        if found is None:
+        count = known[id(value)]
+        if count is None:
             raise FileError("a value contains itself")
-        return found
+        return count
     known[id(value)] = None
     total = 1 + sum(
         _count(each, known, depth + 1)

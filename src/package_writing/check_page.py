@@ -15,12 +15,7 @@ from package_writing.check_motion import observe
 from package_writing.trial import ENGINES
 from robot_envs import Robot, RobotEnvError, controllers
 from robot_sim.control.errors import ControlError
-from robot_sim.physics.description import (
-    ModelDescription,
-    Plugin,
-    is_control_plugin,
-    library_of,
-)
+from robot_sim.physics.description import ModelDescription, Plugin, is_control_plugin, library_of
 from robot_sim.physics.engines import installing
 from robot_sim.physics.files.elements import truth
 from robot_sim.physics.files.sdf_parts import MOMENTS
@@ -84,8 +79,8 @@ def examine(file: RobotFile, parameters: str | None) -> Findings:
         if importlib.util.find_spec(module) is None:
             page.notes.append(f"not tried with {name}: '{installing(module)}' installs it")
             continue
-        page.lines[name], found = observe(content, interfaces, engine)
-        for text in found:
+        page.lines[name], texts = observe(content, interfaces, engine)
+        for text in texts:
             faults[text].append(name)
     page.wrong += [f"{text} ({' and '.join(names)})" for text, names in faults.items()]
     return page

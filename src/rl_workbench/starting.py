@@ -46,8 +46,8 @@ def search_path() -> str:
     import sysconfig  # only after Ctrl-C is handled
 
     standard = sysconfig.get_path("stdlib")
-    found = sys.path.index(standard) if standard in sys.path else len(sys.path)
-    return os.pathsep.join(dict.fromkeys(map(os.path.abspath, sys.path[:found])))
+    end = sys.path.index(standard) if standard in sys.path else len(sys.path)
+    return os.pathsep.join(dict.fromkeys(map(os.path.abspath, sys.path[:end])))
 
 
 @contextlib.contextmanager

@@ -54,6 +54,6 @@ def bands(
     """Returns percentile bootstrap intervals over the first axis of (N, P), as two arrays (P,)."""
     count = len(scores)
     picked = np.random.default_rng(0).integers(count, size=(resamples, count))
-    found = statistic(scores.T[:, picked], axis=-1)
-    low, high = np.quantile(found, [(1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0], axis=-1)
+    results = statistic(scores.T[:, picked], axis=-1)
+    low, high = np.quantile(results, [(1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0], axis=-1)
     return low, high

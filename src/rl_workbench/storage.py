@@ -1,16 +1,23 @@
-"""Atomic writing of files, and reading of config.json."""
+"""Files of trainings: atomic writing, and reading with errors of one line."""
 
+import contextlib
 import io
 import json
 import os
+import pickle
 import secrets
-from collections.abc import Callable
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from file_access.content import open_text
 from rl_workbench.errors import WorkbenchError
 
+# What reading a damaged file of torch's may raise.
+DAMAGED = (RuntimeError, pickle.UnpicklingError, EOFError, ValueError, KeyError, TypeError,
+           AttributeError, IndexError, zipfile.BadZipFile, zlib.error)  # fmt: skip
 Writer = Callable[[BinaryIO], object]  # fills a file
 
 
@@ -43,6 +50,26 @@ def write_file(path: Path, write: Writer, shown: Path | None = None) -> None:
         raise WorkbenchError(f"can't write {shown}: {shown.parent} is not a folder") from error
     except OSError as error:
         raise WorkbenchError(f"can't write {shown}: {error.strerror or error}") from error
+
+
+@contextlib.contextmanager
+def reading(path: Path, fault: str, wrong: tuple[type[Exception], ...] = DAMAGED) -> Iterator[None]:
+    """Turns errors while a file is read into one line; `fault` is what `wrong` ones mean, with {} for why."""
+    try:
+        yield
+    except OSError as error:
+        raise WorkbenchError(f"can't read {path}: {error.strerror or error}") from error
+    except wrong as error:
+        why = " ".join(str(error).split())
+        raise WorkbenchError(f"{path} {fault.format(why)}") from error
+
+
+def check_archive(file: BinaryIO) -> None:
+    """Raises BadZipFile if a file of torch's is damaged: torch doesn't verify checksums."""
+    with zipfile.ZipFile(file) as archive:
+        if archive.testzip():
+            raise zipfile.BadZipFile
+    file.seek(0)
 
 
 def check_writable(path: Path) -> None:

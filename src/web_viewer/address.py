@@ -104,7 +104,7 @@ def find_address(host: str, port: int | None) -> Address:
     problem = ""
     for each in ports:
         try:
-            found = _bind(host, each)
+            free = _bind(host, each)
         except socket.gaierror as error:  # the same at any port, and each lookup may be slow
             problem = error.strerror or str(error)
             break
@@ -114,7 +114,7 @@ def find_address(host: str, port: int | None) -> Address:
         except (OSError, OverflowError) as error:
             problem = getattr(error, "strerror", None) or str(error)
             continue
-        return Address(host, found, "" if is_loopback(host) else secrets.token_urlsafe(TOKEN_BYTES))
+        return Address(host, free, "" if is_loopback(host) else secrets.token_urlsafe(TOKEN_BYTES))
     tried = f"port {port}" if port is not None else f"ports {ports[0]} to {ports[-1]}"
     raise PortInUse(
         f"the page can't be served on {host}, {tried}: {problem}; choose others with --host, --port"

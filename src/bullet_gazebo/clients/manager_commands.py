@@ -132,16 +132,16 @@ def _require_manager() -> None:
 
 def _read_groups() -> Groups:
     _require_master()
-    found = rospy.get_param(PARAMETER, None)
+    groups = rospy.get_param(PARAMETER, None)
     place = f"the parameter {rospy.resolve_name(PARAMETER)}"
-    if found is None:
+    if groups is None:
         raise CommandFailed(f"{place} isn't set")
-    if not isinstance(found, dict):
+    if not isinstance(groups, dict):
         raise CommandFailed(f"{place} must map names of groups to lists of controllers")
-    for group, names in found.items():
+    for group, names in groups.items():
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             raise CommandFailed(f"{place}: group '{group}' must be a list of names of controllers")
-    return {str(group): names for group, names in found.items()}
+    return {str(group): names for group, names in groups.items()}
 
 
 def _group(groups: Groups, name: str) -> list[str]:

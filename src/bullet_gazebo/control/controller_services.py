@@ -97,9 +97,9 @@ class ControllerServices:
         """Imports a user's own type, without holding the simulator's lock: it may take a while."""
         kind = params.get("type") if isinstance(params, dict) else None
         if isinstance(kind, str) and kind not in self._manager.types:
-            found = find_type(kind)
-            if found is not None:
-                self._manager.types[kind] = found
+            own = find_type(kind)
+            if own is not None:
+                self._manager.types[kind] = own
 
     def _open(self, controller: Controller) -> ControllerTopics:
         try:

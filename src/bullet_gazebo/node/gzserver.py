@@ -155,11 +155,11 @@ class GazeboNode:
         self.sim.relatch = _flag("~relatch_on_reset")
         self._watchdog = Watchdog(self.sim)
         recordings = _recordings(args)
-        found = read_world(args.world, interrupted)
-        fill_world(self.sim, found, interrupted)
+        world = read_world(args.world, interrupted)
+        fill_world(self.sim, world, interrupted)
         if args.paused:
             self.sim.pause()
-        self._advertise(_flag("~enable_ros_network"), args, found.plugins)
+        self._advertise(_flag("~enable_ros_network"), args, world.plugins)
         self._recorders = [SimulationRecorder(self.sim, options) for options in recordings]
 
     def _advertise(self, network: bool, args: argparse.Namespace, of_world: list[Plugin]) -> None:
@@ -243,13 +243,13 @@ Work = Callable[[GazeboNode], int]
 def _recordings(args: argparse.Namespace) -> list[RecordingOptions]:
     """Returns the recordings that the command line asks for."""
     width, height = args.video_size
-    found = [
+    recordings = [
         RecordingOptions(Path(name).absolute(), args.video_rate, width, height, args.video_model)
         for name in args.video
     ]
-    for options in found:
+    for options in recordings:
         options.check()
-    return found
+    return recordings
 
 
 def _flag(name: str) -> bool:

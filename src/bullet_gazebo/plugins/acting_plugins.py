@@ -182,8 +182,8 @@ class JointPoseTrajectoryPlugin(ContextPlugin):
         self._model.set_joint_positions(self._held)
         if self._kept is not None:
             link, pose = self._kept  # the whole model moves so that this link stays
-            found = self._model.link_state(link)[0]
-            self._model.place(pose.compose(self._model.state()[0].relative_to(found)))
+            place = self._model.link_state(link)[0]
+            self._model.place(pose.compose(self._model.state()[0].relative_to(place)))
         if not self._points and now >= self._end:
             self._stop()
 

@@ -49,19 +49,19 @@ class PlanarMovePlugin(DrivePlugin):
             self.sample(now)
 
     def sample(self, now: int) -> OdometrySample:
-        found = self.truth(now, POSE, TWIST)
-        found = found._replace(position=(*found.position[:2], 0.0))
-        seen, self._seen = self._seen, found
+        sample = self.truth(now, POSE, TWIST)
+        sample = sample._replace(position=(*sample.position[:2], 0.0))
+        seen, self._seen = self._seen, sample
         if seen is None or now <= seen.stamp:
-            return found
+            return sample
         seconds = (now - seen.stamp) / NANOSECONDS
-        (x, y, _), (u, v, _) = found.position, seen.position
-        yaw, before = (to_rpy(each.orientation)[2] for each in (found, seen))
+        (x, y, _), (u, v, _) = sample.position, seen.position
+        yaw, before = (to_rpy(each.orientation)[2] for each in (sample, seen))
         east, north = (x - u) / seconds, (y - v) / seconds
         cosine, sine = math.cos(yaw), math.sin(yaw)
         turn = math.remainder(yaw - before, 2.0 * math.pi) / seconds
         linear = (cosine * east + sine * north, cosine * north - sine * east, 0.0)
-        return found._replace(linear=linear, angular=(0.0, 0.0, turn))
+        return sample._replace(linear=linear, angular=(0.0, 0.0, turn))
 
     def moved(self) -> None:
         self._seen = None

@@ -38,21 +38,21 @@ TRUTHS = {"true": True, "1": True, "false": False, "0": False}
 def choice(context: PluginContext, tag: str, default: bool) -> bool:
     """Returns the truth value in the plugin's child element `tag`; of another word it warns."""
     text = context.text(tag, str(default))
-    found = TRUTHS.get(text.lower())
-    if found is None:
+    truth = TRUTHS.get(text.lower())
+    if truth is None:
         rospy.logwarn(
             "Plugin %s: <%s> is '%s', neither true nor false: %s is used",
             context.plugin.filename, tag, text, default,
         )  # fmt: skip
-    return default if found is None else found
+    return default if truth is None else truth
 
 
 def length(context: PluginContext, tag: str, default: float) -> float:
     """Returns the positive number in the plugin's child element `tag`."""
-    found = context.number(tag, default)
-    if found <= 0.0:
-        raise DescriptionError(f"<{tag}> must be above 0, not {found}")
-    return found
+    metres = context.number(tag, default)
+    if metres <= 0.0:
+        raise DescriptionError(f"<{tag}> must be above 0, not {metres}")
+    return metres
 
 
 class DrivePlugin(ContextPlugin):

@@ -84,16 +84,16 @@ class LinkAttacher:
 
     def _release(self, key: tuple[str, ...]) -> bool:
         """Ends what joins these links; the world forgets what a deletion or a reset ends."""
-        found = [each for each in self._sim.world.attachments if _ends(each) == key]
-        for attachment in found:
+        attachments = [each for each in self._sim.world.attachments if _ends(each) == key]
+        for attachment in attachments:
             self._sim.world.detach(attachment)
-        return bool(found)
+        return bool(attachments)
 
     def _link(self, model: str, link: str) -> tuple[Model, str] | None:
-        found = self._sim.world.models.get(model)
-        if found is None or link not in found.link_names or found.description.script is not None:
+        other = self._sim.world.models.get(model)
+        if other is None or link not in other.link_names or other.description.script is not None:
             return None  # an actor follows its script, and nothing else
-        return found, link
+        return other, link
 
 
 def _ends(attachment: Attachment) -> tuple[str, ...]:

@@ -292,7 +292,7 @@ class HectorSonarPlugin(HectorPlugin):
     def publish(self, now: int, seconds: float) -> None:
         laser, random = self._sensor.laser, self.random(now)
         exact = nearest(self._sensor.scan(random), laser, 0.0, random)
-        found = float(self._error.applied(np.full(3, exact), seconds, random)[0])
+        measured = float(self._error.applied(np.full(3, exact), seconds, random)[0])
         self._publisher.publish(
             Range(
                 header=Header(stamp=to_time(now), frame_id=self._frame),
@@ -300,7 +300,7 @@ class HectorSonarPlugin(HectorPlugin):
                 field_of_view=min(fan.high - fan.low for fan in (laser.horizontal, laser.vertical)),
                 min_range=laser.low,
                 max_range=laser.high,
-                range=min(max(found, laser.low), laser.high),
+                range=min(max(measured, laser.low), laser.high),
             )
         )
 
@@ -311,10 +311,10 @@ def _reader(context: PluginContext) -> Callable[[str, float], np.ndarray]:
     def read(tag: str, default: float) -> np.ndarray:
         words = context.text(tag, str(default)).split()
         count = 1 if len(words) == 1 else 3
-        found = numbers(" ".join(words), f"<{tag}>", count)
-        for number in found:
+        values = numbers(" ".join(words), f"<{tag}>", count)
+        for number in values:
             checked_deviation(abs(number), f"<{tag}>")
-        return np.broadcast_to(found, 3)
+        return np.broadcast_to(values, 3)
 
     return read
 

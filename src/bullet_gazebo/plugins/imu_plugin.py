@@ -19,15 +19,15 @@ from robot_sim.sensors.imu import ImuSensor, ModelImu
 def read_imu(message: ImuMsg) -> dict[str, np.ndarray]:
     """Returns what an IMU's message says; a number that isn't finite is a ValueError."""
     turn, spin, push = message.orientation, message.angular_velocity, message.linear_acceleration
-    found = {
+    measured = {
         "orientation": np.array([turn.x, turn.y, turn.z, turn.w]),
         "angular_velocity": np.array([spin.x, spin.y, spin.z]),
         "linear_acceleration": np.array([push.x, push.y, push.z]),
     }
-    for name, numbers in found.items():
+    for name, numbers in measured.items():
         if not np.isfinite(numbers).all():
             raise ValueError(f"{name} is {numbers.tolist()}")
-    return found
+    return measured
 
 
 class ImuPlugin(SensorPlugin):

@@ -155,9 +155,9 @@ class _Senses(Stateful):
     def _cliffs(self, now: int) -> None:
         # What meets nothing is deep.
         deep = [min(float(each.measure(now)[0].ranges.min()), 65.0) for each in self._down]
-        found = tuple(each > self._threshold for each in deep)
-        for side in self._changed("cliff", found):
-            event = CliffEvent(side, found[side], round(1e3 * max(deep[side], 0.0)))
+        over_cliff = tuple(each > self._threshold for each in deep)
+        for side in self._changed("cliff", over_cliff):
+            event = CliffEvent(side, over_cliff[side], round(1e3 * max(deep[side], 0.0)))
             self._events["cliff"].publish(event)
 
     def _bumps(self, now: int) -> None:
@@ -174,25 +174,25 @@ class _Senses(Stateful):
                 side = round(1.0 - math.degrees(math.atan2(-y, -x)) / 60.0)
                 if BUMPER[0] < height < BUMPER[1] and side in (0, 1, 2):
                     pressed.add(side)
-        found = tuple(side in pressed for side in range(3))
-        for side in self._changed("bumper", found):
-            self._events["bumper"].publish(BumperEvent(side, found[side]))
+        touched = tuple(side in pressed for side in range(3))
+        for side in self._changed("bumper", touched):
+            self._events["bumper"].publish(BumperEvent(side, touched[side]))
 
     def _drops(self, now: int) -> None:
         if self._wheels[0].is_stale(now):
             return
-        found = tuple(not each.measure(now) for each in self._wheels)
-        for side in self._changed("wheel_drop", found):
-            self._events["wheel_drop"].publish(WheelDropEvent(side, found[side]))
+        dropped = tuple(not each.measure(now) for each in self._wheels)
+        for side in self._changed("wheel_drop", dropped):
+            self._events["wheel_drop"].publish(WheelDropEvent(side, dropped[side]))
 
     def _core(self, now: int) -> SensorState:
         message = SensorState(
             header=Header(stamp=to_time(now)), time_stamp=now // 1_000_000 % 65536
         )
-        for name, found in self._state.items():
+        for name, states in self._state.items():
             # Of two wheels the right one has the lowest bit.
-            bits = BITS[-len(found) :]
-            setattr(message, name, sum(bit for bit, on in zip(bits, found, strict=True) if on))
+            bits = BITS[-len(states) :]
+            setattr(message, name, sum(bit for bit, on in zip(bits, states, strict=True) if on))
         return message
 
 

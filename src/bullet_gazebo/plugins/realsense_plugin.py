@@ -30,14 +30,14 @@ class RealsensePlugin(ContextPlugin):
     def __init__(self, context: PluginContext) -> None:
         prefix = context.text("prefix", "")
         sensors = {sensor.name: sensor for sensor in context.model.description.sensors}
-        found = [name for name in EYES if prefix + name in sensors]
-        if not found:
+        eyes = [name for name in EYES if prefix + name in sensors]
+        if not eyes:
             raise DescriptionError(
                 f"<prefix>: the model has no sensor '{prefix}{DEPTH}' or the like"
             )
         self._eyes = [
             (_Depths if name == DEPTH else _Eye)(context, name, sensors[prefix + name])
-            for name in found
+            for name in eyes
         ]
 
 

@@ -27,8 +27,8 @@ def namespace_of(context: PluginContext, absent: str, empty: str) -> str:
     `MODEL` is the model's name.
     """
     given = context.given_namespace
-    found = absent if given is None else given or empty
-    return context.model.name if found == MODEL else found
+    namespace = absent if given is None else given or empty
+    return context.model.name if namespace == MODEL else namespace
 
 
 def topic_in(namespace: str, name: str) -> str:

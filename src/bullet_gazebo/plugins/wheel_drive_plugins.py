@@ -100,8 +100,8 @@ class SkidSteerPlugin(DrivePlugin):
         self._drive()
 
     def sample(self, now: int) -> OdometrySample:
-        found = self.truth(now, self._covariance, self._covariance)
-        return found._replace(position=(*found.position[:2], 0.0))
+        sample = self.truth(now, self._covariance, self._covariance)
+        return sample._replace(position=(*sample.position[:2], 0.0))
 
 
 class TricyclePlugin(WheeledPlugin):

@@ -46,7 +46,7 @@ class JointServices:
 
     def _set_properties(self, request: srv.SetJointPropertiesRequest) -> str:
         with self._sim.lock:
-            found = existing(self._sim.world.joint(request.joint_name), NO_JOINT)
+            joint = existing(self._sim.world.joint(request.joint_name), NO_JOINT)
             ode = request.ode_joint_config
             check_message(ode, INFINITE)
             # Element i is for axis i, and no joint here has a second one. An empty list changes nothing.
@@ -58,7 +58,7 @@ class JointServices:
                 )
             )
             try:
-                set_joint_properties(*found, wanted, self._sim.world.time_step)
+                set_joint_properties(*joint, wanted, self._sim.world.time_step)
             except PropertyError as error:
                 raise ServiceRefused(str(error)) from error
         return "SetJointProperties: properties set"
@@ -102,26 +102,26 @@ class ForceServices:
 
     def _apply_effort(self, request: srv.ApplyJointEffortRequest) -> str:
         with self._sim.lock:
-            found = existing(self._sim.world.joint(request.joint_name), NO_JOINT)
+            joint = existing(self._sim.world.joint(request.joint_name), NO_JOINT)
             check_message(request)
             interval = self._interval(request.start_time, request.duration)
-            self._sim.applied.efforts.append(AppliedEffort(*found, request.effort, interval))
+            self._sim.applied.efforts.append(AppliedEffort(*joint, request.effort, interval))
         return "ApplyJointEffort: effort set"
 
     def _apply_wrench(self, request: srv.ApplyBodyWrenchRequest) -> str:
         with self._sim.lock:
             world = self._sim.world
-            found = existing(world.link(request.body_name), "body does not exist")
+            link = existing(world.link(request.body_name), "body does not exist")
             frame = existing(world.frame(request.reference_frame), "reference_frame not found")
             check_message(request)
             wrench = in_world(
                 (to_vector(request.wrench.force), to_vector(request.wrench.torque)),
                 to_vector(request.reference_point),
-                found[0].link_state(found[1])[0],
+                link[0].link_state(link[1])[0],
                 None if world.is_world_frame(request.reference_frame) else frame[0],
             )
             interval = self._interval(request.start_time, request.duration)
-            self._sim.applied.wrenches.append(AppliedWrench(*found, wrench, interval))
+            self._sim.applied.wrenches.append(AppliedWrench(*link, wrench, interval))
         return ""
 
     def _interval(self, start: genpy.Time, duration: genpy.Duration) -> ActingTime:

@@ -138,8 +138,8 @@ class LinkServices:
         self, request: srv.GetLinkPropertiesRequest
     ) -> srv.GetLinkPropertiesResponse:
         with self._sim.lock:
-            found = existing(self._sim.world.link(request.link_name), NO_LINK)
-            inertia, gravity = link_inertia(*found), found[0].description.links[found[1]].gravity
+            link = existing(self._sim.world.link(request.link_name), NO_LINK)
+            inertia, gravity = link_inertia(*link), link[0].description.links[link[1]].gravity
         return srv.GetLinkPropertiesResponse(
             com=to_pose_msg(Pose(inertia.com.position)),  # never its orientation
             gravity_mode=gravity,
@@ -151,9 +151,9 @@ class LinkServices:
 
     def _set_properties(self, request: srv.SetLinkPropertiesRequest) -> str:
         with self._sim.lock:
-            found = existing(self._sim.world.link(request.link_name), NO_LINK)
+            link = existing(self._sim.world.link(request.link_name), NO_LINK)
             check_message(request)
-            old = link_inertia(*found)
+            old = link_inertia(*link)
             inertia = replace(
                 old,
                 mass=request.mass,
@@ -161,7 +161,7 @@ class LinkServices:
                 **{key: getattr(request, key) for key in TENSOR},
             )
             try:
-                set_link_properties(self._sim.world, *found, inertia, request.gravity_mode)
+                set_link_properties(self._sim.world, *link, inertia, request.gravity_mode)
             except (PropertyError, DescriptionError) as error:
                 raise ServiceRefused(str(error)) from error
         return "SetLinkProperties: properties set"
@@ -169,10 +169,10 @@ class LinkServices:
     def _get_state(self, request: srv.GetLinkStateRequest) -> srv.GetLinkStateResponse:
         with self._sim.lock:
             world = self._sim.world
-            found = existing(world.link(request.link_name), NO_LINK)
+            link = existing(world.link(request.link_name), NO_LINK)
             fault = f"reference reference_frame not found, {SCOPE}"
             frame = existing(world.frame(request.reference_frame), fault)
-            pose, twist = seen_from(found[0].link_state(found[1]), frame)
+            pose, twist = seen_from(link[0].link_state(link[1]), frame)
         state = LinkState(
             request.link_name, to_pose_msg(pose), to_twist_msg(twist), request.reference_frame
         )
@@ -185,18 +185,18 @@ class LinkServices:
     def _set_state(self, request: srv.SetLinkStateRequest) -> str:
         wanted = request.link_state
         with self._sim.lock:
-            found = existing(self._sim.world.link(wanted.link_name), "link does not exist")
+            link = existing(self._sim.world.link(wanted.link_name), "link does not exist")
             frame = existing(self._frame(wanted.reference_frame), "failed")
             check_message(wanted)
             linear, angular = from_twist_msg(wanted.twist)
             # Gazebo subtracts the frame's velocity, and doesn't turn the request's.
             twist = (subtract(linear, frame[1][0]), subtract(angular, frame[1][1]))
-            self._sim.place_link(*found, frame[0].compose(from_pose_msg(wanted.pose)), twist)
+            self._sim.place_link(*link, frame[0].compose(from_pose_msg(wanted.pose)), twist)
         return "SetLinkState: success"
 
     def _frame(self, name: str) -> tuple[Pose, Twist] | None:
         """Returns the state of a link or the world; a model is not a frame here."""
-        found = self._sim.world.link(name)
-        if found is not None:
-            return found[0].link_state(found[1])
+        link = self._sim.world.link(name)
+        if link is not None:
+            return link[0].link_state(link[1])
         return (Pose(), AT_REST) if name in WORLD_FRAMES else None

@@ -84,8 +84,8 @@ class SpawnServices:
         text = without_comments(request.model_xml)
         root = ROOT_TAG.search(text)
         if root is None or root.group(1) != "robot":
-            found = f"<{shown(root.group(1))}>" if root else "no XML"
-            raise _refused(f"entity format is invalid: {found} instead of a URDF's <robot>.")
+            what = f"<{shown(root.group(1))}>" if root else "no XML"
+            raise _refused(f"entity format is invalid: {what} instead of a URDF's <robot>.")
         return self._spawn(request, _with_package_paths(text))
 
     def _spawn(self, request: srv.SpawnModelRequest, text: str) -> srv.SpawnModelResponse:

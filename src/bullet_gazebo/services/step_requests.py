@@ -86,14 +86,14 @@ class Addresses:
 
     def commanded(self, controllers: Sequence[str], joints: Sequence[str]) -> Commanded:
         """Finds running controllers, /namespace/name or plain, and free joints, model::joint or plain."""
-        found: dict[int, Controller] = {}  # by identity: a user's class may not be hashable
+        receivers: dict[int, Controller] = {}  # by identity: a user's class may not be hashable
         ports: list[tuple[Input, int | slice]] = []
         size = 0
         for name in controllers:
             controller = self._running_controller(name)
-            if id(controller) in found:
+            if id(controller) in receivers:
                 raise ControlError(f"controllers names one twice: '{name}'")
-            found[id(controller)] = controller
+            receivers[id(controller)] = controller
             port, kind = _command_port(controller)
             count = kind.count(len(controller.claimed))
             ports.append((port, size if kind.single else slice(size, size + count)))
@@ -103,17 +103,17 @@ class Addresses:
         if len({id(joint) for joint in handles}) < len(handles):
             raise ControlError(f"commanded_joints names one twice: {list(joints)}")
         rivals = {id(each): each for pair in pairs for each in _rivals(*pair)}
-        return Commanded(list(found.values()), ports, size, handles, list(rivals.values()))
+        return Commanded(list(receivers.values()), ports, size, handles, list(rivals.values()))
 
     def movable_joints(self, names: Sequence[str]) -> list[tuple[Model, str]]:
         """Returns the model and plain name of each joint, given plain or scoped names."""
         joints: dict[tuple[Model, str], None] = {}
         for name in names:
             several = f"several models have a joint '{name}'; write model::{name}"
-            found = _only(self._movable, name, f"there is no movable joint '{name}'", several)
-            if found in joints:
-                raise ControlError(f"joints names '{found[0].name}::{found[1]}' twice")
-            joints[found] = None
+            joint = _only(self._movable, name, f"there is no movable joint '{name}'", several)
+            if joint in joints:
+                raise ControlError(f"joints names '{joint[0].name}::{joint[1]}' twice")
+            joints[joint] = None
         return list(joints)
 
     @cached_property
@@ -169,22 +169,22 @@ class Addresses:
 
 def _by_name(entries: Iterable[tuple[str, str, Found]]) -> dict[str, list[Found]]:
     """Maps the plain and the full name of each entry to all entries of that name."""
-    found: dict[str, list[Found]] = {}
+    by_name: dict[str, list[Found]] = {}
     for plain, full, entry in entries:
         for name in {plain, full}:
-            found.setdefault(name, []).append(entry)
-    return found
+            by_name.setdefault(name, []).append(entry)
+    return by_name
 
 
 def _only(
     known: dict[str, list[Found]], name: str, missing: str, several: str, advice: str = ""
 ) -> Found:
-    found = known.get(name, [])
-    if not found:
+    entries = known.get(name, [])
+    if not entries:
         raise ControlError(f"{missing}{did_you_mean(name, known)}{advice}")
-    if len(found) > 1:
+    if len(entries) > 1:
         raise ControlError(several)
-    return found[0]
+    return entries[0]
 
 
 def _command_port(controller: Controller) -> tuple[Input, CommandKind]:
@@ -271,14 +271,10 @@ def _placed_joints(addresses: Addresses, request: StepWorldRequest) -> dict[Mode
 def _check_ticks(request: StepWorldRequest, asks: bool) -> None:
     begins = request.reset != StepWorldRequest.NONE or bool(request.joints or request.models)
     if not (0 if begins or asks else 1) <= request.ticks <= MAX_TICKS:
-        raise ControlError(
-            f"ticks is {request.ticks}: 1 to {MAX_TICKS} can be done in one call"
-            + (
-                ", or 0 with a reset, joints or models to place, or states to report"
-                if request.ticks == 0
-                else ""
-            )
-        )
+        text = f"ticks is {request.ticks}: 1 to {MAX_TICKS} can be done in one call"
+        if request.ticks == 0:
+            text += ", or 0 with a reset, joints or models to place, or states to report"
+        raise ControlError(text)
     if request.reset > StepWorldRequest.SIMULATION:
         raise ControlError(f"reset is {request.reset}: 0 (none), 1 (world) or 2 (simulation)")
     if request.seed and request.reset == StepWorldRequest.NONE:

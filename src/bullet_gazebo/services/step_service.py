@@ -214,11 +214,8 @@ class StepService:
 
     def _check_layout(self, prepared: _Prepared) -> None:
         """Raises UnknownName if the numbers would belong to other names now."""
-        models = list(prepared.reader.read(stepped=False).models)
-        if (prepared.addresses.joint_names, prepared.models) != (
-            self._addresses().joint_names,
-            models,
-        ):
+        now = self._addresses().joint_names, list(prepared.reader.read(stepped=False).models)
+        if (prepared.addresses.joint_names, prepared.models) != now:
             raise UnknownName("robots or models have come or gone")
 
     def _refused(self, fault: str) -> srv.PreparedStepResponse:
@@ -326,9 +323,9 @@ class StepService:
 
     def _set_friction(self, request: srv.SetLinkFrictionRequest) -> str:
         with self._sim.lock:
-            found = existing(self._sim.world.link(request.link_name), NO_LINK)
+            link = existing(self._sim.world.link(request.link_name), NO_LINK)
             try:
-                set_link_friction(*found, request.factor)
+                set_link_friction(*link, request.factor)
             except PropertyError as error:
                 raise ServiceRefused(str(error)) from error
         return "SetLinkFriction: friction set"

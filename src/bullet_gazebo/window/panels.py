@@ -89,8 +89,8 @@ class TimePanel:
 
     def show_speed(self) -> None:
         """Shows the speed in force, which another client may have set."""
-        found = self._commands.physics()
-        factor = found.max_update_rate * found.time_step
+        physics = self._commands.physics()
+        factor = physics.max_update_rate * physics.time_step
         names = [name for name, each in SPEEDS.items() if abs(each - factor) < 1e-6]
         name = names[0] if names else OTHER
         if self._speed.value != name:
@@ -201,8 +201,8 @@ class Controllers:
 
 def _taken(kind: str) -> str:
     """Returns what a controller of another kind takes."""
-    found = [each for each in ("effort", "velocity") if each in kind.lower()]
-    return {"effort": "efforts", "velocity": "velocities"}[found[0]] if found else "no positions"
+    kinds = [each for each in ("effort", "velocity") if each in kind.lower()]
+    return {"effort": "efforts", "velocity": "velocities"}[kinds[0]] if kinds else "no positions"
 
 
 def _claimed(controller: ControllerState) -> list[str]:

@@ -81,9 +81,9 @@ class RemoteScene:
         """Returns the newest messages, each once; None for one that doesn't come in `timeout` [s]."""
         with self._news:
             self._news.wait_for(lambda: self._poses is not None, timeout)
-            found = self._poses, self._contacts
+            newest = self._poses, self._contacts
             self._poses = self._contacts = None
-        return found
+        return newest
 
     @property
     def is_heard(self) -> bool:

@@ -87,12 +87,12 @@ def draw_cloud(message: PointCloud2) -> Drawing:
             "offsets": [places[name] for name in names], "itemsize": message.point_step,
         }
     )  # fmt: skip
-    found = np.frombuffer(message.data, layout)
-    points = np.stack([found[name] for name in "xyz"], axis=1)
+    columns = np.frombuffer(message.data, layout)
+    points = np.stack([columns[name] for name in "xyz"], axis=1)
     if "rgb" not in names:
         return _thinned(points, None)
     shifts = np.array([16, 8, 0], np.uint32)
-    return _thinned(points, (found["rgb"][:, None] >> shifts & 255).astype(np.uint8))
+    return _thinned(points, (columns["rgb"][:, None] >> shifts & 255).astype(np.uint8))
 
 
 def draw_jpeg(message: CompressedImage) -> Drawing:
@@ -137,8 +137,8 @@ DRAWN: dict[str, tuple[type, Callable[[Any], Drawing]]] = {
 
 def drawn_as(kind: str) -> tuple[type, Callable[[Any], Drawing]] | None:
     """Returns a message's type by its name, and what draws it; None if the type isn't known here."""
-    found = None if kind in DRAWN else roslib.message.get_message_class(kind)
-    return DRAWN.get(kind, found and (found, draw_text))
+    other = None if kind in DRAWN else roslib.message.get_message_class(kind)
+    return DRAWN.get(kind, other and (other, draw_text))
 
 
 class SensorPanel:

@@ -18,6 +18,7 @@ from rl_workbench.agents.policy_gradient import (
     TwoNetworks,
     check_finite,
     descend,
+    discounted_sums,
     start_at_zero,
 )
 from rl_workbench.agents.settings import DocumentSettings
@@ -45,16 +46,6 @@ class ValueNetwork(nn.Module):
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         return self.fc2(self.relu(self.fc1(observations)))
-
-
-def discounted_returns(rewards: list[float], gamma: float) -> np.ndarray:
-    """Computes each step's return (T,), float64, backwards from the last: G_t = r_t + gamma G_t+1."""
-    returns = np.empty(len(rewards))
-    future = 0.0
-    for index in range(len(rewards) - 1, -1, -1):
-        future = rewards[index] + gamma * future
-        returns[index] = future
-    return returns
 
 
 class PolicyGradientAgent(TwoNetworks):
@@ -113,9 +104,8 @@ class PolicyGradientAgent(TwoNetworks):
         """
         observations = torch.from_numpy(np.stack(episode.observations))  # (T, 4)
         actions = torch.tensor(episode.actions)  # (T,)
-        returns = torch.from_numpy(
-            discounted_returns(episode.rewards, self.settings.gamma)
-        )  # (T,) float64
+        # (T,), float64
+        returns = torch.from_numpy(discounted_sums(episode.rewards, self.settings.gamma))
         values = self.value(observations).squeeze(1)  # (T,)
         advantages = (returns - values.detach().double()).float()
         value_loss = nn.functional.mse_loss(values, returns.float())

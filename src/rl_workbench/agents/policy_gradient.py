@@ -2,7 +2,9 @@
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -68,6 +70,12 @@ def as_tensor(actions: list[Any]) -> torch.Tensor:
     if actions and isinstance(actions[0], np.ndarray):
         return torch.from_numpy(np.stack(actions))
     return torch.tensor(actions)
+
+
+def discounted_sums(terms: Sequence[float], factor: float) -> np.ndarray:
+    """Computes S_t = x_t + factor S_t+1 for all terms x_t, (T,), float64: returns, if they are rewards."""
+    backwards = accumulate(reversed(terms), lambda following, term: term + factor * following)
+    return np.array([*backwards][::-1])
 
 
 class Losses(NamedTuple):

@@ -23,6 +23,7 @@ from rl_workbench.agents.policy_gradient import (
     as_tensor,
     check_finite,
     descend,
+    discounted_sums,
     start_at_zero,
 )
 from rl_workbench.agents.policy_networks import (
@@ -184,11 +185,11 @@ class ReinforceAgent(TwoNetworks):
         advantages, targets = [], []
         for episode in batch:
             values = self._values(episode)
-            found = generalised_advantages(
+            gains = generalised_advantages(
                 episode.rewards, values, self.settings.gamma, self.settings.gae_lambda
             )
-            advantages.append(found)
-            targets.append(found + values[:-1])
+            advantages.append(gains)
+            targets.append(gains + values[:-1])
         return tuple(  # type: ignore[return-value]
             torch.from_numpy(np.concatenate(each).astype(np.float32))
             for each in (advantages, targets)
@@ -231,10 +232,5 @@ def generalised_advantages(
 
     Returns (T,), float64, for rewards (T,) and the values of T states and the final one, (T + 1,).
     """
-    advantages = np.empty(len(rewards))
-    following = 0.0
-    for index in range(len(rewards) - 1, -1, -1):
-        difference = rewards[index] + gamma * values[index + 1] - values[index]
-        following = difference + gamma * gae_lambda * following
-        advantages[index] = following
-    return advantages
+    differences = np.asarray(rewards) + gamma * values[1:] - values[:-1]
+    return discounted_sums(differences.tolist(), gamma * gae_lambda)

@@ -39,15 +39,15 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         result = play(policy, arguments.episodes, arguments.seed)
     line = threshold(run.env_id)
     checkpoint = str(policy.checkpoint or RANDOM)
-    found = {"run": str(run.folder), "checkpoint": checkpoint, **statistics(result, line)}
+    figures = {"run": str(run.folder), "checkpoint": checkpoint, **statistics(result, line)}
     # With JSON on standard output, the text goes to standard error.
     stream = sys.stderr if to_stdout else sys.stdout
     tell(episode_lines(result), stream)
-    tell(_summary(found, line), stream)
+    tell(_summary(figures, line), stream)
     if to_stdout:
-        tell(json.dumps(found, indent=1))
+        tell(json.dumps(figures, indent=1))
     elif arguments.json:
-        write_file(arguments.json, as_json(found))
+        write_file(arguments.json, as_json(figures))
 
 
 def statistics(result: "Evaluation", threshold: float | None) -> dict[str, Any]:

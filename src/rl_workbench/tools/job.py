@@ -238,5 +238,5 @@ def steps_of(folder: Path) -> tuple[int, int]:
 def outcome(summary: dict[str, Any]) -> str:
     """Returns a training's result in half a line."""
     best = summary.get("best")
-    found = f"best evaluation {best[1]:.1f} at step {best[0]}" if best else "no evaluation"
-    return f"in {summary['seconds']:.1f} s, {found}"
+    text = f"best evaluation {best[1]:.1f} at step {best[0]}" if best else "no evaluation"
+    return f"in {summary['seconds']:.1f} s, {text}"

@@ -66,10 +66,10 @@ def job_pool(
 
 def claim(folder: Path, name: str, wanted: Any, refusal: str) -> None:
     """Writes the settings of a folder's runs to a file, or refuses those that differ from the file's."""
-    found = read_json(folder / name)
-    if found is None:
+    claimed = read_json(folder / name)
+    if claimed is None:
         write_file(folder / name, as_json(wanted))
-    elif found != json.loads(json.dumps(wanted)):
+    elif claimed != json.loads(json.dumps(wanted)):
         raise WorkbenchError(f"{folder} holds {refusal}; name another folder with --out")
 
 
@@ -220,9 +220,9 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """Lists the jobs of a benchmark or a sweep; only reads files."""
-    found = read_jobs(arguments.folder)
-    width = max((len(each.name) for each in found), default=0)
-    for each in found:
+    jobs = read_jobs(arguments.folder)
+    width = max((len(each.name) for each in jobs), default=0)
+    for each in jobs:
         steps = f"{each.step} of {each.steps}" if each.steps else str(each.step)
         parts = [f"{each.state:8}", f"{each.name:{width}}", f"{steps:>15} steps"]
         if each.state == RUNNING:
@@ -230,8 +230,8 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         if each.attempts > 1:
             parts.append(f"attempt {each.attempts}")
         tell("  ".join([*parts, each.line]).rstrip())
-    counts = Counter(each.state for each in found)
-    tell(f"{len(found)} jobs: {', '.join(f'{count} {state}' for state, count in counts.items())}")
+    counts = Counter(each.state for each in jobs)
+    tell(f"{len(jobs)} jobs: {', '.join(f'{count} {state}' for state, count in counts.items())}")
 
 
 def read_jobs(folder: Path) -> list[JobStatus]:

@@ -50,19 +50,19 @@ def run_panels(runs: Sequence[Run], over: str) -> "list[Panel]":
     count = Counter((run.env_id, short[run.folder]) for run in runs)
 
     def name(run: Run) -> str:
-        found = short[run.folder]
-        return found if count[run.env_id, found] == 1 else f"{found} ({run.name})"
+        label = short[run.folder]
+        return label if count[run.env_id, label] == 1 else f"{label} ({run.name})"
 
     def curve(run: Run) -> "SeedCurve":
-        found = training_curve(run)
-        episodes = np.arange(1.0, len(found.values) + 1.0)
-        return SeedCurve(found.steps if over == "steps" else episodes, found.values)
+        rewards = training_curve(run)
+        episodes = np.arange(1.0, len(rewards.values) + 1.0)
+        return SeedCurve(rewards.steps if over == "steps" else episodes, rewards.values)
 
     def success(run: Run) -> "SeedCurve | None":
-        found = curve_of(run, SUCCESS)
-        episodes = np.searchsorted(training_curve(run).steps, found.steps, side="right")
-        steps = found.steps if over == "steps" else episodes.astype(float)
-        return SeedCurve(steps, found.values) if len(found.values) else None
+        rates = curve_of(run, SUCCESS)
+        episodes = np.searchsorted(training_curve(run).steps, rates.steps, side="right")
+        steps = rates.steps if over == "steps" else episodes.astype(float)
+        return SeedCurve(steps, rates.values) if len(rates.values) else None
 
     return [*_panels(runs, name, curve), *_success_panels(runs, name, success)]
 
@@ -110,10 +110,10 @@ def _panels(
     from rl_workbench.env_ids import threshold
     from rl_workbench.plotting import Panel
 
-    found: dict[tuple[str, str], dict[str, list[SeedCurve]]] = {}
+    panels: dict[tuple[str, str], dict[str, list[SeedCurve]]] = {}
     for run in runs:
         name, curve = name_of(run), curve_of(run)
         if curve is not None:
-            panel = found.setdefault((run.env_id, name if apart else ""), {})
+            panel = panels.setdefault((run.env_id, name if apart else ""), {})
             panel.setdefault(name, []).append(curve)
-    return [Panel(env_id, groups, threshold(env_id)) for (env_id, _), groups in found.items()]
+    return [Panel(env_id, groups, threshold(env_id)) for (env_id, _), groups in panels.items()]

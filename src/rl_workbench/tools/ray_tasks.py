@@ -64,9 +64,9 @@ def train(
         raise NodeUnusable(
             f"{node} doesn't see {folder}: --out must be a folder that all nodes share"
         )
-    found = library_versions()
-    wrong = [name for name, its in wanted.items() if found.get(name) != its]
-    others = [f"{name} {found.get(name)}, not {wanted[name]}" for name in wrong]
+    versions = library_versions()
+    wrong = [name for name, its in wanted.items() if versions.get(name) != its]
+    others = [f"{name} {versions.get(name)}, not {wanted[name]}" for name in wrong]
     if others:
         raise NodeUnusable(f"{node} would not be bit-identical: it has {', '.join(others)}")
     if is_hopeless(job, since):

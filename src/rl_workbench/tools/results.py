@@ -134,8 +134,8 @@ def rows(results: Sequence[RunResult], columns: Mapping[str, str]) -> list[dict[
 
 def figures(results: Sequence[RunResult]) -> dict[str, Any]:
     """Returns a group's statistics and runs as plain values, for JSON."""
-    found = statistics_of(results)
-    return {"statistics": found and found._asdict(), "runs": rows(results, COMPARE)}
+    summary = statistics_of(results)
+    return {"statistics": summary and summary._asdict(), "runs": rows(results, COMPARE)}
 
 
 def table(results: Sequence[RunResult], columns: Mapping[str, str]) -> str:
@@ -178,10 +178,10 @@ def _of(title: str, field: str, show: Callable[[Statistics], str]) -> Column:
     """Makes a column of a field's statistic; its cells name the number of seeds if some lack the field."""
 
     def cell(results: Sequence[RunResult]) -> str:
-        found = statistics_of(results, field)
-        if found is None:
+        stats = statistics_of(results, field)
+        if stats is None:
             return "-"
-        return show(found) + (f" ({found.n} of {len(results)})" if found.n < len(results) else "")
+        return show(stats) + (f" ({stats.n} of {len(results)})" if stats.n < len(results) else "")
 
     return title, field, cell
 
@@ -196,8 +196,8 @@ def _steps_to_solve(title: str, reduce: Callable[[list[float]], Any]) -> Column:
     """Makes a column of the steps to solve; a seed that never solved it counts as infinite."""
 
     def cell(results: Sequence[RunResult]) -> str:
-        found = reduce([each.solved_step or math.inf for each in results])
-        return "never" if found == math.inf else f"{found:.0f}"
+        step = reduce([each.solved_step or math.inf for each in results])
+        return "never" if step == math.inf else f"{step:.0f}"
 
     return title, "group", cell
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from file_access.content import open_text
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.storage import CONFIG_RECORD, read_json, read_record
+from rl_workbench.storage import CONFIG_RECORD, read_json, read_record, reading
 from rl_workbench.training.scalar_log import RETURN
 from web_viewer.table import NAME as SCALARS
 
@@ -113,13 +113,13 @@ def find_runs(patterns: Sequence[str], warn: Callable[[str], None]) -> list[Run]
 
     Matches that aren't runs are skipped; `warn` receives a line for each whose record is damaged.
     """
-    found: dict[Path, Run] = {}
+    unique: dict[Path, Run] = {}
     for pattern in patterns:
         runs = _matching(pattern, warn)
         if not runs:
             raise WorkbenchError(f"there is no run folder at {pattern}")
-        found.update((run.folder, run) for run in runs)
-    return list(found.values())
+        unique.update((run.folder, run) for run in runs)
+    return list(unique.values())
 
 
 def _matching(pattern: str, warn: Callable[[str], None]) -> list[Run]:
@@ -129,14 +129,14 @@ def _matching(pattern: str, warn: Callable[[str], None]) -> list[Run]:
     inside = list(map(Path, glob.glob(pattern)))
     if path.is_dir():  # a benchmark's has a folder for each variant
         inside = list(path.glob("*/*" if (path / SUITE_RECORD).is_file() else "*"))
-    found = []
+    matching = []
     for folder in sorted(inside):
         if is_run(folder):
             try:
-                found.append(open_run(folder))
+                matching.append(open_run(folder))
             except WorkbenchError as error:  # one damaged run mustn't stop the others
                 warn(f"{error}; skipped")
-    return found
+    return matching
 
 
 def training_curve(run: Run) -> Curve:
@@ -152,16 +152,12 @@ def curve_of(run: Run, tag: str) -> Curve:
     path = run.folder / SCALARS
     if not path.exists():
         return Curve(*np.empty((2, 0)))
-    try:
-        with open_text(path) as file:
-            points = [
-                (float(row["step"]), float(row["value"]))
-                for row in csv.DictReader(file)
-                # A running training may not have completed the last line yet.
-                if row["tag"] == tag and row["wall_time"]
-            ]
-    except OSError as error:
-        raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
-    except (KeyError, ValueError, TypeError, csv.Error) as error:
-        raise WorkbenchError(f"{path} isn't the table of a training: {error}") from error
+    wrong = (KeyError, ValueError, TypeError, csv.Error)
+    with reading(path, "isn't the table of a training: {}", wrong), open_text(path) as file:
+        points = [
+            (float(row["step"]), float(row["value"]))
+            for row in csv.DictReader(file)
+            # A running training may not have completed the last line yet.
+            if row["tag"] == tag and row["wall_time"]
+        ]
     return Curve(*np.array(points, dtype=float).reshape(-1, 2).T)

@@ -4,8 +4,6 @@ import copy
 import io
 import json
 import warnings
-import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +17,7 @@ from torch import nn
 from file_access.content import open_file
 from rl_workbench.agents.greedy import Choice, SeveralChoices, Switches
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.storage import check_archive, reading
 from rl_workbench.tools.policies import TEST_SEED, Player
 from rl_workbench.tools.runs import Run
 from rl_workbench.training.environments import as_float32
@@ -30,7 +29,6 @@ METADATA = "metadata.json"  # its name within the file
 SAMPLES = 1000  # observations for the comparison
 ROUNDING = 1e-4  # largest difference from summing the same float32 numbers in another order
 Observation = Any  # of one step: a float32 array, or a dict of those
-_DAMAGED = (RuntimeError, ValueError, KeyError, zipfile.BadZipFile, zlib.error)
 
 
 class ExportedPolicy(NamedTuple):
@@ -50,18 +48,9 @@ class Agreement(NamedTuple):
 
 def open_exported(path: Path) -> ExportedPolicy:
     """Reads an exported policy. TorchScript is a program: open only files that you trust."""
-    try:
-        with open_file(path) as file:
-            content = file.read()
-        # torch doesn't verify the checksums of a file that it reads.
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            if archive.testzip():
-                raise WorkbenchError(f"{path} is damaged")
-        module, metadata = read(content)
-    except OSError as error:
-        raise WorkbenchError(f"can't read {path}: {error.strerror or error}") from error
-    except _DAMAGED as error:
-        raise WorkbenchError(f"{path} is damaged, or no exported policy") from error
+    with reading(path, "is damaged, or no exported policy"), open_file(path) as file:
+        check_archive(file)
+        module, metadata = read(file.read())
     if metadata.get("format") != FORMAT:
         raise WorkbenchError(f"{path} is not an exported policy of this version")
     lacks = [name for name, kind in READ.items() if not isinstance(metadata.get(name), kind)]
@@ -229,9 +218,9 @@ def _compare(
     """Compares the file's actions with the policy's; raises WorkbenchError if more than rounding differs."""
     wanted = np.stack([np.asarray(policy.act(each)) for each in observations])
     with torch.no_grad():
-        found = file(batch(observations)).numpy()
+        actions = file(batch(observations)).numpy()
     space = policy.env.action_space
-    equal, distances = _differences(found, wanted, space)
+    equal, distances = _differences(actions, wanted, space)
     is_continuous = isinstance(space, spaces.Box)
     wrong = distances > ROUNDING if is_continuous else ~equal
     if wrong.any() and not is_continuous:

@@ -57,10 +57,10 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         with self._running("reset"):
-            found: Any = self.env.reset(seed=seed, options=options)
-        if not isinstance(found, tuple) or len(found) != 2:
+            answer: Any = self.env.reset(seed=seed, options=options)
+        if not isinstance(answer, tuple) or len(answer) != 2:
             raise self._old_gym()
-        observation, info = found
+        observation, info = answer
         if self._length:  # Gymnasium's checks look at the first steps alone
             self.env = _without_checks(self.env)
         self._sums, self._length = {}, 0
@@ -109,8 +109,8 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> np.ndarray:
         """Returns rewards (N,), float32, for goals (N, n) achieved while others were desired; N infos."""
         with self._running(COMPUTE_REWARD):
-            found = self.env.get_wrapper_attr(COMPUTE_REWARD)(achieved, desired, info)
-            rewards = np.asarray(found, np.float32)
+            answer = self.env.get_wrapper_attr(COMPUTE_REWARD)(achieved, desired, info)
+            rewards = np.asarray(answer, np.float32)
         name = f"{COMPUTE_REWARD}() of {self._id}"
         if rewards.shape != (len(achieved),):
             raise self._error(

@@ -9,10 +9,7 @@ Each holds everything. last.pt and best.pt are further names of numbered files.
 import contextlib
 import errno
 import os
-import pickle
 import shutil
-import zipfile
-import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -21,14 +18,12 @@ import torch
 
 from file_access.content import open_file
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.storage import save_tensors
+from rl_workbench.storage import check_archive, reading, save_tensors
 
 LAST, BEST = "last.pt", "best.pt"
 FOLDER = "checkpoints"
 LEFTOVERS = (".*.pt.*", ".*.pt.new", ".*.pth.*", ".*.json.*", ".*.png.*")  # of a killed write
 FORMAT = "rl_workbench 2"  # changes when older files can't be read any more
-_DAMAGED = (RuntimeError, pickle.UnpicklingError, EOFError, ValueError, KeyError, TypeError,
-            AttributeError, IndexError, zipfile.BadZipFile, zlib.error)  # fmt: skip
 _MISFITS = (LookupError, TypeError, ValueError, RuntimeError, AttributeError, ArithmeticError)
 
 
@@ -94,19 +89,9 @@ def _numbered(run: Path) -> list[Path]:
 
 def read(path: Path) -> dict[str, Any]:
     """Reads a checkpoint into main memory. A foreign file can't run code."""
-    try:
-        # torch doesn't verify the checksums of a file that it reads.
-        with open_file(path) as file:
-            with zipfile.ZipFile(file) as archive:
-                bad = archive.testzip()
-            if bad:
-                raise WorkbenchError(f"{path} is damaged")
-            file.seek(0)
-            content = torch.load(file, map_location="cpu", weights_only=True)
-    except OSError as error:
-        raise WorkbenchError(f"can't read {path}: {error.strerror or error}") from error
-    except _DAMAGED as error:
-        raise WorkbenchError(f"{path} is damaged, or no checkpoint") from error
+    with reading(path, "is damaged, or no checkpoint"), open_file(path) as file:
+        check_archive(file)
+        content = torch.load(file, map_location="cpu", weights_only=True)
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise WorkbenchError(f"{path} is not a checkpoint of a training")
     return content
@@ -139,11 +124,11 @@ def candidates(run: Path, best_first: bool = False) -> list[Path]:
     the start.
     """
     best, others = [run / BEST], [run / LAST, *_numbered(run)]
-    found: dict[object, Path] = {}
+    paths: dict[object, Path] = {}
     for path in best + others if best_first else others + best:
         try:
             status = path.stat()
         except OSError:
             continue
-        found.setdefault((status.st_dev, status.st_ino), path)
-    return list(found.values())
+        paths.setdefault((status.st_dev, status.st_ino), path)
+    return list(paths.values())

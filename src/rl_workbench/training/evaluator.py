@@ -69,18 +69,18 @@ def run_greedily(
     env: Env, act: Act, seed: int, episodes: int, should_stop: Callable[[], bool] = lambda: False
 ) -> Evaluation | None:
     """Plays episodes in an environment, seeded once; returns None if `should_stop()` became true."""
-    found = Evaluation([], [])
+    result = Evaluation([], [])
     for index in range(episodes):
         length, total = -1, 0.0  # the first step is the reset
         for step in episode_steps(env, act, None if index else seed):
             if should_stop():
                 return None
             length, total = length + 1, total + step.reward
-        found.lengths.append(length)
-        found.returns.append(total)
+        result.lengths.append(length)
+        result.returns.append(total)
         if step.success is not None:
-            found.successes.append(step.success)
-    return found
+            result.successes.append(step.success)
+    return result
 
 
 class Evaluator:
@@ -123,13 +123,13 @@ class Evaluator:
         """
         self._algorithm.check_weights()
         with self._undisturbed(say, is_last):
-            found = self._episodes(self._run.eval_episodes, 0)
-            if found is None:
+            evaluation = self._episodes(self._run.eval_episodes, 0)
+            if evaluation is None:
                 return None
-            if found.mean_return <= best or not self._run.confirm_episodes:
-                return found, found.mean_return
+            if evaluation.mean_return <= best or not self._run.confirm_episodes:
+                return evaluation, evaluation.mean_return
             confirmed = self._episodes(self._run.confirm_episodes, 1)
-            return None if confirmed is None else (found, confirmed.mean_return)
+            return None if confirmed is None else (evaluation, confirmed.mean_return)
 
     @contextmanager
     def _undisturbed(self, say: Say, is_last: bool) -> Iterator[None]:

@@ -11,7 +11,7 @@ import yaml
 from rl_workbench.env_ids import without_module
 from rl_workbench.errors import WorkbenchError, need
 from rl_workbench.option import Options, check_options, is_plain, option, unknown
-from rl_workbench.storage import CONFIG_RECORD, read_record
+from rl_workbench.storage import CONFIG_RECORD, read_record, reading
 from rl_workbench.training.algorithms import AlgorithmKind, algorithm
 
 # A resumed training may change these.
@@ -228,12 +228,8 @@ def section_names(form: str, env_id: str | None) -> tuple[str, ...]:
 
 def read_section(path: Path, names: Sequence[str], preset: str | None) -> dict[str, Any]:
     """Reads the options of a preset, or of the first section that exists; a file without sections is one."""
-    try:
+    with reading(path, "isn't YAML: {}", (yaml.YAMLError, UnicodeDecodeError)):
         content = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    except OSError as error:
-        raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise WorkbenchError(f"{path} isn't YAML: {' '.join(str(error).split())}") from error
     if not isinstance(content, dict):
         raise WorkbenchError(f"{path} isn't a YAML file of options")
     if content and not any(isinstance(value, dict) for value in content.values()):

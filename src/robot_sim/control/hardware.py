@@ -199,8 +199,8 @@ class RobotHardware(Shared):
             if joint is None:
                 raise ControlError(f"transmission of joint '{transmission.joint}': no such joint")
             self.interfaces.setdefault(transmission.interface, {})[joint.name] = joint
-        found = {name: j for group in self.interfaces.values() for name, j in group.items()}
-        self.joints = {name: found[name] for name in sorted(found)}
+        joints = {name: j for group in self.interfaces.values() for name, j in group.items()}
+        self.joints = dict(sorted(joints.items()))
         self.effort_joints = self._of(EFFORT)
         gains = gains or {}
         self.drives: list[Drive] = [
@@ -255,7 +255,7 @@ class RobotHardware(Shared):
         joints = self.interfaces.get(interface, {})
         if name in joints:
             return joints[name]
-        own = [each for each, others in self.interfaces.items() if name in others]
+        own = [kind for kind, others in self.interfaces.items() if name in others]
         if own:
             raise ControlError(
                 f"joint '{name}' has hardware_interface::{own[0]}, and the controller needs "

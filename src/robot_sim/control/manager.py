@@ -226,13 +226,13 @@ class ControllerManager:
         self.on_fault(controller, error)
 
     def _known(self, names: Iterable[str], strict: bool) -> list[Controller]:
-        found: dict[str, Controller] = {}
+        controllers: dict[str, Controller] = {}
         for name in names:
             if name in self._controllers:
-                found[name] = self._controllers[name]
+                controllers[name] = self._controllers[name]
             elif strict:
                 raise ControlError(f"Could not switch: no controller named '{name}' is loaded.")
-        return list(found.values())
+        return list(controllers.values())
 
 
 def _check_made(controller: object, name: str, hardware: RobotHardware) -> None:

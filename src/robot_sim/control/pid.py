@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 from robot_sim.control.errors import ControlError
 from robot_sim.state_dict import Stateful
@@ -56,9 +56,14 @@ class Gains:
         )
 
 
+def is_number(value: object) -> TypeGuard[int | float]:
+    """Returns whether a parameter is a finite number; a bool isn't."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
 def _number(params: Mapping[str, object], key: str, default: float, place: str) -> float:
     value = params.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    if not is_number(value):
         raise ControlError(f"{place}/{key} is {value!r}: it must be a finite number")
     return float(value)
 

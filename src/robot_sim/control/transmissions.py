@@ -10,6 +10,7 @@ from file_access.content import FileError
 from file_access.xml_text import parse
 from robot_sim.control.errors import ControlError
 from robot_sim.control.joint import JointHandle, JointLimits, SoftLimits
+from robot_sim.control.pid import is_number
 
 PREFIX = "hardware_interface/"
 OVERRIDES = {  # what: field of the limits, and its parameter
@@ -63,20 +64,18 @@ def read_description(text: str) -> RobotDescription:
         robot = parse(text)
     except FileError as error:
         raise ControlError(f"robot_description: {error}") from error
-    found_joints = [
-        *robot.findall("gazebo/joint"),
-        *robot.findall("joint"),
-    ]  # those of SDF close loops
-    joints = {e.get("name", ""): _joint(e) for e in found_joints}
+    closing = robot.findall("gazebo/joint")  # loops
+    joints = {e.get("name", ""): _joint(e) for e in (*closing, *robot.findall("joint"))}
     warnings: list[str] = []
     transmissions: dict[str, Transmission] = {}
     for element in robot.findall("transmission"):
-        found = _transmission(element, warnings)
-        if found is None:
+        transmission = _transmission(element, warnings)
+        if transmission is None:
             continue
-        if found.joint in transmissions:
-            warnings.append(f"Joint '{found.joint}' has several transmissions; the first is used.")
-        transmissions.setdefault(found.joint, found)
+        joint = transmission.joint
+        if joint in transmissions:
+            warnings.append(f"Joint '{joint}' has several transmissions; the first is used.")
+        transmissions.setdefault(joint, transmission)
     return RobotDescription(joints, list(transmissions.values()), warnings, robot)
 
 
@@ -91,20 +90,20 @@ def distance(robot: Element, joint: str, other: str) -> float:
 def _place(robot: Element, joint: str) -> list[float]:
     above = {each.find("child"): each for each in robot.findall("joint")}
     joints = {child.get("link"): each for child, each in above.items() if child is not None}
-    found = robot.find(f"joint[@name='{joint}']")
+    element = robot.find(f"joint[@name='{joint}']")
     place = [0.0, 0.0, 0.0]
     visited = set()
-    while found is not None:
-        if found in visited:
+    while element is not None:
+        if element in visited:
             raise ControlError(f"robot_description: the joints above '{joint}' form a loop")
-        visited.add(found)
-        origin, parent = found.find("origin"), found.find("parent")
+        visited.add(element)
+        origin, parent = element.find("origin"), element.find("parent")
         text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
         try:
             place = [a + float(b) for a, b in zip(place, text.split(), strict=True)]
         except ValueError as error:
             raise ControlError(f"robot_description: a joint is at '{text}'") from error
-        found = None if parent is None else joints.get(parent.get("link"))
+        element = None if parent is None else joints.get(parent.get("link"))
     return place
 
 
@@ -225,7 +224,8 @@ def _overridden(joint: JointHandle, params: Mapping[str, Any], warnings: list[st
             limits = replace(limits, **dict.fromkeys(fields))
         elif switch is True:
             signed = what == "position"
-            wrong = [key for key in fields.values() if not _is_limit(params.get(key), signed)]
+            given = {key: params.get(key) for key in fields.values()}
+            wrong = [k for k, v in given.items() if not is_number(v) or (v < 0 and not signed)]
             if wrong:
                 warnings.append(
                     f"joint_limits/{joint.name}: has_{what}_limits is set, but {', '.join(wrong)} is "
@@ -235,12 +235,3 @@ def _overridden(joint: JointHandle, params: Mapping[str, Any], warnings: list[st
             values: dict[str, Any] = {field: float(params[key]) for field, key in fields.items()}
             limits = replace(limits, **values)
     return limits
-
-
-def _is_limit(value: Any, signed: bool) -> bool:
-    return is_number(value) and (signed or value >= 0)
-
-
-def is_number(value: object) -> bool:
-    """Returns whether a parameter is a finite number; a bool isn't."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -3,7 +3,7 @@
 import math
 import os
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
@@ -341,12 +341,12 @@ class ModelDescription:
 
     def inertias(self) -> dict[str, Inertia | None]:
         """Returns the inertia of each link in an engine: helpers that close loops have shares of it."""
-        found = {name: link.inertia for name, link in self.links.items()}
+        inertias = {name: link.inertia for name, link in self.links.items()}
         for whole in {link.part_of for link in self.loops}:
             bodies, inertia = self.bodies_of(whole), self.links[whole].inertia
             if inertia is not None:
-                found |= dict.fromkeys(bodies, inertia.scaled(1.0 / len(bodies)))
-        return found
+                inertias |= dict.fromkeys(bodies, inertia.scaled(1.0 / len(bodies)))
+        return inertias
 
     def joints_by_parent(self) -> defaultdict[str, list[Joint]]:
         """Returns the joints that each link carries, in document order."""
@@ -355,11 +355,18 @@ class ModelDescription:
             joints[joint.parent].append(joint)
         return joints
 
+    def joints_below(self, *links: str) -> Iterator[Joint]:
+        """Yields the joints that links carry, and those below them, each after the one above it."""
+        below, order = self.joints_by_parent(), list(links)
+        for link in order:
+            yield from below[link]
+            order += [joint.child for joint in below[link]]  # the list grows while it is walked
+
     def carriers(self, link: str) -> list[Joint]:
         """Returns the joints between the root and `link`, from the root on."""
         above = {joint.child: joint for joint in self.joints.values()}
-        found: list[Joint] = []
+        joints: list[Joint] = []
         while link in above:
-            found.insert(0, above[link])
+            joints.insert(0, above[link])
             link = above[link].parent
-        return found
+        return joints

@@ -78,14 +78,10 @@ def link_poses(
     """
     poses = {model.root: root}
     poses.update({name: root.compose(pose) for name, pose in model.islands.items()})
-    below = model.joints_by_parent()
-    order = list(poses)
-    for parent in order:
-        for joint in below[parent]:
-            motion = _motion(joint, 0.0 if model.static else positions.get(joint.name, 0.0))
-            moved = joint.pose.compose(joint.anchor).compose(motion)
-            poses[joint.child] = poses[parent].compose(moved.compose(joint.anchor.inverse()))
-            order.append(joint.child)  # the list grows while it is walked
+    for joint in model.joints_below(*poses):
+        motion = _motion(joint, 0.0 if model.static else positions.get(joint.name, 0.0))
+        moved = joint.pose.compose(joint.anchor).compose(motion)
+        poses[joint.child] = poses[joint.parent].compose(moved.compose(joint.anchor.inverse()))
     return poses
 
 
@@ -140,12 +136,8 @@ def mobility(
 def poses_at_zero(model: ModelDescription) -> dict[str, Pose]:
     """Returns the poses of the links, seen from the root, with all joints at zero."""
     poses = {model.root: Pose()}
-    below = model.joints_by_parent()
-    todo = [model.root]
-    for name in todo:
-        for joint in below[name]:
-            poses[joint.child] = poses[name].compose(joint.pose)
-            todo.append(joint.child)  # the list grows while it is walked
+    for joint in model.joints_below(model.root):
+        poses[joint.child] = poses[joint.parent].compose(joint.pose)
     return poses
 
 

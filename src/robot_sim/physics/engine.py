@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 from robot_sim.physics.description import DescriptionError, Inertia, ModelDescription
-from robot_sim.physics.pose import Pose, Vector
+from robot_sim.physics.pose import ZERO, Pose, Vector
 
 Twist = tuple[Vector, Vector]
 """Linear [m/s] and angular [rad/s] velocity in world axes."""
@@ -140,6 +140,18 @@ class Body(ABC):
         """Lets gravity act on link `name`, or not."""
 
 
+class EngineSettings(NamedTuple):
+    """Gravity [m/s²], step [s], iterations of the solver in a step, and the fastest end of overlaps [m/s].
+
+    `Shape.max_vel` bounds the speed at which contacts end overlaps of a shape, too.
+    """
+
+    gravity: Vector = ZERO
+    time_step: float = 0.001
+    iterations: int = 50
+    separation: float = math.inf
+
+
 LinkOf = tuple[Body, str]
 """A body and the name of a link of it."""
 
@@ -191,20 +203,8 @@ class Engine(ABC):
         """Ends what `fasten` began."""
 
     @abstractmethod
-    def set_gravity(self, gravity: Vector) -> None:
-        """Sets the acceleration of gravity [m/s²]."""
-
-    @abstractmethod
-    def set_time_step(self, dt: float) -> None:
-        """Sets the length of a step [s]."""
-
-    @abstractmethod
-    def set_iterations(self, count: int) -> None:
-        """Sets the number of iterations of the solver in a step."""
-
-    @abstractmethod
-    def set_fastest_separation(self, speed: float) -> None:
-        """Bounds the speed [m/s] at which contacts end overlaps; `Shape.max_vel` bounds it for a shape."""
+    def configure(self, settings: EngineSettings) -> None:
+        """Sets what acts in all steps from now on."""
 
     @abstractmethod
     def step(self) -> None:

@@ -175,10 +175,7 @@ def _pieces(link: Link) -> list[Link]:
 
 def parents_first(model: ModelDescription) -> ModelDescription:
     """Returns the model with each link after its parent: PyBullet crashes otherwise."""
-    below = model.joints_by_parent()
-    order = [model.root]
-    for name in order:
-        order.extend(joint.child for joint in below[name])  # the list grows while it is walked
+    order = [model.root, *(joint.child for joint in model.joints_below(model.root))]
     return replace(model, links={name: model.links[name] for name in order})
 
 

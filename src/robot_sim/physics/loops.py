@@ -94,11 +94,11 @@ def _close(
 
 def in_loops(model: ModelDescription) -> set[str]:
     """Returns the joints of all loops, and of rings of fixed joints."""
-    found: set[str] = set()
+    joints: set[str] = set()
     for link in model.links.values():
         ways = ({joint.name for joint in model.carriers(end)} for end in (link.owner, link.name))
-        found |= set.symmetric_difference(*ways)
-    return found
+        joints |= set.symmetric_difference(*ways)
+    return joints
 
 
 def closed(model: ModelDescription, states: States, goals: Mapping[str, float]) -> States | None:

@@ -33,12 +33,12 @@ LUMPED = "_fixed_joint_lump__"
 
 def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
     """Returns `items` by name."""
-    found: dict[str, Named] = {}
+    named: dict[str, Named] = {}
     for item in items:
-        if item.name in found:
+        if item.name in named:
             raise DescriptionError(f"{what} '{item.name}' is there twice")
-        found[item.name] = item
-    return found
+        named[item.name] = item
+    return named
 
 
 def find_roots(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:

@@ -1,7 +1,7 @@
 """A model in the world: its description, its body in the engine, and its state."""
 
 import logging
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
@@ -124,7 +124,7 @@ class Model(Shared):
         for name in sorted(set(positions) & set(self._joints)):
             joint = self.description.joints[name]
             self.body.reset_joint(self._joints[name], self.clamped(name, positions[name]))
-            self._rest(self._below(joint.child))
+            self._rest(below.name for below in self.description.joints_below(joint.child))
         self.put_followers()
         self.close_loops(positions, before)
 
@@ -157,15 +157,15 @@ class Model(Shared):
         old = {name: state[0] for name, state in zip(self._joints, before, strict=True)}
         starts = {name: (old[name], state[1]) for name, state in states.items()}
         goals = {name: states[name][0] for name in states if name in held}
-        found = closed(self.description, starts if goals else states, goals)
-        if found is None:
+        solution = closed(self.description, starts if goals else states, goals)
+        if solution is None:
             loose = in_loops(self.description)
-            found = states | {name: (old[name], 0.0) for name in states if name in loose}
+            solution = states | {name: (old[name], 0.0) for name in states if name in loose}
             logger.warning(
                 "Model '%s': its loops don't close on the way to %s; they stay as they were",
                 self.name, ", ".join(f"{name} = {goals[name]:g}" for name in sorted(goals) if name in loose),
             )  # fmt: skip
-        for name, state in found.items():
+        for name, state in solution.items():
             if state != states[name]:
                 self.body.reset_joint(self._joints[name], *state)
 
@@ -318,7 +318,7 @@ class Model(Shared):
 
     def rest_joints(self) -> None:
         """Stops all joints; the root link keeps its velocity."""
-        self._rest(list(self._joints))
+        self._rest(self._joints)
 
     def reset(self, joints: bool) -> None:
         """Returns to the initial pose, at rest; with `joints`, also every joint to zero."""
@@ -328,14 +328,9 @@ class Model(Shared):
             self.put_followers()
             self.close_loops((), [(0.0, 0.0)] * len(self._joints))
         self.place(self.initial_pose)
-        self._rest(list(self._joints))
+        self.rest_joints()
 
-    def _rest(self, names: list[str]) -> None:
+    def _rest(self, names: Iterable[str]) -> None:
         states = self.body.joint_states()
         for index in (self._joints[name] for name in names if name in self._joints):
             self.body.reset_joint(index, states[index][0])
-
-    def _below(self, link: str) -> list[str]:
-        """Names of the joints on the child side of `link`."""
-        below = self.description.joints_by_parent()[link]
-        return [name for joint in below for name in (joint.name, *self._below(joint.child))]

@@ -14,7 +14,7 @@ from robot_sim.physics.description import (
     ModelDescription,
     Shape,
 )
-from robot_sim.physics.engine import Body, Contact, Engine, Side, Twist
+from robot_sim.physics.engine import Body, Contact, Engine, EngineSettings, Side, Twist
 from robot_sim.physics.entity_names import EntityNames
 from robot_sim.physics.model import AT_REST, Model
 from robot_sim.physics.pose import Pose, Vector, conjugate, rotate, subtract
@@ -23,6 +23,7 @@ from robot_sim.state_dict import Shared
 
 GRAVITY: Vector = (0.0, 0.0, -9.8)  # [m/s²], Gazebo's default
 TIME_STEP = 0.001  # [s], Gazebo's default
+MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
 WORLD_FRAMES = ("", "world", "map", "/map")
 PROPERTIES = ("inertia or gravity of a link", "stop or damping of a joint", "damping of a joint by its gains",
               "friction of a link")  # fmt: skip
@@ -81,10 +82,7 @@ class World(Shared):
         self._names = EntityNames()
         self._special: list[Model] = []  # with springs, decay or a kinematic link
         self._recalled: Sequence[Contact] | None = None  # until the next step
-        self.time_step = time_step
-        self.gravity = gravity
-        engine.set_gravity(gravity)
-        engine.set_time_step(time_step)
+        self.time_step, self.gravity = time_step, gravity
         self.set_solver(SolverSettings())
 
     def spawn(self, name: str, description: ModelDescription, pose: Pose) -> Model:
@@ -187,32 +185,36 @@ class World(Shared):
 
     def with_attached(self, models: Iterable[Model]) -> set[Model]:
         """Returns models, and all that is attached to them, also by way of others."""
-        found = set(models)
-        waiting = list(found)
+        reached = set(models)
+        waiting = list(reached)
         while waiting:
             for each in self._of(waiting.pop()):
-                fresh = {each.first[0], each.second[0]} - found
-                found |= fresh
+                fresh = {each.first[0], each.second[0]} - reached
+                reached |= fresh
                 waiting += fresh
-        return found
+        return reached
 
     def set_gravity(self, gravity: Vector) -> None:
         """Sets the acceleration of gravity [m/s²]."""
         self.gravity = gravity
-        self.engine.set_gravity(gravity)
+        self._configure()
 
     def set_time_step(self, time_step: float) -> None:
         """Sets the length of a physics step [s]."""
         self.time_step = time_step
-        self.engine.set_time_step(time_step)
+        self._configure()
         for model in self.models.values():
             model.apply_damping(time_step)
 
     def set_solver(self, solver: SolverSettings) -> None:
         """Stores the solver's settings, and sets those that the engine has."""
         self.solver = solver
-        self.engine.set_iterations(solver.iterations)
-        self.engine.set_fastest_separation(solver.contact_max_correcting_vel)
+        self._configure()
+
+    def _configure(self) -> None:
+        iterations = max(1, min(self.solver.iterations, MOST_ITERATIONS))
+        separation = self.solver.contact_max_correcting_vel
+        self.engine.configure(EngineSettings(self.gravity, self.time_step, iterations, separation))
 
     def set_inertia(self, model: Model, link: str, inertia: Inertia) -> None:
         """Gives a link of `model` another inertia; poses and velocities stay.

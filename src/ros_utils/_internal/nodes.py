@@ -48,9 +48,9 @@ def _master_of(address: str) -> str | None:
 
     roscpp nodes have no method for it, so the answer comes from what their process was started with.
     """
-    told: str | None = answer(address, "getMasterUri", timeout=1.0)
-    if told is not None:
-        return told
+    uri: str | None = answer(address, "getMasterUri", timeout=1.0)
+    if uri is not None:
+        return uri
     host = urlsplit(address).hostname
     pid = node_pid(address) if host and _master.host_is_local(host) else None
     return _started_with(pid) if pid else None

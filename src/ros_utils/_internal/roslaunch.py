@@ -78,10 +78,9 @@ def await_nodes(handle: Handle) -> bool:
         if time.monotonic() - since > quiet and _own_nodes(handle) >= len(seen[0]):
             break
         time.sleep(POLL)
-    told = [f"ended already: {', '.join(seen[1])}"] if seen[1] else []
-    for line in told + handle.lines(
-        "cannot launch node"
-    ):  # roslaunch continues with the other nodes
+    ended = [f"ended already: {', '.join(seen[1])}"] if seen[1] else []
+    # Where it can't launch one, roslaunch continues with the other nodes.
+    for line in ended + handle.lines("cannot launch node"):
         _log.warn(f"{handle.start.label}: {line}{handle.where()}")
     return True
 

@@ -18,8 +18,7 @@ from rl_workbench.training.checked import CURVES
 from rl_workbench.training.checkpoints import fitting
 from rl_workbench.training.environments import succeeded
 from rl_workbench.training.options import TrainingOptions
-from rl_workbench.training.sb3.acting import load_policy
-from rl_workbench.training.sb3.models import make_learning_model
+from rl_workbench.training.sb3.models import load_policy, make_learning_model
 from rl_workbench.training.sb3.positions import ModelMark, Positions, buffer_state, restore_buffer
 from rl_workbench.training.training import Training
 
@@ -213,12 +212,12 @@ class FrameCallback(BaseCallback):
         return self._can_go_back
 
     def _log_losses(self, model: Any) -> None:
-        found = {LOSSES[name]: value for name, value in _pending_losses(model).items()}
-        for tag, value in found.items():
+        losses = {LOSSES[name]: value for name, value in _pending_losses(model).items()}
+        for tag, value in losses.items():
             _check_finite(tag, value)
         steps, frequency = self._arrived, self._log_frequency
-        if found and steps // frequency > (steps - model.stride) // frequency:
-            self._frame.log.add(steps, found)
+        if losses and steps // frequency > (steps - model.stride) // frequency:
+            self._frame.log.add(steps, losses)
             model.logger.dump(steps)  # the logger has no outputs, so this only clears it
 
     def _on_step(self) -> bool:

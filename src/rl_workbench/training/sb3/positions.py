@@ -172,11 +172,11 @@ def restore_buffer(buffer: Any, state: dict[str, Any]) -> None:
 
 def _arrays(buffer: Any) -> dict[str, np.ndarray]:
     """Returns the buffer's arrays by name; those of a Dict of observations one by one."""
-    found: dict[str, np.ndarray] = {}
+    arrays: dict[str, np.ndarray] = {}
     for name in ARRAYS:
         own = getattr(buffer, name, None)
         if isinstance(own, dict):
-            found |= {f"{name}/{key}": part for key, part in own.items()}
+            arrays |= {f"{name}/{key}": part for key, part in own.items()}
         elif isinstance(own, np.ndarray):
-            found[name] = own
-    return found
+            arrays[name] = own
+    return arrays

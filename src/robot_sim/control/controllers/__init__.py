@@ -39,21 +39,21 @@ def find_type(type_name: str) -> type[Controller] | None:
         return None
     try:
         spec = importlib.util.find_spec(package)
-        found = getattr(importlib.import_module(package), name, None) if spec else None
+        controller = getattr(importlib.import_module(package), name, None) if spec else None
     except faults() as error:
         raise ControlError(f"controller type '{type_name}': {package} raised {error!r}") from error
     if spec is None:
         return None
     where = f"{package} (of {spec.origin})"
-    if found is None:
+    if controller is None:
         raise ControlError(
             f"controller type '{type_name}' does not exist: {where} has no class {name}"
         )
-    if not isinstance(found, type) or not issubclass(found, Controller):
+    if not isinstance(controller, type) or not issubclass(controller, Controller):
         raise ControlError(
             f"controller type '{type_name}': {name} of {where} is not a subclass of "
             "robot_sim.control.controllers.base.Controller"
         )
-    if getattr(found, "type_name", None) != type_name:
+    if getattr(controller, "type_name", None) != type_name:
         raise ControlError(f"controller type '{type_name}': its class must say so as type_name")
-    return found
+    return controller

@@ -94,10 +94,10 @@ class DiffDriveController(VehicleController):
             SEPARATION: given.wheel_separation_multiplier,
         }
         left, right = (Side(joints, radius) for joints in sides)
-        found = cls(name, given, (left, right), separation, scales)
+        controller = cls(name, given, (left, right), separation, scales)
         if given.publish_wheel_joint_controller_state:
-            found.outputs.append(found._wheels)
-        return found
+            controller.outputs.append(controller._wheels)
+        return controller
 
     def _rescale(self, scales: Mapping[str, Any]) -> None:
         left, right, separation = self._measures

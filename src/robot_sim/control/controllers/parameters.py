@@ -6,6 +6,7 @@ from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, NamedTuple, Self, dataclass_transform
 
 from robot_sim.control.errors import ControlError
+from robot_sim.control.pid import is_number
 
 EACH = "<joint>"  # in a key: the name of each joint
 
@@ -45,8 +46,8 @@ class Parameters:
     @classmethod
     def declared(cls) -> dict[str, Declared]:
         """Returns what is said of each, by the name of the field."""
-        found = {each.name: each.metadata[""] for each in fields(cls)}  # type: ignore[arg-type]
-        return {name: each._replace(key=each.key or name) for name, each in found.items()}
+        said = {each.name: each.metadata[""] for each in fields(cls)}  # type: ignore[arg-type]
+        return {name: each._replace(key=each.key or name) for name, each in said.items()}
 
     @classmethod
     def read(cls, params: Mapping[str, object], name: str, joint: str = "") -> Self:
@@ -54,7 +55,7 @@ class Parameters:
 
         Raises ControlError if one is missing or wrong.
         """
-        found = {}
+        values = {}
         for attribute, declared in cls.declared().items():
             tree, place = params, name
             parts = [joint if each == EACH else each for each in declared.key.split("/")]
@@ -63,8 +64,8 @@ class Parameters:
                 tree = mapping(tree.get(part, {}), place)
             value, key = tree.get(parts[-1]), f"{place}/{parts[-1]}"
             is_absent = parts[-1] not in tree and declared.default is not MISSING
-            found[attribute] = declared.default if is_absent else declared.read(value, key)
-        return cls(**found)
+            values[attribute] = declared.default if is_absent else declared.read(value, key)
+        return cls(**values)
 
 
 def reader(
@@ -89,11 +90,6 @@ def are_names(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(each, str) for each in value)
 
 
-def _is_number(value: Any) -> bool:
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return is_number and math.isfinite(value)
-
-
 def of_type(kind: type) -> Callable[[Any, str], Any]:
     """Returns a reader of values of one type; a float is finite."""
     if kind is float:
@@ -105,7 +101,7 @@ def of_type(kind: type) -> Callable[[Any, str], Any]:
 
 
 SLOWEST = 1e-6  # [Hz]; below it, as at 0, nothing is ever published
-number = reader(_is_number, "is missing or is not a finite number", float)
+number = reader(is_number, "is missing or is not a finite number", float)
 truth = reader(lambda value: isinstance(value, bool), "must be true or false")
 mapping = reader(lambda value: isinstance(value, Mapping), "must hold parameters by name")
 length = reader(lambda value: 0.0 < value < math.inf, "must be above 0 and finite")

@@ -103,10 +103,10 @@ class AckermannSteeringController(SteeringController):
         )
         radius = given.length("wheel_radius", name, lambda: wheel_radius(robot, wheel.name))
         base *= given.wheel_separation_h_multiplier
-        found = cls(name, given, wheel, fork, base, radius)
-        found.scale_radius = given.wheel_radius_multiplier
-        found.scale_angle = given.steer_pos_multiplier
-        return found
+        controller = cls(name, given, wheel, fork, base, radius)
+        controller.scale_radius = given.wheel_radius_multiplier
+        controller.scale_angle = given.steer_pos_multiplier
+        return controller
 
     def remember(self) -> None:
         self._last_turned = self.wheels[0].position
@@ -190,15 +190,15 @@ class FourWheelSteeringController(SteeringController):
 
     def drive(self, linear: float, angular: float) -> None:
         if self._angles is None or self.is_late(self._now):
-            found = self._geometry.steering(linear, 0.0, angular)
+            steering = self._geometry.steering(linear, 0.0, angular)
         else:
             front, rear = map(math.tan, self._angles)
             base = self._geometry.base
-            found = self._geometry.steering(1.0, 0.5 * (front + rear), (front - rear) / base)
-            found = Steering(tuple(linear * each for each in found.speeds), found.angles)
-        for joint, speed in zip(self.wheels, found.speeds, strict=True):
+            steering = self._geometry.steering(1.0, 0.5 * (front + rear), (front - rear) / base)
+            steering = Steering(tuple(linear * each for each in steering.speeds), steering.angles)
+        for joint, speed in zip(self.wheels, steering.speeds, strict=True):
             joint.command = speed / self._radius
-        for joint, angle in zip(self.forks, found.angles, strict=True):
+        for joint, angle in zip(self.forks, steering.angles, strict=True):
             joint.command = angle
 
     def report(self, now: int) -> None:

@@ -16,7 +16,7 @@ from robot_sim.control.controllers.parameters import (
     reader,
 )
 from robot_sim.control.errors import ControlError
-from robot_sim.control.transmissions import is_number
+from robot_sim.control.pid import is_number
 from robot_sim.drives.odometry import DeadReckoning, OdometrySample, Period, RollingMean, Triple
 from robot_sim.drives.wheels import SpeedLimits
 
@@ -43,7 +43,7 @@ def _limits(axis: str) -> Callable[[Any, str], SpeedLimits]:
     """Returns a reader of the limits of an axis, of the kinds that are switched on."""
 
     def read(value: Any, key: str) -> SpeedLimits:
-        place, found = f"{key}/{axis}", {}
+        place, limits = f"{key}/{axis}", {}
         tree = value.get(axis, {}) if isinstance(value, Mapping) else {}
         if not isinstance(tree, Mapping):
             raise ControlError(f"parameter {place} must hold limits: {tree!r}")
@@ -51,8 +51,8 @@ def _limits(axis: str) -> Callable[[Any, str], SpeedLimits]:
             limited = f"has_{kind}_limits"
             if of_type(bool)(tree.get(limited, False), f"{place}/{limited}"):
                 most = number(tree.get(f"max_{kind}"), f"{place}/max_{kind}")
-                found[kind] = number(tree.get(f"min_{kind}", -most), f"{place}/min_{kind}"), most
-        return SpeedLimits(**found)
+                limits[kind] = number(tree.get(f"min_{kind}", -most), f"{place}/min_{kind}"), most
+        return SpeedLimits(**limits)
 
     return read
 
@@ -193,13 +193,13 @@ class VehicleController(Controller):
 
     def _limit(self, linear: float, angular: float, dt: float) -> tuple[float, float]:
         limits = self.options.linear, self.options.angular
-        found = [
+        limited = [
             limit.limited(speed, last, before, dt)
             for limit, speed, last, before in zip(
                 limits, (linear, angular), self._last, self._before, strict=True
             )
         ]
-        self._before, self._last = self._last, (found[0], found[1])
+        self._before, self._last = self._last, (limited[0], limited[1])
         return self._last
 
     def report(self, now: int) -> None:

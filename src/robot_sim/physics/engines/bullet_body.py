@@ -58,10 +58,11 @@ class BulletBody(Body):
         self._offsets = offsets
         self._fixed = description.fixed_base
         self._map_names()
+        # Links and collisions of the model that may touch where PyBullet's link does.
         self.touching = {
-            index: (link.part_of or link.name, tuple(shape.name for shape in link.collisions))
+            index: (link.owner, tuple(shape.name for shape in link.collisions))
             for index, link in ((i, description.links[name]) for name, i in self._links.items())
-        }  # links and collisions of the model that may touch where PyBullet's link does
+        }
         dynamics = pybullet.getDynamicsInfo(body, BASE, client)
         self._check_meshes()
         self._com = Pose(dynamics[3], dynamics[4])  # the engine turns it onto the principal axes
@@ -204,11 +205,11 @@ class BulletBody(Body):
 
     def _overlap(self, a: Link, b: Link) -> bool:
         """Returns whether two links overlap in the present pose."""
-        found = pybullet.getClosestPoints(
+        points = pybullet.getClosestPoints(
             self.id, self.id, 0.0, self._links[a.name], self._links[b.name],
             physicsClientId=self._client,
         )  # fmt: skip
-        return any(point[8] < -OVERLAP for point in found)
+        return any(point[8] < -OVERLAP for point in points)
 
     def _keep_moments(self, index: int, inertia: Inertia) -> None:
         """Sets moments that no real body has (a > b + c): PyBullet drops them, ODE doesn't.
@@ -240,11 +241,7 @@ class BulletBody(Body):
 
     def add_wrench(self, link: str, force: Vector, torque: Vector) -> None:
         index = self._links[link]
-        if index == BASE:
-            com = pybullet.getBasePositionAndOrientation(self.id, self._client)[0]
-        else:
-            com = pybullet.getLinkState(self.id, index, 0, 1, self._client)[0]
-        world = pybullet.WORLD_FRAME
+        com, world = self.centre_of_mass(link).position, pybullet.WORLD_FRAME
         pybullet.applyExternalForce(self.id, index, force, com, world, self._client)
         pybullet.applyExternalTorque(self.id, index, torque, world, self._client)
 

@@ -78,11 +78,11 @@ class Separation:
     def ease(self, time_step: float) -> None:
         """Bounds the speeds of the next step; called while `placed`."""
         pybullet.performCollisionDetection(self._client)
-        found = pybullet.getContactPoints(physicsClientId=self._client)
+        contacts = pybullet.getContactPoints(physicsClientId=self._client)
         # Shares of the overlap to end in a step, of links on static ones, and of those that push each other.
         alone: dict[LinkIndex, float] = {}
         mutual: dict[LinkIndex, float] = {}
-        for contact in found:
+        for contact in contacts:
             if contact[8] < -SHALLOW:
                 self._ease_pair(contact, time_step, alone, mutual)
         for link in self._eased - alone.keys() - mutual.keys():

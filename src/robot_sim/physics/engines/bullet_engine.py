@@ -2,9 +2,7 @@
 
 import contextlib
 import locale
-import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +10,7 @@ from typing import Any, NamedTuple
 from file_access.locks import scratch_folder
 from robot_sim.heap import give_back
 from robot_sim.physics.description import DescriptionError, ModelDescription
-from robot_sim.physics.engine import Body, Contact, Engine, LinkOf, Side
+from robot_sim.physics.engine import Body, Contact, Engine, EngineSettings, LinkOf, Side
 from robot_sim.physics.engine_form import at_joints, parents_first
 from robot_sim.physics.engines.bullet_body import BASE, BulletBody
 from robot_sim.physics.engines.bullet_constraints import add_weld, weld_of
@@ -20,22 +18,11 @@ from robot_sim.physics.engines.bullet_contacts import Separation
 from robot_sim.physics.engines.bullet_files import write_urdf
 from robot_sim.physics.engines.bullet_meshes import SharedMeshes, static_mesh
 from robot_sim.physics.engines.quiet_pybullet import pybullet
-from robot_sim.physics.pose import ZERO, Pose, Vector, add, scale
+from robot_sim.physics.pose import Pose, Vector, add, scale
 
-MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
 ALL = 2**31 - 1  # constraints of a world
 PLANE = 1200  # [bytes] of a file, if it had been loaded from one
 MOST_WASTE = 1_000_000  # [bytes] of files that removed bodies were loaded from: 5 MB of memory
-
-
-@dataclass
-class BulletSettings:
-    """Gravity [m/s²], length of a step [s], iterations of the solver; the defaults are PyBullet's."""
-
-    gravity: Vector = ZERO
-    time_step: float = 1.0 / 240.0
-    iterations: int = 50
-    separation: float = math.inf  # [m/s], the fastest
 
 
 class Fastening(NamedTuple):
@@ -54,7 +41,7 @@ class BulletEngine(Engine):
     and `waste` are the sizes of the files that present and removed bodies were loaded from [bytes].
     """
 
-    def __init__(self, settings: BulletSettings | None = None) -> None:
+    def __init__(self, settings: EngineSettings | None = None) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
         # The solver's result depends on the order of contact pairs, and on which bodies it solves together:
         # make both the same in every run. Bodies that come near each other may share an island or not,
@@ -66,7 +53,6 @@ class BulletEngine(Engine):
         )  # fmt: skip
         self._step = partial(pybullet.stepSimulation, self._client)
         self._separation = Separation(self._client)
-        self._settings = settings or BulletSettings()
         self._bodies: dict[int, BulletBody] = {}
         self._sides: dict[tuple[int, int], Side] = {}  # by body and link
         self._weightless: set[tuple[int, int]] = set()  # body and link, where gravity doesn't act
@@ -75,7 +61,7 @@ class BulletEngine(Engine):
         self._fastened: dict[int, Fastening] = {}
         self._last = 0  # number of what was fastened
         self.waste, self._most_waste = 0, MOST_WASTE
-        self._apply()
+        self.configure(settings or EngineSettings())
 
     def order(self) -> list[BulletBody]:
         return list(self._bodies.values())
@@ -84,34 +70,16 @@ class BulletEngine(Engine):
     def live(self) -> int:
         return sum(self._sizes.values()) + self._meshes.size
 
-    def _apply(self) -> None:
-        """Applies the settings to the world."""
-        settings = self._settings
+    def configure(self, settings: EngineSettings) -> None:
+        self._settings = settings
         self._separation.fastest = settings.separation
-        iterations = max(1, min(settings.iterations, MOST_ITERATIONS))
         pybullet.setGravity(*settings.gravity, physicsClientId=self._client)
         pybullet.setTimeStep(settings.time_step, physicsClientId=self._client)
         pybullet.setPhysicsEngineParameter(
-            numSolverIterations=iterations, physicsClientId=self._client
+            numSolverIterations=settings.iterations, physicsClientId=self._client
         )
         for body in self._bodies.values():
             body.set_time_step(settings.time_step)
-
-    def set_gravity(self, gravity: Vector) -> None:
-        self._settings.gravity = gravity
-        self._apply()
-
-    def set_time_step(self, dt: float) -> None:
-        self._settings.time_step = dt
-        self._apply()
-
-    def set_iterations(self, count: int) -> None:
-        self._settings.iterations = count
-        self._apply()
-
-    def set_fastest_separation(self, speed: float) -> None:
-        self._settings.separation = speed
-        self._apply()
 
     def load(self, description: ModelDescription, pose: Pose) -> BulletBody:
         if description.is_plane:
@@ -204,8 +172,8 @@ class BulletEngine(Engine):
 
     def contacts(self) -> list[Contact]:
         # Without those that were only near.
-        found = pybullet.getContactPoints(physicsClientId=self._client)
-        return [_contact(each, self._sides) for each in found if each[9] > 0.0]
+        points = pybullet.getContactPoints(physicsClientId=self._client)
+        return [_contact(each, self._sides) for each in points if each[9] > 0.0]
 
     def fastened(self) -> dict[int, Any]:
         places = {body: place for place, body in enumerate(self._bodies)}

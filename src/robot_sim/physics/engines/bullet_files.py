@@ -90,9 +90,7 @@ def _write_link(robot: Element, link: Link, static: bool, folder: Path) -> None:
     element = SubElement(robot, "link", name=link.name)
     # Without an inertial PyBullet would assume 1 kg; only the immovable link `world` has none.
     _write_inertia(element, link.inertia or Inertia(mass=0.0))
-    if any(
-        shape.solid for shape in link.collisions
-    ):  # else PyBullet keeps them once more, to draw them
+    if any(shape.solid for shape in link.collisions):  # or PyBullet keeps them twice, to draw them
         _write_shape(SubElement(element, "visual"), Shape("sphere", (UNSEEN,)))
     for shape in link.collisions:
         written = SubElement(element, "collision")

@@ -6,18 +6,15 @@ from itertools import count
 from typing import Any
 
 import mujoco
-import numpy as np
 
 from robot_sim.physics.description import DescriptionError, ModelDescription
-from robot_sim.physics.engine import Body, Contact, Engine, LinkOf, Side
+from robot_sim.physics.engine import Body, Contact, Engine, EngineSettings, LinkOf, Side
 from robot_sim.physics.engine_form import check_bounds
 from robot_sim.physics.engines.mujoco_body import MujocoBody
 from robot_sim.physics.engines.mujoco_model import Elements, ModelWriter, add_weld, compile_spec
 from robot_sim.physics.engines.mujoco_state import MujocoState
-from robot_sim.physics.pose import ZERO, Pose, Vector
+from robot_sim.physics.pose import Pose
 
-MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
-DEFAULT_STEP = 0.001  # [s]
 STIFFEST = 2.0  # steps: MuJoCo's shortest time constant of a constraint
 # Of contacts: [s], and of critical damping. Stiffer ones throw what slides into the air, softer ones let slip
 # what is gripped, less damped ones rattle.
@@ -37,17 +34,13 @@ class MujocoEngine(Engine):
     def __init__(self) -> None:
         # By default MuJoCo writes warnings into a file in the current folder.
         mujoco.set_mju_user_warning(logger.warning)
-        self._gravity: Vector = ZERO
-        self._time_step = DEFAULT_STEP
-        self._iterations = 50
-        self._separation = np.inf  # [m/s], the fastest
         self._bodies: dict[str, MujocoBody] = {}
         self._sides: dict[int, Side] = {}  # by number of the geom
         self._keys = count()
         self._fastened: dict[int, Joined] = {}
         model = compile_spec(mujoco.MjSpec())
         self._state = MujocoState(model, mujoco.MjData(model))
-        self._configure()
+        self.configure(EngineSettings())
 
     def load(self, description: ModelDescription, pose: Pose) -> MujocoBody:
         return self._load([(description, pose)])[0]
@@ -91,22 +84,6 @@ class MujocoEngine(Engine):
     def unfasten(self, number: int) -> None:
         del self._fastened[number]
         self._compile()
-
-    def set_gravity(self, gravity: Vector) -> None:
-        self._gravity = gravity
-        self._state.model.opt.gravity[:] = gravity
-
-    def set_time_step(self, dt: float) -> None:
-        self._time_step = dt
-        self._configure()
-
-    def set_iterations(self, count: int) -> None:
-        self._iterations = max(1, min(count, MOST_ITERATIONS))
-        self._state.model.opt.iterations = self._iterations
-
-    def set_fastest_separation(self, speed: float) -> None:
-        self._separation = speed
-        self._state.set_fastest_separation(speed)
 
     def step(self) -> None:
         self._state.step()
@@ -179,14 +156,15 @@ class MujocoEngine(Engine):
             mujoco.mj_setConst(self._state.model, mujoco.MjData(self._state.model))
         if heavy:
             self._state.model.opt.tolerance = 0.0  # else it counts as a share of the heaviest
-        self._configure()
+        self.configure(self._settings)
 
-    def _configure(self) -> None:
+    def configure(self, settings: EngineSettings) -> None:
+        self._settings = settings
         model, option = self._state.model, self._state.model.opt
-        self._state.set_time_step(self._time_step)
-        self._state.set_fastest_separation(self._separation)
-        option.gravity[:] = self._gravity
-        option.iterations = self._iterations
+        self._state.set_time_step(settings.time_step)
+        self._state.set_fastest_separation(settings.separation)
+        option.gravity[:] = settings.gravity
+        option.iterations = settings.iterations
         option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         option.impratio = IMPRATIO
@@ -202,8 +180,8 @@ class MujocoEngine(Engine):
             model.jnt_solref, model.dof_solref, model.geom_solref, model.tendon_solref_fri,
             model.eq_solref,
         ):  # fmt: skip
-            reference[:] = (STIFFEST * self._time_step, 1.0)
-        model.geom_solref[:] = (max(CONTACT[0], STIFFEST * self._time_step), CONTACT[1])
+            reference[:] = (STIFFEST * settings.time_step, 1.0)
+        model.geom_solref[:] = (max(CONTACT[0], STIFFEST * settings.time_step), CONTACT[1])
         for impedance in (
             model.jnt_solimp, model.dof_solimp, model.geom_solimp, model.tendon_solimp_fri,
             model.eq_solimp,

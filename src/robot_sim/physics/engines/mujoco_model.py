@@ -63,14 +63,10 @@ class ModelWriter:
         base = self._add_link(self.spec.worldbody, model.root, pose)
         if not model.fixed_base:
             self._elements.free = base.add_freejoint()
-        below = model.joints_by_parent()
         for link, where in model.islands.items():
             self._add_link(base, link, where)
-        order = [model.root, *model.islands]
-        for parent in order:
-            for joint in below[parent]:
-                self._add_joint(self._elements.bodies[parent], joint)
-                order.append(joint.child)  # the list grows while it is walked
+        for joint in model.joints_below(model.root, *model.islands):
+            self._add_joint(self._elements.bodies[joint.parent], joint)
         if not model.static:
             self._keep_apart()
             self._add_gears()

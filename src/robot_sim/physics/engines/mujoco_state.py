@@ -197,7 +197,7 @@ class MujocoState:
 
     def contacts(self, sides: Mapping[int, Side]) -> list[Contact]:
         """Returns where bodies touched in the last step, without those that were only near."""
-        found, wrench = [], np.empty(6)
+        contacts, wrench = [], np.empty(6)
         for index in range(self.data.ncon):
             mujoco.mj_contactForce(self.model, self.data, index, wrench)
             force, along, across, *_ = wrench.tolist()
@@ -210,10 +210,10 @@ class MujocoState:
                 # The normal points towards the second geom, which is our first one then.
                 second, first = (sides[geom] for geom in contact.geom.tolist())
                 depth = -float(contact.dist)
-                found.append(
+                contacts.append(
                     Contact((x, y, z), scale(normal, force), friction, normal, depth, first, second)
                 )
-        return found
+        return contacts
 
 
 def _vector(numbers: Sequence[float]) -> Vector:

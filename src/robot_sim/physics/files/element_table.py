@@ -133,9 +133,9 @@ class WithoutEffect:
 
 def without_effect(root: Element, section: str) -> list[str]:
     """Returns the warning of what has no effect in a file; none if all is well."""
-    found = WithoutEffect()
-    found.look(root, section)
-    return found.warnings()
+    report = WithoutEffect()
+    report.look(root, section)
+    return report.warnings()
 
 
 def _value(element: Element) -> str:

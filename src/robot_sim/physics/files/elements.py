@@ -105,8 +105,8 @@ def rename_lumped(plugin: Element, lumped: Mapping[str, tuple[str, Pose]]) -> No
 
     See docs/contract/sensors.md 0.6.
     """
-    found = [each for each in map(plugin.find, FRAME_TAGS) if each is not None]
-    renamed = [each for each in found if (each.text or "").strip() in lumped]
+    tags = [each for each in map(plugin.find, FRAME_TAGS) if each is not None]
+    renamed = [each for each in tags if (each.text or "").strip() in lumped]
     for element in renamed:
         element.text, pose = lumped[(element.text or "").strip()]
     if renamed:

@@ -44,11 +44,11 @@ def convex_pieces(vertices: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
         if abs(mesh.volume) > CONVEX * hull.volume():
             return []
     counted = np.insert(mesh.faces, 0, 3, axis=1)  # corners of each face, as VTK has it
-    found = compute_vhacd(
+    pieces = compute_vhacd(
         mesh.vertices, counted.ravel().astype(np.uint32), maxConvexHulls=MOST_PIECES,
         maxNumVerticesPerCH=PIECE_CORNERS, resolution=VOXELS, asyncACD=False,
     )  # fmt: skip
-    return [corners for corners, _ in found if is_solid(corners)]
+    return [corners for corners, _ in pieces if is_solid(corners)]
 
 
 def is_solid(points: np.ndarray) -> bool:

@@ -32,21 +32,21 @@ Found = tuple[str, Mimic]
 
 def add_mechanisms(model: ModelDescription, robot: Element | None = None) -> None:
     """Adds to `model` what its plugins say, and the `<mimic>` elements of a URDF's `robot`."""
-    found: dict[str, Mimic] = {}
+    mimics: dict[str, Mimic] = {}
     for plugin in model.plugins:
         library = library_of(plugin.filename)
         if library in MIMIC_LIBRARIES:
-            _keep(model, found, partial(_of_plugin, model, plugin))
+            _keep(model, mimics, partial(_of_plugin, model, plugin))
         elif library == DISABLE_LINK_LIBRARY:
             _disable(model, plugin)
     if model.static:
         return
-    driven = set(found) | _with_transmission(robot)
+    driven = set(mimics) | _with_transmission(robot)
     for element in () if robot is None else robot.findall("joint"):
         mimic = element.find("mimic")
         if mimic is not None and element.get("name", "") not in driven:
-            _keep(model, found, partial(_of_urdf, model, element, mimic))
-    model.mimics = dict(_drivers_first(model, found))
+            _keep(model, mimics, partial(_of_urdf, model, element, mimic))
+    model.mimics = dict(_drivers_first(model, mimics))
 
 
 def _keep(model: ModelDescription, found: dict[str, Mimic], read: Callable[[], Found]) -> None:
@@ -60,8 +60,8 @@ def _keep(model: ModelDescription, found: dict[str, Mimic], read: Callable[[], F
 
 def _with_transmission(robot: Element | None) -> set[str]:
     """Returns joints that controllers move; they don't follow by `<mimic>`, too."""
-    found = [] if robot is None else robot.findall("transmission/joint")
-    return {joint.get("name", "") for joint in found}
+    joints = [] if robot is None else robot.findall("transmission/joint")
+    return {joint.get("name", "") for joint in joints}
 
 
 def _of_urdf(model: ModelDescription, element: Element, mimic: Element) -> Found:

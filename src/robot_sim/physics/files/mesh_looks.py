@@ -130,20 +130,20 @@ def _brighten(material: Any) -> None:
 
 def _by_color(colors: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yields which faces have a colour, and the colour, of (n, 4) of uint8; many are reduced to a few."""
-    found, kinds = np.unique(colors, axis=0, return_inverse=True)
-    if len(found) > MOST_COLORS:
+    palette, kinds = np.unique(colors, axis=0, return_inverse=True)
+    if len(palette) > MOST_COLORS:
         coarse = (colors[:, :3] // 64).astype(int) @ (16, 4, 1)
         _, kinds = np.unique(coarse, return_inverse=True)
-        found = np.array([colors[kinds == kind].mean(axis=0) for kind in range(kinds.max() + 1)])
-    for kind, color in enumerate(found):
+        palette = np.array([colors[kinds == kind].mean(axis=0) for kind in range(kinds.max() + 1)])
+    for kind, color in enumerate(palette):
         yield kinds.ravel() == kind, color
 
 
 def _color(material: Any) -> np.ndarray:
     for key in ("baseColorFactor", "diffuse"):
-        found = getattr(material, key, None)
-        if found is not None:
-            return _rgba(found)
+        value = getattr(material, key, None)
+        if value is not None:
+            return _rgba(value)
     return np.ones(4)
 
 
@@ -160,9 +160,9 @@ def _image(material: Any) -> np.ndarray | None:
     from PIL import Image
 
     for key in ("baseColorTexture", "image"):
-        found = getattr(material, key, None)
-        if isinstance(found, Image.Image):
-            small = found.convert("RGB")
+        image = getattr(material, key, None)
+        if isinstance(image, Image.Image):
+            small = image.convert("RGB")
             small.thumbnail((LARGEST_IMAGE, LARGEST_IMAGE))
             return np.asarray(small)
     return None

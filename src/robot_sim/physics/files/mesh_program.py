@@ -1,15 +1,17 @@
 """The child process of `meshes`: STL, COLLADA and OBJ files into arrays for engines.
 
-trimesh reads COLLADA, OBJ and binary STL. What it leaves to its caller is done here: units and axes, named
+trimesh reads COLLADA and binary STL. What it leaves to its caller is done here: units and axes, named
 parts, and the check that every face has finite corners.
 """
 
 import hashlib
 import json
+import math
 import re
 import struct
 from collections.abc import Callable, Iterable
-from io import BytesIO, StringIO
+from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -23,7 +25,6 @@ from robot_sim.physics.files.hull import convex_pieces, hull_points
 from robot_sim.physics.files.mesh_cache import read_arrays, written
 from robot_sim.physics.files.mesh_looks import meters_of, parse_collada, read_glb, read_parts
 from robot_sim.physics.files.meshes import IMAGES, Selection, Submesh, read_content
-from robot_sim.physics.files.plain_obj import READ, plain_obj
 from robot_sim.physics.files.shape_meshes import MADE, heightmap
 
 MOST_TRIANGLES = 1_000_000
@@ -206,69 +207,62 @@ def _stl_fault(text: str) -> str:
 
 def _read_obj(data: bytes, only: str) -> list[Part]:
     """Returns a part for each object or group of the file, or for those named `only`."""
-    from trimesh.exchange.obj import load_obj
-
-    content = data.decode("utf-8-sig", "replace")
-    if not only and (plain := plain_obj(content)) is not None:
-        return [plain]
-    text = "\n".join(_obj_lines(content, only))
-    loaded = load_obj(
-        StringIO(text), group_material=False, skip_materials=True, maintain_order=True,
-        split_objects=True, split_groups=True,
-    )  # fmt: skip
-    parts = reversed(loaded.get("geometry", {}).values())  # trimesh begins with the last one
-    return [(np.asarray(part["vertices"]), np.asarray(part["faces"])) for part in parts]
-
-
-def _obj_lines(text: str, only: str) -> list[str]:
-    """Returns the lines that make the shape, with indices counted from 1 from the start of the file.
-
-    trimesh takes an index of 0 for the first vertex, counts a negative one back from the end of the file
-    instead of from its own line, and confuses corners that have textures with corners that have none.
-    """
-    lines: list[str] = []
-    faces: list[tuple[int, int]] = []  # the highest vertex of each face, and its line
-    count, name, others = 0, "", set()
-    joined = text.replace("\\\r\n", " ").replace("\\\n", " ")
-    for number, line in enumerate(joined.splitlines(), 1):
+    text = data.decode("utf-8-sig", "replace").replace("\\\r\n", " ").replace("\\\n", " ")
+    vertices: list[tuple[float, ...]] = []
+    parts: list[tuple[str, list[list[int]]]] = [("", [])]
+    header, highest, place = ["o"], -1, 0  # the highest corner, and its line
+    for number, line in enumerate(text.splitlines(), 1):
         words = line.split()
-        if not words or words[0] not in READ:
-            continue
-        if words[0] == "v":
-            count += 1
-            words[4:] = []  # a weight or a colour
-            numbers(" ".join(words[1:]), f"line {number}: a vertex", 3)
-        elif words[0] == "f":
-            corners = [_obj_index(word, count, number) for word in words[1:]]
-            if len(corners) < 3:
-                raise DescriptionError(f"line {number}: a face has {len(corners)} corners")
-            faces.append((max(corners), number))
-            if only and name != only:
-                others.add(name)
-                continue
-            words[1:] = map(str, corners)
-        else:
-            name = " ".join(words[1:])
-        lines.append(" ".join(words))
-    for corner, number in faces:
-        if corner > count:
-            raise DescriptionError(f"line {number}: a face names vertex {corner} of {count}")
-    if only and not any(line.startswith("f ") for line in lines):
-        raise _not_found(only, others)
-    return lines
+        kind = words[0] if words else ""
+        if kind == "v":  # a weight or a colour may follow
+            vertices.append(_obj_vertex(words[1:4], number))
+        elif kind == "f":
+            corners = _obj_corners(words[1:], len(vertices), number)
+            fan = pairwise(corners[1:])
+            parts[-1][1].extend(
+                [[corners[0], b, c] for b, c in fan] if len(corners) > 3 else [corners]
+            )
+            if max(corners) > highest:
+                highest, place = max(corners), number
+        elif kind in ("o", "g") and words != header:
+            header = words
+            parts.append((" ".join(words[1:]), []))
+    count = len(vertices)
+    if highest >= count:
+        raise DescriptionError(f"line {place}: a face names vertex {highest + 1} of {count}")
+    chosen = [faces for name, faces in parts if faces and only in ("", name)]
+    if only and not chosen:
+        raise _not_found(only, [name for name, faces in parts if faces])
+    points = np.array(vertices).reshape(-1, 3)
+    return [(points, np.array(faces)) for faces in chosen]
 
 
-def _obj_index(word: str, count: int, number: int) -> int:
-    """Returns the vertex of a corner in line `number`, before which there are `count` vertices."""
+def _obj_vertex(words: list[str], number: int) -> tuple[float, ...]:
+    """Returns a vertex of line `number`; the slower `numbers` says what is wrong with one."""
     try:
-        index = int(word.partition("/")[0])
+        x, y, z = map(float, words)
+    except ValueError:
+        x = y = z = math.nan
+    if math.isfinite(x + y + z):
+        return x, y, z
+    return numbers(" ".join(words), f"line {number}: a vertex", 3)
+
+
+def _obj_corners(words: list[str], count: int, number: int) -> list[int]:
+    """Returns the vertices of a face in line `number`, before which there are `count` vertices."""
+    indices: list[int] = []
+    try:
+        for word in words:
+            indices.append(int(word.partition("/")[0]))
     except ValueError as error:
-        raise DescriptionError(
-            f"line {number}: '{shown(word)}' is not a corner of a face"
-        ) from error
-    if index == 0 or index < -count:
-        raise DescriptionError(f"line {number}: a face names vertex {index} of {count}")
-    return index if index > 0 else count + 1 + index
+        what = shown(words[len(indices)])
+        raise DescriptionError(f"line {number}: '{what}' is not a corner of a face") from error
+    for index in indices:
+        if index == 0 or index < -count:
+            raise DescriptionError(f"line {number}: a face names vertex {index} of {count}")
+    if len(indices) < 3:
+        raise DescriptionError(f"line {number}: a face has {len(indices)} corners")
+    return [index - 1 if index > 0 else count + index for index in indices]
 
 
 def _read_collada(data: bytes, only: str) -> list[Part]:

@@ -30,7 +30,7 @@ FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute"
 MOST_BYTES = 200_000_000  # of a file: a million triangles as COLLADA writes them
 LARGE = 50_000  # [bytes] of a file that is kept
 # Begin the names of what is kept; others when others would come out.
-KEPT, PIECES = "mesh-2", "v-hacd-1"
+KEPT, PIECES = "mesh-3", "v-hacd-1"
 
 # It stays for further meshes: starting Python and importing trimesh takes longer than most files.
 _process = LimitedProcess("robot_sim.physics.files.mesh_program:answer", LIMITS)
@@ -182,8 +182,8 @@ def read_look(path: str) -> MeshLook:
         DescriptionError: It can't be shown; one line with the file and what is wrong.
     """
     check_mesh(Path(path), (*SUFFIXES, *IMAGES))
-    found = Path(path).stat()
-    return _look(Path(path), found.st_mtime_ns, found.st_size)
+    status = Path(path).stat()
+    return _look(Path(path), status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(MOST_KEPT)

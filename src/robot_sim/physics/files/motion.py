@@ -24,15 +24,15 @@ def read_link_motion(link: Link, element: Element, warnings: list[str]) -> None:
     link.kinematic = link.kinematic or truth(element.findtext("kinematic"))
     decay, factor = element.find("velocity_decay"), element.find("dampingFactor")
     if decay is not None:
-        found = value(decay, "linear", where, 0.0), value(decay, "angular", where, 0.0)
+        shares = value(decay, "linear", where, 0.0), value(decay, "angular", where, 0.0)
     elif factor is not None:
-        found = (finite(_given(factor), where),) * 2
+        shares = (finite(_given(factor), where),) * 2
     else:
         return
-    if not 0.0 <= min(found) <= max(found) <= 1.0:
-        warnings.append(f"{where}: {found} are not between 0 and 1; they are left out")
+    if not 0.0 <= min(shares) <= max(shares) <= 1.0:
+        warnings.append(f"{where}: {shares} are not between 0 and 1; they are left out")
     elif link.decay is None:
-        link.decay = found
+        link.decay = shares
 
 
 def settle_kinematic(model: ModelDescription) -> None:

@@ -28,6 +28,6 @@ def own_models() -> dict[str, Element]:
 
 def model_of_mesh(uri: str) -> Element | None:
     """Returns our own model of which Gazebo's has a mesh `uri`."""
-    found = MESH.fullmatch(uri.strip())
-    model = own_models().get(found[1]) if found else None
+    match = MESH.fullmatch(uri.strip())
+    model = own_models().get(match[1]) if match else None
     return model if model is not None and model.get("rgba") and not model.get("exact") else None

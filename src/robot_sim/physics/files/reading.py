@@ -11,20 +11,9 @@ from xml.etree.ElementTree import Element
 
 from file_access.content import MAX_BYTES, FileError, TooLarge, read_file
 from file_access.xml_text import MAX_ELEMENTS, parse
-from robot_sim.physics.description import (
-    DescriptionError,
-    LimitExceeded,
-    Mesh,
-    ModelDescription,
-)
+from robot_sim.physics.description import DescriptionError, LimitExceeded, Mesh, ModelDescription
 from robot_sim.physics.files.elements import files_named_by_a_model, place, shown
-from robot_sim.physics.files.meshes import (
-    SUFFIXES,
-    Selection,
-    check_mesh,
-    in_pieces,
-    read_mesh,
-)
+from robot_sim.physics.files.meshes import SUFFIXES, Selection, check_mesh, in_pieces, read_mesh
 
 MeshFile = tuple[str, Mesh | None]
 """A file's path, and its mesh if it was read."""
@@ -186,24 +175,24 @@ class Reading:
         """
         if not model.collides_with_itself:
             return
-        found: dict[Mesh, Mesh] = {}
+        split: dict[Mesh, Mesh] = {}
         end = time.monotonic() + MAX_SPLITTING
         for link in model.links.values():
             for number, shape in enumerate(link.collisions):
                 if shape.solid is None or shape.solid.is_heightmap:
                     continue
                 self.check()
-                if shape.solid not in found:
-                    found[shape.solid] = shape.solid
+                if shape.solid not in split:
+                    split[shape.solid] = shape.solid
                     try:
                         if time.monotonic() > end:
                             raise DescriptionError(f"others took {MAX_SPLITTING:g} s")
-                        found[shape.solid] = in_pieces(shape.solid)
+                        split[shape.solid] = in_pieces(shape.solid)
                     except DescriptionError as error:
                         model.warnings.append(
                             f"mesh '{shape.mesh}' collides by its convex hull: {error}"
                         )
-                link.collisions[number] = replace(shape, solid=found[shape.solid])
+                link.collisions[number] = replace(shape, solid=split[shape.solid])
 
     def model(self) -> None:
         """Counts one more model."""

@@ -125,7 +125,7 @@ def _begin(model: ModelDescription, element: Element, where: str) -> Iterator[st
     model.start = SavedMotion(root, STILL if model.fixed_base else twist, joints)
     apart = [
         f"'{shown(name)}'"
-        for name, pose in _placed(model, model.start)
+        for name, pose in _placed(model, model.start).items()
         if whole[name] in given and _distance(pose, links[name][0]) > SLACK
     ]
     if apart:
@@ -178,13 +178,13 @@ def _motion(joint: Joint, position: float) -> Pose:
     return joint.pose.compose(joint.anchor).compose(step).compose(joint.anchor.inverse())
 
 
-def _placed(model: ModelDescription, start: SavedMotion) -> Iterator[tuple[str, Pose]]:
-    """Yields each link, and where the joints put it."""
-    below, todo = model.joints_by_parent(), [(model.root, start.pose)]
-    for name, pose in todo:
-        yield name, pose
-        for joint in below[name]:  # the list grows while it is walked
-            todo.append((joint.child, pose.compose(_motion(joint, start.joints[joint.name][0]))))
+def _placed(model: ModelDescription, start: SavedMotion) -> dict[str, Pose]:
+    """Returns where the joints put each link."""
+    poses = {model.root: start.pose}
+    for joint in model.joints_below(model.root):
+        motion = _motion(joint, start.joints[joint.name][0])
+        poses[joint.child] = poses[joint.parent].compose(motion)
+    return poses
 
 
 def _distance(one: Pose, other: Pose) -> float:

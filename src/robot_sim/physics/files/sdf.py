@@ -94,8 +94,8 @@ def _open(uri: str, context: FileContext) -> tuple[Element, FileContext]:
 
 def _open_file(uri: str, context: FileContext) -> tuple[Element, FileContext]:
     with files_named_by_a_model(f"'{shown(uri)}'"):
-        found = context.resources.find(uri, context.folder)
-        path = _model_file(found, context.reading) if found.is_dir() else found
+        target = context.resources.find(uri, context.folder)
+        path = _model_file(target, context.reading) if target.is_dir() else target
     root = context.reading.open(path)
     with place(str(path)):
         if root.tag not in ("sdf", "gazebo"):

@@ -7,13 +7,7 @@ from functools import cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from robot_sim.physics.description import (
-    Color,
-    DescriptionError,
-    Inertia,
-    Joint,
-    Sensor,
-)
+from robot_sim.physics.description import Color, DescriptionError, Inertia, Joint, Sensor
 from robot_sim.physics.files.elements import (
     direction,
     finite,
@@ -24,13 +18,7 @@ from robot_sim.physics.files.elements import (
     shown,
     truth,
 )
-from robot_sim.physics.pose import (
-    Pose,
-    Vector,
-    conjugate,
-    from_rpy,
-    rotate,
-)
+from robot_sim.physics.pose import Pose, Vector, conjugate, from_rpy, rotate
 
 MATERIALS = Path(__file__).with_name("materials.toml")
 MODEL = "__model__"
@@ -102,8 +90,8 @@ def read_inertia(link: Element, where: str, static: bool) -> Inertia:
     where = f"{where}, inertial"
     inertial = link.find("inertial")
     mass = value(inertial, "mass", where, 1.0)
-    found = {key: value(inertial, f"inertia/{key}", where, d) for key, d in MOMENTS.items()}
-    tensor = mended(found)
+    moments = {key: value(inertial, f"inertia/{key}", where, d) for key, d in MOMENTS.items()}
+    tensor = mended(moments)
     least = min(mass, tensor["ixx"], tensor["iyy"], tensor["izz"])
     if least < 0.0 or (mass == 0.0 and not static):
         raise DescriptionError(f"{where}: the mass must be above 0, and no moment below it")
@@ -112,11 +100,7 @@ def read_inertia(link: Element, where: str, static: bool) -> Inertia:
 
 
 def read_sensors(
-    parent: Element,
-    link: str,
-    warnings: list[str],
-    frames: Frames | None = None,
-    joint: str = "",
+    parent: Element, link: str, warnings: list[str], frames: Frames | None = None, joint: str = ""
 ) -> Iterator[Sensor]:
     """Yields the sensors of `link` that `parent` has; a faulty one is a warning.
 
@@ -159,11 +143,11 @@ def _material_colors() -> dict[str, Color]:
 
 def material_color(name: str, warnings: list[str]) -> Color | None:
     """Returns the colour of one of Gazebo's materials; None, and a warning, for another one."""
-    found = _material_colors().get(name)
+    color = _material_colors().get(name)
     warning = f"the colour of material '{shown(name)}' is not known"
-    if found is None and name and warning not in warnings:
+    if color is None and name and warning not in warnings:
         warnings.append(warning)
-    return found
+    return color
 
 
 @dataclass(frozen=True)
@@ -196,9 +180,8 @@ class JointReader:
         joint.pose = child.relative_to(parent)
         pose, relative_to = read_pose(element, where)
         if joint.kind != "fixed" and (pose != Pose() or relative_to not in ("", joint.child)):
-            frame = self._link(
-                relative_to or joint.child, where
-            )  # not the joint's: a link may have its name
+            # Not the joint's: a link may have its name.
+            frame = self._link(relative_to or joint.child, where)
             joint.anchor = frame.compose(pose).relative_to(child)
 
     def _link(self, name: str, where: str) -> Pose:

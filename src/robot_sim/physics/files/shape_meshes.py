@@ -85,9 +85,9 @@ def ball() -> Made:
     """Returns a ball with a radius of 1 m."""
     from trimesh import creation
 
-    found = creation.icosphere(subdivisions=ROUNDS)
-    vertices = np.array(found.vertices)
-    return vertices, np.array(found.faces, np.int32), (vertices,)
+    sphere = creation.icosphere(subdivisions=ROUNDS)
+    vertices = np.array(sphere.vertices)
+    return vertices, np.array(sphere.faces, np.int32), (vertices,)
 
 
 MADE: dict[str, Callable[..., Made]] = {"polyline": extruded, "ellipsoid": ball}

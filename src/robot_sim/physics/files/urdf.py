@@ -149,9 +149,7 @@ class LinkReader:
         for material in robot.findall("material"):
             name = material.get("name", "")
             self._materials[name] = self._or_none(_rgba, material, f"material '{shown(name)}'")
-        for material in robot.iterfind(
-            "link/visual/material"
-        ):  # the first link that gives a colour
+        for material in robot.iterfind("link/visual/material"):  # the first that gives a colour
             name = material.get("name", "")
             if name and name not in self._materials:
                 with suppress(DescriptionError):  # reading its link will report it
@@ -166,9 +164,9 @@ class LinkReader:
         place = f"link '{link.name}'"
         inertial = element.find("inertial")
         if inertial is not None:
-            link.inertia = found = self._or_none(_inertia, inertial, f"{place}, inertial")
+            link.inertia = body = self._or_none(_inertia, inertial, f"{place}, inertial")
             # Gazebo's engine crashes over it.
-            if found is not None and min(found.mass, found.ixx, found.iyy, found.izz) < -TINY:
+            if body is not None and min(body.mass, body.ixx, body.iyy, body.izz) < -TINY:
                 raise DescriptionError(
                     f"{place}, inertial: mass and moments of inertia can't be negative"
                 )
@@ -203,13 +201,13 @@ class LinkReader:
         uri, needed = _solid(element, place).get("filename", ""), element.tag == "collision"
         try:
             with files_named_by_a_model(place):
-                found = self.meshes.find(uri, place, needed)
+                mesh = self.meshes.find(uri, place, needed)
         except DescriptionError as error:
             if needed:
                 raise
             self.meshes.warnings.append(f"{error}; it is left out")
             return None
-        return None if found is None else replace(shape, mesh=found[0], solid=found[1])
+        return None if mesh is None else replace(shape, mesh=mesh[0], solid=mesh[1])
 
     def _color(self, element: Element, place: str) -> Color | None:
         material = element.find("material")

@@ -111,13 +111,13 @@ def _text(element: Element) -> str:
 def add_extension_joints(model: ModelDescription, robot: Element) -> None:
     """Adds the joints of `robot` to `model`, whose fixed joints are lumped; a faulty one is a warning."""
     blocks = (block for block in robot.findall("gazebo") if not block.get("reference"))
-    found = [element for block in blocks for element in block.findall("joint")]
-    if not found or model.static:
+    elements = [element for block in blocks for element in block.findall("joint")]
+    if not elements or model.static:
         return
     poses = link_poses(model, model.root_pose, {})
     poses |= {name: poses[link].compose(pose) for name, (link, pose) in model.lumped.items()}
     joints, links = dict(model.joints), dict(model.links)
-    for given in _read(found, poses, model.warnings):
+    for given in _read(elements, poses, model.warnings):
         joint = _on_whole_links(given, model)
         if joint.name in joints:
             model.warnings.append(

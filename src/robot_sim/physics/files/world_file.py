@@ -37,13 +37,7 @@ from robot_sim.physics.files.sdf_parts import WORLD, Frames, read_color, read_po
 from robot_sim.physics.files.sdf_shapes import ShapeReader
 from robot_sim.physics.files.urdf import read_urdf
 from robot_sim.physics.pose import Pose, Vector
-from robot_sim.physics.world import (
-    GRAVITY,
-    TIME_STEP,
-    SolverSettings,
-    World,
-    ground_plane,
-)
+from robot_sim.physics.world import GRAVITY, TIME_STEP, SolverSettings, World, ground_plane
 
 UPDATE_RATE = 1000.0  # [Hz], SDF's default
 SOLVER = {

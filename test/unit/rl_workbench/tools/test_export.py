@@ -213,7 +213,7 @@ def test_observations_in_parts(algorithm: str, actions: spaces.Space) -> None:
     """As of environments with a goal; and every kind of action."""
     import stable_baselines3
 
-    from rl_workbench.training.sb3.acting import greedy_network
+    from rl_workbench.training.sb3.models import greedy_network
 
     env = Reach(actions)
     own = getattr(stable_baselines3, ALGORITHMS[algorithm].hyperparameters().library_class)
