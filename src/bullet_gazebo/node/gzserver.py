@@ -60,6 +60,7 @@ from robot_sim.physics.engine import Engine
 from robot_sim.physics.engines import BULLET, ENGINES, EngineError, make_engine
 from robot_sim.physics.world import World
 from robot_sim.pictures.recording import RecordingError, RecordingOptions, SimulationRecorder
+from robot_sim.sensors.picture_process import PictureProcess
 from robot_sim.simulator import Simulator
 from ros_calls import master
 from ros_calls.absence import SPAWNS
@@ -177,7 +178,11 @@ class GazeboNode:
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
-        plugins = PluginRegistry(self.sim, thinner, args.seed or 0, sensors, args.camera_scale)
+        pictures = PictureProcess(self.sim, "rays")
+        rospy.on_shutdown(pictures.close)  # before the topics close
+        plugins = PluginRegistry(
+            self.sim, thinner, args.seed or 0, sensors, args.camera_scale, pictures
+        )
         load_plugins(self.sim, plugins, of_world if network else ())
         if not network:
             return
