@@ -26,7 +26,7 @@ from bullet_gazebo.plugins.sensor_topics import (
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.camera_sensors import shot_of
 from robot_sim.sensors.pinhole import CameraView, PinholeCamera, Shot
-from robot_sim.sensors.renderers import PictureStream
+from robot_sim.sensors.rendering import PictureStream
 from robot_sim.state_dict import Shared
 
 QUEUE = 2

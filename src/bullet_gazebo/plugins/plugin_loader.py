@@ -30,7 +30,7 @@ from robot_sim.physics.description import (
 )
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose
-from robot_sim.sensors.renderers import CameraRenderer
+from robot_sim.sensors.rendering import CameraRenderer
 from robot_sim.sensors.schedule import SensorClock
 from robot_sim.sensors.sensing import Mount, Sensing
 from robot_sim.simulator import Simulator

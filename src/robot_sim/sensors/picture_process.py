@@ -21,13 +21,8 @@ from typing import Any
 import psutil
 
 from robot_sim.sensors.pinhole import CameraView, Shot
-from robot_sim.sensors.renderers import (
-    CameraRenderer,
-    PictureStream,
-    RendererError,
-    Send,
-    make_renderer,
-)
+from robot_sim.sensors.renderers import make_renderer
+from robot_sim.sensors.rendering import CameraRenderer, PictureStream, RendererError, Send
 from robot_sim.sensors.scene import Target
 from robot_sim.simulator import Simulator
 

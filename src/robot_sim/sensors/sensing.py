@@ -12,7 +12,7 @@ from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.noise import checked_deviation, generator
 from robot_sim.sensors.rays import RayScene
-from robot_sim.sensors.renderers import CameraRenderer, RayRenderer
+from robot_sim.sensors.rendering import CameraRenderer, RayRenderer
 from robot_sim.sensors.schedule import Schedule
 from robot_sim.simulator import Simulator
 from robot_sim.state_dict import Shared, Stateful

@@ -16,7 +16,7 @@ from robot_sim.sensors import picture_process
 from robot_sim.sensors.noise import generator
 from robot_sim.sensors.picture_process import PictureProcess
 from robot_sim.sensors.pinhole import PinholeCamera, Shot
-from robot_sim.sensors.renderers import PictureStream, RayRenderer, RendererError
+from robot_sim.sensors.rendering import PictureStream, RayRenderer, RendererError
 from robot_sim.sensors.sensing import Sensing
 from robot_sim.simulator import Simulator
 
