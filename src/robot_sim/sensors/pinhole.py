@@ -16,7 +16,7 @@ from robot_sim.sensors.shading import colours
 
 MOST_PIXELS = 2_100_000  # full HD
 LONGEST_SIDE = 65_500  # of a JPEG
-PIECE = 1 << 17  # pixels that are looked at together
+PIECE = 1 << 15  # pixels that are looked at together: what they need fits into caches
 NOT_ASKED = np.zeros(0)
 
 

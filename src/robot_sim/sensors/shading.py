@@ -15,17 +15,20 @@ def colours(scene: RayCaster, hits: Hits, origin: np.ndarray, directions: np.nda
     """Returns the colours (n, 3), 0 to 255, of what rays from `origin` in `directions` (n, 3) have met."""
     assert scene.state is not None  # it has been cast
     seen = np.full((len(directions), 3), BACKGROUND)
-    met = np.flatnonzero(hits.targets != NONE)
-    normals = np.zeros((len(directions), 3))
-    for target in np.unique(hits.targets[met]):
-        rays = met[hits.targets[met] == target]
-        points = origin + hits.distances[rays, None] * directions[rays]
-        normals[rays] = scene.normals(target, points, hits.triangles[rays])
-        seen[rays] = _own_colours(scene, target, hits.triangles[rays], hits.weights[rays])
-    # Meshes' triangles may face either way: light falls on the side that is seen.
-    away = np.einsum("ij,ij->i", normals, directions) > 0.0
-    normals[away] *= -1.0
-    seen[met] *= _light(scene.state.beams, normals[met])
+    order = np.argsort(hits.targets.astype(np.int16), kind="stable")  # by radix, as short numbers are
+    targets = hits.targets[order]
+    for rays in np.split(order, np.flatnonzero(np.diff(targets)) + 1):
+        target = int(hits.targets[rays[0]])
+        if target == NONE:
+            continue
+        ways, triangles = directions[rays], hits.triangles[rays]
+        points = origin + hits.distances[rays, None] * ways
+        normals = scene.normals(target, points, triangles)
+        # Meshes' triangles may face either way: light falls on the side that is seen.
+        away = np.einsum("ij,ij->i", normals, ways) > 0.0
+        normals = np.where(away[:, None], -normals, normals)
+        own = _own_colours(scene, target, triangles, hits.weights[rays])
+        seen[rays] = own * _light(scene.state.beams, normals)
     return seen
 
 
