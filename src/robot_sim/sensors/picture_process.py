@@ -8,6 +8,7 @@ is lent to those who only look. The process ends with the simulator's, however t
 import logging
 import math
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -27,6 +28,7 @@ from robot_sim.sensors.scene import Target
 from robot_sim.simulator import Simulator
 
 MAIN = "import sys; from robot_sim.sensors.picture_process import main; sys.exit(main())"
+NICENESS = "5"  # in real time, where ticks are due and pictures aren't
 START_TIMEOUT = 60.0  # [s] for the process to begin
 LOOK = 1.0  # [s] between two looks whether it computes
 WINDOW = 5.0  # [s] in which a camera's frames are counted
@@ -45,6 +47,7 @@ class PictureProcess(CameraRenderer):
         super().__init__()
         self.name = name
         self._sim = sim
+        self._niceness = () if sim.lockstep else (NICENESS,)
         self._fault = ""
         self._asking = threading.Lock()
         self._process: tuple[subprocess.Popen[bytes], Connection] | None = None
@@ -58,8 +61,8 @@ class PictureProcess(CameraRenderer):
         ours, theirs = Pipe()
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         process = subprocess.Popen(
-            [sys.executable, "-P", "-c", MAIN, str(theirs.fileno()), self.name],
-            env=environment, pass_fds=[theirs.fileno()], start_new_session=True,
+            [sys.executable, "-P", "-c", MAIN, str(theirs.fileno()), self.name, *self._niceness],
+            env=environment, pass_fds=[theirs.fileno()],
         )  # fmt: skip
         theirs.close()
         self._process = process, ours
@@ -164,6 +167,9 @@ def _tell(stream: PictureStream, shot: Shot) -> None:
 
 def main() -> int:
     """Renders what comes through the pipe whose number is the first argument, by the second one."""
+    for number in (signal.SIGINT, signal.SIGTERM):  # to the group; it ends with the pipe
+        signal.signal(number, signal.SIG_IGN)
+    os.nice(sum(map(int, sys.argv[3:])))
     connection = Connection(int(sys.argv[1]))
     try:
         renderer = make_renderer(sys.argv[2])
