@@ -28,7 +28,7 @@ from robot_sim.sensors.scene import Target
 from robot_sim.simulator import Simulator
 
 MAIN = "import sys; from robot_sim.sensors.picture_process import main; sys.exit(main())"
-NICENESS = "5"  # in real time, where ticks are due and pictures aren't
+NICENESS = "10"  # in real time, where ticks are due and pictures aren't
 START_TIMEOUT = 60.0  # [s] for the process to begin
 LOOK = 1.0  # [s] between two looks whether it computes
 WINDOW = 5.0  # [s] in which a camera's frames are counted
