@@ -21,6 +21,7 @@ from robot_sim.sensors.shading import AMBIENT, BACKGROUND, DIFFUSE
 SLICES, STACKS = 64, 32  # of a ball
 ROUND = 2.0 / (1.0 + math.cos(math.pi / SLICES))  # facets half within the shape and half without
 LEAST_NEAR = 1e-3  # [m]; a near plane in the eye shows nothing
+LEAST = 1e-9  # [m] of what MuJoCo would refuse as too small
 THIN = 1e-6  # half the thickness of a plane, by how far the camera sees
 OFF = ("SHADOW", "REFLECTION", "HAZE", "SKYBOX", "FOG")
 SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "software")
@@ -85,14 +86,15 @@ class GlRenderer(CameraRenderer):
         data.geom_xmat[:] = turns.reshape(-1, 9)
         eye = self._look(shot)
         colours, depths = self._draw(shot, from_behind=False)
-        if (np.linalg.norm(data.geom_xpos - eye, axis=1) < self._reaches).any():
+        near = max(camera.near, LEAST_NEAR)
+        corner = near * math.hypot(1.0, camera.across[0], camera.down[0, 0])
+        if (np.linalg.norm(data.geom_xpos - eye, axis=1) < self._reaches + corner).any():
             # GL lights faces on their front alone; rays see the inside of a shape, and sheets from behind.
             others, there = self._draw(shot, from_behind=True)
             nearer = there > depths
             colours[nearer], depths[nearer] = others[nearer], there[nearer]
         nothing = depths == 0.0
         colours[nothing] = int(BACKGROUND)
-        near = max(camera.near, LEAST_NEAR)
         along = near * camera.far / (near + depths * (camera.far - near))
         return CameraView(colours, np.where(nothing, np.inf, along))
 
@@ -158,9 +160,8 @@ class GlRenderer(CameraRenderer):
         self._model = model = spec.compile()
         textures = [texture for texture in added if texture is not None]
         for begin, texture in zip(model.tex_adr, textures, strict=True):
-            model.tex_data[begin : begin + texture.size] = texture[
-                ::-1
-            ].ravel()  # the lowest row first
+            lowest_first = texture[::-1].ravel()
+            model.tex_data[begin : begin + texture.size] = lowest_first
         self._data, self._option = mj.MjData(model), mj.MjvOption()
         self._scene = mj.MjvScene(model, maxgeom=len(targets) + 1)
         self._context = mj.MjrContext(model, mj.mjtFontScale.mjFONTSCALE_50)
@@ -170,22 +171,18 @@ class GlRenderer(CameraRenderer):
             self._scene.flags[getattr(mj.mjtRndFlag, f"mjRND_{flag}")] = 0
         # From how near a shape may show the back of a face; a mesh always.
         self._reaches = np.array([
-            0.0 if (kind := target.shape.kind) == "plane"
+            -np.inf if (kind := target.shape.kind) == "plane"
             else np.inf if kind == "mesh" else reach(kind, target.shape.size)
             for target in targets
         ])  # fmt: skip
         self._planes = [n for n, target in enumerate(targets) if target.shape.kind == "plane"]
         count = len(targets)
         self._own_turns, self._own_places = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
-        for number in np.flatnonzero(
-            model.geom_dataid >= 0
-        ):  # MuJoCo moves meshes into a frame of theirs
-            mesh, turn = model.geom_dataid[number], np.zeros(9)
+        # MuJoCo moves meshes into frames of theirs.
+        for number in np.flatnonzero(model.geom_dataid >= 0):
+            mesh, turn = model.geom_dataid[number], self._own_turns[number].reshape(9)
             mj.mju_quat2Mat(turn, model.mesh_quat[mesh])
-            self._own_turns[number], self._own_places[number] = (
-                turn.reshape(3, 3),
-                model.mesh_pos[mesh],
-            )
+            self._own_places[number] = model.mesh_pos[mesh]
 
     def _add(self, spec: Any, name: str, target: Target) -> np.ndarray | None:
         """Adds a visual to a model, with room for its texture; returns that."""
@@ -194,9 +191,9 @@ class GlRenderer(CameraRenderer):
         _set(paint, specular=0.0, shininess=0.0, reflectance=0.0)
         geom = spec.worldbody.add_geom(material=name, contype=0, conaffinity=0)
         geom.type = getattr(mj.mjtGeom, f"mjGEOM_{shape.kind.upper()}")
-        size = shape.size
+        size = np.maximum(shape.size, LEAST)
         if shape.kind == "box":
-            geom.size = np.array(size) / 2.0
+            geom.size = size / 2.0
         elif shape.kind == "cylinder":
             geom.size = [ROUND * size[0], size[1] / 2.0, 0.0]
         elif shape.kind == "sphere":
@@ -204,15 +201,18 @@ class GlRenderer(CameraRenderer):
         elif shape.kind == "plane":  # MuJoCo shows its own ones from above alone
             geom.type = mj.mjtGeom.mjGEOM_BOX
             geom.size = [1.0, 1.0, THIN]
-        else:
-            assert piece is not None  # of a visual mesh
+        elif piece is not None and (whole := piece.solid.normals.any(axis=1)).any():
             geom.meshname = name
             mesh = spec.add_mesh(name=name, inertia=mj.mjtMeshInertia.mjMESH_INERTIA_SHELL)
-            corners, normals = piece.solid
-            faces = np.arange(len(corners))
-            _set(mesh, uservert=corners.ravel(), usernormal=normals.ravel(), userface=faces)
+            count = max(int(np.count_nonzero(whole)), 6)  # a single triangle counts twice
+
+            def flat(each: np.ndarray) -> np.ndarray:
+                return np.resize(each[whole], (count, each.shape[1])).ravel()
+
+            corners, normals = map(flat, piece.solid)
+            _set(mesh, uservert=corners, usernormal=normals, userface=np.arange(count))
             if piece.texture is not None and piece.uvs is not None:
-                _set(mesh, usertexcoord=piece.uvs.ravel())
+                _set(mesh, usertexcoord=flat(piece.uvs))
                 height, width = piece.texture.shape[:2]
                 spec.add_texture(
                     name=name, type=mj.mjtTexture.mjTEXTURE_2D, width=width, height=height,
@@ -220,6 +220,8 @@ class GlRenderer(CameraRenderer):
                 )  # fmt: skip
                 paint.textures[mj.mjtTextureRole.mjTEXROLE_RGB] = name
                 return piece.texture
+        else:  # triangles without an area
+            _set(geom, type=mj.mjtGeom.mjGEOM_SPHERE, size=[LEAST] * 3)
         return None
 
 

@@ -124,6 +124,19 @@ def test_meshes_with_textures_and_sheets_from_behind(world, gl, tmp_path):
         assert (seen[..., colour] - seen[..., others].max(axis=-1) > 50).mean() > 0.01
 
 
+@pytest.mark.parametrize("corners", [
+    [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 0, 0]] * 6,
+])  # fmt: skip
+def test_meshes_that_mujoco_would_refuse_are_drawn(world, gl, tmp_path, corners):
+    points = np.array(corners, float) @ [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
+    faces = np.arange(len(points)).reshape(-1, 3)
+    vertices = np.vstack([points, [[0.0, 0.0, 0.3], [0.0, 0.3, 0.3], [0.0, 0.0, 0.6]]])
+    mesh = trimesh.Trimesh(vertices, [*faces, [len(points) + i for i in range(3)]], process=False)
+    mesh.export(tmp_path / "mesh.obj")
+    world.spawn("mesh", parse_sdf(MESH.format(1, tmp_path / "mesh.obj")), Pose((1.0, 0.0, 0.3)))
+    compare(gl, WorldScene(world, visuals=True))
+
+
 def test_without_gl_it_says_so_in_a_line_and_auto_takes_rays(monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "nothing")
     with pytest.raises(RendererError, match="MUJOCO_GL=nothing gives no GL: .*ws extras") as raised:
