@@ -68,7 +68,7 @@ usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
        ws check [NAME...]    run all checks, or those named: ${CHECKS[*]}
        ws docs [FOLDER]      build the documentation as a site and serve it, or write it to FOLDER
        ws shell              open an interactive bash in the workspace, with roscd and completion
-       ws extras [CMD...]    install requirements/extras.txt too, then run CMD, if any
+       ws extras [CMD...]    install requirements/extras.txt and Mesa too, then run CMD, if any
        ws rviz [CMD...]      install Debian's RViz too, then run CMD, if any
        ws foreign [CMD...]   install compilers and what other people's packages commonly build against, then
                              run CMD, if any
@@ -165,7 +165,7 @@ main() {
     case $1 in
         test)
             steps=(debian venv test_tools companions build)
-            [[ " $* " == *" --fast "* ]] || steps+=(compiler extras)
+            [[ " $* " == *" --fast "* ]] || steps+=(compiler extras mesa)
             [[ " $* " == *" --fast "* || $SYSTEM != "debian 12" ]] || steps+=(oracle)
             ;;
         check)
@@ -173,7 +173,7 @@ main() {
             steps=(debian checkers venv test_tools doc_tools companions build)
             ;;
         docs) steps=(debian venv doc_tools companions build) ;;
-        extras) steps=(debian venv extras companions build) ;;
+        extras) steps=(debian venv extras mesa companions build) ;;
         rviz) steps=(debian rviz venv companions build) ;;
         foreign) steps=(debian compiler foreign venv companions build) ;;
     esac

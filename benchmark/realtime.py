@@ -8,15 +8,14 @@ a table and writes realtime.json. It starts a simulator on a master of its own.
 """
 
 import contextlib
-import os
 import subprocess
 import sys
 import time
 import xmlrpc.client
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
+import psutil
 import reporting
 import rosgraph
 from cartpole_world import add_cartpole
@@ -62,9 +61,10 @@ def simulator_process(simulation: Simulation) -> int:
 
 
 def processor_time(process: int) -> float:
-    """Processor time [s] that a process has had."""
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    """Processor time [s] that a process and those it has started, as the one of pictures, have had."""
+    simulator = psutil.Process(process)
+    times = [each.cpu_times() for each in (simulator, *simulator.children())]
+    return sum(each.user + each.system for each in times)
 
 
 def factor(seconds: float, process: int) -> tuple[float, float]:

@@ -17,6 +17,7 @@ declare -A TITLE=(
     [test_tools]="tools for test and check"
     [doc_tools]="tools for the documentation"
     [extras]="extra Python packages"
+    [mesa]="Debian packages that draw"
     [companions]="catkin workspace of the companions"
     [build]="catkin workspace"
 )
@@ -25,7 +26,7 @@ COMPILER="mend what the compiler or CMake complains of; if that is nothing of yo
 # shellcheck disable=SC2034
 declare -A REMEDY=(
     [debian]="$NETWORK; on other systems than Debian 12 and 13 see docs/catkin.md"
-    [checkers]=$NETWORK [compiler]=$NETWORK [oracle]=$NETWORK [rviz]=$NETWORK [foreign]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [doc_tools]=$NETWORK [extras]=$NETWORK
+    [checkers]=$NETWORK [compiler]=$NETWORK [oracle]=$NETWORK [rviz]=$NETWORK [foreign]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [doc_tools]=$NETWORK [extras]=$NETWORK [mesa]=$NETWORK
     [companions]=$COMPILER [build]=$COMPILER
 )
 
@@ -79,6 +80,7 @@ key_compiler() { debian_missing compiler.txt; }
 key_oracle() { debian_missing oracle.txt; }
 key_rviz() { debian_missing rviz.txt; }
 key_foreign() { debian_missing foreign.txt; }
+key_mesa() { debian_missing mesa.txt; }
 
 AS_ROOT=()
 become_root() {
@@ -98,6 +100,7 @@ plan_compiler() { plan_packages compiler.txt; }
 plan_oracle() { plan_packages oracle.txt; }
 plan_rviz() { plan_packages rviz.txt; }
 plan_foreign() { plan_packages foreign.txt; }
+plan_mesa() { plan_packages mesa.txt; }
 plan_packages() {  # file
     local missing
     mapfile -t missing < <(debian_missing "$1")
@@ -130,6 +133,8 @@ make_compiler() { make_packages compiler.txt; }
 make_oracle() { make_packages oracle.txt; }
 make_rviz() { make_packages rviz.txt; }
 make_foreign() { make_packages foreign.txt; }
+# Not all who want the extras are root, and not all of them want this one.
+make_mesa() { make_packages mesa.txt || echo "There will be no renderer:=gl."; }
 make_packages() {  # file
     local missing
     mapfile -t missing < <(debian_missing "$1")

@@ -76,7 +76,7 @@ class SceneServer:
 
     def _get(self, request: GetSceneRequest) -> GetSceneResponse:
         world, known = self._sim.world, frozenset(request.known)
-        with self._sim.lock:  # converting a large model takes long, and is done without it
+        with self._sim.lock.glance():  # converting a large model takes long, and is done without it
             version = self._number(world.version)
             models = list(world.models.values())
             lights = [copy(light) for light in world.lights.values()]
@@ -112,7 +112,7 @@ class SceneServer:
             if self._ending.wait(max(0.0, due - time.monotonic())):
                 return
             try:
-                with self._sim.lock:
+                with self._sim.lock.glance():
                     copies = self._copy()
                 for publish in copies:
                     publish()

@@ -64,6 +64,9 @@ class RobotEnv(SavedEnv):
             newest joint state without waiting.
         deadline: Wall time that a simulator over ROS in lock-step may take for an answer, on top of 10 ms for
             each physics step [s]; None: 5 s, and 30 s for "ros-own", of which there may be many.
+        renderer: What makes the pictures of cameras: "rays", with equal bits on all machines; "gl", by OpenGL
+            on a GPU or in software; "auto": GL where there is a GPU, else rays. For "bullet", "mujoco" and
+            "ros-own".
         max_steps: After how many steps an episode is truncated; None: the task's.
         sensor_noise: Standard deviation of noise on what joints and sensors measure; see `Sensor`.
         sensor_delay: Age of an observation [control steps].
@@ -96,6 +99,7 @@ class RobotEnv(SavedEnv):
         *,
         control_period: float | None = None,
         deadline: float | None = None,
+        renderer: str = "rays",
         max_steps: int | None = None,
         sensor_noise: Noise = 0.0,
         sensor_delay: int = 0,
@@ -136,7 +140,7 @@ class RobotEnv(SavedEnv):
         self._steps: int | None = None  # None: no episode is under way
         self._begun: _Step | None = None
         if backend is None or isinstance(backend, str):
-            backend = make_backend(scene, backend, period, deadline)
+            backend = make_backend(scene, backend, period, deadline, renderer)
         self.backend: RobotBackend = backend
         self._closed = False
         try:

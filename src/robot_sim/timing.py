@@ -27,7 +27,8 @@ class FairLock(Shared):
 
     def __init__(self) -> None:
         self._guard = threading.Lock()
-        self._waiting: deque[threading.Lock] = deque()
+        self._waiting: deque[tuple[threading.Lock, bool]] = deque()  # and whether they only look
+        self._is_lent = False
         self.held = False
         self.holder: int | None = None  # the thread; None also at the moment when it is handed over
         self.turns = 0  # how often it was acquired
@@ -49,21 +50,37 @@ class FairLock(Shared):
     @contextmanager
     def glance(self) -> Iterator[None]:
         """Holds the lock for a look that decides nothing: `taken` and `leaving` aren't called."""
-        self._take()
+        self._take(looks=True)
         self.holder = threading.get_ident()
+        self.turns += 1
         try:
             yield
         finally:
             self._release()
 
-    def _take(self) -> None:
+    @contextmanager
+    def lent(self) -> Iterator[None]:
+        """Lets those who glance have the lock within the block, one after the other.
+
+        The holder calls it while it waits in the middle of a tick. Nobody changes the world meanwhile.
+        """
+        holder = self.holder
+        self._is_lent = True
+        self._release()
+        try:
+            yield
+        finally:
+            self._take(looks=True)
+            self.holder, self._is_lent = holder, False
+
+    def _take(self, looks: bool = False) -> None:
         with self._guard:
-            if not self.held:
+            if not self.held and (looks or not self._is_lent):
                 self.held = True
                 return
             turn = threading.Lock()
             turn.acquire()
-            self._waiting.append(turn)
+            self._waiting.append((turn, looks))
         turn.acquire()
 
     def wait(self, event: threading.Event, timeout: float) -> None:
@@ -87,10 +104,12 @@ class FairLock(Shared):
     def _release(self) -> None:
         self.holder = None
         with self._guard:
-            if self._waiting:
-                self._waiting.popleft().release()  # the lock stays held: it is handed over
-            else:
-                self.held = False
+            for waiter in self._waiting:
+                if waiter[1] or not self._is_lent:
+                    self._waiting.remove(waiter)
+                    waiter[0].release()  # the lock stays held: it is handed over
+                    return
+            self.held = False
 
 
 class Holds:

@@ -72,7 +72,7 @@ class ControllerServices:
         self._services.append(rospy.Service(full, kind, handle))
 
     def _list(self, request: srv.ListControllersRequest) -> srv.ListControllersResponse:
-        with self._sim.lock:
+        with self._sim.lock.glance():
             listed = self._manager.listed()
         return srv.ListControllersResponse([_state(entry) for entry in listed])
 

@@ -67,7 +67,7 @@ class TrajectoryTopics:
 
     def _query(self, request: srv.QueryTrajectoryStateRequest) -> srv.QueryTrajectoryStateResponse:
         try:
-            with self._sim.lock:
+            with self._sim.lock.glance():
                 states = self._controller.query(request.time.to_nsec())
         except TrajectoryRefused as refusal:
             raise rospy.ServiceException(str(refusal)) from refusal

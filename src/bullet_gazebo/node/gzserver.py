@@ -60,6 +60,9 @@ from robot_sim.physics.engine import Engine
 from robot_sim.physics.engines import BULLET, ENGINES, EngineError, make_engine
 from robot_sim.physics.world import World
 from robot_sim.pictures.recording import RecordingError, RecordingOptions, SimulationRecorder
+from robot_sim.sensors.picture_process import PictureProcess
+from robot_sim.sensors.renderers import RENDERERS
+from robot_sim.sensors.rendering import RAYS, RendererError
 from robot_sim.simulator import Simulator
 from ros_calls import master
 from ros_calls.absence import SPAWNS
@@ -114,6 +117,10 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     option(
         "--camera-scale", type=_scale, default=1.0, metavar="SCALE",
         help="size of cameras' pictures, beside the one in the robot's file: 0.25 is a quarter of the width",
+    )  # fmt: skip
+    option(
+        "--renderer", choices=RENDERERS, default=RAYS,
+        help="of cameras' pictures: rays, equal bits on all machines; gl, by OpenGL; auto, gl on a GPU",
     )  # fmt: skip
     for names in INERT:
         option(*names.split(), action="store_true", help="accepted, without effect")
@@ -177,7 +184,15 @@ class GazeboNode:
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
-        plugins = PluginRegistry(self.sim, thinner, args.seed or 0, sensors, args.camera_scale)
+        pictures = PictureProcess(self.sim, args.renderer)
+        rospy.on_shutdown(pictures.close)  # before the topics close
+        if args.renderer != RAYS:  # which may be missing
+            pictures.start()
+            rospy.loginfo("Cameras' pictures are made by %s", pictures.name)
+            args.renderer = pictures.name
+        plugins = PluginRegistry(
+            self.sim, thinner, args.seed or 0, sensors, args.camera_scale, pictures
+        )
         load_plugins(self.sim, plugins, of_world if network else ())
         if not network:
             return
@@ -279,7 +294,7 @@ def simulate(
     """Simulates until the end; returns the exit code."""
     try:
         node = GazeboNode(args, engine, signals.noted)
-    except RecordingError as error:
+    except (RecordingError, RendererError) as error:
         rospy.logfatal("%s", error)
         return 1
     except Exception:

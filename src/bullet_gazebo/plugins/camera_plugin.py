@@ -1,14 +1,21 @@
 """libgazebo_ros_camera.so, ..._multicamera.so and both triggered (docs/contract/sensors.md 4a, 4c, 11.6)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import ClassVar
 
 import rospy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Empty
 
-from bullet_gazebo.plugins.camera_topics import CameraTopics, offer_rate, read_image, scope_of
+from bullet_gazebo.plugins.camera_topics import (
+    CameraTopics,
+    offer_rate,
+    read_image,
+    scope_of,
+    stream_of,
+)
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import (
     MODEL,
@@ -18,7 +25,8 @@ from bullet_gazebo.plugins.sensor_topics import (
     topic_in,
 )
 from robot_sim.physics.description import DescriptionError, Sensor
-from robot_sim.sensors.pinhole import CameraSensor, PinholeCamera, camera_of, rate_of
+from robot_sim.sensors.camera_sensors import CameraSensor, camera_of, rate_of
+from robot_sim.sensors.pinhole import CameraView, PinholeCamera
 from robot_sim.sensors.sensing import sensor_of
 
 MULTICAMERA = "multicamera"
@@ -34,12 +42,12 @@ class CameraPlugin(ContextPlugin):
     )
     measurement: ClassVar = CameraSensor
     kind = "camera"  # of sensor
-    non_persistent = ("_sensor", "_is_heard", "_eyes")
+    non_persistent = ("_is_heard", "_eyes")
     latch = False  # a new subscriber has a picture taken
 
     def __init__(self, context: PluginContext) -> None:
         self._context = context
-        self._sensor = sensor = sensor_of(context, (self.kind,))
+        sensor = sensor_of(context, (self.kind,))
         topics = SensorTopics(context, rate_of(context, sensor), self._on_clock)
         self._is_heard = topics.is_heard
         self._scope = scope = scope_of(context)
@@ -50,21 +58,23 @@ class CameraPlugin(ContextPlugin):
             context.text("cameraInfoTopicName", "camera_info"),
         )
         self._eyes = [
-            (camera, CameraTopics(
+            CameraTopics(
                 context, camera, topics, scope, (side + names[0], side + names[1]),
                 0.0 if side == SIDES[0] else baseline, side, latch=self.latch,
-            ))
+            )
             for side, camera in _cameras(sensor, context.sensing.camera_scale)
         ]  # fmt: skip
+        self._stream = stream_of(context)
 
     def _on_clock(self, now: int) -> None:
         self._take(now)
 
     def _take(self, now: int) -> None:
-        link = self._context.model.link_state(self._sensor.link)[0]
-        scene = self._context.sensing.visuals
-        for camera, topics in self._eyes:
-            topics.send(camera.picture(scene, link, topics.wants_colour), now)
+        self._stream.take([eye.shot(now) for eye in self._eyes], partial(self._send, now))
+
+    def _send(self, now: int, views: Sequence[CameraView]) -> None:
+        for eye, view in zip(self._eyes, views, strict=True):
+            eye.send(view, now)
 
 
 class MulticameraPlugin(CameraPlugin):
@@ -97,7 +107,7 @@ class TriggeredCameraPlugin(CameraPlugin):
         self._clock.look()
 
     def _update(self, now: int) -> None:
-        if self._waiting:
+        if self._waiting and not self._stream.is_behind:
             self._waiting -= 1
             if self._is_heard():
                 self._take(now)

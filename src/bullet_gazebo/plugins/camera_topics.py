@@ -24,7 +24,9 @@ from bullet_gazebo.plugins.sensor_topics import (
     topic_in,
 )
 from robot_sim.physics.pose import Pose
-from robot_sim.sensors.pinhole import CameraView, PinholeCamera, with_noise
+from robot_sim.sensors.camera_sensors import shot_of
+from robot_sim.sensors.pinhole import CameraView, PinholeCamera, Shot
+from robot_sim.sensors.rendering import PictureStream
 from robot_sim.state_dict import Shared
 
 QUEUE = 2
@@ -91,15 +93,20 @@ class CameraTopics(Shared):
     def header(self, now: int) -> Header:
         return Header(stamp=to_time(now), frame_id=self._frame)
 
+    def shot(self, now: int, colours: bool = False, depths: bool = False) -> Shot:
+        """Returns what its picture at a time [ns] is made of; the plugin may need `colours` and `depths`."""
+        return shot_of(
+            self._context, self._camera, now, self._own,
+            image=self.wants_colour, colours=colours, depths=depths,
+        )  # fmt: skip
+
     def send(self, picture: CameraView, now: int) -> None:
         """Publishes what is heard of a picture at a time [ns]."""
-        header = self.header(now)
-        if self.wants_colour:
-            seen = with_noise(self._context, self._camera, picture.colours, now, self._own)
-            if self._image.is_heard:
-                self._image.publish(to_image(seen, self._camera.format, header))
-            if self._jpeg.is_heard:
-                self._jpeg.publish(_to_jpeg(seen, header))
+        header, seen = self.header(now), picture.image
+        if seen.size and self._image.is_heard:
+            self._image.publish(to_image(seen, self._camera.format, header))
+        if seen.size and self._jpeg.is_heard:
+            self._jpeg.publish(_to_jpeg(seen, header))
         if self._info.is_heard:
             self.info.header = header
             self._info.publish(self.info)
@@ -111,6 +118,14 @@ class CameraTopics(Shared):
             return SetCameraInfoResponse(False, "the size isn't that of the camera's pictures")
         self.info = given
         return SetCameraInfoResponse(True, "")
+
+
+def stream_of(context: PluginContext) -> PictureStream:
+    """Returns the way of a plugin's pictures to topics that are advertised: it closes before them."""
+    sensing, name = context.sensing, f"{context.model.name}, {context.key}"
+    stream = PictureStream(name, sensing.renderer, sensing.schedule)
+    context.closing(stream.close)
+    return stream
 
 
 def show_camera(context: PluginContext, topic: str, kind: type, camera: PinholeCamera) -> None:

@@ -1,5 +1,7 @@
 """libgazebo_ros_depth_camera.so and libgazebo_ros_openni_kinect.so (docs/contract/sensors.md 4b)."""
 
+from collections.abc import Sequence
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -13,6 +15,7 @@ from bullet_gazebo.plugins.camera_topics import (
     read_depth,
     scope_of,
     show_camera,
+    stream_of,
 )
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import (
@@ -23,7 +26,8 @@ from bullet_gazebo.plugins.sensor_topics import (
     topic_in,
 )
 from robot_sim.physics.files.elements import truth
-from robot_sim.sensors.pinhole import KINECT, DepthSensor, PinholeCamera
+from robot_sim.sensors.camera_sensors import KINECT, DepthSensor
+from robot_sim.sensors.pinhole import CameraView, PinholeCamera
 
 POINT_STEP = 32
 FIELDS = {"x": 0, "y": 4, "z": 8, "rgb": 16}
@@ -72,19 +76,25 @@ class DepthCameraPlugin(ContextPlugin):
         info = named("depthImageCameraInfoTopicName", "depth/camera_info")
         self._depth_info = topics.advertise(info, CameraInfo, QUEUE, wakes=False)
         self._in_millimetres = truth(context.text("useDepth16UC1Format", "false"))
+        self._stream = stream_of(context)
 
     def _measure(self, now: int) -> None:
-        picture = self._sensor.view(self._pictures.wants_colour or self._cloud.is_heard)
+        is_cloud = self._cloud.is_heard
+        shot = self._pictures.shot(now, colours=is_cloud, depths=is_cloud or self._depth.is_heard)
+        self._stream.take([shot], partial(self._send, now))
+
+    def _send(self, now: int, views: Sequence[CameraView]) -> None:
+        [picture] = views
         self._pictures.send(picture, now)
         header = self._pictures.header(now)
         depths = self._sensor.depths(picture)
-        if self._depth.is_heard:
+        if depths.size and self._depth.is_heard:
             self._depth.publish(to_depth_image(depths, self._in_millimetres, header))
         if self._depth_info.is_heard:
             info = self._pictures.info
             info.header = header
             self._depth_info.publish(info)
-        if self._cloud.is_heard:
+        if picture.colours.size and self._cloud.is_heard:
             self._cloud.publish(
                 to_cloud(depths, picture.colours, self._sensor.camera, self.is_organised, header)
             )

@@ -30,6 +30,7 @@ from robot_sim.physics.description import (
 )
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose
+from robot_sim.sensors.rendering import CameraRenderer
 from robot_sim.sensors.schedule import SensorClock
 from robot_sim.sensors.sensing import Mount, Sensing
 from robot_sim.simulator import Simulator
@@ -206,12 +207,15 @@ class PluginRegistry:
     def __init__(
         self, sim: Simulator, thinner: Thinner, seed: int = 0,
         shown: list[SceneSensor] | None = None, camera_scale: float = 1.0,
+        renderer: CameraRenderer | None = None,
     ) -> None:  # fmt: skip
-        """`seed` and `camera_scale` as of `Sensing`; to `shown` come the topics that windows can draw."""
+        """`seed`, `camera_scale` and `renderer` as of `Sensing`; to `shown` come the topics that windows can
+        draw.
+        """
         self._sim = sim
         self._shown = [] if shown is None else shown
         self._thinner = thinner
-        self.sensing = Sensing(sim, seed, camera_scale)
+        self.sensing = Sensing(sim, seed, camera_scale, renderer)
         # Imported now, so that no spawn waits for it.
         self._built_in = built_in("LIBRARIES")
         self._of_worlds = built_in("WORLD_LIBRARIES")

@@ -1,18 +1,27 @@
 """librealsense_gazebo_plugin.so: the cameras of a RealSense (docs/contract/sensors.md 12.2)."""
 
+from collections.abc import Sequence
+from functools import partial
+
 import numpy as np
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 
 from bullet_gazebo.common.messages import to_time
-from bullet_gazebo.plugins.camera_topics import QUEUE, CameraTopics, camera_info, show_camera
+from bullet_gazebo.plugins.camera_topics import (
+    QUEUE,
+    CameraTopics,
+    camera_info,
+    show_camera,
+    stream_of,
+)
 from bullet_gazebo.plugins.depth_camera_plugin import to_cloud, to_depth_image
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import ContextPlugin, SensorTopics, frame_of, topic_in
 from robot_sim.physics.description import DescriptionError, Sensor
 from robot_sim.physics.files.elements import truth
-from robot_sim.physics.pose import Pose
-from robot_sim.sensors.pinhole import PinholeCamera, camera_of
+from robot_sim.sensors.camera_sensors import camera_of, shot_of
+from robot_sim.sensors.pinhole import CameraView, PinholeCamera, Shot
 from robot_sim.state_dict import Shared
 
 DEPTH = "depth"
@@ -45,7 +54,7 @@ class _Eye(Shared):
     """A camera of its own rate."""
 
     def __init__(self, context: PluginContext, name: str, sensor: Sensor) -> None:
-        self.context, self._link = context, sensor.link
+        self.context = context
         self.camera = camera_of(sensor, context.sensing.camera_scale)
         self.element, topic = EYES[name]
         rate = context.rate(f"{self.element.rstrip('12')}UpdateRate", sensor.rate)
@@ -55,6 +64,7 @@ class _Eye(Shared):
         self.frame = context.text(f"{self.element}OpticalframeName", f"{name}_optical_frame")
         self.info_topic = f"{self.topic.rpartition('/')[0]}/camera_info".lstrip("/")
         self.open()
+        self._stream = stream_of(context)
 
     def open(self) -> None:
         """Advertises its topics."""
@@ -66,15 +76,16 @@ class _Eye(Shared):
         self._pictures.info = _centred(self.context, self.camera)
 
     def take(self, now: int) -> None:
-        """Publishes what is heard of a picture at a time [ns]."""
-        seen = self.camera.picture(
-            self.context.sensing.visuals, self.place(), self._pictures.wants_colour
-        )
-        self._pictures.send(seen, now)
+        """Publishes what is heard of a picture at a time [ns], once it is made."""
+        self._stream.take([self.shot(now)], partial(self.send, now))
 
-    def place(self) -> Pose:
-        """Returns the pose of its link."""
-        return self.context.model.link_state(self._link)[0]
+    def shot(self, now: int) -> Shot:
+        """Returns what is heard."""
+        return self._pictures.shot(now)
+
+    def send(self, now: int, views: Sequence[CameraView]) -> None:
+        """Publishes it."""
+        self._pictures.send(views[0], now)
 
 
 class _Depths(_Eye):
@@ -99,17 +110,21 @@ class _Depths(_Eye):
         self._near = context.number("pointCloudCutoff", 0.5)
         self._far = context.number("pointCloudCutoffMax", 5.0)
 
-    def take(self, now: int) -> None:
-        wants_cloud = self._cloud is not None and self._cloud.is_heard
-        seen = self.camera.picture(self.context.sensing.visuals, self.place(), wants_cloud)
+    def shot(self, now: int) -> Shot:
+        is_cloud = self._cloud is not None and self._cloud.is_heard
+        depths = is_cloud or self._depth.is_heard
+        return shot_of(self.context, self.camera, now, colours=is_cloud, depths=depths)
+
+    def send(self, now: int, views: Sequence[CameraView]) -> None:
+        [seen] = views
         header = Header(stamp=to_time(now), frame_id=self._frame)
-        if self._depth.is_heard:
+        if seen.depths.size and self._depth.is_heard:
             depths = _within(seen.depths, self._low, self._high)
             self._depth.publish(to_depth_image(depths, True, header))
         if self._info_topic.is_heard:
             self._info.header = header
             self._info_topic.publish(self._info)
-        if self._cloud is not None and wants_cloud:
+        if self._cloud is not None and seen.colours.size and self._cloud.is_heard:
             depths = _within(seen.depths, self._near, self._far)
             self._cloud.publish(to_cloud(depths, seen.colours, self.camera, True, header))
 

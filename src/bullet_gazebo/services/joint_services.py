@@ -32,7 +32,7 @@ class JointServices:
     def _get_properties(
         self, request: srv.GetJointPropertiesRequest
     ) -> srv.GetJointPropertiesResponse:
-        with self._sim.lock:
+        with self._sim.lock.glance():
             model, name = existing(self._sim.world.joint(request.joint_name), NO_JOINT)
             position, rate = model.joint_state(name)
         # Gazebo answers REVOLUTE and no damping whatever the joint is.

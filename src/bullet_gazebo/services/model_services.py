@@ -60,7 +60,7 @@ class ModelServices:
     def _get_properties(
         self, request: srv.GetModelPropertiesRequest
     ) -> srv.GetModelPropertiesResponse:
-        with self._sim.lock:
+        with self._sim.lock.glance():
             model = existing(self._sim.world.model(request.model_name), NO_MODEL)
             # All names are unscoped, and canonical_body_name is never filled.
             return srv.GetModelPropertiesResponse(
@@ -74,7 +74,7 @@ class ModelServices:
 
     def _get_state(self, request: srv.GetModelStateRequest) -> srv.GetModelStateResponse:
         response = _StateResponse()
-        with self._sim.lock:
+        with self._sim.lock.glance():
             model = self._sim.world.model(request.model_name)
             if model is None:
                 response.status_message = "GetModelState: model does not exist"
@@ -137,7 +137,7 @@ class LinkServices:
     def _get_properties(
         self, request: srv.GetLinkPropertiesRequest
     ) -> srv.GetLinkPropertiesResponse:
-        with self._sim.lock:
+        with self._sim.lock.glance():
             link = existing(self._sim.world.link(request.link_name), NO_LINK)
             inertia, gravity = link_inertia(*link), link[0].description.links[link[1]].gravity
         return srv.GetLinkPropertiesResponse(
@@ -167,7 +167,7 @@ class LinkServices:
         return "SetLinkProperties: properties set"
 
     def _get_state(self, request: srv.GetLinkStateRequest) -> srv.GetLinkStateResponse:
-        with self._sim.lock:
+        with self._sim.lock.glance():
             world = self._sim.world
             link = existing(world.link(request.link_name), NO_LINK)
             fault = f"reference reference_frame not found, {SCOPE}"

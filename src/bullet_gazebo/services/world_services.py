@@ -98,7 +98,7 @@ class PhysicsServices:
         ]
 
     def _get_world(self, request: srv.GetWorldPropertiesRequest) -> srv.GetWorldPropertiesResponse:
-        with self._sim.lock:
+        with self._sim.lock.glance():
             return srv.GetWorldPropertiesResponse(
                 sim_time=self._sim.sim_time,
                 model_names=list(self._sim.world.models),
@@ -108,7 +108,7 @@ class PhysicsServices:
             )
 
     def get(self, request: srv.GetPhysicsPropertiesRequest) -> srv.GetPhysicsPropertiesResponse:
-        with self._sim.lock:
+        with self._sim.lock.glance():
             world = self._sim.world
             solver = {key: getattr(world.solver, ours) for key, ours in FIELDS.items()}
             return srv.GetPhysicsPropertiesResponse(
@@ -189,7 +189,7 @@ class LightServices:
 
     def _get(self, request: srv.GetLightPropertiesRequest) -> srv.GetLightPropertiesResponse:
         name = request.light_name
-        with self._sim.lock:
+        with self._sim.lock.glance():
             light = self._sim.world.lights.get(name)
             if light is None:
                 text = f"getLightProperties: Requested light {name} not found!"

@@ -32,8 +32,9 @@ def need_ros(what: str) -> None:
 
 
 def make_backend(
-    scene: "Scene", backend: str | None, control_period: float, deadline: float | None = None
-) -> "RobotBackend":
+    scene: "Scene", backend: str | None, control_period: float, deadline: float | None = None,
+    renderer: str = "rays",
+) -> "RobotBackend":  # fmt: skip
     """Makes what moves a scene's robots, one of `BACKENDS`; over ROS it starts what isn't running.
 
     Args:
@@ -42,8 +43,11 @@ def make_backend(
         control_period: Simulated time of one action [s]; in real time 0 takes the newest joint state at once.
         deadline: Wall time for an answer in lock-step, on top of 10 ms for each tick [s]; None: the default.
 
+        renderer: Of cameras' pictures, see `RobotEnv`.
+
     Raises:
-        ValueError: For an unknown backend, or a control period of a fraction of physics steps.
+        ValueError: For an unknown backend, a renderer that can't be had, or a control period of a fraction of
+            physics steps.
         RobotEnvError: If ROS isn't installed, or the robots can't be brought up.
     """
     from file_access.text import nearest_or_all
@@ -63,12 +67,17 @@ def make_backend(
     if name in (IN_PROCESS, MUJOCO):
         from robot_envs.backends.in_process import InProcessWorld
 
-        return InProcessWorld(scene, control_period, name)
+        return InProcessWorld(scene, control_period, name, renderer)
     need_ros(f"the backend {name}")
     if name == OWN:
         from robot_envs.backends.ros.own_world import OwnWorld
 
-        return OwnWorld(scene, control_period, deadline)
+        return OwnWorld(scene, control_period, deadline, renderer)
+    if renderer != "rays":
+        raise ValueError(
+            f"renderer={renderer!r} is for a simulator of the environment's own; one that others share gets "
+            f"it at its start, as in renderer:={renderer} of empty_world.launch"
+        )
     from robot_envs.backends.ros.session import running_session
 
     return running_session(scene, name == REALTIME).connect(scene, control_period, deadline)

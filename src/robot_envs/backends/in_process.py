@@ -53,6 +53,8 @@ from robot_sim.physics.properties import (
 )
 from robot_sim.physics.world import NameTaken, World
 from robot_sim.robot import ControlledRobot, control_period_of
+from robot_sim.sensors.renderers import make_renderer
+from robot_sim.sensors.rendering import RAYS
 from robot_sim.sensors.sensing import Sensing
 from robot_sim.sensors.sensor_readers import SensorReaders, offer_sensors
 from robot_sim.simulator import Simulator
@@ -73,13 +75,16 @@ class InProcessWorld(RobotBackend):
     """A scene's robots and their controllers, in a world of their own.
 
     No other thread knows this world, so its lock is never taken. Raises ValueError for a control period [s]
-    of a fraction of physics steps or a missing engine, RobotEnvError for a wrong file.
+    of a fraction of physics steps or a missing engine or renderer, RobotEnvError for a wrong file.
     """
 
     deterministic, complete, shared = True, True, False
 
-    def __init__(self, scene: Scene, control_period: float, engine: str = "bullet") -> None:
+    def __init__(
+        self, scene: Scene, control_period: float, engine: str = "bullet", renderer: str = RAYS
+    ) -> None:
         self.scene = scene
+        self._renderer = make_renderer(renderer)
         world = World(make_engine(engine), time_step=PHYSICS_STEP)
         self._sim = Simulator(world, lockstep=True)
         self._closed = False
@@ -152,7 +157,7 @@ class InProcessWorld(RobotBackend):
     def _sense(self, names: Sequence[str]) -> None:
         if self._readers is not None and self._readers.serves(names):
             return
-        sensing = self._sensing = self._sensing or Sensing(self._sim)
+        sensing = self._sensing = self._sensing or Sensing(self._sim, renderer=self._renderer)
         readers = SensorReaders(self._sim, sensing, names)
         if self._readers is not None:
             self._readers.end()
@@ -259,6 +264,7 @@ class InProcessWorld(RobotBackend):
         """Frees the world; may be called twice."""
         if not self._closed:
             self._closed = True
+            self._renderer.close()
             self._sim.world.close()
 
 

@@ -12,9 +12,9 @@ from robot_sim.physics.description import DescriptionError, Sensor
 from robot_sim.physics.files.sdf_parts import value
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.noise import Noise, read_noise
-from robot_sim.sensors.rays import RayScene, frames
+from robot_sim.sensors.rays import RayScene
+from robot_sim.sensors.scene import FURTHEST, frames
 from robot_sim.sensors.sensing import (
-    FURTHEST,
     Field,
     Measurement,
     Mount,

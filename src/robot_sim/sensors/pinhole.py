@@ -1,32 +1,32 @@
 """Cameras: colours and depths of what lies before a pinhole (docs/contract/sensors.md 4)."""
 
 import math
-from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from robot_sim.physics.description import DescriptionError, Sensor, library_of
+from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.files.sdf_parts import read_pose, value
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.noise import Noise, read_noise
-from robot_sim.sensors.rays import RayScene, frames
-from robot_sim.sensors.sensing import FURTHEST, Field, Measurement, Mount, sensor_of, slower
+from robot_sim.sensors.rays import RayCaster
+from robot_sim.sensors.scene import FURTHEST, SceneState, frames
 from robot_sim.sensors.shading import colours
 
-KINECT = "libgazebo_ros_openni_kinect.so"
-DEPTH_KINDS = ("depth", "depth_camera", "rgbd_camera")
-MOST_PIXELS = 2_100_000  # full HD: services wait while a picture is made
+MOST_PIXELS = 2_100_000  # full HD
 LONGEST_SIDE = 65_500  # of a JPEG
-PIECE = 1 << 17  # pixels that are looked at together
+PIECE = 1 << 15  # pixels that are looked at together: what they need fits into caches
+NOT_ASKED = np.zeros(0)
 
 
 class CameraView(NamedTuple):
-    """What a camera sees."""
+    """What a camera sees; `NOT_ASKED` is what wasn't asked for."""
 
-    colours: np.ndarray  # (height, width, 3) of uint8
-    depths: np.ndarray  # (height, width) along the optical axis [m]; inf: nothing within the clips
+    colours: np.ndarray = NOT_ASKED  # (height, width, 3) of uint8, without noise
+    # (height, width) along the optical axis [m]; inf: nothing within the clips
+    depths: np.ndarray = NOT_ASKED
+    image: np.ndarray = NOT_ASKED  # the colours with noise
 
 
 class PinholeCamera:
@@ -66,7 +66,7 @@ class PinholeCamera:
         )
         self.down = down[:, None]
 
-    def picture(self, scene: RayScene, link: Pose, in_colour: bool = True) -> CameraView:
+    def picture(self, scene: RayCaster, link: Pose, in_colour: bool = True) -> CameraView:
         """Returns what the camera sees of visuals, without noise; black if not `in_colour`."""
         pose = link.compose(self.pose)
         shape = self.height, self.width
@@ -78,7 +78,7 @@ class PinholeCamera:
         return seen
 
     def _see(
-        self, seen: CameraView, rows: slice, scene: RayScene, pose: Pose, in_colour: bool
+        self, seen: CameraView, rows: slice, scene: RayCaster, pose: Pose, in_colour: bool
     ) -> None:
         """Fills in some rows of a view."""
         turns, places = frames([pose])
@@ -94,6 +94,34 @@ class PinholeCamera:
             seen.colours[:] = np.rint(np.clip(found, 0.0, 255.0)).reshape(seen.colours.shape)
 
 
+class Shot(NamedTuple):
+    """What a picture is made of, then or later, here or in another process."""
+
+    camera: PinholeCamera
+    link: Pose  # of what carries the camera
+    scene: SceneState
+    image: bool = False  # whether that of the view is asked for
+    colours: bool = False
+    depths: bool = False
+    noise: tuple[float, np.random.Generator] | None = None  # its bias, and what draws the rest
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether nothing is asked for."""
+        return not (self.image or self.colours or self.depths)
+
+    def finished(self, seen: CameraView) -> CameraView:
+        """Returns what is asked for of what is seen, its image with noise."""
+        image, noise = seen.colours, self.camera.noise
+        if self.image and noise is not None and self.noise is not None:
+            image = noisy(image, noise, *self.noise)
+        return CameraView(
+            seen.colours if self.colours else NOT_ASKED,
+            seen.depths if self.depths else NOT_ASKED,
+            image if self.image else NOT_ASKED,
+        )
+
+
 def noisy(
     picture: np.ndarray, noise: Noise, bias: float, random: np.random.Generator
 ) -> np.ndarray:
@@ -102,87 +130,8 @@ def noisy(
     return np.rint(255.0 * np.clip(values, 0.0, 1.0)).astype(np.uint8)
 
 
-def camera_of(sensor: Sensor, scale: float = 1.0) -> PinholeCamera:
-    """Returns the only camera of a sensor; `scale` as of `PinholeCamera`.
-
-    Raises DescriptionError if it has none, or it can't be simulated.
-    """
-    where = f"sensor '{sensor.name}'"
-    element = sensor.element.find("camera")
-    if element is None:
-        raise DescriptionError(f"{where} has no <camera>")
-    return PinholeCamera(element, sensor.pose, where, sensor.link, scale)
-
-
-def with_noise(
-    mount: Mount, camera: PinholeCamera, picture: np.ndarray, now: int, own: str = ""
-) -> np.ndarray:
-    """Returns a camera's picture at a time [ns] with its noise; `own` names one of several cameras."""
-    noise, part = camera.noise, f"/{own}"
-    if noise is None:
-        return picture
-    return noisy(picture, noise, noise.draw_bias(mount.biases(part)), mount.random(now, part))
-
-
-def rate_of(mount: Mount, sensor: Sensor) -> float:
-    """Returns the slower one of a plugin's `<updateRate>` and the sensor's rate [Hz]; 0 is every step."""
-    return slower(mount.rate(), sensor.rate)
-
-
-class CameraSensor(Measurement):
-    """A camera on a model."""
-
-    non_persistent = ("_sensor", "camera")
-    kinds: ClassVar[Sequence[str]] = ("camera",)
-    fields: ClassVar = {"image": Field("(height, width, 3) of uint8: red, green and blue", True)}
-
-    def __init__(self, mount: Mount) -> None:
-        super().__init__(mount)
-        self._sensor = sensor_of(mount, self.kinds)
-        self.camera = camera_of(self._sensor, mount.sensing.camera_scale)
-        self.rate = rate_of(mount, self._sensor)
-
-    def view(self, in_colour: bool = True) -> CameraView:
-        """Returns what it sees now, without noise."""
-        link = self.mount.model.link_state(self._sensor.link)[0]
-        return self.camera.picture(self.mount.sensing.visuals, link, in_colour)
-
-    def values(self, now: int) -> dict[str, np.ndarray]:
-        return {"image": with_noise(self.mount, self.camera, self.view().colours, now)}
-
-
-class DepthSensor(CameraSensor):
-    """A depth camera. Of its plugin, `pointCloudCutoff` (0.4 m) is read, and a kinect's `pointCloudCutoffMax`
-    (5 m)."""
-
-    kinds = DEPTH_KINDS
-    fields: ClassVar = {
-        "depth": Field(
-            "(height, width) of float32 along the optical axis [m]; NaN beyond the cutoffs", True
-        )
-    }
-
-    def __init__(self, mount: Mount) -> None:
-        super().__init__(mount)
-        has_end = library_of(mount.plugin.filename) == KINECT
-        self._low = mount.number("pointCloudCutoff", 0.4 if mount.plugin.filename else 0.0)
-        self._high = mount.number("pointCloudCutoffMax", 5.0) if has_end else math.inf
-
-    def depths(self, view: CameraView) -> np.ndarray:
-        """Returns depths (height, width) within the cutoffs [m]; NaN for others."""
-        depths = np.minimum(view.depths, self.camera.far)
-        depths[(depths <= self._low) | (depths > self._high)] = np.nan
-        return depths
-
-    def values(self, now: int) -> dict[str, np.ndarray]:
-        return {"depth": self.depths(self.view(in_colour=False)).astype(np.float32)}
-
-
 def _pixels(element: Element, path: str, where: str, default: int) -> int:
     count = value(element, path, where, default)
     if count != int(count) or not 1 <= count <= LONGEST_SIDE:
         raise DescriptionError(f"{where}: <{path}> is {count:g}; 1 to {LONGEST_SIDE} are possible")
     return int(count)
-
-
-SENSORS = (CameraSensor, DepthSensor)

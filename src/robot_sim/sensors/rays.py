@@ -8,39 +8,19 @@ is only compared with shapes whose bounding ball it meets. Worlds of one process
 
 import hashlib
 import importlib.util
-import logging
 import math
-from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 from weakref import WeakValueDictionary
 
 import numpy as np
 
-from robot_sim.physics.description import DescriptionError, Link, Shape
-from robot_sim.physics.model import Model
-from robot_sim.physics.pose import Pose
 from robot_sim.physics.world import World
-from robot_sim.pictures.visuals import Piece, pieces_of, solid_of
 from robot_sim.sensors.intersection import DISTANCES, NORMALS, reach
+from robot_sim.sensors.scene import SceneState, Target, WorldScene
 
-logger = logging.getLogger(f"rosout.{__name__}")
 LARGE = 2000  # triangles of a mesh that isn't built anew with its neighbours
 NONE = -1
 MARGIN = 1e-5  # [m], and relative: of the comparison of rays and balls, in float32
-
-
-class Target(NamedTuple):
-    """A shape that rays meet; a visual mesh has a target for each of its colours and textures."""
-
-    model: Model
-    link: str
-    shape: Shape
-    piece: Piece | None = None
-    number: int = 0  # of the piece in its file
-
-    def corners(self) -> np.ndarray:
-        """Returns the corners (3 n, 3) of its triangles, in the shape's frame [m]."""
-        return (self.piece.solid if self.piece else solid_of(self.shape)).corners
 
 
 class Hits(NamedTuple):
@@ -62,36 +42,24 @@ class Hits(NamedTuple):
         return order
 
 
-class RayScene:
-    """The shapes of a world's models, for rays: collisions, or visuals as cameras see them.
+class RayCaster:
+    """Casts rays into a scene."""
 
-    The caller holds the world's lock.
-    """
-
-    def __init__(self, world: World, visuals: bool = False) -> None:
-        self.world = world
-        self._visuals = visuals
+    def __init__(self) -> None:
         self.targets: list[Target] = []
         self.retro = np.zeros(1)  # reflectivity of each target
-        self._targets_of: dict[Model, list[Target]] = {}
-        self._key: object = None
-        self._is_fresh = False
+        self.state: SceneState | None = None
         self._apart_meshes: dict[int, Any] = {}
 
-    def expire(self) -> None:
-        """Says that things may have moved: the next cast looks where they are."""
-        self._is_fresh = False
-
-    def _refresh(self) -> None:
-        models = self.world.models.values()
-        key = self.world.version, [model.placed for model in models if model.description.static]
-        if key != self._key:
-            self._build()
-            self._key = key
-        if len(self._moving):
-            self._place(self._moving)
-            self._find_centres()
-        self._is_fresh = True
+    def show(self, state: SceneState) -> None:
+        """Takes over what there is, and where it is."""
+        before, self.state = self.state, state
+        if state is before:
+            return
+        self._turns, self._places = state.turns, state.places
+        if before is None or before.version != state.version:
+            self._build(state.all_targets)
+        self._find_centres()
 
     @np.errstate(over="ignore", invalid="ignore")  # of what is light years away
     def cast(
@@ -107,8 +75,6 @@ class RayScene:
             near: Where rays start, as a distance from the origin [m]; of each ray (n,), or of all.
             far: Where they end.
         """
-        if not self._is_fresh:
-            self._refresh()
         starts = origin + np.reshape(near, (-1, 1)) * directions
         found = self._meet_still(starts, directions)
         rays = np.arange(len(directions))
@@ -202,22 +168,13 @@ class RayScene:
 
     # --- what there is --------------------------------------------------------------------------
 
-    def _build(self) -> None:
-        read, known = _seen if self._visuals else _solid, self._targets_of
-        self._targets_of = {
-            model: known.get(model)
-            or [target for link in model.description.links.values() for target in read(model, link)]
-            for model in self.world.models.values()
-        }
-        self.targets = targets = [each for found in self._targets_of.values() for each in found]
+    def _build(self, targets: list[Target]) -> None:
+        self.targets = targets
         count = len(targets)
         self.retro = np.array([*(target.shape.retro for target in targets), 0.0])  # of NONE, too
         self._kinds = np.array([*(target.shape.kind for target in targets), ""])
         self._sizes = np.zeros((count, 3))
-        self._own_turns, self._own_places = frames([target.shape.pose for target in targets])
-        self._turns, self._places = np.zeros((count, 3, 3)), np.zeros((count, 3))
         self._centres, self._radii = np.zeros((count, 3)), np.zeros(count)
-        self._place(np.arange(count))
         self._planes = [i for i in range(count) if self._kinds[i] == "plane"]
         still, triangles, apart, meshes = [], [], [], {}
         for index, target in enumerate(targets):
@@ -225,14 +182,14 @@ class RayScene:
             if shape.kind == "plane":
                 continue
             self._sizes[index, : len(shape.size)] = shape.size
-            is_still = target.model.description.static and shape.kind != "sphere"
+            is_still = target.is_static and shape.kind != "sphere"
             if shape.kind != "mesh" and not is_still:
                 apart.append(index)
                 self._radii[index] = reach(shape.kind, shape.size)
                 continue
             corners = target.corners()
             is_large = shape.kind == "mesh" and len(corners) > 3 * LARGE
-            if target.model.description.static and not is_large:
+            if target.is_static and not is_large:
                 still.append(index)
                 triangles.append(corners @ self._turns[index].T + self._places[index])
                 continue
@@ -243,9 +200,6 @@ class RayScene:
         self._apart_meshes, self._still_triangles = meshes, _built(triangles)
         self._are_cylinders = self._kinds == "cylinder"
         self._analytic = [kind for kind in DISTANCES if kind in self._kinds[apart]]
-        moves = [not targets[index].model.description.static for index in apart]
-        self._moving = self._apart[np.array(moves, bool)]
-        self._find_centres()
 
     def _find_centres(self) -> None:
         """Finds where the balls are around what isn't part of the still scene."""
@@ -260,51 +214,23 @@ class RayScene:
         self._centres[index] = (low + high) / 2.0
         self._radii[index] = np.linalg.norm(high - low) / 2.0
 
-    def _place(self, targets: np.ndarray) -> None:
-        """Reads where `targets` are."""
-        poses: dict[Model, dict[str, Pose]] = {}
-        links = []
-        for index in targets.tolist():
-            model, link = self.targets[index][:2]
-            if model not in poses:
-                poses[model] = model.poses_by_link()
-            links.append(poses[model][link])
-        turns, places = frames(links)
-        self._turns[targets] = turns @ self._own_turns[targets]
-        own = np.einsum("kij,kj->ki", turns, self._own_places[targets])
-        self._places[targets] = places + own
 
+class RayScene(RayCaster):
+    """Casts rays into a world; see `WorldScene`."""
 
-def frames(poses: Sequence[Pose]) -> tuple[np.ndarray, np.ndarray]:
-    """Returns rotation matrices (n, 3, 3) and positions (n, 3) of poses."""
-    x, y, z, w = np.array([pose.orientation for pose in poses]).reshape(-1, 4).T
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    places = np.array([pose.position for pose in poses]).reshape(-1, 3)
-    return np.array(rows).transpose(2, 0, 1), places
+    def __init__(self, world: World, visuals: bool = False) -> None:
+        super().__init__()
+        self.scene = WorldScene(world, visuals)
 
+    def expire(self) -> None:
+        """Says that things may have moved: the next cast looks where they are."""
+        self.scene.expire()
 
-def _solid(model: Model, link: Link) -> list[Target]:
-    return [Target(model, link.name, shape) for shape in link.collisions]
-
-
-def _seen(model: Model, link: Link) -> Iterator[Target]:
-    """Yields what is visible of a link. A plane is read as a collision only."""
-    planes = [shape for shape in link.collisions if shape.kind == "plane"]
-    for shape in [*link.visuals, *planes]:
-        if shape.kind != "mesh":
-            yield Target(model, link.name, shape)
-            continue
-        try:
-            for number, piece in enumerate(pieces_of(shape)):
-                yield Target(model, link.name, shape, piece, number)
-        except DescriptionError as error:
-            logger.warning(
-                "model '%s', link '%s' isn't seen whole: %s", model.name, link.name, error
-            )
+    def cast(
+        self, origin: np.ndarray, directions: np.ndarray, near: Any = 0.0, far: Any = math.inf
+    ) -> Hits:
+        self.show(self.scene.state())
+        return super().cast(origin, directions, near, far)
 
 
 class _Met(NamedTuple):

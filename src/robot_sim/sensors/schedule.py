@@ -80,7 +80,7 @@ class Schedule(Shared, Stateful):
         self._is_looking = False
         self.moves = 0  # how often something other than time has moved bodies
         self.moved_at = LONG_AGO  # when it did so last [ns]
-        self._last_reset = NEVER
+        self.last_reset = NEVER
         self._moves_of: dict[str, Move] = {}  # since then, by names of models
         self.moves_before_seed = 0
         self._begins_anew = False  # with the next reset
@@ -199,7 +199,7 @@ class Schedule(Shared, Stateful):
 
     def last_move(self, model: Model) -> Move:
         """Returns the last move of a model by something other than time, resets included."""
-        return self._moves_of.get(model.name, self._last_reset)
+        return self._moves_of.get(model.name, self.last_reset)
 
     def _moved(self, moved: Moved) -> None:
         """Measures afresh what is heard: all after a reset of world or time, else what the models carry."""
@@ -208,7 +208,7 @@ class Schedule(Shared, Stateful):
         move = Move(self.moves, now)
         anew = False
         if moved is None:
-            self._last_reset, self._moves_of = move, {}
+            self.last_reset, self._moves_of = move, {}
             anew, self._begins_anew = self._begins_anew, False
         else:
             there = self._sim.world.models

@@ -12,23 +12,27 @@ from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.noise import checked_deviation, generator
 from robot_sim.sensors.rays import RayScene
+from robot_sim.sensors.rendering import CameraRenderer, RayRenderer
 from robot_sim.sensors.schedule import Schedule
 from robot_sim.simulator import Simulator
 from robot_sim.state_dict import Shared, Stateful
 
-FURTHEST = 1e9  # [m] that a sensor reaches
 LARGEST_NUMBER = 1e30  # number of a plugin: messages have 32-bit floats
 
 
 class Sensing(Shared, Stateful):
     """The sensors of a simulator; `seed` is that of their noise, `camera_scale` the size of pictures beside
-    that in the file.
+    that in the file, and `renderer` makes them: rays without one.
     """
 
     non_persistent = ("collisions", "visuals", "camera_scale")
 
-    def __init__(self, sim: Simulator, seed: int = 0, camera_scale: float = 1.0) -> None:
+    def __init__(
+        self, sim: Simulator, seed: int = 0, camera_scale: float = 1.0,
+        renderer: CameraRenderer | None = None,
+    ) -> None:  # fmt: skip
         self.camera_scale = camera_scale
+        self.renderer = renderer or RayRenderer()
         self.schedule = Schedule(sim)
         self.collisions = RayScene(sim.world)
         self.visuals = RayScene(sim.world, visuals=True)

@@ -4,52 +4,51 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from robot_sim.physics.description import Light
-from robot_sim.physics.pose import rotate
-from robot_sim.pictures.visuals import GREY
-from robot_sim.sensors.rays import NONE, Hits, RayScene
+from robot_sim.sensors.rays import NONE, Hits, RayCaster
+from robot_sim.sensors.scene import Beam
 
 BACKGROUND = 178.0  # of each channel, as Gazebo's
-GROUND = (0.8, 0.8, 0.8, 1.0)  # of a plane without a colour
 AMBIENT, DIFFUSE = 0.4, 0.6  # the latter of a light as bright as Gazebo's sun
-BRIGHT = 0.8
-SUN = Light("sun", (BRIGHT, BRIGHT, BRIGHT, 1.0), direction=(-0.5, 0.1, -0.9), kind="directional")
 
 
-def colours(scene: RayScene, hits: Hits, origin: np.ndarray, directions: np.ndarray) -> np.ndarray:
+def colours(scene: RayCaster, hits: Hits, origin: np.ndarray, directions: np.ndarray) -> np.ndarray:
     """Returns the colours (n, 3), 0 to 255, of what rays from `origin` in `directions` (n, 3) have met."""
+    assert scene.state is not None  # it has been cast
     seen = np.full((len(directions), 3), BACKGROUND)
-    met = np.flatnonzero(hits.targets != NONE)
-    normals = np.zeros((len(directions), 3))
-    for target in np.unique(hits.targets[met]):
-        rays = met[hits.targets[met] == target]
-        points = origin + hits.distances[rays, None] * directions[rays]
-        normals[rays] = scene.normals(target, points, hits.triangles[rays])
-        seen[rays] = _own_colours(scene, target, hits.triangles[rays], hits.weights[rays])
-    # Meshes' triangles may face either way: light falls on the side that is seen.
-    away = np.einsum("ij,ij->i", normals, directions) > 0.0
-    normals[away] *= -1.0
-    seen[met] *= _light(scene.world.lights.values(), normals[met])
+    order = np.argsort(
+        hits.targets.astype(np.int16), kind="stable"
+    )  # by radix, as short numbers are
+    targets = hits.targets[order]
+    for rays in np.split(order, np.flatnonzero(np.diff(targets)) + 1):
+        target = int(hits.targets[rays[0]])
+        if target == NONE:
+            continue
+        ways, triangles = directions[rays], hits.triangles[rays]
+        points = origin + hits.distances[rays, None] * ways
+        normals = scene.normals(target, points, triangles)
+        # Meshes' triangles may face either way: light falls on the side that is seen.
+        away = np.einsum("ij,ij->i", normals, ways) > 0.0
+        normals = np.where(away[:, None], -normals, normals)
+        own = _own_colours(scene, target, triangles, hits.weights[rays])
+        seen[rays] = own * _light(scene.state.beams, normals)
     return seen
 
 
-def _light(lights: Iterable[Light], normals: np.ndarray) -> np.ndarray:
-    """Returns the light (k, 3) on surfaces with these normals; without any directional light the sun's."""
+def _light(beams: Iterable[Beam], normals: np.ndarray) -> np.ndarray:
+    """Returns the light (k, 3) on surfaces with these normals."""
     found = np.full_like(normals, AMBIENT)
-    for light in [each for each in lights if each.kind == "directional"] or [SUN]:
-        direction = np.array(rotate(light.pose.orientation, light.direction))
+    for direction, strength in beams:
         facing = np.maximum(normals @ -direction / (np.linalg.norm(direction) or 1.0), 0.0)
-        found += DIFFUSE * facing[:, None] * (np.array(light.diffuse[:3]) / BRIGHT)
+        found += DIFFUSE * facing[:, None] * strength
     return found
 
 
 def _own_colours(
-    scene: RayScene, target: int, triangles: np.ndarray, weights: np.ndarray
+    scene: RayCaster, target: int, triangles: np.ndarray, weights: np.ndarray
 ) -> np.ndarray:
     """Returns the unlit colours (k, 3) of points of a target."""
-    shape, piece = scene.targets[target].shape, scene.targets[target].piece
-    rgba = piece.rgba if piece else shape.rgba or (GROUND if shape.kind == "plane" else GREY)
-    tint = 255.0 * np.array(rgba[:3])
+    piece = scene.targets[target].piece
+    tint = 255.0 * np.array(scene.targets[target].rgba[:3])
     if piece is None or piece.texture is None or piece.uvs is None:
         return np.broadcast_to(tint, (len(triangles), 3))
     corners = piece.uvs.reshape(-1, 3, 2)[triangles]

@@ -22,6 +22,7 @@ def entry(number, **fields):
 
 FACTS = {
     "camera_scale": 1.0,
+    "renderer": "rays",
     "physics": "ode", "paused": False, "seed": None, "hashes": None, "world": "/gone/small.world",
     "world_text": None, "series": 1,
 }  # fmt: skip

@@ -24,7 +24,8 @@ from file_access.limited import LimitedProcess
 def test_a_world_file_that_has_gone_is_written_again(tmp_path):
     facts = FACTS | {"physics": "mujoco", "paused": True, "seed": 3, "world_text": "<sdf/>"}
     *options, path = arguments_of(facts, tmp_path)
-    assert options == ["--lockstep", "--physics=mujoco", "--camera-scale=1.0", "-u", "--seed=3"]
+    cameras = ["--camera-scale=1.0", "--renderer=rays"]
+    assert options == ["--lockstep", "--physics=mujoco", *cameras, "-u", "--seed=3"]
     assert path == str(tmp_path / "recorded.world")
     assert (tmp_path / "recorded.world").read_text() == "<sdf/>"
 

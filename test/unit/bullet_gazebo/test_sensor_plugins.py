@@ -2,6 +2,7 @@
 
 import gc
 import math
+import threading
 import tracemalloc
 from collections import Counter
 
@@ -23,6 +24,7 @@ from robot_sim.physics.engines import make_engine
 from robot_sim.physics.files.sdf import parse_sdf
 from robot_sim.physics.pose import Pose
 from robot_sim.physics.world import World, ground_plane
+from robot_sim.sensors.picture_process import PictureProcess
 from robot_sim.sensors.pinhole import PinholeCamera
 from robot_sim.simulator import Simulator
 
@@ -280,4 +282,34 @@ def test_pictures_are_made_smaller_where_that_is_asked_for(monkeypatch, scale, s
     [image, *_], [info, *_] = published(Image), published(CameraInfo)
     assert (image.width, image.height) == (info.width, info.height) == size
     assert info.K[0] == pytest.approx(size[0] / (2.0 * math.tan(1.047 / 2.0)))
+    node.sim.world.close()
+
+
+def test_in_real_time_pictures_of_all_kinds_come_from_beside_the_ticks(monkeypatch):
+    node = Node(silence(monkeypatch))
+    node.sim.lockstep = False
+    pictures = PictureProcess(node.sim, "rays")
+    node.plugins = PluginRegistry(node.sim, None, renderer=pictures)
+    sensors = (
+        camera(own="<cameraName>eye</cameraName>"),
+        SENSOR.format(
+            "depth", CAMERA.format(""), "openni_kinect", "<cameraName>deep</cameraName>"
+        ).replace("bad", "deep"),
+    )
+    model = node.sim.world.spawn("m", parse_sdf(MODEL.format("".join(sensors), "")), Pose())
+    node.plugins.load(model, "/")
+    kinds = {"/eye/image_raw", "/eye/image_raw/compressed", "/deep/depth/image_raw", "/deep/points"}
+    for _ in range(30_000):
+        node.sim.step(1)
+        if kinds <= {topic for topic, sent in SilentPublisher.messages.items() if sent}:
+            break
+        threading.Event().wait(0.001)
+    node.plugins.unload(model)
+    sent = {topic: [*messages] for topic, messages in SilentPublisher.messages.items()}
+    stamps = [each.header.stamp.to_nsec() for each in sent["/eye/image_raw"]]
+    assert stamps == sorted(set(stamps)) and stamps[-1] <= node.sim.now
+    assert {topic for topic, messages in sent.items() if messages} >= kinds
+    for _ in range(5):
+        node.sim.step(1)
+    assert {topic: [*each] for topic, each in SilentPublisher.messages.items()} == sent
     node.sim.world.close()

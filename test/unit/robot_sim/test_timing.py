@@ -69,3 +69,35 @@ def test_a_busy_simulation_does_not_keep_others_out():
     done.set()
     thread.join(BOUND)
     assert not thread.is_alive()
+
+
+def test_a_lent_lock_serves_those_who_only_look_and_then_goes_back():
+    lock, order = FairLock(), []
+    looked = threading.Event()
+
+    def change():
+        with lock:
+            order.append("changed")
+
+    def look():
+        with lock.glance():
+            order.append("looked")
+        looked.set()
+
+    threads = [threading.Thread(target=change), threading.Thread(target=look)]
+    with lock:
+        mine = lock.holder
+        for count, thread in enumerate(threads):  # the change asks first
+            thread.start()
+            while len(lock._waiting) <= count:
+                threading.Event().wait(0.001)
+        with lock.lent():
+            assert looked.wait(BOUND)
+            assert lock.holder is None
+            with lock.glance():
+                order.append("looked again")
+        assert lock.holder == mine
+        order.append("went on")
+    for thread in threads:
+        thread.join(BOUND)
+    assert order == ["looked", "looked again", "went on", "changed"]

@@ -55,19 +55,20 @@ class OwnSimulator:
         slot: Its place among the simulators that start together.
         world: The robot's world file, or its text, which is written next to the log.
         seed: Of random numbers that plugins draw.
+        renderer: Of cameras' pictures.
 
     Raises:
         RobotEnvError: If no process can be started.
     """
 
-    def __init__(self, slot: Slot, world: Source | None, seed: int) -> None:
+    def __init__(self, slot: Slot, world: Source | None, seed: int, renderer: str = "rays") -> None:
         self.slot = slot
         self.uri = ""  # the master's address, once it is known
         self.pid: int | None = None  # the simulator's process
         self._owner = os.getpid()
         folder = _log_folder()
         self.log = folder / "simulator.log"
-        arguments = ["-u", "--lockstep", "--seed", str(seed), "__name:=gazebo",
+        arguments = ["-u", "--lockstep", "--seed", str(seed), "--renderer", renderer, "__name:=gazebo",
                      f"__log:={folder / 'node.log'}", "_pub_clock_frequency:=100"]  # fmt: skip
 
         try:

@@ -142,6 +142,7 @@ class OwnWorld(RobotBackend):
         scene: The robots and objects.
         control_period: Simulated time of one action [s].
         deadline: Wall time that an answer may take, on top of 10 ms for each tick [s]; None: 30 s.
+        renderer: Of cameras' pictures.
 
     Raises:
         ValueError: If the period isn't a whole number of physics steps.
@@ -151,8 +152,12 @@ class OwnWorld(RobotBackend):
 
     deterministic, complete, shared = True, True, False
 
-    def __init__(self, scene: Scene, control_period: float, deadline: float | None = None) -> None:
+    def __init__(
+        self, scene: Scene, control_period: float, deadline: float | None = None,
+        renderer: str = "rays",
+    ) -> None:  # fmt: skip
         self.scene = scene
+        self._renderer = renderer
         self.restarts = 0
         self._period = control_period  # [s]
         self._deadline = DEADLINE if deadline is None else deadline
@@ -172,7 +177,7 @@ class OwnWorld(RobotBackend):
             raise
 
     def _start(self) -> OwnSimulator:
-        return OwnSimulator(self._slot, self.scene.robots[0].world, SEED)
+        return OwnSimulator(self._slot, self.scene.robots[0].world, SEED, self._renderer)
 
     def connect(self) -> None:
         """Waits for the simulator, and brings the robots up.
