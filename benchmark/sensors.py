@@ -125,7 +125,7 @@ def scans(results: dict[str, float], folder: Path, rounds: int, static: bool) ->
     model = world.spawn("robot", parse_sdf(sdf), Pose())
     sensor = model.description.sensors[0]
     laser, scene, random = Laser(sensor), RayScene(world), np.random.default_rng(0)
-    client = engine._client._client
+    client = engine._client
 
     def scan() -> np.ndarray:
         scene.expire()

@@ -10,8 +10,9 @@ import numpy as np
 from robot_sim.physics.description import DescriptionError, Sensor, library_of
 from robot_sim.physics.files.sdf_parts import read_pose, value
 from robot_sim.physics.pose import Pose
+from robot_sim.sensors.frames import frames
 from robot_sim.sensors.noise import Noise, read_noise
-from robot_sim.sensors.rays import RayScene, frames
+from robot_sim.sensors.rays import RayScene
 from robot_sim.sensors.sensing import FURTHEST, Field, Measurement, Mount, sensor_of, slower
 from robot_sim.sensors.shading import colours
 

@@ -10,7 +10,7 @@ import hashlib
 import importlib.util
 import logging
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 from weakref import WeakValueDictionary
 
@@ -21,6 +21,7 @@ from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose
 from robot_sim.physics.world import World
 from robot_sim.pictures.visuals import Piece, pieces_of, solid_of
+from robot_sim.sensors.frames import frames
 from robot_sim.sensors.intersection import DISTANCES, NORMALS, reach
 
 logger = logging.getLogger(f"rosout.{__name__}")
@@ -116,7 +117,9 @@ class RayScene:
             found.improve(rays, target, self._plane_distances(target, starts, directions))
         targets, rays = self._pairs(origin, directions, np.max(far))
         for kind in self._analytic:
-            some = self._kinds[targets] == kind
+            some = np.flatnonzero(self._kinds[targets] == kind)
+            if not len(some):
+                continue
             distances = self._distances(
                 kind, targets[some], starts[rays[some]], directions[rays[some]]
             )
@@ -145,8 +148,9 @@ class RayScene:
         targets = self._still[met.parts]  # the last one is NONE
         found = Hits(met.distances, targets, met.triangles, met.weights)
         some = np.flatnonzero(self._are_cylinders[targets])  # their triangles lie within them
-        exact = self._distances("cylinder", targets[some], starts[some], directions[some])
-        found.distances[some] = np.where(exact < np.inf, exact, found.distances[some])
+        if len(some):
+            exact = self._distances("cylinder", targets[some], starts[some], directions[some])
+            found.distances[some] = np.where(exact < np.inf, exact, found.distances[some])
         return found
 
     def _meet_mesh(
@@ -179,8 +183,22 @@ class RayScene:
         along = x * dx
         along += y * dy
         along += z * dz
-        which, rays = (along >= least[:, None]).nonzero()
+        meets = along >= least[:, None]
+        for inside in np.flatnonzero(room <= 0.0).tolist():
+            self._pass_above(meets[inside], apart[inside], origin, directions)
+        which, rays = meets.nonzero()
         return apart[which], rays
+
+    def _pass_above(
+        self, meets: np.ndarray, target: int, origin: np.ndarray, directions: np.ndarray
+    ) -> None:
+        """Excludes rays from within a target's ball that pass above it, as those of a laser on a robot do."""
+        axis = self._turns[target][:, 2]
+        height = float((origin - self._places[target]) @ axis)
+        above = abs(height) - 0.5 * self._heights[target]
+        if above > MARGIN:  # what is met is nearer than the ball's diameter
+            reach = math.copysign(2.0 * self._radii[target], height)
+            meets &= reach * (directions @ axis) <= MARGIN - above
 
     def _distances(
         self, kind: str, targets: np.ndarray, starts: np.ndarray, directions: np.ndarray
@@ -217,6 +235,7 @@ class RayScene:
         self._own_turns, self._own_places = frames([target.shape.pose for target in targets])
         self._turns, self._places = np.zeros((count, 3, 3)), np.zeros((count, 3))
         self._centres, self._radii = np.zeros((count, 3)), np.zeros(count)
+        self._heights = np.full(count, np.inf)
         self._place(np.arange(count))
         self._planes = [i for i in range(count) if self._kinds[i] == "plane"]
         still, triangles, apart, meshes = [], [], [], {}
@@ -229,6 +248,8 @@ class RayScene:
             if shape.kind != "mesh" and not is_still:
                 apart.append(index)
                 self._radii[index] = reach(shape.kind, shape.size)
+                if shape.kind != "sphere":
+                    self._heights[index] = shape.size[-1]
                 continue
             corners = target.corners()
             is_large = shape.kind == "mesh" and len(corners) > 3 * LARGE
@@ -273,18 +294,6 @@ class RayScene:
         self._turns[targets] = turns @ self._own_turns[targets]
         own = np.einsum("kij,kj->ki", turns, self._own_places[targets])
         self._places[targets] = places + own
-
-
-def frames(poses: Sequence[Pose]) -> tuple[np.ndarray, np.ndarray]:
-    """Returns rotation matrices (n, 3, 3) and positions (n, 3) of poses."""
-    x, y, z, w = np.array([pose.orientation for pose in poses]).reshape(-1, 4).T
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    places = np.array([pose.position for pose in poses]).reshape(-1, 3)
-    return np.array(rows).transpose(2, 0, 1), places
 
 
 def _solid(model: Model, link: Link) -> list[Target]:
