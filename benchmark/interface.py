@@ -15,7 +15,15 @@ from collections.abc import Callable
 
 import reporting
 import rospy
-from gazebo_msgs.srv import GetWorldProperties, SetModelConfiguration
+from gazebo_msgs.msg import ModelState
+from gazebo_msgs.srv import (
+    DeleteModel,
+    GetWorldProperties,
+    SetModelConfiguration,
+    SetModelState,
+    SpawnModel,
+)
+from geometry_msgs.msg import Pose
 from std_srvs.srv import Empty
 
 from ros_utils import ros_gazebo, ros_urdf
@@ -30,11 +38,16 @@ LISTENER = (
 TARGETS = {  # [ms] for median and 99th percentile, None for no target; a factor for the last one
     "launch to a stepping world": (3500.0, None),
     "spawn to answered": (50.0, None),
+    "a goal is spawned, plain call": (5.0, None),
+    "a goal is moved, plain call": (5.0, None),
+    "a goal is deleted, plain call": (5.0, None),
     "persistent call": (0.15, None),
     "plain call": (1.5, None),
     "reset_world + set_model_configuration, persistent": (1.0, 3.0),
     "real-time factor with 5 subscribers of /clock": (1.0, None),
 }
+GOAL = """<sdf version="1.6"><model name="goal"><static>true</static><link name="link"><visual name="flag">
+<geometry><box><size>0.4 0.4 0.01</size></box></geometry></visual></link></model></sdf>"""
 JOINTS = (["stand_cart", "cart_pole"], [0.0, 0.05])
 FACTOR_TIME = 10.0  # [s]
 
@@ -65,6 +78,23 @@ def spawns(count: int) -> list[float]:
         taken += times(lambda: ros_gazebo.gazebo_spawn_urdf_string(xml, "cartpole"), 1)
         ros_gazebo.gazebo_delete_model("cartpole")
     ros_gazebo.gazebo_spawn_urdf_string(xml, "cartpole")
+    return taken
+
+
+def goals(count: int) -> dict[str, list[float]]:
+    """What a script waits for whose goal comes and goes with each episode."""
+    ways: dict[str, Callable[[], object]] = {
+        "spawned": lambda: spawn("goal", GOAL, "", Pose(), "world"),
+        "moved": lambda: move(ModelState(model_name="goal")),
+        "deleted": lambda: delete("goal"),
+    }
+    spawn = rospy.ServiceProxy("/gazebo/spawn_sdf_model", SpawnModel)
+    move = rospy.ServiceProxy("/gazebo/set_model_state", SetModelState)
+    delete = rospy.ServiceProxy("/gazebo/delete_model", DeleteModel)
+    taken: dict[str, list[float]] = {f"a goal is {name}, plain call": [] for name in ways}
+    for _ in range(count):
+        for values, way in zip(taken.values(), ways.values(), strict=True):
+            values.extend(times(way, 1))
     return taken
 
 
@@ -114,6 +144,7 @@ def measure(launches: int, count: int) -> dict[str, list[float]]:
         os.environ.update(simulation.environment())  # rospy's own proxies go there too
         rospy.init_node("interface_benchmark", disable_rostime=True)
         results["spawn to answered"] = spawns(20)
+        results |= goals(count // 20)
         results |= calls(count)
         results["real-time factor with 5 subscribers of /clock"] = factor(simulation)
     return results

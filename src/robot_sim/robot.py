@@ -79,6 +79,8 @@ class ControlledRobot:
         self._effort_joints = [(j, enforce, indices[j.name]) for j, enforce in hardware.enforcers]
         self._drives = [(drive, indices[drive.joint.name]) for drive in hardware.drives]
         self._efforts = [0.0] * len(indices)
+        has_pids = any(drive.pid is not None for drive in hardware.drives)
+        self._exerts = has_pids or bool(self._effort_joints)  # efforts, besides motors
         moved = {drive.joint.name for drive, _ in self._drives if drive.pid is None}
         # What a motor drives is as fast as its command.
         self._watched = [index for name, index in indices.items() if name not in moved]
@@ -185,7 +187,8 @@ class ControlledRobot:
             self._halt()
         if self._drives:
             self._drive(dt)
-        self.model.body.apply_efforts(efforts)
+        if self._exerts:
+            self.model.body.apply_efforts(efforts)
 
     def effort_on(self, joint: str) -> float:
         """Returns the effort [N m, N] that it has applied to a movable joint in the last step."""
@@ -204,15 +207,15 @@ class ControlledRobot:
         Between motors of any force and a wall an engine may find no solution: joints would jump in each
         step. So while something pushes one off its command, all motors keep to their effort limits.
         """
-        motors = []
+        motors, yields = [], False
         for drive, index in self._drives:
             drive.limit(dt)
             if drive.pid is not None:
                 drive.joint.effort = self._efforts[index] = drive.effort(dt)
             else:
                 motors.append((drive, index, *drive.motor(dt)))
+                yields = yields or drive.pushed
         body = self.model.body
-        yields = any(drive.pushed for drive, *_ in motors)
         for drive, index, speed, most in motors:
             strongest = drive.strongest if yields else STRONGEST
             body.set_motor(index, speed, min(most, strongest, STRONGEST))

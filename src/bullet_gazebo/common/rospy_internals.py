@@ -16,7 +16,7 @@ import select
 import time
 import types
 import xmlrpc.client
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -157,8 +157,13 @@ def is_connected(topic: str, node: str, publishes: bool) -> bool | None:
 
 def subscribers(topic: str) -> list[str]:
     """Returns the nodes that subscribe to a topic of this process, given its resolved name."""
+    return [each.endpoint_id for each in connections(topic)]
+
+
+def connections(topic: str) -> Sequence[Any]:
+    """Returns the connections to the subscribers of a topic: another list when one comes or goes."""
     publication = _topics().get_publisher_impl(topic)
-    return [each.endpoint_id for each in publication.connections] if publication else []
+    return publication.connections if publication else ()
 
 
 def on_topics_changed(call: Callable[[], None]) -> None:

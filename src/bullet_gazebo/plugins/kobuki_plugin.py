@@ -154,7 +154,7 @@ class _Senses(Stateful):
 
     def _cliffs(self, now: int) -> None:
         # What meets nothing is deep.
-        deep = [min(float(each.measure(now)[0].ranges.min()), 65.0) for each in self._down]
+        deep = [min(float(each.measure(now).ranges.min()), 65.0) for each in self._down]
         over_cliff = tuple(each > self._threshold for each in deep)
         for side in self._changed("cliff", over_cliff):
             event = CliffEvent(side, over_cliff[side], round(1e3 * max(deep[side], 0.0)))

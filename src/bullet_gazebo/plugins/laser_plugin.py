@@ -50,7 +50,7 @@ class LaserPlugin(SensorPlugin):
         return Header(stamp=to_time(now), frame_id=self.frame)
 
     def measure(self, now: int) -> Any:
-        laser, (scan, _) = self.sensor.laser, self.sensor.measure(now)
+        laser, scan = self.sensor.laser, self.sensor.measure(now)
         return LaserScan(
             header=self.header(now),
             angle_min=laser.horizontal.low,
@@ -73,7 +73,8 @@ class BlockLaserPlugin(LaserPlugin):
         self._deviation = context.deviation()
 
     def measure(self, now: int) -> PointCloud:
-        laser, (scan, random) = self.sensor.laser, self.sensor.measure(now)
+        laser, random = self.sensor.laser, self.context.random(now)
+        scan = self.sensor.scan(random)
         ranges, intensities = np.minimum(scan.ranges, laser.high).ravel(), scan.intensities.ravel()
         with np.errstate(invalid="ignore"):  # inf * 0
             points = ranges[:, None] * laser.directions.reshape(-1, 3)
@@ -128,7 +129,8 @@ class VelodynePlugin(LaserPlugin):
         )
 
     def measure(self, now: int) -> PointCloud2:
-        scan, random = self.sensor.measure(now)
+        random = self.context.random(now)
+        scan = self.sensor.scan(random)
         ranges, intensities = scan.ranges.T, scan.intensities.T
         seen = self._within(ranges) & (intensities >= self._least)
         if self._deviation:

@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from typing import Any
 
 import genpy
 from bullet_gazebo_msgs.msg import TopicMessage
@@ -13,13 +14,13 @@ from bullet_gazebo.common.messages import to_time
 from bullet_gazebo.common.node_process import seed_random_numbers
 from bullet_gazebo.common.publishing import Thinner
 from bullet_gazebo.common.rospy_internals import (
+    connections,
     deliver,
     divert_connections,
     divert_messages,
     is_connected,
     on_topics_changed,
     publish_without_yielding,
-    subscribers,
 )
 from bullet_gazebo.journal.journal import WorldJournal
 from bullet_gazebo.services import ServiceRefused, offer
@@ -74,6 +75,7 @@ class Mailboxes:
         self._guard = threading.Lock()
         # Replaced, never changed: ticks and other nodes' handlers iterate it when a node comes.
         self._boxes: dict[str, Mailbox] = {}
+        self._heard: dict[str, tuple[Any, Any, bool]] = {}  # by topic: see `any_hears`
         divert_messages(self._sink)
         publish_without_yielding()
         on_topics_changed(self._count_change)
@@ -91,7 +93,10 @@ class Mailboxes:
     @property
     def has_awaited(self) -> bool:
         """Whether there is a message that some node waits for."""
-        return any(box.has_awaited for box in self._boxes.values())
+        for box in self._boxes.values():  # noqa: SIM110 - after each tick: `any` takes five times as long
+            if box.has_awaited:
+                return True
+        return False
 
     def nodes_to_wake(self) -> list[str]:
         """Returns the nodes whose awaited messages have come."""
@@ -99,7 +104,13 @@ class Mailboxes:
 
     def any_hears(self, topic: str) -> bool:
         """Whether one of the nodes is connected to a topic that this process publishes."""
-        return not self._boxes.keys().isdisjoint(subscribers(topic))
+        # Asked in each tick, and found out anew when connections or nodes have been replaced.
+        now, boxes = connections(topic), self._boxes
+        known = self._heard.get(topic)
+        if known is None or known[0] is not now or known[1] is not boxes:
+            is_heard = any(each.endpoint_id in boxes for each in now)
+            known = self._heard[topic] = now, boxes, is_heard
+        return known[2]
 
     def connect(
         self, node: str, subscriptions: Sequence[str], publications: Sequence[str]
@@ -217,7 +228,10 @@ class AdvanceService:
         sim, mailboxes = self._sim, self._mailboxes
 
         def ends_slice() -> bool:
-            return mailboxes.has_awaited or any(each.has_messages() for each in sim.outboxes)
+            for outbox in sim.outboxes:
+                if outbox.has_messages():
+                    return True
+            return mailboxes.has_awaited
 
         passed = 0
         while True:

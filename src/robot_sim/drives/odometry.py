@@ -105,11 +105,12 @@ class RollingMean(Stateful):
 
     def add(self, value: float) -> float:
         """Returns the mean with a new value."""
-        if len(self._values) == self._values.maxlen:
-            self._sum -= self._values[0]
-        self._values.append(value)
+        values = self._values
+        if len(values) == values.maxlen:
+            self._sum -= values[0]
+        values.append(value)
         self._sum += value
-        return self._sum / len(self._values)
+        return self._sum / len(values)
 
     def clear(self) -> None:
         self._values.clear()

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from robot_sim.physics.engines import installing
+from robot_sim.sensors.frames import frames
 from robot_sim.sensors.intersection import reach
 from robot_sim.sensors.pinhole import CameraView, Shot
 from robot_sim.sensors.rendering import CameraRenderer, RendererError
-from robot_sim.sensors.scene import SceneState, Target, frames
+from robot_sim.sensors.scene import SceneState, Target
 from robot_sim.sensors.shading import AMBIENT, BACKGROUND, DIFFUSE
 
 SLICES, STACKS = 64, 32  # of a ball

@@ -45,14 +45,16 @@ def cylinder_distances(origins: Numbers, directions: Numbers, sizes: Numbers) ->
         half = np.sqrt(np.maximum(room, 0.0) / across)
         low = (-0.5 * sizes[:, 1] - origins[:, 2]) / along
         high = (0.5 * sizes[:, 1] - origins[:, 2]) / along
+    enter, leave, meets = middle - half, middle + half, room >= 0.0
     parallel = across == 0.0
-    inside = np.einsum("ij,ij->i", origins[:, :2], origins[:, :2]) <= sizes[:, 0] ** 2
-    enter = np.where(parallel, -np.inf, middle - half)
-    leave = np.where(parallel, np.inf, middle + half)
+    if parallel.any():
+        inside = np.einsum("ij,ij->i", origins[:, :2], origins[:, :2]) <= sizes[:, 0] ** 2
+        enter = np.where(parallel, -np.inf, enter)
+        leave = np.where(parallel, np.inf, leave)
+        meets = np.where(parallel, inside, meets)
     level = along == 0.0
     enter = np.maximum(enter, np.where(level, -np.inf, np.fmin(low, high)))
     leave = np.minimum(leave, np.where(level, np.inf, np.fmax(low, high)))
-    meets = np.where(parallel, inside, room >= 0.0)
     meets &= ~level | (np.abs(origins[:, 2]) <= 0.5 * sizes[:, 1])
     return _first(enter, leave, meets & (enter <= leave))
 

@@ -11,9 +11,10 @@ import numpy as np
 from robot_sim.physics.description import DescriptionError, Sensor
 from robot_sim.physics.files.sdf_parts import value
 from robot_sim.physics.pose import Pose
+from robot_sim.sensors.frames import frames
 from robot_sim.sensors.noise import Noise, read_noise
 from robot_sim.sensors.rays import RayScene
-from robot_sim.sensors.scene import FURTHEST, frames
+from robot_sim.sensors.scene import FURTHEST
 from robot_sim.sensors.sensing import (
     Field,
     Measurement,
@@ -91,7 +92,7 @@ class Laser:
         return _directions(*(fan.angles(fan.readings) for fan in fans))
 
     def measure(
-        self, scene: RayScene, pose: Pose, bias: float, random: np.random.Generator
+        self, scene: RayScene, pose: Pose, bias: float, random: np.random.Generator | None
     ) -> Scan:
         """Measures from `pose` in the world, with the noise's bias [m].
 
@@ -109,7 +110,7 @@ class Laser:
         for axis, fan in enumerate((self.vertical, self.horizontal)):
             ranges, intensities = (_resampled(each, fan, axis) for each in (ranges, intensities))
         beyond, before = ranges >= self.high, ranges <= self.low
-        if self.noise is not None:
+        if self.noise is not None and random is not None:
             noisy = self.noise.applied(np.minimum(ranges, self.high), bias, random)
             ranges = np.clip(noisy, self.low, self.high)
         ranges = np.where(beyond, np.inf, np.where(before, -np.inf, ranges))
@@ -139,19 +140,18 @@ class LaserSensor(Measurement):
         sensing = mount.sensing
         self._scene = sensing.visuals if self.laser.sees_visuals else sensing.collisions
 
-    def measure(self, now: int) -> tuple[Scan, np.random.Generator]:
-        """Returns a scan at a time [ns], and what draws further noise of it."""
-        random = self.mount.random(now)
-        return self.scan(random), random
+    def measure(self, now: int) -> Scan:
+        """Returns a scan at a time [ns]."""
+        return self.scan(None if self.laser.noise is None else self.mount.random(now))
 
-    def scan(self, random: np.random.Generator) -> Scan:
-        """Returns a scan, whose noise is drawn from `random`."""
+    def scan(self, random: np.random.Generator | None) -> Scan:
+        """Returns a scan, whose noise, if it has any, is drawn from `random`."""
         mount, noise = self.mount, self.laser.noise
         bias = 0.0 if noise is None else noise.draw_bias(mount.biases())
         return self.laser.measure(self._scene, sensor_pose(mount.model, self.sensor), bias, random)
 
     def values(self, now: int) -> dict[str, np.ndarray]:
-        scan, _ = self.measure(now)
+        scan = self.measure(now)
         return {name: each.astype(np.float32).ravel() for name, each in scan._asdict().items()}
 
 
@@ -169,8 +169,8 @@ class RangeSensor(LaserSensor):
 
     def nearest(self, now: int) -> float:
         """Returns the smallest range at a time [ns], at most the largest that it measures [m]."""
-        scan, random = self.measure(now)
-        return nearest(scan, self.laser, self._deviation, random)
+        random = self.mount.random(now)
+        return nearest(self.scan(random), self.laser, self._deviation, random)
 
     def values(self, now: int) -> dict[str, np.ndarray]:
         return {"ranges": np.array([self.nearest(now)], np.float32)}

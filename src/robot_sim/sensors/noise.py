@@ -6,9 +6,11 @@ listens or has listened.
 
 import hashlib
 from dataclasses import dataclass
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
+from numpy.random.bit_generator import ISeedSequence
 
 from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.files.sdf_parts import value
@@ -18,10 +20,20 @@ LARGEST_DEVIATION = 1e9
 DEVIATIONS = ("stddev", "bias_stddev")
 
 
+class _Key(ISeedSequence):
+    """A key of Philox, which with `key=` would first ask the system for random numbers."""
+
+    def __init__(self, digest: bytes) -> None:
+        self._words = np.frombuffer(digest, "<u8")
+
+    def generate_state(self, n_words: int, dtype: Any = np.uint32) -> np.ndarray:
+        return self._words
+
+
 def generator(seed: int, *key: object) -> np.random.Generator:
     """Returns the generator of what `key` names in a world with this seed."""
     digest = hashlib.blake2b(repr((seed, *key)).encode(), digest_size=16).digest()
-    return np.random.Generator(np.random.Philox(key=int.from_bytes(digest, "little")))
+    return np.random.Generator(np.random.Philox(_Key(digest)))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)

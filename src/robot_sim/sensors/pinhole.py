@@ -9,9 +9,10 @@ import numpy as np
 from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.files.sdf_parts import read_pose, value
 from robot_sim.physics.pose import Pose
+from robot_sim.sensors.frames import frames
 from robot_sim.sensors.noise import Noise, read_noise
 from robot_sim.sensors.rays import RayCaster
-from robot_sim.sensors.scene import FURTHEST, SceneState, frames
+from robot_sim.sensors.scene import FURTHEST, SceneState
 from robot_sim.sensors.shading import colours
 
 MOST_PIXELS = 2_100_000  # full HD

@@ -82,7 +82,9 @@ class RayCaster:
             found.improve(rays, target, self._plane_distances(target, starts, directions))
         targets, rays = self._pairs(origin, directions, np.max(far))
         for kind in self._analytic:
-            some = self._kinds[targets] == kind
+            some = np.flatnonzero(self._kinds[targets] == kind)
+            if not len(some):
+                continue
             distances = self._distances(
                 kind, targets[some], starts[rays[some]], directions[rays[some]]
             )
@@ -111,8 +113,9 @@ class RayCaster:
         targets = self._still[met.parts]  # the last one is NONE
         found = Hits(met.distances, targets, met.triangles, met.weights)
         some = np.flatnonzero(self._are_cylinders[targets])  # their triangles lie within them
-        exact = self._distances("cylinder", targets[some], starts[some], directions[some])
-        found.distances[some] = np.where(exact < np.inf, exact, found.distances[some])
+        if len(some):
+            exact = self._distances("cylinder", targets[some], starts[some], directions[some])
+            found.distances[some] = np.where(exact < np.inf, exact, found.distances[some])
         return found
 
     def _meet_mesh(
@@ -145,8 +148,22 @@ class RayCaster:
         along = x * dx
         along += y * dy
         along += z * dz
-        which, rays = (along >= least[:, None]).nonzero()
+        meets = along >= least[:, None]
+        for inside in np.flatnonzero(room <= 0.0).tolist():
+            self._pass_above(meets[inside], apart[inside], origin, directions)
+        which, rays = meets.nonzero()
         return apart[which], rays
+
+    def _pass_above(
+        self, meets: np.ndarray, target: int, origin: np.ndarray, directions: np.ndarray
+    ) -> None:
+        """Excludes rays from within a target's ball that pass above it, as those of a laser on a robot do."""
+        axis = self._turns[target][:, 2]
+        height = float((origin - self._places[target]) @ axis)
+        above = abs(height) - 0.5 * self._heights[target]
+        if above > MARGIN:  # what is met is nearer than the ball's diameter
+            reach = math.copysign(2.0 * self._radii[target], height)
+            meets &= reach * (directions @ axis) <= MARGIN - above
 
     def _distances(
         self, kind: str, targets: np.ndarray, starts: np.ndarray, directions: np.ndarray
@@ -175,6 +192,7 @@ class RayCaster:
         self._kinds = np.array([*(target.shape.kind for target in targets), ""])
         self._sizes = np.zeros((count, 3))
         self._centres, self._radii = np.zeros((count, 3)), np.zeros(count)
+        self._heights = np.full(count, np.inf)
         self._planes = [i for i in range(count) if self._kinds[i] == "plane"]
         still, triangles, apart, meshes = [], [], [], {}
         for index, target in enumerate(targets):
@@ -186,6 +204,8 @@ class RayCaster:
             if shape.kind != "mesh" and not is_still:
                 apart.append(index)
                 self._radii[index] = reach(shape.kind, shape.size)
+                if shape.kind != "sphere":
+                    self._heights[index] = shape.size[-1]
                 continue
             corners = target.corners()
             is_large = shape.kind == "mesh" and len(corners) > 3 * LARGE

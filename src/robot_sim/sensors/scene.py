@@ -8,9 +8,10 @@ import numpy as np
 
 from robot_sim.physics.description import Color, DescriptionError, Light, Link, Shape
 from robot_sim.physics.model import Model
-from robot_sim.physics.pose import Pose, rotate
+from robot_sim.physics.pose import rotate
 from robot_sim.physics.world import World
 from robot_sim.pictures.visuals import GREY, Piece, pieces_of, solid_of
+from robot_sim.sensors.frames import frames
 
 FURTHEST = 1e9  # [m] that a sensor reaches
 BRIGHT = 0.8  # diffuse colour of Gazebo's sun
@@ -129,18 +130,6 @@ class WorldScene:
         turns, places = frames(poses)
         own = np.einsum("kij,kj->ki", turns, self._own_places[targets])
         return turns @ self._own_turns[targets], places + own
-
-
-def frames(poses: Sequence[Pose]) -> tuple[np.ndarray, np.ndarray]:
-    """Returns rotation matrices (n, 3, 3) and positions (n, 3) of poses."""
-    x, y, z, w = np.array([pose.orientation for pose in poses]).reshape(-1, 4).T
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    places = np.array([pose.position for pose in poses]).reshape(-1, 3)
-    return np.array(rows).transpose(2, 0, 1), places
 
 
 def beam_of(light: Light) -> Beam:

@@ -4,6 +4,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import pytest
 from rospy.impl import tcpros_pubsub
@@ -23,9 +24,10 @@ def boxes(monkeypatch):
     )
     monkeypatch.setattr(module, "on_topics_changed", lambda call: diverted.update(changed=call))
     monkeypatch.setattr(module, "publish_without_yielding", lambda: None)
-    monkeypatch.setattr(module, "subscribers", lambda topic: ["/script"])
+    topics = {"/a": [SimpleNamespace(endpoint_id="/script")]}
+    monkeypatch.setattr(module, "connections", lambda topic: topics.get(topic, ()))
     made = Mailboxes()
-    made.diverted = diverted
+    made.diverted, made.topics = diverted, topics
     return made
 
 
@@ -40,6 +42,17 @@ def switch_often():
 
 def contents(box):
     return [(message.topic, message.data) for message in box.take()]
+
+
+def test_a_topic_is_heard_while_a_node_that_asks_for_time_is_connected(boxes):
+    assert not boxes.any_hears("/a")
+    boxes.of("/script")
+    assert boxes.any_hears("/a")
+    assert not boxes.any_hears("/b")
+    boxes.topics["/a"] = []
+    assert not boxes.any_hears("/a")
+    boxes.topics["/a"] = [SimpleNamespace(endpoint_id=node) for node in ("/other", "/script")]
+    assert boxes.any_hears("/a")
 
 
 def test_messages_are_taken_once_in_their_order():

@@ -43,7 +43,7 @@ class Side(Stateful):
 
     def travel(self) -> float:
         """Returns how far they have rolled since the last call, in the mean [m]."""
-        turned = sum(joint.position for joint in self.joints) / len(self.joints)
+        turned = sum([joint.position for joint in self.joints]) / len(self.joints)
         last, self._last = self._last, turned
         return self.radius * (turned - last)
 

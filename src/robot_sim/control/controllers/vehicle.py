@@ -174,9 +174,9 @@ class VehicleController(Controller):
             self._velocity = (linear, 0.0, self.turn_of(linear, angular))
             ahead, left, turn = (dt * each for each in self._velocity)
         else:
-            ahead, left, turn = motion = self.measure(dt)
-            speeds = [mean.add(part / dt) for mean, part in zip(self._means, motion, strict=True)]
-            self._velocity = (speeds[0], speeds[1], speeds[2])
+            ahead, left, turn = self.measure(dt)
+            along, across, round_ = self._means
+            self._velocity = (along.add(ahead / dt), across.add(left / dt), round_.add(turn / dt))
         self.place.move_on_arc(ahead, turn, left)
         if self.period.is_over(now):
             self.report(now)
@@ -192,14 +192,12 @@ class VehicleController(Controller):
         return now - self._stamp > self.options.cmd_vel_timeout * NANOSECONDS
 
     def _limit(self, linear: float, angular: float, dt: float) -> tuple[float, float]:
-        limits = self.options.linear, self.options.angular
-        limited = [
-            limit.limited(speed, last, before, dt)
-            for limit, speed, last, before in zip(
-                limits, (linear, angular), self._last, self._before, strict=True
-            )
-        ]
-        self._before, self._last = self._last, (limited[0], limited[1])
+        options, last, before = self.options, self._last, self._before
+        self._before = last
+        self._last = (
+            options.linear.limited(linear, last[0], before[0], dt),
+            options.angular.limited(angular, last[1], before[1], dt),
+        )
         return self._last
 
     def report(self, now: int) -> None:

@@ -79,6 +79,9 @@ class BulletBody(Body):
             pybullet.setJointMotorControlArray, body, self._indices, pybullet.TORQUE_CONTROL, unused, unused
         )  # fmt: skip
         self._unused = unused
+        self._motors: dict[
+            int, tuple[float, float]
+        ] = {}  # speeds and efforts, as set for this step
         places = {n: (body, i) for n, i in zip(self.joint_names, self._indices, strict=True)}
         self._gears = {
             name: (add_gear(client, places[name], places[mimic.driver], mimic), mimic.effort)
@@ -269,6 +272,7 @@ class BulletBody(Body):
 
     def set_time_step(self, dt: float) -> None:
         """Limits speeds for a step of `dt` [s]. PyBullet has one limit for joints and base."""
+        self._motors.clear()  # PyBullet keeps the impulse of a step
         fastest = FURTHEST / dt if self._indices else FASTEST
         pybullet.changeDynamics(
             self.id, BASE, maxJointVelocity=fastest, physicsClientId=self._client
@@ -298,6 +302,9 @@ class BulletBody(Body):
         )  # fmt: skip
 
     def set_motor(self, index: int, velocity: float, effort: float) -> None:
+        if self._motors.get(index) == (velocity, effort):
+            return
+        self._motors[index] = velocity, effort
         pybullet.setJointMotorControl2(
             self.id, self._indices[index], pybullet.VELOCITY_CONTROL, targetVelocity=velocity,
             force=effort, physicsClientId=self._client,

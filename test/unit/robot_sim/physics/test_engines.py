@@ -117,6 +117,18 @@ def test_a_joint_goes_no_further_than_3_14_in_a_step(make_world, step):
     assert model.joint_state("rail")[0] == pytest.approx(-0.9 * math.pi, rel=1e-6)
 
 
+def test_a_motor_has_the_force_it_is_given_again_after_the_step_has_changed(make_world):
+    world = make_world(time_step=0.001, gravity=(0.0, 0.0, 0.0))
+    model = world.spawn("chain", parse_urdf(CHAIN), Pose())
+    model.set_motor("rail", 100.0, 2.0)
+    world.step()
+    world.set_time_step(0.01)
+    before = model.joint_state("rail")[1]
+    model.set_motor("rail", 100.0, 2.0)
+    world.step()
+    assert model.joint_state("rail")[1] - before == pytest.approx(10.0 * before, rel=1e-3)
+
+
 @pytest.mark.extras("mujoco")
 def test_in_mujoco_many_fast_joints_that_are_each_slow_enough_go_on():
     world = World(make_engine("mujoco"), gravity=(0.0, 0.0, 0.0))

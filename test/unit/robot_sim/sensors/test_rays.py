@@ -10,6 +10,7 @@ import pytest
 from robot_sim.physics.pose import Pose, from_rpy
 from robot_sim.sensors import pinhole, rays
 from robot_sim.sensors import scene as scenes
+from robot_sim.sensors.frames import frames
 from robot_sim.sensors.intersection import DISTANCES
 from robot_sim.sensors.rays import NONE, RayScene
 
@@ -55,6 +56,25 @@ def test_shapes_are_met_where_the_engine_meets_them_or_exactly(world, put, kind,
     assert (met != np.isfinite(exact)).sum() <= 2 * (static and kind == "cylinder")
     both = met & np.isfinite(exact)
     np.testing.assert_allclose(hits.distances[both], exact[both], atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["box", "cylinder"])
+@pytest.mark.parametrize("above", [1e-9, 0.005, 0.05])
+def test_a_robot_is_met_from_a_sensor_on_top_of_it(world, put, kind, above):
+    """The formula of the shape is the oracle, for rays from within its bounding ball."""
+    put("body", kind, SIZES[kind], Pose((1.0, 2.0, 3.0), from_rpy(0.1, 0.05, 0.7)), static=False)
+    up = Pose((1.0, 2.0, 3.0), from_rpy(0.1, 0.05, 0.7)).compose(Pose((0.02, 0.01, 0.4 + above)))
+    random = np.random.default_rng(1)
+    own = random.normal(size=(2000, 3)) * (1.0, 1.0, 0.05)
+    own /= np.linalg.norm(own, axis=1, keepdims=True)
+    turn = frames([up])[0][0]
+    hits = RayScene(world).cast(np.array(up.position), own @ turn.T)
+    starts = np.tile((0.02, 0.01, 0.4 + above), (2000, 1))
+    exact = DISTANCES[kind](starts, own, np.tile((*SIZES[kind], 0.0)[:3], (2000, 1)))
+    np.testing.assert_allclose(
+        np.where(hits.targets == 1, hits.distances, np.inf), exact, atol=1e-5
+    )
+    assert 20 < np.isfinite(exact).sum() < 1500
 
 
 def test_things_are_met_where_they_are_now(world, put):
