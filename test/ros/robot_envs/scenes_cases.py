@@ -43,7 +43,9 @@ class Arms(Scenes, unittest.TestCase):
         return Volley(Path(folder))
 
     def test_it_keeps_what_environments_of_robots_promise(self):
-        check_robot_env(lambda **options: RobotEnv(self.robots, self.task(), **options), ("ros",))
+        check_robot_env(
+            lambda **options: RobotEnv(self.robots, self.task(), **options), ("ros",), steps=30
+        )
 
     def test_pictures_show_the_same_as_of_the_world_in_process(self):
         pictures = []

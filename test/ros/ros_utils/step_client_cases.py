@@ -46,9 +46,9 @@ class OneRobot(Clients):
 
     @classmethod
     def setUpClass(cls):
-        simulation = Simulation(lockstep=True)
-        cls.addClassCleanup(simulation.close)
-        cls.enterClassContext(simulation.active())
+        cls.simulation = Simulation(lockstep=True)
+        cls.addClassCleanup(cls.simulation.close)
+        cls.enterClassContext(cls.simulation.active())
         add_cartpole()
 
     def setUp(self):
@@ -67,6 +67,14 @@ class OneRobot(Clients):
         self.assertEqual(
             client.step(8, model_states=True).model_names, ["ground_plane", "cartpole"]
         )
+
+    def test_a_simulator_that_hangs_is_an_error_in_time(self):
+        client = self.client(timeout=1.0)
+        process = simulator_process(self.simulation.master_uri)
+        os.kill(process, signal.SIGSTOP)
+        self.addCleanup(os.kill, process, signal.SIGCONT)
+        with self.assertRaisesRegex(ServiceHangs, r"within 1(\.\d+)? s"):
+            client.step(1)
 
     def test_a_long_step_is_given_its_time(self):
         client = self.client(timeout=0.2)
@@ -111,18 +119,6 @@ class OwnSimulators(Clients):
                 if angle == 0.1:
                     with self.assertRaises(ServiceGone):
                         client.step(8, {CART: 0.1})
-
-    def test_a_simulator_that_hangs_is_an_error_in_time(self):
-        simulation = self.simulate()
-        with simulation.active():
-            add_cartpole()
-            self.client().step(1)
-            client = self.client(timeout=1.0)
-            process = simulator_process(simulation.master_uri)
-            os.kill(process, signal.SIGSTOP)
-            self.addCleanup(os.kill, process, signal.SIGCONT)  # before the simulation is closed
-            with self.assertRaisesRegex(ServiceHangs, r"within 1(\.\d+)? s"):
-                client.step(1)
 
 
 def simulator_process(master_uri):

@@ -9,9 +9,9 @@ import sys
 import gymnasium
 import numpy as np
 import pytest
+from support.scenes import play as script
+from support.scenes.play import play
 
-import cartpole  # noqa: F401 - registers the environments
-import robot_envs.robots  # noqa: F401
 from robot_envs import EnvSnapshot, SimulatorError
 from robot_sim.plain_data import pack, unpack
 from robot_sim.snapshot import DIGEST, MAGIC, Snapshot, SnapshotError
@@ -22,29 +22,6 @@ ODD = [
     np.zeros((0, 2)), {"__generator__": "seed", "state": 1, "seeds": None},
     {"__generator__": "PCG64", "state": {}, "seeds": [1, [], 10**9, 0]},
 ]  # fmt: skip
-
-PLAY = """
-import sys
-import gymnasium
-import cartpole, robot_envs.robots
-from robot_envs import EnvSnapshot
-from robot_sim.plain_data import pack
-
-def play(env, seed=5):
-    env.action_space.seed(seed)
-    given = []
-    for _ in range(20):
-        given.append(env.step(env.action_space.sample()))
-        if given[-1][2] or given[-1][3]:
-            given.append(env.reset())
-    return pack(given).hex()
-"""
-FRESH = """
-env = gymnasium.make(sys.argv[1], backend=sys.argv[2]).unwrapped
-env.restore_state(EnvSnapshot.load(sys.argv[3]))
-print("played", play(env))
-"""
-exec(PLAY)
 
 
 def begun(identifier, backend):
@@ -57,15 +34,17 @@ def begun(identifier, backend):
 
 
 @pytest.mark.extras("mujoco")
-@pytest.mark.parametrize("backend", ["bullet", "mujoco"])
-@pytest.mark.parametrize("identifier", ["robot_envs/PickCube-v0", "robot_envs/Navigate-v0"])
+@pytest.mark.parametrize(
+    ("identifier", "backend"),
+    [("robot_envs/PickCube-v0", "mujoco"), ("robot_envs/Navigate-v0", "bullet")],
+)
 def test_a_fresh_process_goes_on_to_the_bit(identifier, backend, tmp_path):
     env = begun(identifier, backend)
     env.save_state().save(tmp_path / "there.snapshot")
-    first = play(env)  # noqa: F821
+    first = play(env)
     env.close()
     done = subprocess.run(
-        [sys.executable, "-c", PLAY + FRESH, identifier, backend, str(tmp_path / "there.snapshot")],
+        [sys.executable, script.__file__, identifier, backend, str(tmp_path / "there.snapshot")],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -87,6 +66,11 @@ def places(value, place=()):
         yield from places(each, (*place, key))
 
 
+def signed(content):
+    """A file of a snapshot, with the digest of what it holds."""
+    return MAGIC + hashlib.sha256(content).digest() + content
+
+
 def forged(data, rng):
     """The same with an odd value somewhere, or with other bytes; its digest is right."""
     content = data[BEGIN:]
@@ -103,7 +87,7 @@ def forged(data, rng):
         for _ in range(rng.randint(1, 3)):
             changed[rng.randrange(len(changed))] = rng.randrange(256)
         content = bytes(changed)
-    return MAGIC + hashlib.sha256(content).digest() + content
+    return signed(content)
 
 
 def test_forged_files_run_no_code_and_are_one_error():
@@ -146,11 +130,10 @@ def test_a_refused_one_changes_nothing():
     ):
         fits, content = unpack(pack(state))
         change(fits, content)
-        content = pack([fits, content])
-        data = MAGIC + hashlib.sha256(content).digest() + content
+        data = signed(pack([fits, content]))
         with pytest.raises(SimulatorError):
             env.restore_state(EnvSnapshot.from_bytes(data))
-    assert play(env) == play(same)  # noqa: F821
+    assert play(env) == play(same)
     env.close()
     same.close()
 
@@ -169,8 +152,7 @@ def test_no_controller_loses_what_it_refers_to(name, change):
     good = env.save_state().to_bytes()
     fits, state = unpack(good[BEGIN:])
     change(state["robots"][0]["manager"]["controllers"][name])
-    content = pack([fits, state])
-    data = MAGIC + hashlib.sha256(content).digest() + content
+    data = signed(pack([fits, state]))
     with pytest.raises(SimulatorError, match="can't be restored: .*(pid|_joints|controller)"):
         env.restore_state(EnvSnapshot.from_bytes(data))
     env.restore_state(EnvSnapshot.from_bytes(good))
@@ -189,8 +171,7 @@ def test_joints_and_drives_lose_no_numbers(change):
     env = begun("robot_envs/PickCube-v0", "bullet")
     fits, state = unpack(env.save_state().to_bytes()[BEGIN:])
     change(state["robots"][0])
-    content = pack([fits, state])
-    data = MAGIC + hashlib.sha256(content).digest() + content
+    data = signed(pack([fits, state]))
     with pytest.raises(SimulatorError, match="numbers of gripper_arm's joints are missing"):
         env.restore_state(EnvSnapshot.from_bytes(data))
     env.close()
@@ -207,8 +188,7 @@ def test_no_episode_begins_at_a_forged_one(change):
     env = begun("cartpole/Balance-v0", "bullet")
     fits, state = unpack(env.save_state().to_bytes()[BEGIN:])
     change(state["environment"])
-    content = pack([fits, state])
-    data = MAGIC + hashlib.sha256(content).digest() + content
+    data = signed(pack([fits, state]))
     with pytest.raises(SimulatorError, match="^no episode can begin at the snapshot: "):
         env.reset(options={"snapshot": EnvSnapshot.from_bytes(data)})
     env.close()

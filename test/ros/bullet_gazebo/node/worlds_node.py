@@ -171,8 +171,8 @@ class Spawning(unittest.TestCase):
 
     def test_thousands_of_faults_are_a_few_lines(self):
         """Each would be a line in the log, and the spawn would take minutes."""
-        blocks = '<gazebo reference="gone"><mu1>1</mu1></gazebo>' * 100_000
-        plugins = '<gazebo><plugin filename="libnobody_has.so"/></gazebo>' * 50_000
+        blocks = '<gazebo reference="gone"><mu1>1</mu1></gazebo>' * 20_000
+        plugins = '<gazebo><plugin filename="libnobody_has.so"/></gazebo>' * 10_000
         xml = URDF.replace("</robot>", f"{blocks}{plugins}</robot>")
         self.spawned("wordy", xml, initial_pose=at(0.0, -30.0, 1.0))
 

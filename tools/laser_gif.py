@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Draws docs/images/laser.gif: the rover drives to goals between swinging gates, by a policy that learned.
 
-./ws python3 test/support/pages/laser_gif.py runs/navigate docs/images/laser.gif
+./ws python3 tools/laser_gif.py runs/navigate docs/images/laser.gif
 """
 
 import argparse
@@ -9,13 +9,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
 
 from rl_workbench.tools.policies import load_learned
 from rl_workbench.tools.runs import open_run
-from robot_envs import RobotEnv
 from robot_envs.robots.rover import ROBOT
 from robot_sim.physics.description import Mesh, Shape
 from robot_sim.physics.pose import Pose
@@ -58,7 +58,7 @@ def scan_shapes(points: list[np.ndarray | None]) -> Iterator[tuple[str, Shape]]:
 class Drawing:
     """The world of an environment, with the goal and what the laser meets."""
 
-    def __init__(self, env: RobotEnv, size: tuple[int, int]) -> None:
+    def __init__(self, env: Any, size: tuple[int, int]) -> None:
         self._env, self._size, self._drawn = env, size, Renderer()
         self._models = env.backend._sim.world.models
         for name, model in self._models.items():
@@ -86,12 +86,12 @@ class Drawing:
 
 def main() -> None:
     args = parse_args()
-    size = tuple(int(each) for each in args.size.split("x"))
+    width, height = map(int, args.size.split("x"))
     learned = load_learned(open_run(args.run), "best", {"world": args.world})
     env, frames = learned.env, []
-    drawing = Drawing(env.unwrapped, size)
+    drawing = Drawing(env.unwrapped, (width, height))
     for seed in args.seeds:
-        seen, ends, info = *env.reset(seed=seed)[:1], False, {}
+        (seen, info), ends = env.reset(seed=seed), False
         while not ends:
             frames.append(drawing.picture())
             seen, _, terminated, truncated, info = env.step(learned.act(seen))

@@ -1,103 +1,28 @@
-"""Snapshots of a simulator: the same commands lead to the same bits, or the snapshot is refused."""
+"""Snapshots of a world: the same commands lead to the same bits, or the snapshot is refused."""
 
-import random
-from collections import deque
-from dataclasses import is_dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from support.robots.branches import check_branches, future
 from support.robots.cartpole import CONTROLLERS, cartpole_urdf
 from support.robots.grippers import cube, gripper
-from support.robots.trajectory_rig import Listener
 from support.robots.worlds import add_robot, start
 
 from robot_sim.applied_forces import ActingTime, AppliedEffort, AppliedWrench
-from robot_sim.control.controllers.base import Output
-from robot_sim.control.controllers.forward import Forward
-from robot_sim.control.hardware import EFFORT
-from robot_sim.control.trajectory_goals import GoalRequest, Trajectory, TrajectoryPoint
 from robot_sim.physics.engines import make_engine
 from robot_sim.physics.files.urdf import parse_urdf
 from robot_sim.physics.pose import Pose, from_rpy
 from robot_sim.physics.properties import JointProperties, set_joint_properties
 from robot_sim.physics.world import World, ground_plane
-from robot_sim.sensors.schedule import Schedule
-from robot_sim.sensors.sensing import Sensing
-from robot_sim.sensors.sensor_readers import SensorReaders
 from robot_sim.simulator import Simulator
-from robot_sim.snapshot import Snapshot, SnapshotError
-from robot_sim.state_dict import StateError
+from robot_sim.snapshot import SnapshotError
 
 S = 1_000_000_000  # [ns]
+
+
 OFF_CENTRE = Pose((0.01, 0.0, 0.0))
-
-
-@pytest.fixture
-def sim(new_engine):
-    """A world in lock-step with ground, on each engine."""
-    simulator = Simulator(World(new_engine()), lockstep=True)
-    simulator.world.spawn("ground_plane", ground_plane(), Pose())
-    yield simulator
-    simulator.world.close()
-
-
-def future(sim, ticks=150):
-    """What a number of ticks leads to, tick by tick."""
-    seen = []
-    for _ in range(ticks):
-        with sim.lock:
-            sim.advance(1)
-        models = sim.world.models.values()
-        states = [(m.joint_states(), [m.link_state(link) for link in m.link_names]) for m in models]
-        contacts = [each[:5] for each in sim.world.contacts()]
-        efforts = [j.effort for r in sim.robots for j in r.hardware.joints.values()]
-        seen.append((sim.now, states, contacts, efforts))
-    return seen
-
-
-def check_plain(value):
-    """Checks that a state is plain data: numbers, texts, arrays, and containers and records of these."""
-    if isinstance(value, dict):
-        value = [*value, *value.values()]
-    elif is_dataclass(value):
-        value = [getattr(value, name) for name in value.__dataclass_fields__]
-    if isinstance(value, (list, tuple, deque)):
-        for each in value:
-            check_plain(each)
-    else:
-        assert isinstance(value, (type(None), bool, int, float, str, bytes, np.ndarray, np.generic))
-
-
-def check_branches(sim, between, act=lambda: None, ticks=150):
-    """Checks that the future is the same after `between`, in which anything happens."""
-    with sim.lock:
-        snapshot = sim.save_state()
-    check_plain(snapshot.state)
-    act()
-    first = future(sim, ticks)
-    for each in (snapshot, Snapshot.from_bytes(snapshot.to_bytes())):
-        between()
-        with sim.lock:
-            sim.restore_state(each)
-        act()
-        assert future(sim, ticks) == first
-    return first
-
-
-def test_a_controlled_robot_goes_on_as_before(sim):
-    robot = add_robot(sim, "cartpole", cartpole_urdf())
-    start(robot, CONTROLLERS)
-    robot.manager.get("cart").command(0.3)
-    future(sim, 37)
-
-    def between():
-        robot.manager.get("cart").command(-0.2)
-        sim.reset_simulation()
-        future(sim, 11)
-
-    first = check_branches(sim, between)
-    assert first[-1][3] != first[0][3]
 
 
 def check_that_snapshots_change_nothing(sim, begin):
@@ -262,168 +187,6 @@ def test_motors_efforts_and_wrenches_that_act_for_a_time(sim):
         robot.set_motor("lift", -0.3, 10.0)
 
     check_branches(sim, between)
-
-
-def test_a_trajectory_is_followed_from_where_it_was(sim):
-    robot = add_robot(sim, "cartpole", cartpole_urdf())
-    joint = {"joints": ["stand_cart"], "gains": {"stand_cart": {"p": 500.0, "i": 10.0, "d": 20.0}}}
-    start(robot, {"arm": {"type": "effort_controllers/JointTrajectoryController", **joint}})
-    arm = robot.manager.get("arm")
-
-    def way(*places):
-        points = [TrajectoryPoint((k + 1) * S // 5, [x]) for k, x in enumerate(places)]
-        arm.follow(Trajectory(["stand_cart"], points))
-
-    way(0.1, -0.2, 0.2)
-    future(sim, 150)
-    first = check_branches(sim, lambda: way(-0.3) or future(sim, 50), ticks=300)
-    assert max(abs(states[1][0][0][0]) for _, states, *_ in first) > 0.1
-
-
-def test_goals_are_their_clients_who_are_told_that_they_end(sim):
-    robot = add_robot(sim, "cartpole", cartpole_urdf())
-    joint = {"joints": ["stand_cart"], "gains": {"stand_cart": {"p": 500.0, "i": 10.0, "d": 20.0}}}
-    start(robot, {"arm": {"type": "effort_controllers/JointTrajectoryController", **joint}})
-    arm = robot.manager.get("arm")
-
-    def pursue(key, place):
-        told = Listener()
-        trajectory = Trajectory(["stand_cart"], [TrajectoryPoint(S // 5, [place])])
-        arm.pursue(key, GoalRequest(trajectory), told)
-        return told
-
-    first = pursue("first", 0.1)
-    future(sim, 50)
-    with sim.lock:
-        snapshot = sim.save_state()
-    after = future(sim, 400)
-    assert [each.kind for each in first.outcomes] == ["succeeded"]
-    second = pursue("second", -0.1)
-    future(sim, 20)
-    with sim.lock:
-        sim.restore_state(snapshot)
-    assert [each.kind for each in second.outcomes] == ["canceled"]
-    assert future(sim, 400) == after
-    assert len(first.outcomes) == len(second.outcomes) == 1
-
-
-IMU = (
-    '<gazebo reference="cart"><sensor type="imu" name="feel"><always_on>1</always_on>'
-    "<update_rate>100</update_rate><imu><linear_acceleration><x><noise type='gaussian'>"
-    "<stddev>0.1</stddev></noise></x></linear_acceleration></imu></sensor></gazebo></robot>"
-)
-
-
-def test_sensors_measure_the_same_with_the_same_noise(sim):
-    robot = add_robot(sim, "cartpole", cartpole_urdf().replace("</robot>", IMU))
-    start(robot, CONTROLLERS)
-    sensing = Sensing(sim, seed=3)
-    with sim.lock:
-        readers = SensorReaders(sim, sensing, ["feel"])
-    robot.manager.get("cart").command(0.2)
-    future(sim, 25)
-    with sim.lock:
-        snapshot = sim.save_state()
-
-    def measured():
-        seen = []
-        for _ in range(30):
-            future(sim, 5)
-            (taken,) = readers.read()
-            seen.append((taken.now, {k: v.tolist() for k, v in taken.values.items()}))
-        return seen
-
-    first = measured()
-    assert len({str(values) for _, values in first}) > 10
-    for seed in (5, 6):
-        sim.reseed(seed)
-        sim.reset_simulation()
-        measured()
-        with sim.lock:
-            sim.restore_state(snapshot)
-        assert measured() == first
-
-
-def test_a_sensor_that_is_heard_only_since_measures_at_its_times(sim):
-    schedule, seen, heard = Schedule(sim), [], False
-    model = next(iter(sim.world.models.values()))
-    with sim.lock:
-        schedule.begin(model, 10.0, seen.append, lambda: heard, at_once=False)
-    future(sim, 250)
-    with sim.lock:
-        snapshot = sim.save_state()
-        heard = True
-        schedule.review()
-    future(sim, 300)
-    first = seen.copy()
-    seen.clear()
-    with sim.lock:
-        sim.restore_state(snapshot)
-        heard = True
-        schedule.review()
-    future(sim, 300)
-    assert seen == first == [3 * S // 10, 4 * S // 10, 5 * S // 10]
-
-
-class Counting(Forward):
-    """A user's controller, whose attributes are saved."""
-
-    interface = EFFORT
-
-    @classmethod
-    def create(cls, name, params, hardware):
-        return cls(name, [hardware.joints["stand_cart"]])
-
-    def __init__(self, name, joints):
-        super().__init__(name, joints)
-        self.seen, self.random, self.report = [], random.Random(3), Output("count", "Float64")
-
-    def update(self, now, dt):
-        self.seen.append(now)
-        self._joints[0].command = self.random.gauss(0.0, 0.1) * len(self.seen)
-
-
-class Faulty(Counting):
-    def state_dict(self):
-        return len(self.seen)
-
-    def load_state_dict(self, state):
-        raise ValueError(f"not {state}")
-
-
-def with_controller(sim, kind):
-    robot = add_robot(sim, "cartpole", cartpole_urdf())
-    robot.manager.types["own/Mine"] = kind
-    start(robot, {"mine": {"type": "own/Mine"}})
-    return robot.manager.get("mine")
-
-
-def test_a_users_controller_is_saved_by_its_attributes(sim):
-    mine = with_controller(sim, Counting)
-    future(sim, 10)
-    check_branches(sim, lambda: future(sim, 20))
-    mine.callback = lambda: 0
-    with (
-        sim.lock,
-        pytest.raises(StateError, match=r"^Counting.callback: .*state_dict\(\) and a load_"),
-    ):
-        sim.save_state()
-
-
-def test_all_else_is_restored_where_a_users_controller_cannot(sim):
-    with_controller(sim, Faulty)
-    future(sim, 10)
-    with sim.lock:
-        snapshot = sim.save_state()
-    model = sim.world.models["cartpole"]
-    before = sim.now, model.joint_states()
-    future(sim, 20)
-    with (
-        sim.lock,
-        pytest.raises(StateError, match=r"load_state_dict\(\) of Faulty raised .*not 10"),
-    ):
-        sim.restore_state(snapshot)
-    assert (sim.now, model.joint_states()) == before
 
 
 def test_another_world_is_refused_and_stays_as_it_is(sim, new_engine):
