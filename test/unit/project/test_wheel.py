@@ -124,7 +124,7 @@ def test_the_robots_that_come_along_move_as_in_the_workspace(python: Path, tmp_p
         "steps = [env.step(env.action_space.sample() * 0.0 + 0.5) for env in envs * 5];"
         "print(json.dumps([' '.join(str(step[:2]).split()) for step in steps]))"
     )
-    assert len(json.loads(as_in_the_workspace(python, code, tmp_path))) == 11 * 5
+    assert len(json.loads(as_in_the_workspace(python, code, tmp_path))) == 12 * 5
 
 
 def test_a_package_of_ones_own_is_written(python: Path, tmp_path: Path) -> None:
