@@ -28,7 +28,8 @@ IDS = (
     "cartpole/Balance-v0", "cartpole/SwingUp-v0", "robot_envs/TwoLinkReach-v0",
     "robot_envs/TwoLinkReachGoal-v0", "robot_envs/SixJointReach-v0", "robot_envs/PickCube-v0",
     "robot_envs/PickCubeGoal-v0", "robot_envs/Furuta-v0", "robot_envs/DoublePendulum-v0",
-    "robot_envs/Hopper-v0", "robot_envs/Navigate-v0", "robot_envs/NavigateImages-v0",
+    "robot_envs/Hopper-v0", "robot_envs/Quadruped-v0", "robot_envs/Navigate-v0",
+    "robot_envs/NavigateImages-v0",
 )  # fmt: skip
 BACKENDS = ("bullet", "mujoco", "ros-own")
 OTHER = {"bullet": "ros-own", "ros-own": "bullet"}

@@ -154,7 +154,7 @@ def vehicle(results: dict[str, float], seconds: int, renderer: str = "") -> None
         process = simulator_process(simulation)
         looking = threading.Thread(target=contextvars.copy_context().run, args=(look,))
         with listening(simulation, topics):
-            time.sleep(2.0)
+            factor(2, process)  # everything has begun then
             looking.start()
             what = renderer or "unheard camera"
             results[f"{what}, real-time factor"], _ = factor(seconds, process)

@@ -64,7 +64,7 @@ class PolicyNode:
         except ValueError as error:
             raise RobotEnvError(str(error)) from error
         self._wanted: Any = None  # a goal that has come
-        self._told: Any = None  # the one logged last
+        self._logged: Any = None  # the goal that was logged last
         self._reason = self._reported = ""  # why the robot stands still, now and in the last line
         self._unreported = 0  # changes since that line
         self._next_report = 0.0  # [s of wall time] of the next one
@@ -218,9 +218,9 @@ class PolicyNode:
             return
         try:
             self._pilot.aim(goal)
-            if goal != self._told:
+            if goal != self._logged:
                 rospy.loginfo(f"the goal is {list(goal)}")
-                self._told = goal
+                self._logged = goal
         except ValueError as error:
             rospy.logwarn(f"{error}; it keeps the one it has")
 

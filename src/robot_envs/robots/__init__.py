@@ -15,7 +15,7 @@ _ENVIRONMENTS = (  # name, module and class of the task, the return from which o
     ("Furuta", "furuta", "SwingUp", 240.0),
     ("DoublePendulum", "double_pendulum", "Balance", 475.0),
     ("Hopper", "hopper", "HopForward", 450.0),
-    ("Quadruped", "quadruped", "Walk", 40.0),
+    ("Quadruped", "quadruped", "Walk", None),
     ("Navigate", "rover", "Navigate", 8.5),
     ("NavigateImages", "rover", "NavigateImages", 8.0),
 )

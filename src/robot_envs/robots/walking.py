@@ -155,7 +155,7 @@ class WalkByCommand(Task):
         twist = Twist((float(fast * math.cos(way)), float(fast * math.sin(way)), 0.0))
         off = rng.uniform(-0.05, 0.05, len(self.joints))
         joints = dict(zip(self.joints, (self.middle + off).tolist(), strict=True))
-        held = self._commands(self.middle)
+        held = self._holding(self.middle)
         return InitialState(joints, {self.robot.model: Motion(pose, twist)}, held)
 
     def aim(self, goal: Sequence[float]) -> None:
@@ -178,9 +178,9 @@ class WalkByCommand(Task):
 
     def apply(self, action: np.ndarray, state: WorldState) -> Commands:
         self.last, self.action = self.action, action.astype(float)
-        return self._commands(self.middle + self.reach * self.action)
+        return self._holding(self.middle + self.reach * self.action)
 
-    def _commands(self, positions: np.ndarray) -> dict[str, float | tuple[float, ...]]:
+    def _holding(self, positions: np.ndarray) -> dict[str, float | tuple[float, ...]]:
         """Returns the commands that hold joints at positions [rad]."""
         numbers, given = iter(positions.tolist()), {}
         for port in self.robot.ports:

@@ -15,9 +15,8 @@ def colours(scene: RayCaster, hits: Hits, origin: np.ndarray, directions: np.nda
     """Returns the colours (n, 3), 0 to 255, of what rays from `origin` in `directions` (n, 3) have met."""
     assert scene.state is not None  # it has been cast
     seen = np.full((len(directions), 3), BACKGROUND)
-    order = np.argsort(
-        hits.targets.astype(np.int16), kind="stable"
-    )  # by radix, as short numbers are
+    # Short numbers are sorted by radix; beyond their range a target may come in two groups.
+    order = np.argsort(hits.targets.astype(np.int16), kind="stable")
     targets = hits.targets[order]
     for rays in np.split(order, np.flatnonzero(np.diff(targets)) + 1):
         target = int(hits.targets[rays[0]])

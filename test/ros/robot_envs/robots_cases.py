@@ -17,6 +17,7 @@ IDS = tuple(
         "Furuta",
         "DoublePendulum",
         "Hopper",
+        "Quadruped",
     )
 )
 CASES = (

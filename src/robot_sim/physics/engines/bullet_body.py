@@ -79,9 +79,8 @@ class BulletBody(Body):
             pybullet.setJointMotorControlArray, body, self._indices, pybullet.TORQUE_CONTROL, unused, unused
         )  # fmt: skip
         self._unused = unused
-        self._motors: dict[
-            int, tuple[float, float]
-        ] = {}  # speeds and efforts, as set for this step
+        # Speeds and efforts, as set for this step.
+        self._motors: dict[int, tuple[float, float]] = {}
         places = {n: (body, i) for n, i in zip(self.joint_names, self._indices, strict=True)}
         self._gears = {
             name: (add_gear(client, places[name], places[mimic.driver], mimic), mimic.effort)
