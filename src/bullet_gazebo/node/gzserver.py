@@ -363,13 +363,13 @@ def main_with_window(argv: Sequence[str] | None = None) -> int:
 
 
 @contextlib.contextmanager
-def window(arguments: Sequence[str]) -> Iterator[None]:
+def window(arguments: Sequence[str]) -> Iterator[subprocess.Popen[bytes]]:
     """Opens the window in a process of its own for the time of a block."""
     # The launch file's name and log file are the server's.
     own = [a for a in arguments if ":=" in a and not a.startswith(("__name:=", "__log:="))]
     client = subprocess.Popen([sys.executable, "-P", "-c", WINDOW, *own, f"__name:={WINDOW_NAME}"])
     try:
-        yield
+        yield client
     finally:
         client.send_signal(signal.SIGTERM)
         try:

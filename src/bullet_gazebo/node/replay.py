@@ -1,9 +1,10 @@
 """The replay of a recorded run in this process's simulator, compared entry by entry (docs/replay.md)."""
 
 import json
+import math
 import re
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, wait
 from types import SimpleNamespace
 from typing import Any
@@ -21,6 +22,7 @@ from bullet_gazebo.node.gzserver import GazeboNode
 from bullet_gazebo.services.advance_service import reseed
 from bullet_gazebo.services.step_requests import SLICE
 from robot_sim.constants import NANOSECONDS
+from robot_sim.timing import Pacer
 
 PACKAGES = re.compile(r"package://(\w+)/")
 LONGEST = 20  # digits of a command's number
@@ -73,6 +75,9 @@ class Replay:
         self._refusals: dict[int, str] = {}  # texts of requests that failed, by number
         self._done: list[JournalEntry] = []  # what the journal has of them, not compared yet
         self._under_way: JournalEntry | None = None
+        self.shown_from = math.inf  # [s] from then on the replay takes as long as the run did
+        self.at_shown: Callable[[], None] = lambda: None  # called once at that time
+        self._pacer: Pacer | None = None
         self.repeated = 0  # entries that were equal
         self.unknown = 0  # of them, those without a recorded state at the beginning
         self.difference = ""
@@ -113,8 +118,10 @@ class Replay:
         self._sim.lock.between = self._between
         try:
             while not self._is_over():
+                before = self.seconds
                 self._repeat(self._take())
                 self._compare()
+                self._show(before)
                 for entry in self._expected.values():
                     self._differ(entry, f"{entry.name} was recorded, and does nothing now")
         finally:
@@ -123,6 +130,16 @@ class Replay:
         self.was_interrupted = rospy.is_shutdown()
         if self._fault is not None:
             raise self._fault
+
+    def _show(self, before: float) -> None:
+        """Waits as long as an entry took that began at that time [s], if it is to be looked at."""
+        self._under_way = None
+        if self._pacer is not None:
+            self._pacer.wait(self.seconds - before)
+        elif self.seconds >= self.shown_from:
+            self.shown_from = math.inf
+            self.at_shown()
+            self._pacer = Pacer()
 
     @property
     def seconds(self) -> float:

@@ -1,6 +1,7 @@
 """The command line of `replay.py`: a master, the simulator and the replay in one process (docs/replay.md)."""
 
 import argparse
+import contextlib
 import logging
 import math
 import os
@@ -20,8 +21,10 @@ from bullet_gazebo.node.replay import Changes, Replay
 from bullet_gazebo.node.start import HASHES, arguments_of, check_facts
 from file_access.expansion import CannotExpand, expand
 from file_access.text import one_line
+from ros_calls.waiting import wait_until
 
 UNUSABLE = 2
+WINDOW = 60.0  # [s of wall time] for the page to open
 LOOPBACK = "127.0.0.1"
 
 
@@ -79,6 +82,10 @@ def parse_args(argv: Sequence[str] | None = None) -> argparse.Namespace:
         help="import the plugins and controllers that the bag names, beside those that come along",
     )  # fmt: skip
     option("--gui", action="store_true", help="open the simulator's page where the replay stops")
+    option(
+        "--from", type=float, default=math.inf, metavar="SECONDS", dest="shown_from",
+        help="with --gui: open the page at that time, and repeat the rest at the speed of the run",
+    )  # fmt: skip
     for flag, what, text in (
         ("--model", "NAME=FILE", "spawn this model from a URDF, xacro or SDF file"),
         ("--params", "NAMESPACE=FILE", "put parameters of a YAML file in place of those recorded"),
@@ -101,19 +108,34 @@ def _replay(
         over = threading.Event()
         rospy.on_shutdown(over.set)
         replay = Replay(recorded, node, changes, args.until)
-        try:
-            replay.run()
-        except NoRecording as fault:
-            return _tell(str(fault), UNUSABLE)
-        code = _judge(args.bag, replay, args.until)
-        if args.gui and not over.is_set():
-            with gzserver.window([]):
+        with contextlib.ExitStack() as page:
+            if args.gui:
+                replay.shown_from = args.shown_from
+                replay.at_shown = lambda: _open(page, replay)
+            try:
+                replay.run()
+            except NoRecording as fault:
+                return _tell(str(fault), UNUSABLE)
+            code = _judge(args.bag, replay, args.until)
+            if args.gui and not over.is_set():
+                if replay.shown_from == args.shown_from:
+                    page.enter_context(gzserver.window([]))
                 over.wait()
         return code
 
     # Warnings have been seen when the run was recorded.
     logging.disable(logging.WARNING)
     return gzserver.main(["gzserver", *arguments_of(recorded.facts, folder)], work)
+
+
+def _open(page: contextlib.ExitStack, replay: Replay) -> None:
+    """Opens the page, and waits until it is there and a user at a terminal wants to see the rest."""
+    client = page.enter_context(gzserver.window([]))
+    shown = f"/{gzserver.WINDOW_NAME}/window"
+    wait_until(lambda: rospy.has_param(shown) or client.poll() is not None, WINDOW, "the page")
+    if sys.stdin.isatty():
+        print(f"at {replay.seconds:g} s; press Enter to play the rest", flush=True)
+        sys.stdin.readline()
 
 
 def _check(recorded: RecordedJournal, bag: Path, trust: bool) -> None:

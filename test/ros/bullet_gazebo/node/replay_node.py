@@ -311,6 +311,25 @@ class ReplayTest(unittest.TestCase):
         self.assertIn(f"recorded {self.bag}", err)
         self.check_equal(at_least=2)
 
+    def test_the_page_opens_where_a_user_wants_to_look(self):
+        script = self.folder / "waits.py"
+        script.write_text(
+            "import rospy\n"
+            "from ros_utils import ros_gazebo\n"
+            "ros_gazebo.launch_Gazebo(gui=False, output='log', launch_new_term=False)\n"
+            "rospy.init_node('waits')\n"
+            "for _ in range(20):\n"
+            "    rospy.sleep(0.1)\n"
+        )
+        code, _, err = self.run_script(script)
+        self.assertEqual(code, 0, err)
+        process = start("rosrun", "cartpole", "replay.py", self.bag, "--from", "1.5", "--gui")
+        self.addCleanup(self.end, process)
+        lines = [next(process.stdout) for _ in range(3)]
+        self.assertIn("the window is the page http", lines[0])  # before the replay's end
+        self.assertIn("equal to the bit", lines[2])
+        self.assertIsNone(process.poll())  # the page stays
+
     def test_a_killed_simulators_bag_can_be_replayed(self):
         """All but the last second is in the file; rosbag finds it."""
         active = self.bag.with_name(f"{self.bag.name}.active")
