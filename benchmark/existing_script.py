@@ -31,7 +31,7 @@ from rl_workbench.storage import write_file
 
 ROOT = Path(__file__).resolve().parent.parent
 SCRIPT = ROOT.parent / "shared" / "pg_script" / "launch_robot_test.py"
-LINE = re.compile(r"Episode (\d+), Step (\d+): Action=\d, Reward=(\S+)")
+LINE = re.compile(r"Episode (\d+), Step (\d+): Action=\S+, Reward=(\S+)")
 BLOCK = 50  # [episodes] for each mean in the table
 SILENCE = 120.0  # [s] without a step after which the script is taken to be stuck
 MARK = "CARTPOLE_BENCHMARK"

@@ -17,7 +17,7 @@ from std_srvs.srv import Empty
 from ros_utils import ros_gazebo, ros_node, ros_spawn
 
 CONTROLLERS = ["joint_state_controller", "stand_cart_position_controller"]
-STEPS = 200
+JOINTS, STEPS = ["cart_pole", "stand_cart"], 200
 
 if not ros_gazebo.launch_Gazebo(gui=False) or not ros_spawn.spawn_model_in_gazebo(
     "cartpole_gazebo", "cartpole_v1.urdf", "joint_position_control.yaml", CONTROLLERS,
@@ -34,7 +34,7 @@ command = rospy.Publisher("/stand_cart_position_controller/command", Float64, qu
 for episode in range(3):
     pause()
     reset_world()
-    place_joints("cartpole", "robot_description", ["cart_pole"], [0.05 * (episode + 1)])
+    place_joints("cartpole", "robot_description", JOINTS, [0.05 * (episode + 1), 0.0])
     unpause()
     steps, angle, place = 0, 0.0, 0.0
     while steps < STEPS and abs(angle) < 0.4:

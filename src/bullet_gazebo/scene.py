@@ -122,7 +122,7 @@ class SceneServer:
             due = max(due + PERIOD, time.monotonic())  # missed messages aren't made up for
 
     def _copy(self) -> list[Callable[[], None]]:
-        """Copies what is to be published; the caller holds the lock."""
+        """Copies the state to publish; the caller holds the lock."""
         copies: list[Callable[[], None]] = []
         if self._poses[1].size:
             copies.append(self._copy_poses())

@@ -1,4 +1,4 @@
-"""The page of `check_robot.py` on a file: contents, what is served, standing and motion."""
+"""The page of `check_robot.py` on a file: contents, topics and services, standing and motion."""
 
 import importlib.util
 import math

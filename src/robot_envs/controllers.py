@@ -117,7 +117,7 @@ def faults(
     hardware: RobotHardware,
     movable: Sequence[str],
 ) -> Iterator[str]:
-    """Yields what is wrong with a robot's controllers.
+    """Yields the faults of a robot's controllers.
 
     `commanded` are those that a task should command, None all that take numbers; `movable` are all movable
     joints, also those without a transmission.

@@ -188,7 +188,7 @@ class Robot:
             )
 
     def _world_faults(self) -> Iterator[str]:
-        """Yields what is wrong with control period, world and namespace."""
+        """Yields the faults of control period, world and namespace."""
         period, step = self.control_period, self.physics_step
         if step is None and self.world in (None, EMPTY):
             step = TIME_STEP

@@ -99,7 +99,7 @@ class AppliedForces:
         )
 
     def apply(self, now: int) -> None:
-        """Applies what acts in the step that ends at `now` [ns], and drops what is over."""
+        """Applies the forces of the step that ends at `now` [ns], and drops expired ones."""
         # Gazebo sets a body's force and torque: of several wrenches the one queued last counts.
         acting = {(id(w.model), w.link): w for w in self.wrenches if w.interval.covers(now)}
         for each in acting.values():

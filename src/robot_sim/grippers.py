@@ -159,7 +159,7 @@ class GraspHold(Stateful):
         }
 
     def forget(self) -> None:
-        """Counts anew what is gripped."""
+        """Forgets all contacts counted so far."""
         self._counts.clear()
 
     def look(self, now: int) -> None:

@@ -60,7 +60,7 @@ class Moves:
 
 
 def _carry(world: World, moved: Collection[Model]) -> None:
-    """Moves what is attached to moved models along; what is fixed, or was moved as well, is detached."""
+    """Moves attached models along; detaches those that are fixed or were moved themselves."""
     stay, waiting = set(moved), list(moved)
     while waiting:
         model = waiting.pop()

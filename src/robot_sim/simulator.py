@@ -34,14 +34,14 @@ class Outbox(Protocol):
 
 
 class NotInLockstep(RuntimeError):
-    """A client wants to step a world whose time runs by itself."""
+    """A client wants to step a world in real time."""
 
 
 class Simulator(Shared):
-    """Time, the world and its robots, under one lock that everybody holds who touches them.
+    """Clockwork of a world and its robots; every access holds its lock.
 
-    There are two modes. Either time runs by itself in run(), at most `max_update_rate` ticks a second of
-    wall time (0: as fast as possible), or in lock-step, where only advance() moves it.
+    In real time `run` ticks, at most `max_update_rate` times a second of wall time. In lock-step only
+    `advance` does.
     """
 
     def __init__(

@@ -47,7 +47,7 @@ class Snapshot:
 
     @classmethod
     def from_bytes(cls, data: bytes) -> Self:
-        """Returns the snapshot of bytes that `to_bytes` has returned, here or in another process.
+        """Returns the snapshot from the bytes of `to_bytes`, also those of another process.
 
         Raises:
             SnapshotError: If they are damaged, or of another version.

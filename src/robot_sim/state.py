@@ -237,7 +237,7 @@ def _centre(model: Model, link: str) -> Vector:
 
 
 class LinkQuery(NamedTuple):
-    """A link, and the link in whose frame its state is wanted; "" or "world" is the world's frame.
+    """A link, and the link in whose frame its state is expressed; "" and "world" are the world's frame.
 
     Names are plain, or model::link. Links that were lumped into another one have a state, too.
     """
@@ -248,7 +248,7 @@ class LinkQuery(NamedTuple):
 
 @dataclass(frozen=True)
 class StateQuery:
-    """What to read, by name: plain, or scoped by models. What isn't asked for costs nothing."""
+    """A query by names, plain or scoped by models; only its parts are computed."""
 
     models: tuple[str, ...] = ()  # whose states are wanted
     all_models: bool = False  # instead

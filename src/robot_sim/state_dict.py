@@ -299,7 +299,7 @@ def _seeds(bits: Any) -> list[Any] | None:
 
 
 def _nothing(part: Any, state: Any) -> None:
-    """Leaves what is shared to its owner."""
+    """Loads nothing: the owner of shared state loads it."""
 
 
 @cache
@@ -309,7 +309,7 @@ def _takes(kind: Hashable) -> Any:
 
 
 def _loaded(current: Any, saved: Any) -> Any:
-    """Returns what takes the place of `current`: `saved`, with the objects that are there already."""
+    """Returns the saved value, with the current one's objects kept and loaded in place."""
     kind: Any = type(saved)
     if kind in ATOMS:
         return saved
@@ -342,7 +342,7 @@ def _loaded(current: Any, saved: Any) -> Any:
 
 
 def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
-    """Puts a generator's state into the present one, or into a new one if that is of another kind."""
+    """Loads a generator's state into the current one, or into a new one if their kinds differ."""
     kind, state = saved[GENERATOR], saved["state"]
     if kind not in ("torch", "Random", *BIT_GENERATORS):
         raise StateError(f"there is no generator of type {kind!r:.100}")
@@ -378,12 +378,12 @@ def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
 
 
 def checked_bits(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Returns the state of one of NumPy's bit generators, which would read beyond its numbers otherwise.
+    """Checks a bit generator's position in its buffers, which NumPy doesn't; returns the state.
 
     Raises:
-        StateError: if the next number is none of them.
+        StateError: If a position lies outside of its buffer.
     """
     places = (state["state"].get("pos", 0), 624), (state.get("buffer_pos", 0), 4)
     if all(0 <= place <= count for place, count in places):
         return state
-    raise StateError("there is no such state of a generator")
+    raise StateError("the generator's position lies outside of its numbers")

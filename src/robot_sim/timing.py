@@ -60,7 +60,7 @@ class FairLock(Shared):
 
     @contextmanager
     def lent(self) -> Iterator[None]:
-        """Lets those who glance have the lock within the block, one after the other.
+        """Lends the lock to `glance` within the block, to one caller after the other.
 
         The holder calls it while it waits in the middle of a tick. Nobody changes the world meanwhile.
         """

@@ -1,4 +1,4 @@
-"""Readiness of a world: a bounded wait, and what is missing.
+"""Readiness of a world: a bounded wait, and its missing parts.
 
 ready = Ready(models=["arm"], controllers=["joint_state_controller", "arm_controller"])
 ros_launch.ros_launch_from_pkg("my_arm", "arm.launch", ready=ready, timeout=120.0)

@@ -58,7 +58,7 @@ class JournalOutput(rospy.SubscribeListener):
         rospy.on_shutdown(self.close)
 
     def peer_subscribe(self, _name: str, _all: object, publish: Publish) -> None:
-        """Lets a new subscriber have what was before; what comes twice has the same number."""
+        """Sends earlier entries to a new subscriber; repeated ones have the same number."""
         with self._one_at_a_time:
             before = self._journal.listen(self._take)
         if before is None:
@@ -83,14 +83,14 @@ class JournalOutput(rospy.SubscribeListener):
             self._fresh += entries
 
     def end_bag(self) -> None:
-        """Completes the bag; subscribers get what comes later."""
+        """Completes the bag; later entries go to subscribers alone."""
         with self._news:
             self._bag_ends = True
             self._news.notify_all()
             self._news.wait_for(lambda: self._bag is None, STOP_TIMEOUT)
 
     def close(self) -> None:
-        """Sends what is left, and completes the bag."""
+        """Sends the remaining entries, and completes the bag."""
         self._journal.unlisten(self._take)
         with self._news:
             self._ending = True

@@ -313,7 +313,7 @@ def main(argv: list[str] | None = None, work: Work | None = None) -> int:
     use_one_arena()
     command_line = sys.argv if argv is None else argv
     more = shlex.split(os.environ.get(MORE_ARGUMENTS, ""))
-    args = parse_args([*more, *rospy.myargv(command_line)[1:]])
+    args = parse_args([*rospy.myargv(command_line)[1:], *more])  # which win over a launch file's
     name = full_name(command_line, NAME)
     try:
         wait_for_master(NAME)

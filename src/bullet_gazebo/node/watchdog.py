@@ -103,7 +103,7 @@ class Watchdog:
             self._ended.wait(max(0.0, self._deadline - time.monotonic()))
 
     def left_hanging(self) -> str | None:
-        """Returns who still keeps the world's lock after `stop`, or None."""
+        """Returns the thread that still holds the world's lock after `stop`, or None."""
         lock = self._sim.lock
         ended = not self._began or self._ended.is_set()
         return holder(lock) if self._stall.reported or (lock.held and not ended) else None
@@ -148,7 +148,7 @@ class StallWatch:
 
 
 def holder(lock: FairLock) -> str:
-    """Returns who holds the lock, with the innermost lines of its stack."""
+    """Returns the lock's holder, with the innermost lines of its stack."""
     thread = lock.holder
     frame = sys._current_frames().get(thread) if thread is not None else None
     if frame is None:

@@ -103,7 +103,7 @@ class HandOfGodPlugin(ContextPlugin):
     def _pull(self, now: int) -> None:
         model = self._context.model
         pose, (linear, angular) = model.link_state(self._link)
-        if self._tf.is_heard_elsewhere:
+        if self._tf.has_other_subscribers:
             self._tf.publish(to_transform(now, "world", self._actual, pose))
         target = self._target()
         inertia = model.description.links[self._link].inertia

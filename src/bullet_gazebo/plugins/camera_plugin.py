@@ -42,14 +42,14 @@ class CameraPlugin(ContextPlugin):
     )
     measurement: ClassVar = CameraSensor
     kind = "camera"  # of sensor
-    non_persistent = ("_is_heard", "_eyes")
+    non_persistent = ("_has_subscribers", "_eyes")
     latch = False  # a new subscriber has a picture taken
 
     def __init__(self, context: PluginContext) -> None:
         self._context = context
         sensor = sensor_of(context, (self.kind,))
         topics = SensorTopics(context, rate_of(context, sensor), self._on_clock)
-        self._is_heard = topics.is_heard
+        self._has_subscribers = topics.has_subscribers
         self._scope = scope = scope_of(context)
         offer_rate(context, topics, scope)
         baseline = context.number("hackBaseline", 0.0)
@@ -109,7 +109,7 @@ class TriggeredCameraPlugin(CameraPlugin):
     def _update(self, now: int) -> None:
         if self._waiting and not self._stream.is_behind:
             self._waiting -= 1
-            if self._is_heard():
+            if self._has_subscribers():
                 self._take(now)
         if not self._waiting:
             self._clock.look()

@@ -88,7 +88,7 @@ class CameraTopics(Shared):
     @property
     def wants_colour(self) -> bool:
         """Whether somebody looks at its pictures."""
-        return self._image.is_heard or self._jpeg.is_heard
+        return self._image.has_subscribers or self._jpeg.has_subscribers
 
     def header(self, now: int) -> Header:
         return Header(stamp=to_time(now), frame_id=self._frame)
@@ -101,13 +101,13 @@ class CameraTopics(Shared):
         )  # fmt: skip
 
     def send(self, picture: CameraView, now: int) -> None:
-        """Publishes what is heard of a picture at a time [ns]."""
+        """Publishes the subscribed parts of a picture at a time [ns]."""
         header, seen = self.header(now), picture.image
-        if seen.size and self._image.is_heard:
+        if seen.size and self._image.has_subscribers:
             self._image.publish(to_image(seen, self._camera.format, header))
-        if seen.size and self._jpeg.is_heard:
+        if seen.size and self._jpeg.has_subscribers:
             self._jpeg.publish(_to_jpeg(seen, header))
-        if self._info.is_heard:
+        if self._info.has_subscribers:
             self.info.header = header
             self._info.publish(self.info)
 

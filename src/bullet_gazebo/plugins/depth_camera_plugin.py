@@ -79,8 +79,10 @@ class DepthCameraPlugin(ContextPlugin):
         self._stream = stream_of(context)
 
     def _measure(self, now: int) -> None:
-        is_cloud = self._cloud.is_heard
-        shot = self._pictures.shot(now, colours=is_cloud, depths=is_cloud or self._depth.is_heard)
+        is_cloud = self._cloud.has_subscribers
+        shot = self._pictures.shot(
+            now, colours=is_cloud, depths=is_cloud or self._depth.has_subscribers
+        )
         self._stream.take([shot], partial(self._send, now))
 
     def _send(self, now: int, views: Sequence[CameraView]) -> None:
@@ -88,13 +90,13 @@ class DepthCameraPlugin(ContextPlugin):
         self._pictures.send(picture, now)
         header = self._pictures.header(now)
         depths = self._sensor.depths(picture)
-        if depths.size and self._depth.is_heard:
+        if depths.size and self._depth.has_subscribers:
             self._depth.publish(to_depth_image(depths, self._in_millimetres, header))
-        if self._depth_info.is_heard:
+        if self._depth_info.has_subscribers:
             info = self._pictures.info
             info.header = header
             self._depth_info.publish(info)
-        if picture.colours.size and self._cloud.is_heard:
+        if picture.colours.size and self._cloud.has_subscribers:
             self._cloud.publish(
                 to_cloud(depths, picture.colours, self._sensor.camera, self.is_organised, header)
             )

@@ -112,9 +112,9 @@ class DrivePlugin(ContextPlugin):
 
     def report(self, now: int) -> None:
         """Publishes odometry and its transform, as far as they are heard."""
-        odometry = self._odometry is not None and self._odometry.is_heard
+        odometry = self._odometry is not None and self._odometry.has_subscribers
         # A second transform with the same stamp would be refused, with a warning.
-        tf = self.tf is not None and self.tf.is_heard and now != self._sent
+        tf = self.tf is not None and self.tf.has_subscribers and now != self._sent
         if not odometry and not tf:
             return
         sample = self.sample(now)
@@ -174,7 +174,7 @@ class WheeledPlugin(DrivePlugin):
     _driven = 0  # [ns]
 
     def measure_by(self, separation: float, joints: Sequence[tuple[Joint, str]]) -> None:
-        """Reads the elements that choose what is reported, by wheels with a separation [m].
+        """Reads the elements that choose the reported odometry, of wheels with a separation [m].
 
         Each joint comes with the name of its child frame.
         """
@@ -212,7 +212,7 @@ class WheeledPlugin(DrivePlugin):
         self.report(now)
         if self._transforms is not None:
             self._transforms.publish(now)
-        if self._joint_states is not None and self._joint_states.is_heard:
+        if self._joint_states is not None and self._joint_states.has_subscribers:
             self._joint_states.publish(self.joint_state(now))
         seconds, self._driven = max(now - self._driven, 0) / NANOSECONDS, now
         self.drive(seconds)
@@ -278,6 +278,6 @@ class LinkTransforms(Shared):
 
     def publish(self, now: int) -> None:
         """Publishes one message for each joint at a time [ns], if they are heard."""
-        for parent, child, frames in self._links if self._tf.is_heard else ():
+        for parent, child, frames in self._links if self._tf.has_subscribers else ():
             above, below = (self._model.link_state(link)[0] for link in (parent, child))
             self._tf.publish(to_transform(now, *frames, below.relative_to(above)))

@@ -30,7 +30,7 @@ class ForcePlugin(SensorPlugin):
     def __init__(self, context: PluginContext) -> None:
         self._deviation = context.deviation()
         # Forces are those of one step, so the state of each is looked at, before the measurement.
-        context.clock(0.0, self._look, lambda: self._topic.is_heard, at_once=False)
+        context.clock(0.0, self._look, lambda: self._topic.has_subscribers, at_once=False)
         super().__init__(context)
 
     def _look(self, now: int) -> None:

@@ -49,7 +49,7 @@ MODEL = [
 
 
 class HectorPlugin(ContextPlugin):
-    """One that publishes whether or not it is heard; subclasses call `begin`, and have `publish`."""
+    """Base of sensors that publish without subscribers, too; subclasses call `begin`, and have `publish`."""
 
     non_persistent = ("_errors",)
     default_rate = 0.0  # [Hz]; 0 is every step
@@ -166,7 +166,7 @@ class HectorImuPlugin(HectorSensor):
         turned = multiply(from_rpy(0.0, 0.0, yaw), sample.orientation)
         tilt = self._accel.noise[:2] ** 2 / GRAVITY**2
         header = Header(stamp=to_time(now), frame_id=self.frame)
-        if self._bias.is_heard:
+        if self._bias.has_subscribers:
             drifts = (Vector3(*error.bias) for error in (self._spin, self._accel))
             bias = ImuMsg(header=header, orientation=Quaternion(w=1.0))
             bias.angular_velocity, bias.linear_acceleration = drifts

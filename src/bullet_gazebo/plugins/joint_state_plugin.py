@@ -35,7 +35,7 @@ class JointStatePlugin(ContextPlugin):
             return
         # The next one is due a period after this one was due, however late this one is.
         self._last = max(self._last + self._period, now - self._period)
-        if not self._topic.is_heard:
+        if not self._topic.has_subscribers:
             return
         states = [self._model.joint_state(name) for name in self._names]
         message = JointState(

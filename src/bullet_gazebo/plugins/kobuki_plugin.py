@@ -75,7 +75,7 @@ class KobukiPlugin(DrivePlugin):
         self._place.move(self._ahead() * seconds, self._turning * seconds)
         if self.period.is_over(now):
             self.report(now)
-            if self._joint_states.is_heard:
+            if self._joint_states.has_subscribers:
                 self._joint_states.publish(self._joint_state(now))
         is_late = 0.0 < self._patience * NANOSECONDS < now - self._commanded
         if is_late or not self._has_power:
@@ -102,7 +102,7 @@ class KobukiPlugin(DrivePlugin):
         sample = self._imu.measure(now)
         if sample is not None:
             self._turning = sample.angular_velocity[2]
-            if self._imu_data.is_heard:
+            if self._imu_data.has_subscribers:
                 self._imu_data.publish(to_imu(sample, now, self.child, self._imu.deviation))
 
     def _joint_state(self, now: int) -> JointState:

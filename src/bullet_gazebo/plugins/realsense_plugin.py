@@ -76,11 +76,11 @@ class _Eye(Shared):
         self._pictures.info = _centred(self.context, self.camera)
 
     def take(self, now: int) -> None:
-        """Publishes what is heard of a picture at a time [ns], once it is made."""
+        """Publishes the subscribed parts of a picture at a time [ns], once it is rendered."""
         self._stream.take([self.shot(now)], partial(self.send, now))
 
     def shot(self, now: int) -> Shot:
-        """Returns what is heard."""
+        """Returns the parts with subscribers."""
         return self._pictures.shot(now)
 
     def send(self, now: int, views: Sequence[CameraView]) -> None:
@@ -111,20 +111,20 @@ class _Depths(_Eye):
         self._far = context.number("pointCloudCutoffMax", 5.0)
 
     def shot(self, now: int) -> Shot:
-        is_cloud = self._cloud is not None and self._cloud.is_heard
-        depths = is_cloud or self._depth.is_heard
+        is_cloud = self._cloud is not None and self._cloud.has_subscribers
+        depths = is_cloud or self._depth.has_subscribers
         return shot_of(self.context, self.camera, now, colours=is_cloud, depths=depths)
 
     def send(self, now: int, views: Sequence[CameraView]) -> None:
         [seen] = views
         header = Header(stamp=to_time(now), frame_id=self._frame)
-        if seen.depths.size and self._depth.is_heard:
+        if seen.depths.size and self._depth.has_subscribers:
             depths = _within(seen.depths, self._low, self._high)
             self._depth.publish(to_depth_image(depths, True, header))
-        if self._info_topic.is_heard:
+        if self._info_topic.has_subscribers:
             self._info.header = header
             self._info_topic.publish(self._info)
-        if self._cloud is not None and seen.colours.size and self._cloud.is_heard:
+        if self._cloud is not None and seen.colours.size and self._cloud.has_subscribers:
             depths = _within(seen.depths, self._near, self._far)
             self._cloud.publish(to_cloud(depths, seen.colours, self.camera, True, header))
 

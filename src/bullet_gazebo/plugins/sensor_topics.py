@@ -97,13 +97,13 @@ class Topic(Shared):
         )  # fmt: skip
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether it has subscribers."""
         topic = self._publisher.impl  # get_num_connections() takes a lock that callbacks hold
         return topic is not None and topic.has_connections()
 
     @property
-    def is_heard_elsewhere(self) -> bool:
+    def has_other_subscribers(self) -> bool:
         """Whether it has subscribers besides this node."""
         topic, own = self._publisher.impl, rospy.get_name()
         return topic is not None and any(each.endpoint_id != own for each in topic.connections)
@@ -152,7 +152,7 @@ class SensorTopics(Shared):
     ) -> None:  # fmt: skip
         self._context = context
         self._waking: list[Topic] = []
-        self._clock = context.clock(rate, measure, self.is_heard, at_once)
+        self._clock = context.clock(rate, measure, self.has_subscribers, at_once)
 
     def set_rate(self, rate: float) -> None:
         """Measures at another rate [Hz] from now on; the caller holds the simulator's lock."""
@@ -180,9 +180,9 @@ class SensorTopics(Shared):
             self._waking.append(topic)
         return topic
 
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Returns whether a topic that wakes it has subscribers."""
-        return any(topic.is_heard for topic in self._waking)
+        return any(topic.has_subscribers for topic in self._waking)
 
 
 class SensorTopic(Shared):
@@ -202,9 +202,9 @@ class SensorTopic(Shared):
         self._topic = topics.advertise(name, kind)
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether it has subscribers."""
-        return self._topic.is_heard
+        return self._topic.has_subscribers
 
     def _send(self, now: int) -> None:
         message = self._measure(now)

@@ -57,7 +57,7 @@ LONGEST = 80  # of an unknown command in an answer
 
 
 def advertise_world_services(sim: Simulator) -> list[object]:
-    """Offers all services that read and change what is in the world; returns what keeps them alive."""
+    """Advertises the services of a world's contents; returns the objects that keep them alive."""
     physics = PhysicsServices(sim)
     actions = {
         "~unpause_physics": sim.unpause,

@@ -86,7 +86,7 @@ class RemoteScene:
         return newest
 
     @property
-    def is_heard(self) -> bool:
+    def is_live(self) -> bool:
         """Whether the simulator sends."""
         return time.monotonic() - self._heard < SILENCE
 

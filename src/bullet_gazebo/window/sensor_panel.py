@@ -1,4 +1,4 @@
-"""The page's list of sensors' topics; what is switched on is subscribed to and drawn."""
+"""The page's list of sensors' topics; those switched on are subscribed to and drawn."""
 
 import html
 import io
@@ -152,7 +152,7 @@ class SensorPanel:
         self._made = 0
 
     def set_sensors(self, sensors: Sequence[SceneSensor]) -> None:
-        """Lists these topics; those that stay keep what is drawn."""
+        """Lists these topics; those that stay keep their drawings."""
         kept = {each.sensor.topic: each for each in self._views if each.sensor in sensors}
         for view in self._views:
             if view not in kept.values():
@@ -176,12 +176,12 @@ class SensorPanel:
         return SensorView(self._server, self._folder, sensor, name, *drawn)
 
     def listen(self, watched: bool) -> None:
-        """Subscribes to what is switched on, while a page is open."""
+        """Subscribes to the topics switched on, while a page is open."""
         for view in self._views:
             view.listen(watched)
 
     def show(self, scene: Picture) -> None:
-        """Draws what is new, where the links of the scene are."""
+        """Draws new messages at the links of the scene."""
         if not any(view.is_on for view in self._views):
             return
         links = scene.links
@@ -228,7 +228,7 @@ class SensorView:
         return self._subscriber is not None
 
     def listen(self, watched: bool) -> None:
-        """Subscribes if a page is open and it is switched on; removes what is drawn if it isn't."""
+        """Subscribes if a page is open and it is switched on, else removes its drawing."""
         wanted = watched and self._box.value
         if wanted and self._subscriber is None:
             self._subscriber = rospy.Subscriber(

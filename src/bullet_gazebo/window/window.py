@@ -164,7 +164,7 @@ class Window:
             show()
 
     def _show_texts(self) -> None:
-        if not self._scene.is_heard:
+        if not self._scene.is_live:
             self._time.show_missing(self._scene.node)
         elif self._newest is not None:
             newest = self._newest
@@ -173,7 +173,7 @@ class Window:
             self._models.show(self._picture.links, self._picture.joints(self._newest.positions))
 
     def _show_rest(self) -> None:
-        if self._scene.is_heard:
+        if self._scene.is_live:
             self._time.show_speed()
         self._controllers.look()
         tree = self._controllers.as_html()

@@ -259,7 +259,7 @@ class Training:
         self._callbacks.call("on_episode", self, episode)
 
     def step_done(self) -> None:
-        """Evaluates and saves what is due. The training must be able to continue from here."""
+        """Evaluates and saves if due; the training must be resumable at this point."""
         self._callbacks.call("on_step", self)
         self._evaluate_if_due()
         if self._is_due(self._run.checkpoint_frequency):

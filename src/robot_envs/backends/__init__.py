@@ -35,7 +35,7 @@ def make_backend(
     scene: "Scene", backend: str | None, control_period: float, deadline: float | None = None,
     renderer: str = "rays",
 ) -> "RobotBackend":  # fmt: skip
-    """Makes what moves a scene's robots, one of `BACKENDS`; over ROS it starts what isn't running.
+    """Makes a scene's backend, one of `BACKENDS`; over ROS it starts a simulator if none runs.
 
     Args:
         scene: The robots and objects.

@@ -84,7 +84,7 @@ class JointListener:
         return f"the joint '{name}' is reported at {bad}" if bad else ""
 
     def fault(self) -> str:
-        """Returns what is wrong with a joint's newest state; empty if nothing is."""
+        """Returns the fault of a joint's newest state, or an empty text."""
         with self._lock:
             return next(iter(self._faults.values()), "")
 

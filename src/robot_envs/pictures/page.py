@@ -162,7 +162,7 @@ def _draw_ground(server: viser.ViserServer) -> None:
 
 
 def _seen(placement: Placement) -> list[VisibleModel]:
-    """Returns the robot with all of its links, and the visible links of what is beside it."""
+    """Returns the robot with all links, and the visible links of its surroundings."""
     models = []
     for number, (name, shapes) in enumerate(placement.models.items()):
         links: dict[str, list[Shape]] = defaultdict(list)

@@ -101,7 +101,7 @@ def dropped_points(trajectory: Trajectory, elapsed: int) -> tuple[int, str]:
 
 
 def _fault(point: TrajectoryPoint, joints: int) -> str:
-    """Returns what is wrong with the point, or nothing."""
+    """Returns the point's fault, or an empty text."""
     if not point.positions:
         return "it has no positions"
     for what, values in zip(point._fields[1:], point[1:], strict=True):
@@ -125,7 +125,7 @@ class Tolerance(NamedTuple):
     velocity: float = 0.0
 
     def violation(self, position_error: float, velocity_error: float) -> str:
-        """Returns what is exceeded, or nothing."""
+        """Returns the exceeded tolerance, or an empty text."""
         if 0.0 < self.position < abs(position_error):
             return f"position, tolerance {self.position:g}"
         if 0.0 < self.velocity < abs(velocity_error):

@@ -152,7 +152,7 @@ def main() -> int:
 
 
 def _draw(options: RecordingOptions) -> int:
-    """Draws what comes by standard input; returns the number of frames."""
+    """Draws the frames read from standard input; returns their number."""
     inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
     stopping = False
 

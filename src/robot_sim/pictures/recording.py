@@ -137,7 +137,7 @@ class SimulationRecorder:
             logger.warning("%d frames of the recording were dropped", self._dropped)
 
     def close(self, patience: float) -> None:
-        """Ends the recording, after up to `patience` [s] for what is queued.
+        """Ends the recording, after up to `patience` [s] for queued frames.
 
         The other process may outlive this one to draw the last frames.
         """

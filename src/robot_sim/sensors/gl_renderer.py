@@ -147,7 +147,7 @@ class GlRenderer(CameraRenderer):
         return np.asarray(places[0])
 
     def _build(self, targets: list[Target]) -> None:
-        """Makes a model of MuJoCo of what is visible."""
+        """Makes a MuJoCo model of the visible shapes."""
         mj = self._mj
         spec = mj.MjSpec()
         _set(

@@ -166,7 +166,7 @@ def _tell(stream: PictureStream, shot: Shot) -> None:
 
 
 def main() -> int:
-    """Renders what comes through the pipe whose number is the first argument, by the second one."""
+    """Renders the requests of a pipe (its number is the first argument) by the renderer named second."""
     for number in (signal.SIGINT, signal.SIGTERM):  # to the group; it ends with the pipe
         signal.signal(number, signal.SIG_IGN)
     os.nice(sum(map(int, sys.argv[3:])))

@@ -112,7 +112,7 @@ class Shot(NamedTuple):
         return not (self.image or self.colours or self.depths)
 
     def finished(self, seen: CameraView) -> CameraView:
-        """Returns what is asked for of what is seen, its image with noise."""
+        """Returns the requested parts of a picture, its image with noise."""
         image, noise = seen.colours, self.camera.noise
         if self.image and noise is not None and self.noise is not None:
             image = noisy(image, noise, *self.noise)

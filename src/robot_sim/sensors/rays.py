@@ -32,7 +32,7 @@ class Hits(NamedTuple):
     weights: np.ndarray  # (n, 2) of its second and third corner at the point that is met
 
     def improve(self, rays: np.ndarray, targets: Any, distances: np.ndarray) -> np.ndarray:
-        """Takes over nearer hits, of several of a ray the nearest one; returns which are taken."""
+        """Keeps each ray's nearest hit; returns the hits that were kept."""
         nearer = (distances < self.distances[rays]).nonzero()[0]
         if not len(nearer):
             return nearer
@@ -52,7 +52,7 @@ class RayCaster:
         self._apart_meshes: dict[int, Any] = {}
 
     def show(self, state: SceneState) -> None:
-        """Takes over what there is, and where it is."""
+        """Sets the scene: its shapes and their poses."""
         before, self.state = self.state, state
         if state is before:
             return
@@ -222,7 +222,7 @@ class RayCaster:
         self._analytic = [kind for kind in DISTANCES if kind in self._kinds[apart]]
 
     def _find_centres(self) -> None:
-        """Finds where the balls are around what isn't part of the still scene."""
+        """Computes the bounding balls of moving shapes."""
         turns, apart = self._turns[self._apart], self._apart
         self._apart_centres = self._places[apart] + np.einsum(
             "kij,kj->ki", turns, self._centres[apart]

@@ -1,4 +1,4 @@
-"""Renderers of cameras' pictures, and the way of a picture from its tick to who looks at it."""
+"""Renderers of cameras' pictures, in the tick or beside it."""
 
 import threading
 from collections.abc import Callable, Sequence
@@ -26,11 +26,11 @@ class CameraRenderer(Shared):
         self.is_closed = False
 
     def picture(self, shot: Shot) -> CameraView:
-        """Returns what is asked for of a shot."""
+        """Returns the requested parts of a shot."""
         return CameraView() if shot.is_blank else shot.finished(self._render(shot))
 
     def _render(self, shot: Shot) -> CameraView:
-        """Returns what the camera sees, without noise, at least what is asked for."""
+        """Renders at least the requested parts, without noise."""
         raise NotImplementedError
 
     def take(self, stream: "PictureStream", shots: Sequence[Shot], send: Send) -> None:

@@ -144,7 +144,7 @@ def _solid(model: Model, link: Link) -> Iterator[Target]:
 
 
 def _seen(model: Model, link: Link) -> Iterator[Target]:
-    """Yields what is visible of a link. A plane is read as a collision only."""
+    """Yields the visible shapes of a link; planes come from collisions alone."""
     is_static = model.description.static
     for shape in [*link.visuals, *(each for each in link.collisions if each.kind == "plane")]:
         if shape.kind != "mesh":

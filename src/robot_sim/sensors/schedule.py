@@ -125,7 +125,7 @@ class Schedule(Shared, Stateful):
             self._take_part()
 
     def look(self) -> None:
-        """Looks soon, in a thread of its own, who listens."""
+        """Reviews the listeners soon, in a thread of its own."""
         if not self._is_looking:
             self._is_looking = True
             threading.Thread(target=self._look, name="sensors' listeners", daemon=True).start()
@@ -139,14 +139,14 @@ class Schedule(Shared, Stateful):
             self.review()
 
     def review(self) -> None:
-        """Finds out who listens; the caller holds the simulator's lock."""
+        """Updates which clocks have listeners; the caller holds the simulator's lock."""
         self._is_looking = False
         now = self._sim.now
         fresh = []
         for clock in self._clocks:
             was_heard, clock.heard = clock.heard, clock.listens()
             came = clock.has_newcomer
-            if came:  # one that comes from now on is for the next look
+            if came:  # a later one waits for the next review
                 clock.has_newcomer = False
             came = came or not was_heard
             if clock.heard and not was_heard:
@@ -160,7 +160,7 @@ class Schedule(Shared, Stateful):
         self._take(fresh)
 
     def _take_part(self) -> None:
-        """Takes part in the ticks while something is heard."""
+        """Joins the ticks while a clock has listeners, and leaves them else."""
         heard = [clock.due for clock in self._clocks if clock.heard]
         self._due = min(heard, default=0)
         # A new list: the old one may be in use by a tick.
@@ -189,7 +189,7 @@ class Schedule(Shared, Stateful):
         self.moves_before_seed, self._begins_anew = self.moves, True
 
     def restored(self) -> None:
-        """Goes on from a snapshot, for those who listen now."""
+        """Plans the clocks anew after a restored snapshot, for the present listeners."""
         now = self._sim.now
         for clock in self._clocks:
             # One that is newer than the snapshot, or wasn't heard then.
@@ -202,7 +202,7 @@ class Schedule(Shared, Stateful):
         return self._moves_of.get(model.name, self.last_reset)
 
     def _moved(self, moved: Moved) -> None:
-        """Measures afresh what is heard: all after a reset of world or time, else what the models carry."""
+        """Measures at once: all sensors with listeners after a reset, else those of the moved models."""
         self.moves += 1
         now = self.moved_at = self._sim.now
         move = Move(self.moves, now)

@@ -145,7 +145,7 @@ class SteppedWorld:
             raise WorldError(f"{fault}" + (f" (commanded: {given})" if given else "")) from fault
 
     def _look(self, names: dict[Any, None], name: Any) -> None:
-        """Reads more in each step from now on; what is refused isn't kept."""
+        """Reads more in each step from now on, unless the simulator refuses it."""
         if name not in names:
             names[name] = None
             try:

@@ -13,7 +13,7 @@ POLL = 0.01  # [s of wall time]
 PORT = re.compile(r":(\d+) on socket")  # of the subscriber's side, in what a publisher tells
 
 
-def is_heard(topic):
+def has_subscribers(topic):
     """Whether somebody publishes on `topic`, and each who does sends to this process.
 
     rospy's subscriber counts a connection when it has read the publisher's header, which the publisher writes
@@ -46,7 +46,7 @@ def _sends(address, name):
 def wait_until_heard(*topics):
     """Returns whether that came to be."""
     for _ in range(int(BOUND / POLL)):
-        if all(map(is_heard, topics)):
+        if all(map(has_subscribers, topics)):
             return True
         rospy.rostime.wallsleep(POLL)
     return False

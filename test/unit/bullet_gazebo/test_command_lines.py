@@ -8,6 +8,7 @@ import pytest
 from bullet_gazebo.clients import gz, gzclient, spawn_model, spawner
 from bullet_gazebo.clients.spawn_model import parse
 from bullet_gazebo.common.node_process import seed_random_numbers
+from bullet_gazebo.node import gzserver
 from bullet_gazebo.node.gzserver import parse_args
 from bullet_gazebo.services.spawn_services import model_paths
 from ros_calls.service import ServiceFailed, ServiceGone
@@ -23,6 +24,22 @@ def test_options_stand_in_any_order():
 @pytest.mark.parametrize("line", ["-o a.world", "-o fast a.world", "--nix 5 a.world", "a.world -o"])
 def test_the_world_is_found(line):
     assert parse_args(line.split()).world == "a.world"
+
+
+def test_the_environment_wins_over_a_launch_file(monkeypatch):
+    seen = []
+
+    def wait(name):
+        raise gzserver.NodeNameTaken(name)
+
+    monkeypatch.setattr(gzserver, "wait_for_master", wait)
+    monkeypatch.setattr(gzserver, "parse_args", lambda argv: seen.append(parse_args(argv)))
+    monkeypatch.setenv("GZSERVER_ARGS", "--physics mujoco --camera-scale 0.25 --seed 0")
+    line = ["gzserver", "-e", "ode", "--camera-scale", "1", "my.world", "__name:=gazebo"]
+    assert gzserver.main(line) == 1
+    (args,) = seen
+    assert (args.physics, args.camera_scale, args.seed) == ("mujoco", 0.25, 0)
+    assert args.world == "my.world"
 
 
 def test_a_video_has_its_options():

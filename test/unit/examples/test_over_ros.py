@@ -1,6 +1,7 @@
 """The examples over ROS play their episodes, each with a simulator of its own."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -30,6 +31,16 @@ def test_episodes_over_services_balance_in_lockstep() -> None:
     text = printed(f"{ROOT}/scripts/lockstep.py", f"{ROOT}/examples/episode_over_services.py")
     told = [line.partition(", ")[0] for line in text.splitlines() if "ends at" in line]
     assert told == [f"episode {n}: 200 steps" for n in range(3)]
+
+
+def test_random_changes_of_a_policy_learn() -> None:
+    text = printed(
+        f"{ROOT}/scripts/lockstep.py", "--seed=0", f"{ROOT}/examples/learn_over_services.py"
+    )
+    returns = dict.fromkeys(range(60), 0.0)
+    for episode, reward in re.findall(r"Episode (\d+), .*Reward=(\S+)", text):
+        returns[int(episode)] += float(reward)
+    assert min(list(returns.values())[-10:]) > 180.0 > returns[0]
 
 
 def test_the_tests_of_a_robot_pass() -> None:

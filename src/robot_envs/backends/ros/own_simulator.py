@@ -129,7 +129,7 @@ class OwnSimulator:
             self._process.terminate()
 
     def join(self) -> None:
-        """Waits for the end after `terminate`, and kills what is left; may be called twice."""
+        """Waits for the end after `terminate`, then kills the rest; may be called twice."""
         if os.getpid() != self._owner:  # a forked child must not end its parent's simulator
             return
         with contextlib.suppress(subprocess.TimeoutExpired):

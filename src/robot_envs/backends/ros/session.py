@@ -65,7 +65,7 @@ class RosSession:
         self._started_simulator = False
 
     def start(self, say: Say) -> None:
-        """Starts what is missing, which `say` reports, and makes this the process's session.
+        """Starts missing parts, which `say` reports, and makes this the process's session.
 
         Raises RobotEnvError if something can't be started, or what runs doesn't fit; `close` ends the rest.
         """

@@ -45,7 +45,7 @@ class Parameters:
 
     @classmethod
     def declared(cls) -> dict[str, Declared]:
-        """Returns what is said of each, by the name of the field."""
+        """Returns the description of each parameter by the field's name."""
         said = {each.name: each.metadata[""] for each in fields(cls)}  # type: ignore[arg-type]
         return {name: each._replace(key=each.key or name) for name, each in said.items()}
 

@@ -44,7 +44,7 @@ class Section:
     named: dict[str, Row] = field(default_factory=dict)
 
     def add(self, path: str, row: Row) -> None:
-        """Adds the row of what is at `path` below the element."""
+        """Adds the row of `path`, below the element."""
         *outer, last = path.split("/")
         rows = self.top.below
         for name in outer:

@@ -53,7 +53,7 @@ Part = TypeVar("Part")
 
 
 def read_origin(element: Element, place: str) -> Pose:
-    """Returns the `<origin>` of `element`; what is missing is zero."""
+    """Returns the `<origin>` of `element`; its attributes default to zero."""
     origin = element.find("origin")
     if origin is None:
         return Pose()

@@ -128,7 +128,7 @@ def make_pose(x: float, y: float, z: float, qx: float, qy: float, qz: float, qw:
 
 
 def not_finite(what: str, *numbers: float) -> str:
-    """Returns what is wrong if a number isn't finite; empty if all are."""
+    """Returns the fault if a number isn't finite, or an empty text."""
     if all(map(math.isfinite, numbers)):
         return ""
     return f"{what}: {list(numbers)} holds a number that is not finite"

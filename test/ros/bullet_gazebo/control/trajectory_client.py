@@ -10,7 +10,7 @@ from control_msgs.msg import (
     JointTrajectoryControllerState,
 )
 from support.ros.calls import wait_until
-from support.ros.subscribed import is_heard
+from support.ros.subscribed import has_subscribers
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 NAMES = {value: name for name, value in vars(GoalStatus).items() if name.isupper()}
@@ -83,7 +83,7 @@ class Arm:
             lambda: (
                 self.action.wait_for_server(rospy.Duration(1e-9))
                 and self.command.get_num_connections()
-                and is_heard(self._state.name)
+                and has_subscribers(self._state.name)
             )
         )
 
