@@ -228,7 +228,9 @@ def _draw_threshold(axes: Axes, threshold: float | None, more: str = "") -> None
 
 
 def _finish(axes: Axes, panel: Panel, across: str, up: str) -> None:
-    _draw_threshold(axes, panel.threshold, ", without exploration")  # which these returns have
+    if panel.threshold is not None and axes.dataLim.ymax >= panel.threshold:
+        # Above all curves it would say that none of them learned: they explore, evaluations don't.
+        _draw_threshold(axes, panel.threshold, ", without exploration")
     axes.set_title(panel.environment.rpartition(":")[2])
     axes.set_xlabel(across)
     axes.set_ylabel(SUCCESS if panel.shows_success else up)

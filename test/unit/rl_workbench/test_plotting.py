@@ -87,7 +87,7 @@ def test_where_seeds_ended_is_marked_and_whether_they_were_complete() -> None:
 
 
 def test_each_environment_has_axes_and_a_line_of_its_own() -> None:
-    cart, car = seed([1, 2], [10, 400]), seed([1, 2], [-200, -110])
+    cart, car = seed([1, 2], [450, 520]), seed([1, 2], [-110, -100])
     panels = [
         panel({"dqn": [cart]}, "my_module:CartPole-v1", 475.0),
         panel({"dqn": [car], "ppo": [car]}, "MountainCar-v0", -110.0),
@@ -105,6 +105,13 @@ def test_each_environment_has_axes_and_a_line_of_its_own() -> None:
         same = {line.get_label(): line.get_color() for line in first.lines}
         dqn = next(name for name in same if name.startswith("dqn"))
         assert names[dqn] == same[dqn], "one group, one colour, in every panel"
+
+
+def test_a_threshold_above_all_curves_is_not_drawn() -> None:
+    """Training returns explore; that evaluations without exploration solve it they can't show."""
+    low = [panel({"dqn": [seed([1, 2], [10, 400])]}, "CartPole-v1", 475.0)]
+    for figure in (seed_curves(low), training_curves(low, "episode")):
+        assert not lines(figure.axes[0], "threshold")
 
 
 def test_a_variant_is_held_against_the_first_of_its_own_environment() -> None:
