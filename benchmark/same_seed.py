@@ -82,7 +82,7 @@ def digest(returns: list[float]) -> str:
 
 def picture(results: dict[str, list[list[float]]]) -> Any:
     """Draws the returns of each way's runs over each other."""
-    figure = new_figure(10, 3.2)
+    figure = new_figure(10, 3.5)
     for axes, (way, runs) in zip(
         figure.subplots(1, len(results), sharey=True), results.items(), strict=True
     ):
@@ -93,7 +93,8 @@ def picture(results: dict[str, list[list[float]]]) -> Any:
         axes.set_xlabel("episode")
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("return")
-    figure.axes[0].legend(loc="lower right")
+    lines, names = figure.axes[0].get_legend_handles_labels()
+    figure.legend(lines, names, loc="outside upper center", ncols=2, frameon=False)
     return figure
 
 
