@@ -27,7 +27,7 @@ def test_a_quadruped_trots_by_commands(new):
     folder, robot, task, told = new("my_walker", QUADRUPED, "--base", "free", "--task", "walk")
     assert "my_walker.environment:my_walker/Walk-v0 --config" in told and "--algo sac" in told
     made = task()
-    pairs = dict(zip(made.feet, made.phases, strict=True))
+    pairs = dict(zip(made.feet, made.gait.phases.tolist(), strict=True))
     assert pairs["front_left_calf"] == pairs["rear_right_calf"] != pairs["front_right_calf"]
     assert pairs["front_right_calf"] == pairs["rear_left_calf"]
     assert made.imu is None  # the file has none

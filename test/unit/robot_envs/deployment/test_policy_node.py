@@ -220,7 +220,7 @@ def test_a_walker_stands_until_cmd_vel_says_where_to(clock: SimpleNamespace) -> 
         message = Twist(Vector3(x, y, 0.0), Vector3(0.0, 0.0, turn))
         SilentSubscriber.send("/cmd_vel", message)
         node._step(clock.now, 0.02)
-    wanted = [(0.0, 0.0, 0.0), (0.5, 0.1, -0.3), (0.6, 0.0, 0.0)]
+    wanted = [(0.0, 0.0, 0.0), (0.5, 0.1, -0.3), (0.8, 0.0, 0.0)]
     assert [tuple(each[6:9]) for each in seen] == [pytest.approx(each) for each in wanted]
     assert not seen[0][-2:].any() and seen[1][-2:].any(), "its gait begins"
 

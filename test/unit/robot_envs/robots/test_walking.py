@@ -11,6 +11,7 @@ from robot_envs import RobotEnv
 from robot_envs.errors import TaskError
 from robot_envs.robots.quadruped import HEIGHT, ROBOT, Walk
 from robot_envs.world_state import Motion, Pose, Twist
+from robot_sim.physics.dynamics import link_poses
 from robot_sim.physics.pose import from_rpy
 
 
@@ -42,16 +43,16 @@ def test_the_velocity_is_that_of_the_trunks_own_heading(env, yaw):
 def test_who_moves_as_commanded_gets_all_of_both_terms(env):
     env.task.aim((0.4, -0.1, 0.2))
     there = state_with(env, Pose((0, 0, HEIGHT)), Twist((0.4, -0.1, 0.0), (0.0, 0.0, 0.2)))
-    terms = env.task.terms(there)
+    terms = env.task.terms(there, env.task.velocity(there))
     assert terms["linear"] == pytest.approx(1.0) and terms["angular"] == pytest.approx(1.0)
     assert terms["height"] == terms["orientation"] == terms["fallen"] == 0.0
-    stands = env.task.terms(state_with(env, Pose((0, 0, HEIGHT)), Twist()))
-    assert stands["linear"] == pytest.approx(math.exp(-0.17 / 0.06))
+    stands = env.task.terms(there, (0.0, 0.0, 0.0))
+    assert stands["linear"] == pytest.approx(math.exp(-0.17 / 0.03))
 
 
 def test_commands_are_clipped_to_their_ranges(env):
     env.task.aim((9.0, -9.0, 9.0))
-    assert tuple(env.task.command(env.state)) == (0.6, -0.3, 0.8)
+    assert tuple(env.task.command(env.state)) == (0.8, -0.6, 1.0)
     for wrong in ((1.0,), (math.nan, 0.0, 0.0)):
         with pytest.raises(ValueError, match="a command is"):
             env.task.aim(wrong)
@@ -82,6 +83,45 @@ def test_it_stands_when_nothing_is_done_and_its_feet_touch(env):
     assert info["rewards"]["gait"] == 1.0 and reward > 0.04
 
 
+def feet_at(task, phase, velocity):
+    """Where the spheres at the ends of the shanks are, seen from the trunk."""
+    at = task.middle + task.gait.offsets(phase, np.array(velocity))
+    poses = link_poses(ROBOT.links, Pose(), dict(zip(task.joints, at.tolist(), strict=True)))
+    return np.array([poses[foot].compose(Pose((0.0, 0.0, -0.2))).position for foot in task.feet])
+
+
+@pytest.mark.parametrize("velocity", [(0.5, 0.0, 0.0), (0.0, -0.4, 0.0), (0.2, 0.1, 0.8)])
+def test_the_gaits_feet_move_against_the_command_and_swing_back_lifted(velocity):
+    task = Walk()
+    before, middle, after = (feet_at(task, phase, velocity) for phase in (0.2, 0.25, 0.3))
+    moved = (after - before) / (0.1 * task.gait.period)
+    ahead, left, about = velocity
+    for foot in (0, 3):  # lf, rh
+        x, y, _ = before[foot]
+        asked = (about * y - ahead, -about * x - left)
+        np.testing.assert_allclose(moved[foot, :2], asked, rtol=0.2, atol=0.05)
+    lifts = middle[:, 2] - feet_at(task, None, velocity)[:, 2]
+    np.testing.assert_allclose(lifts, (0.0, 0.08, 0.08, 0.0), atol=0.015)
+    assert task.gait.on_ground(0.25).tolist() == [True, False, False, True]
+
+
+def test_without_lift_actions_are_relative_to_the_stance():
+    assert not Walk(lift=0.0).gait.offsets(0.25, np.array((0.5, 0.0, 0.0))).any()
+
+
+@pytest.mark.parametrize("asked", [(0.7, 0.0, 0.0), (0.0, 0.6, 0.0), (0.0, 0.0, 1.0)])
+def test_the_gait_alone_moves_it_that_way(env, asked):
+    env.reset(seed=3)
+    env.task.aim(asked)
+    moved = []
+    for _ in range(200):
+        *_, terminated, _, info = env.step(np.zeros(12, np.float32))
+        assert not terminated
+        moved.append(info["velocity"])
+    mean = np.mean(moved[50:], axis=0)
+    assert mean @ np.array(asked) > 0.5 * np.dot(asked, asked)
+
+
 def test_an_episode_has_four_commands_of_which_some_ask_to_stand():
     made = env_of()
     drawn = []
@@ -106,7 +146,7 @@ def test_other_weights_change_the_reward_and_unknown_terms_are_named():
 
 
 def test_without_an_imu_the_trunks_own_motion_says_the_same():
-    tasks = Walk(), Walk()
+    tasks = Walk(lift=0.0), Walk(lift=0.0)  # it stands: steps shake the trunk
     blind = tasks[1]
     blind.imu, blind.query = None, tasks[0].reward_query
     envs = [RobotEnv(ROBOT, task) for task in tasks]
