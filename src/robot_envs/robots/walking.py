@@ -13,7 +13,15 @@ from robot_envs.robot import Robot
 from robot_envs.robots import actions, numbers
 from robot_envs.robots.gait import Gait
 from robot_envs.task import Task
-from robot_envs.world_state import Commands, InitialState, Motion, StateQuery, Twist, WorldState
+from robot_envs.world_state import (
+    Commands,
+    InitialState,
+    Motion,
+    Push,
+    StateQuery,
+    Twist,
+    WorldState,
+)
 from robot_sim.physics.pose import Pose, Vector, conjugate, from_rpy, rotate, to_rpy
 
 DOWN = (0.0, 0.0, -1.0)
@@ -23,6 +31,7 @@ FALLEN = (
 COMMANDS = 4  # of an episode
 STANDING = 0.1  # share of commands that ask to stand still
 UNASKED = 0.3  # share of the others' numbers that are 0
+SHOVED = 0.1  # [s]
 LEAST = 0.1  # [m/s] or [rad/s]; below it a command asks to stand still
 
 
@@ -92,6 +101,7 @@ class WalkByCommand(Task):
         aside: Largest commanded speed to either side [m/s].
         about: Largest commanded angular speed [rad/s].
         push: Largest speed of the trunk at the start [m/s].
+        shove: Largest force on the trunk [N], from any side for 0.1 s, once during each command.
         weights: Other weights of terms, by name.
     """
 
@@ -118,6 +128,7 @@ class WalkByCommand(Task):
         aside: float = 0.6,
         about: float = 1.0,
         push: float = 0.2,
+        shove: float = 0.0,
         weights: Mapping[str, float] | None = None,
     ) -> None:
         unknown = set(weights or ()) - set(self.WEIGHTS)
@@ -135,6 +146,7 @@ class WalkByCommand(Task):
         self.feet = tuple(feet)
         self.joints = tuple(joint for port in robot.ports for joint in port.joints)
         self.reach, self.ahead, self.aside, self.about, self.push = reach, ahead, aside, about, push
+        self.shove = shove
         self.weights = {**self.WEIGHTS, **(weights or {})}
         self.middle = np.array([stance.get(each, 0.0) for each in self.joints])
         self.gait = Gait(links, self.joints, self.middle, feet, phases, period, lift)
@@ -168,7 +180,17 @@ class WalkByCommand(Task):
         off = rng.uniform(-0.05, 0.05, len(self.joints))
         joints = dict(zip(self.joints, (self.middle + off).tolist(), strict=True))
         held = self._holding(self.middle)
-        return InitialState(joints, {self.robot.model: Motion(pose, twist)}, held)
+        trunk = f"{self.robot.model}::{self.robot.links.root}"
+        length = self.max_steps * self.robot.control_period / COMMANDS
+        shoves = rng.uniform(0.0, (self.shove, math.tau, length), (COMMANDS, 3)).tolist()
+        pushes = [
+            Push(
+                trunk, (force * math.cos(way), force * math.sin(way), 0.0), i * length + at, SHOVED
+            )
+            for i, (force, way, at) in enumerate(shoves)
+            if force
+        ]
+        return InitialState(joints, {self.robot.model: Motion(pose, twist)}, held, pushes)
 
     def aim(self, goal: Sequence[float]) -> None:
         """Gives it another command: ahead, to the left [m/s], about [rad/s]; raises ValueError else."""

@@ -1,6 +1,7 @@
 """The walking task: what it measures and rewards, in the trunk's own frame."""
 
 import math
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -10,7 +11,7 @@ import robot_envs.robots  # noqa: F401 - registers the environments
 from robot_envs import RobotEnv
 from robot_envs.errors import TaskError
 from robot_envs.robots.quadruped import HEIGHT, ROBOT, Walk
-from robot_envs.world_state import Motion, Pose, Twist
+from robot_envs.world_state import Motion, Pose, Push, Twist
 from robot_sim.physics.dynamics import link_poses
 from robot_sim.physics.pose import from_rpy
 
@@ -132,6 +133,33 @@ def test_an_episode_has_four_commands_of_which_some_ask_to_stand():
     assert 5 <= (drawn == 0.0).all(axis=1).sum() <= 40
     assert drawn[:, 0].min() < -0.2 and drawn[:, 0].max() > 0.5
     made.close()
+
+
+def test_shoves_push_the_trunk_once_during_each_command():
+    assert not Walk().initial_state(np.random.default_rng(0)).pushes
+    pushes = Walk(shove=80.0).initial_state(np.random.default_rng(0)).pushes
+    assert [int(each.start / 5.0) for each in pushes] == [0, 1, 2, 3]
+    assert {each.link for each in pushes} == {"quadruped::base"}
+    assert all(0.0 < math.hypot(*each.force) <= 80.0 for each in pushes)
+
+
+def test_a_push_acts_for_its_time_and_in_its_own_episode_alone(env):
+    pushes = [Push("quadruped::base", (0.0, 90.0, 0.0), 0.1, 0.1)]
+    drawn = replace(env.task.initial_state(np.random.default_rng(0)), pushes=pushes)
+
+    def speeds(initial, steps):
+        env.reset(seed=0, options={"initial_state": initial})
+        env.task.aim((0.0, 0.0, 0.0))
+        given = []
+        for _ in range(steps):
+            env.step(np.zeros(12, np.float32))
+            given.append(env.state.models["quadruped"].twist.linear[1])
+        return given
+
+    pushed, free = speeds(drawn, 10), speeds(replace(drawn, pushes=()), 10)
+    assert pushed[:4] == free[:4] and pushed[9] > free[9] + 0.3
+    speeds(drawn, 2)
+    assert speeds(replace(drawn, pushes=()), 10) == free
 
 
 def test_other_weights_change_the_reward_and_unknown_terms_are_named():
