@@ -96,7 +96,7 @@ def made(backend: str) -> RobotEnv:
 def evaluate(run: str, backend: str, episodes: int) -> list[Walked]:
     """Plays a run's best policy."""
     if run == "none":
-        env, act = made(backend), lambda _: np.zeros(12, np.float32)
+        env, act = made(backend), lambda _: np.zeros(15, np.float32)
     else:
         player = load_learned(open_run(Path(run)), env_options={"backend": backend})
         assert isinstance(player.env.unwrapped, RobotEnv)
@@ -123,7 +123,7 @@ def summary(walked: list[Walked]) -> dict[str, Any]:
 def environment(backend: str) -> Callable[[], int]:
     env = made(backend)
     env.reset(seed=0)
-    action = np.zeros(12, np.float32)
+    action = np.zeros(15, np.float32)
 
     def batch() -> int:
         for _ in range(BATCH):

@@ -32,6 +32,7 @@ COMMANDS = 4  # of an episode
 STANDING = 0.1  # share of commands that ask to stand still
 UNASKED = 0.3  # share of the others' numbers that are 0
 SHOVED = 0.1  # [s]
+TRIM = np.array((0.3, 0.3, 0.5))  # [m/s, rad/s] that an action of 1 adds to the gait's velocity
 LEAST = 0.1  # [m/s] or [rad/s]; below it a command asks to stand still
 
 
@@ -42,11 +43,12 @@ class WalkByCommand(Task):
     `policy_node.py` takes them from /joint_states, the IMU's topic and /cmd_vel.
 
     ## Action space
-    `Box(-1, 1, (joints,))`: the joints' set-points around the reference gait, `reach` [rad] either way. The
-    gait's feet step as the command asks, on the spot or with a stride; see `robot_envs.robots.gait`.
+    `Box(-1, 1, (3 + joints,))`: what the reference gait's velocity is more than the command, 0.3 m/s ahead,
+    0.3 m/s to the left, 0.5 rad/s about; and the joints' set-points around that gait, `reach` [rad] either
+    way. The gait's feet step in turn, on the spot or with a stride; see `robot_envs.robots.gait`.
 
     ## Observation space
-    `Box((3 * joints + 11,))`
+    `Box((3 * joints + 14,))`
 
     | numbers | what they are | unit |
     |---|---|---|
@@ -55,7 +57,7 @@ class WalkByCommand(Task):
     | 3 | the command: speed ahead, to the left, about | m/s, rad/s |
     | joints | positions relative to the stance | rad |
     | joints | velocities | 20 rad/s |
-    | joints | the last action | 1 |
+    | 3 + joints | the last action | 1 |
     | 2 | sine and cosine of the gait's phase; 0 while the command asks to stand | 1 |
 
     ## Rewards
@@ -96,7 +98,8 @@ class WalkByCommand(Task):
         phases: When each foot is put down, as a share of the gait's period.
         period: Period of the gait [s].
         lift: How high the reference gait's feet swing [m]; 0: actions are relative to the stance alone.
-        reach: What an action of 1 moves a joint [rad].
+        reach: What an action of 1 moves a joint [rad]; by default so little that no actions make a
+            quadruped fall.
         ahead: Range of commanded speeds ahead [m/s], the lower one at most 0.
         aside: Largest commanded speed to either side [m/s].
         about: Largest commanded angular speed [rad/s].
@@ -123,7 +126,7 @@ class WalkByCommand(Task):
         phases: Sequence[float],
         period: float = 0.4,
         lift: float = 0.08,
-        reach: float = 0.3,
+        reach: float = 0.15,
         ahead: tuple[float, float] = (-0.5, 0.8),
         aside: float = 0.6,
         about: float = 1.0,
@@ -155,13 +158,13 @@ class WalkByCommand(Task):
         self.commands = np.zeros((COMMANDS, 3))
         self.rewarded: dict[str, float] = {}  # the terms of the last step
         self.pace = np.zeros(3)  # the velocity, averaged
-        self.last = self.action = np.zeros(len(self.joints))
+        self.last = self.action = np.zeros(3 + len(self.joints))
 
     def action_space(self) -> gymnasium.spaces.Box:
-        return actions(len(self.joints))
+        return actions(3 + len(self.joints))
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        return numbers(3 * len(self.joints) + 11)
+        return numbers(3 * len(self.joints) + 14)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         self.rewarded, self.pace = {}, np.zeros(3)
@@ -172,7 +175,7 @@ class WalkByCommand(Task):
         most, least = ((each, self.aside, self.about) for each in (self.ahead[1], -self.ahead[0]))
         self.commands = asked * np.where(asked > 0.0, most, least)
         self.commands[rng.random(COMMANDS) < STANDING] = 0.0
-        self.last = self.action = np.zeros(len(self.joints))
+        self.last = self.action = np.zeros(3 + len(self.joints))
         heading, way, fast = rng.uniform((-math.pi, -math.pi, 0.0), (math.pi, math.pi, self.push))
         x, y, _ = self.robot.pose.position
         pose = Pose((x, y, self.height + 0.01), from_rpy(0.0, 0.0, float(heading)))
@@ -212,8 +215,9 @@ class WalkByCommand(Task):
 
     def apply(self, action: np.ndarray, state: WorldState) -> Commands:
         self.last, self.action = self.action, action.astype(float)
-        reference = self.middle + self.gait.offsets(self.phase(state), self.command(state))
-        return self._holding(reference + self.reach * self.action)
+        velocity = self.command(state) + TRIM * self.action[:3]
+        reference = self.middle + self.gait.offsets(self.phase(state), velocity)
+        return self._holding(reference + self.reach * self.action[3:])
 
     def _holding(self, positions: np.ndarray) -> dict[str, float | tuple[float, ...]]:
         """Returns the commands that hold joints at positions [rad]."""

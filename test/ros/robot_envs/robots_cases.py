@@ -50,7 +50,7 @@ class Robots(unittest.TestCase):
             env = gymnasium.make("robot_envs/Quadruped-v0", backend=backend).unwrapped
             for initial in (InitialState(pushes=pushes), InitialState()):  # the second isn't pushed
                 env.reset(seed=1, options={"initial_state": initial})
-                found.append([env.step(np.zeros(12, np.float32))[0] for _ in range(12)])
+                found.append([env.step(np.zeros(15, np.float32))[0] for _ in range(12)])
             env.close()
         pushed, free, *here = found
         np.testing.assert_array_equal(here, [pushed, free])

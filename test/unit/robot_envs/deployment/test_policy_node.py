@@ -210,7 +210,7 @@ def test_a_vehicle_drives_to_its_goal_by_laser_and_odometry_and_stops_when_they_
 
 def test_a_walker_stands_until_cmd_vel_says_where_to(clock: SimpleNamespace) -> None:
     seen: list[np.ndarray] = []
-    act = lambda observed: seen.append(observed) or np.zeros(12, np.float32)  # noqa: E731
+    act = lambda observed: seen.append(observed) or np.zeros(15, np.float32)  # noqa: E731
     node = PolicyNode(QUADRUPED, Walk(), act, 0.02, late=1.0)
     know_joints(node, QUADRUPED)
     header = Header(stamp=rospy.Time(clock.now))

@@ -77,7 +77,7 @@ def test_it_stands_when_nothing_is_done_and_its_feet_touch(env):
     env.reset(seed=1)
     env.task.aim((0.0, 0.0, 0.0))
     for _ in range(100):
-        seen, reward, terminated, *_, info = env.step(np.zeros(12, np.float32))
+        seen, reward, terminated, *_, info = env.step(np.zeros(15, np.float32))
     assert not terminated and env.task.touching(env.state) == [True] * 4
     np.testing.assert_allclose(seen[:3], (0.0, 0.0, -1.0), atol=0.06)  # gravity
     assert not seen[-2:].any()  # no gait while it stands
@@ -116,7 +116,7 @@ def test_the_gait_alone_moves_it_that_way(env, asked):
     env.task.aim(asked)
     moved = []
     for _ in range(200):
-        *_, terminated, _, info = env.step(np.zeros(12, np.float32))
+        *_, terminated, _, info = env.step(np.zeros(15, np.float32))
         assert not terminated
         moved.append(info["velocity"])
     mean = np.mean(moved[50:], axis=0)
@@ -152,7 +152,7 @@ def test_a_push_acts_for_its_time_and_in_its_own_episode_alone(env):
         env.task.aim((0.0, 0.0, 0.0))
         given = []
         for _ in range(steps):
-            env.step(np.zeros(12, np.float32))
+            env.step(np.zeros(15, np.float32))
             given.append(env.state.models["quadruped"].twist.linear[1])
         return given
 
@@ -164,7 +164,7 @@ def test_a_push_acts_for_its_time_and_in_its_own_episode_alone(env):
 
 def test_other_weights_change_the_reward_and_unknown_terms_are_named():
     calm, plain = env_of(weights={"posture": 0.0}), env_of()
-    action = np.full(12, 0.5, np.float32)
+    action = np.full(15, 0.5, np.float32)
     for each in (calm, plain):
         each.reset(seed=0)
     difference = calm.step(action)[1] - plain.step(action)[1]
@@ -181,7 +181,7 @@ def test_without_an_imu_the_trunks_own_motion_says_the_same():
     for each in envs:
         each.reset(seed=4)
     for _ in range(20):
-        one, other = (each.step(np.full(12, 0.2, np.float32))[0] for each in envs)
+        one, other = (each.step(np.full(15, 0.2, np.float32))[0] for each in envs)
     np.testing.assert_allclose(one, other, atol=0.02)  # the IMU's are of up to 5 ms ago
     for each in envs:
         each.close()
