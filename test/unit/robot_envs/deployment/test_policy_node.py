@@ -223,6 +223,12 @@ def test_a_walker_stands_until_cmd_vel_says_where_to(clock: SimpleNamespace) -> 
     wanted = [(0.0, 0.0, 0.0), (0.5, 0.1, -0.3), (0.8, 0.0, 0.0)]
     assert [tuple(each[6:9]) for each in seen] == [pytest.approx(each) for each in wanted]
     assert not seen[0][-2:].any() and seen[1][-2:].any(), "its gait begins"
+    clock.now += 0.4
+    node._step(clock.now, 0.42)
+    assert seen[-1][6] == pytest.approx(0.8)
+    clock.now += 0.2
+    node._step(clock.now, 0.62)
+    assert not seen[-1][6:9].any(), "nobody commands it any more"
 
 
 @pytest.mark.parametrize(
