@@ -66,7 +66,7 @@ class WalkByCommand(Task):
     | term | what it is | weight |
     |---|---|---|
     | `linear` | exp(-(error of the speeds ahead and to the left)² / 0.03 m²/s²) | 1.5 |
-    | `angular` | exp(-(error of the speed about)² / 0.1 rad²/s²) | 0.75 |
+    | `angular` | exp(-(error of the speed about)² / 0.04 rad²/s²) | 1.5 |
     | `gait` | share of feet that touch the ground when their phase asks for it | 0.5 |
     | `vertical` | square of the trunk's vertical speed [m²/s²] | -1 |
     | `tilting` | square of the trunk's other angular velocities [rad²/s²] | -0.05 |
@@ -112,7 +112,7 @@ class WalkByCommand(Task):
     max_steps = 1000
     aims_at_velocity = True
     WEIGHTS: ClassVar[Mapping[str, float]] = {
-        "linear": 1.5, "angular": 0.75, "gait": 0.5, "vertical": -1.0, "tilting": -0.05,
+        "linear": 1.5, "angular": 1.5, "gait": 0.5, "vertical": -1.0, "tilting": -0.05,
         "orientation": -2.0, "height": -10.0, "smoothness": -0.3, "posture": -0.1, "fallen": -5.0,
     }  # fmt: skip
 
@@ -273,7 +273,7 @@ class WalkByCommand(Task):
         down = self.gait.on_ground(phase)
         return {
             "linear": math.exp(-((ahead - wanted[0]) ** 2 + (left - wanted[1]) ** 2) / 0.03),
-            "angular": math.exp(-((about - wanted[2]) ** 2) / 0.1),
+            "angular": math.exp(-((about - wanted[2]) ** 2) / 0.04),
             "gait": float(np.mean(down == np.array(self.touching(state)))),
             "vertical": twist.linear[2] ** 2,
             "tilting": twist.angular[0] ** 2 + twist.angular[1] ** 2,
