@@ -178,7 +178,7 @@ def _values(request: PackageRequest, copied: Copied, survey: Survey, urdf: str) 
             "--task walk: it has no legs to stand on: it is fixed, or stands on wheels or its base"
         )
     task, algo = (
-        ("Drive", "sac") if base else ("Walk", "sac") if request.walks else ("Reach", "ppo")
+        ("Drive", "sac") if base else ("Walk", "ppo") if request.walks else ("Reach", "ppo")
     )
     imus = (each.name for each in model.sensors if each.kind == "imu")
     gains = {True: wheel_gains(model), False: effort_gains(model)}

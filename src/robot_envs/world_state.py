@@ -11,7 +11,7 @@ from robot_sim.sensors.sensor_reading import Reading
 from robot_sim.state import ContactPair, LinkQuery, StateQuery
 
 __all__ = ["Command", "Commands", "ContactPair", "InitialState", "JointState", "LinkQuery", "Motion", "Pose",
-           "Reading", "StateQuery", "Twist", "WorldState"]  # fmt: skip
+           "Push", "Reading", "StateQuery", "Twist", "WorldState"]  # fmt: skip
 
 Entry = TypeVar("Entry")
 Command = float | Sequence[float]
@@ -123,6 +123,15 @@ class WorldState(NamedTuple):
     sensors: Mapping[str, Reading] = Sensors()
 
 
+class Push(NamedTuple):
+    """A force [N], in the world's axes, at a link's centre of mass."""
+
+    link: str  # "model::link"
+    force: Vector
+    start: float  # [s] of the episode
+    duration: float  # [s]
+
+
 @dataclass(frozen=True)
 class InitialState:
     """The state in which an episode begins; whatever isn't named is as it was spawned.
@@ -133,11 +142,13 @@ class InitialState:
         models: Poses or motions of models in the world, by name; others are where they were spawned.
         commands: What controllers hold until the first action, by name; by default position controllers hold
             their joints' positions, and others 0.
+        pushes: Forces that act on links during the episode.
     """
 
     joints: Mapping[str, float | tuple[float, float]] = field(default_factory=dict)
     models: Mapping[str, Motion | Pose] = field(default_factory=dict)
     commands: Commands = field(default_factory=dict)
+    pushes: Sequence[Push] = ()
 
 
 ONLY_REWARDED = "; what only the reward needs belongs into the task's reward_query"

@@ -25,12 +25,14 @@ from robot_envs.world_state import (
     Links,
     Models,
     Motion,
+    Push,
     Reading,
     Sensors,
     StateQuery,
     WorldState,
     link_keys,
 )
+from robot_sim.applied_forces import ActingTime, AppliedWrench
 from robot_sim.constants import NANOSECONDS
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import RobotHardware
@@ -42,7 +44,7 @@ from robot_sim.physics.description import DescriptionError, Inertia, is_control_
 from robot_sim.physics.engines import make_engine
 from robot_sim.physics.files.urdf import parse_urdf
 from robot_sim.physics.model import Model
-from robot_sim.physics.pose import Pose, Vector, normalized
+from robot_sim.physics.pose import ZERO, Pose, Vector, normalized
 from robot_sim.physics.properties import (
     JointProperties,
     PropertyError,
@@ -117,6 +119,7 @@ class InProcessWorld(RobotBackend):
         self._reads_more = False  # than the joints
         self._held: dict[str, Any] = {}
         self._begin = 0  # [ns] of the episode
+        self._pushed: set[str] = set()  # links, in this episode
         self._knows_contacts = False
 
     def _add(self, robot: Robot) -> tuple[Model, RobotHardware, Loaded]:
@@ -184,9 +187,23 @@ class InProcessWorld(RobotBackend):
                 own = {name: joints[key] for key, (of, name) in moved if of is robot}
                 at, speeds = ({name: each[i] for name, each in own.items()} for i in (0, 1))
                 self._sim.set_joint_states(self._robots[robot.model][0], at, speeds)
+        self._push(initial.pushes)
         state = self._state()
         self._held = self.scene.starting_commands(state.joints)
         return state._replace(commands=self._held)
+
+    def _push(self, pushes: Sequence[Push]) -> None:
+        """Queues an episode's pushes, in place of those of the one before."""
+        applied = self._sim.applied
+        for name in self._pushed:
+            applied.clear_wrenches(name)
+        self._pushed = {each.link for each in pushes}
+        with _refusals():
+            for each in pushes:
+                link = find_link(self._sim.world, each.link)
+                start, duration = (round(time * NANOSECONDS) for time in each[2:])
+                time = ActingTime(self._begin + start, duration)
+                applied.wrenches.append(AppliedWrench(*link, (each.force, ZERO), time))
 
     def begin(self, commands: Commands) -> None:
         """See `RobotBackend.begin`; does nothing."""

@@ -26,6 +26,8 @@ from robot_envs.world_state import ODOMETRY, Command, JointState
 
 LATE_PERIODS, LATE_AT_LEAST = 5, 0.1  # control periods, and [s]
 LATE_AT_MOST = 0.3  # [s] of a vehicle, which drives on meanwhile
+STANDING = (0.0, 0.0, 0.0)  # [m/s, rad/s]
+COMMANDED = 0.5  # [s] that a walker follows a velocity, as cmd_vel_timeout of diff_drive_controller
 POLL = 0.05  # [s] of wall time between two looks at what else might end a wait
 MISSING_PATIENCE = 2.0  # [s] of wall time, until what is missing is logged
 REPORTING = 1.0  # [s] of wall time between two lines about why the robot stands still
@@ -39,7 +41,8 @@ class PolicyNode:
     policy, and publishes their commands. While one of them is late, or the task's episode would have ended,
     it commands a stop instead (see `CommandLimits.stop`). At the end it stops the robot, also after `rosnode
     kill`, or an error of policy or task. The topic `~goal` (std_msgs/Float64MultiArray) changes the goal of a
-    task with goals, `cmd_vel` (geometry_msgs/Twist) that of one that walks at a velocity, first 0.
+    task with goals, `cmd_vel` (geometry_msgs/Twist) that of one that walks at a velocity: 0 at first, and
+    when it has been silent for half a second.
 
     `late` is how long the robot may be without a joint state before it is stopped [s], or without a reading,
     but at least three of its sensor's periods; None: 5 control periods, but at least 0.1 s, and at most 0.3 s
@@ -64,6 +67,7 @@ class PolicyNode:
         except ValueError as error:
             raise RobotEnvError(str(error)) from error
         self._wanted: Any = None  # a goal that has come
+        self._commanded: float | None = None  # when a velocity came [s]; None: it stands again
         self._logged: Any = None  # the goal that was logged last
         self._reason = self._reported = ""  # why the robot stands still, now and in the last line
         self._unreported = 0  # changes since that line
@@ -86,7 +90,7 @@ class PolicyNode:
             rospy.Subscriber("~goal", Float64MultiArray, self._take_goal, queue_size=1)
         if task.aims_at_velocity:
             if goal is None:
-                self._wanted = (0.0, 0.0, 0.0)
+                self._wanted = STANDING
             rospy.Subscriber(full_name(robot, "cmd_vel"), Twist, self._take_velocity, queue_size=1)
 
     def _take_goal(self, message: Float64MultiArray) -> None:
@@ -94,6 +98,7 @@ class PolicyNode:
 
     def _take_velocity(self, message: Twist) -> None:
         self._wanted = message.linear.x, message.linear.y, message.angular.z
+        self._commanded = rospy.get_time()
 
     def run(self, should_end: Callable[[], bool]) -> None:
         """Runs until `should_end`, which is polled, or the node is shut down.
@@ -191,6 +196,8 @@ class PolicyNode:
             self._report(f"{trouble}: the robot is stopped")
             self._publish(self._pilot.stop(self._last))
             return
+        if self._commanded is not None and not 0.0 <= now - self._commanded <= COMMANDED:
+            self._wanted, self._commanded = STANDING, None
         self._aim_if_told()
         commands = self._pilot.step(passed, self._last, self._sensors.read(now - passed))
         if commands is None:

@@ -11,8 +11,17 @@ import numpy as np
 from robot_envs.errors import TaskError
 from robot_envs.robot import Robot
 from robot_envs.robots import actions, numbers
+from robot_envs.robots.gait import Gait
 from robot_envs.task import Task
-from robot_envs.world_state import Commands, InitialState, Motion, StateQuery, Twist, WorldState
+from robot_envs.world_state import (
+    Commands,
+    InitialState,
+    Motion,
+    Push,
+    StateQuery,
+    Twist,
+    WorldState,
+)
 from robot_sim.physics.pose import Pose, Vector, conjugate, from_rpy, rotate, to_rpy
 
 DOWN = (0.0, 0.0, -1.0)
@@ -21,6 +30,9 @@ FALLEN = (
 )
 COMMANDS = 4  # of an episode
 STANDING = 0.1  # share of commands that ask to stand still
+UNASKED = 0.3  # share of the others' numbers that are 0
+SHOVED = 0.1  # [s]
+TRIM = np.array((0.3, 0.3, 0.5))  # [m/s, rad/s] that an action of 1 adds to the gait's velocity
 LEAST = 0.1  # [m/s] or [rad/s]; below it a command asks to stand still
 
 
@@ -31,10 +43,12 @@ class WalkByCommand(Task):
     `policy_node.py` takes them from /joint_states, the IMU's topic and /cmd_vel.
 
     ## Action space
-    `Box(-1, 1, (joints,))`: the joints' set-points around the stance, `reach` [rad] either way.
+    `Box(-1, 1, (3 + joints,))`: what the reference gait's velocity is more than the command, 0.3 m/s ahead,
+    0.3 m/s to the left, 0.5 rad/s about; and the joints' set-points around that gait, `reach` [rad] either
+    way. The gait's feet step in turn, on the spot or with a stride; see `robot_envs.robots.gait`.
 
     ## Observation space
-    `Box((3 * joints + 11,))`
+    `Box((3 * joints + 14,))`
 
     | numbers | what they are | unit |
     |---|---|---|
@@ -43,7 +57,7 @@ class WalkByCommand(Task):
     | 3 | the command: speed ahead, to the left, about | m/s, rad/s |
     | joints | positions relative to the stance | rad |
     | joints | velocities | 20 rad/s |
-    | joints | the last action | 1 |
+    | 3 + joints | the last action | 1 |
     | 2 | sine and cosine of the gait's phase; 0 while the command asks to stand | 1 |
 
     ## Rewards
@@ -51,8 +65,8 @@ class WalkByCommand(Task):
 
     | term | what it is | weight |
     |---|---|---|
-    | `linear` | exp(-(error of the speeds ahead and to the left)² / 0.06 m²/s²) | 1.5 |
-    | `angular` | exp(-(error of the speed about)² / 0.25 rad²/s²) | 0.75 |
+    | `linear` | exp(-(error of the speeds ahead and to the left)² / 0.03 m²/s²) | 1.5 |
+    | `angular` | exp(-(error of the speed about)² / 0.04 rad²/s²) | 1.5 |
     | `gait` | share of feet that touch the ground when their phase asks for it | 0.5 |
     | `vertical` | square of the trunk's vertical speed [m²/s²] | -1 |
     | `tilting` | square of the trunk's other angular velocities [rad²/s²] | -0.05 |
@@ -61,6 +75,8 @@ class WalkByCommand(Task):
     | `smoothness` | mean square of the action's change | -0.3 |
     | `posture` | mean square of the action | -0.1 |
     | `fallen` | it has fallen; once | -5 |
+
+    These speeds are averaged over the last period of the gait, exponentially: each step shakes the trunk.
 
     ## Start of an episode
     In the stance, up to `push` fast in any direction, heading anywhere; the command changes three times.
@@ -81,19 +97,22 @@ class WalkByCommand(Task):
         feet: Links of its feet, in the order of their phases.
         phases: When each foot is put down, as a share of the gait's period.
         period: Period of the gait [s].
-        reach: What an action of 1 moves a joint [rad].
-        ahead: Range of commanded speeds ahead [m/s].
+        lift: How high the reference gait's feet swing [m]; 0: actions are relative to the stance alone.
+        reach: What an action of 1 moves a joint [rad]; by default so little that no actions make a
+            quadruped fall.
+        ahead: Range of commanded speeds ahead [m/s], the lower one at most 0.
         aside: Largest commanded speed to either side [m/s].
         about: Largest commanded angular speed [rad/s].
         push: Largest speed of the trunk at the start [m/s].
+        shove: Largest force on the trunk [N], from any side for 0.1 s, once during each command.
         weights: Other weights of terms, by name.
     """
 
-    non_persistent = ("robot", "feet", "phases", "weights")
+    non_persistent = ("robot", "feet", "gait", "weights")
     max_steps = 1000
     aims_at_velocity = True
     WEIGHTS: ClassVar[Mapping[str, float]] = {
-        "linear": 1.5, "angular": 0.75, "gait": 0.5, "vertical": -1.0, "tilting": -0.05,
+        "linear": 1.5, "angular": 1.5, "gait": 0.5, "vertical": -1.0, "tilting": -0.05,
         "orientation": -2.0, "height": -10.0, "smoothness": -0.3, "posture": -0.1, "fallen": -5.0,
     }  # fmt: skip
 
@@ -105,12 +124,14 @@ class WalkByCommand(Task):
         imu: str | None,
         feet: Sequence[str],
         phases: Sequence[float],
-        period: float = 0.5,
-        reach: float = 0.5,
-        ahead: tuple[float, float] = (-0.3, 0.6),
-        aside: float = 0.3,
-        about: float = 0.8,
+        period: float = 0.4,
+        lift: float = 0.08,
+        reach: float = 0.15,
+        ahead: tuple[float, float] = (-0.5, 0.8),
+        aside: float = 0.6,
+        about: float = 1.0,
         push: float = 0.2,
+        shove: float = 0.0,
         weights: Mapping[str, float] | None = None,
     ) -> None:
         unknown = set(weights or ()) - set(self.WEIGHTS)
@@ -125,30 +146,36 @@ class WalkByCommand(Task):
         com = root.inertia.com.position if root.inertia else (0.0, 0.0, 0.0)
         self.centre = links.root_pose.compose(Pose(com))  # of the trunk's mass
         self.stands = height + self.centre.position[2]  # [m], of it in the stance
-        self.feet, self.phases, self.period = tuple(feet), np.array(phases), period
+        self.feet = tuple(feet)
         self.joints = tuple(joint for port in robot.ports for joint in port.joints)
         self.reach, self.ahead, self.aside, self.about, self.push = reach, ahead, aside, about, push
+        self.shove = shove
         self.weights = {**self.WEIGHTS, **(weights or {})}
         self.middle = np.array([stance.get(each, 0.0) for each in self.joints])
+        self.gait = Gait(links, self.joints, self.middle, feet, phases, period, lift)
         self.query = StateQuery(sensors=(imu,)) if imu else StateQuery(models=(robot.model,))
         self.reward_query = StateQuery(models=(robot.model,), contacts_of=self.feet)
         self.commands = np.zeros((COMMANDS, 3))
         self.rewarded: dict[str, float] = {}  # the terms of the last step
-        self.last = self.action = np.zeros(len(self.joints))
+        self.pace = np.zeros(3)  # the velocity, averaged
+        self.last = self.action = np.zeros(3 + len(self.joints))
 
     def action_space(self) -> gymnasium.spaces.Box:
-        return actions(len(self.joints))
+        return actions(3 + len(self.joints))
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        return numbers(3 * len(self.joints) + 11)
+        return numbers(3 * len(self.joints) + 14)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
-        low = (self.ahead[0], -self.aside, -self.about)
-        high = (self.ahead[1], self.aside, self.about)
-        self.rewarded = {}
-        self.commands = rng.uniform(low, high, (COMMANDS, 3))
+        self.rewarded, self.pace = {}, np.zeros(3)
+        asked = rng.uniform(-1.0, 1.0, (COMMANDS, 3))
+        asked[rng.random((COMMANDS, 3)) < UNASKED] = 0.0
+        # Not all at their most.
+        asked /= np.maximum(1.0, np.linalg.norm(asked, axis=1, keepdims=True))
+        most, least = ((each, self.aside, self.about) for each in (self.ahead[1], -self.ahead[0]))
+        self.commands = asked * np.where(asked > 0.0, most, least)
         self.commands[rng.random(COMMANDS) < STANDING] = 0.0
-        self.last = self.action = np.zeros(len(self.joints))
+        self.last = self.action = np.zeros(3 + len(self.joints))
         heading, way, fast = rng.uniform((-math.pi, -math.pi, 0.0), (math.pi, math.pi, self.push))
         x, y, _ = self.robot.pose.position
         pose = Pose((x, y, self.height + 0.01), from_rpy(0.0, 0.0, float(heading)))
@@ -156,7 +183,17 @@ class WalkByCommand(Task):
         off = rng.uniform(-0.05, 0.05, len(self.joints))
         joints = dict(zip(self.joints, (self.middle + off).tolist(), strict=True))
         held = self._holding(self.middle)
-        return InitialState(joints, {self.robot.model: Motion(pose, twist)}, held)
+        trunk = f"{self.robot.model}::{self.robot.links.root}"
+        length = self.max_steps * self.robot.control_period / COMMANDS
+        shoves = rng.uniform(0.0, (self.shove, math.tau, length), (COMMANDS, 3)).tolist()
+        pushes = [
+            Push(
+                trunk, (force * math.cos(way), force * math.sin(way), 0.0), i * length + at, SHOVED
+            )
+            for i, (force, way, at) in enumerate(shoves)
+            if force
+        ]
+        return InitialState(joints, {self.robot.model: Motion(pose, twist)}, held, pushes)
 
     def aim(self, goal: Sequence[float]) -> None:
         """Gives it another command: ahead, to the left [m/s], about [rad/s]; raises ValueError else."""
@@ -174,11 +211,13 @@ class WalkByCommand(Task):
         """Returns the gait's phase in [0, 1); None while the command asks to stand."""
         if float(np.abs(self.command(state)).max()) < LEAST:
             return None
-        return state.time / self.period % 1.0
+        return state.time / self.gait.period % 1.0
 
     def apply(self, action: np.ndarray, state: WorldState) -> Commands:
         self.last, self.action = self.action, action.astype(float)
-        return self._holding(self.middle + self.reach * self.action)
+        velocity = self.command(state) + TRIM * self.action[:3]
+        reference = self.middle + self.gait.offsets(self.phase(state), velocity)
+        return self._holding(reference + self.reach * self.action[3:])
 
     def _holding(self, positions: np.ndarray) -> dict[str, float | tuple[float, ...]]:
         """Returns the commands that hold joints at positions [rad]."""
@@ -225,18 +264,16 @@ class WalkByCommand(Task):
         }
         return [f"{self.robot.model}::{foot}" in links for foot in self.feet]
 
-    def terms(self, state: WorldState) -> dict[str, float]:
-        """Returns the reward's terms, without weights."""
+    def terms(self, state: WorldState, velocity: np.ndarray | Vector) -> dict[str, float]:
+        """Returns the reward's terms, without weights, for an averaged velocity."""
         pose, twist = state.models[self.robot.model]
-        ahead, left, about = self.velocity(state)
+        ahead, left, about = velocity
         wanted, phase = self.command(state), self.phase(state)
         sway = rotate(conjugate(pose.orientation), DOWN)
-        down = np.full(len(self.feet), True)
-        if phase is not None:
-            down = (phase - self.phases) % 1.0 < 0.5 + 1e-9
+        down = self.gait.on_ground(phase)
         return {
-            "linear": math.exp(-((ahead - wanted[0]) ** 2 + (left - wanted[1]) ** 2) / 0.06),
-            "angular": math.exp(-((about - wanted[2]) ** 2) / 0.25),
+            "linear": math.exp(-((ahead - wanted[0]) ** 2 + (left - wanted[1]) ** 2) / 0.03),
+            "angular": math.exp(-((about - wanted[2]) ** 2) / 0.04),
             "gait": float(np.mean(down == np.array(self.touching(state)))),
             "vertical": twist.linear[2] ** 2,
             "tilting": twist.angular[0] ** 2 + twist.angular[1] ** 2,
@@ -248,7 +285,9 @@ class WalkByCommand(Task):
         }
 
     def reward(self, state: WorldState, action: np.ndarray) -> float:
-        self.rewarded = terms = self.terms(state)
+        share = min(1.0, self.robot.control_period / self.gait.period)
+        self.pace += share * (np.array(self.velocity(state)) - self.pace)
+        self.rewarded = terms = self.terms(state, self.pace)
         total = math.fsum(self.weights[name] * terms[name] for name in terms)
         return total * self.robot.control_period
 

@@ -25,9 +25,9 @@ ARM = "urdf/two_link_arm.urdf.xacro"
 @pytest.mark.slow
 def test_a_quadruped_trots_by_commands(new):
     folder, robot, task, told = new("my_walker", QUADRUPED, "--base", "free", "--task", "walk")
-    assert "my_walker.environment:my_walker/Walk-v0 --config" in told and "--algo sac" in told
+    assert "my_walker.environment:my_walker/Walk-v0 --config" in told and "--algo ppo" in told
     made = task()
-    pairs = dict(zip(made.feet, made.phases, strict=True))
+    pairs = dict(zip(made.feet, made.gait.phases.tolist(), strict=True))
     assert pairs["front_left_calf"] == pairs["rear_right_calf"] != pairs["front_right_calf"]
     assert pairs["front_right_calf"] == pairs["rear_left_calf"]
     assert made.imu is None  # the file has none
@@ -40,7 +40,9 @@ def test_a_quadruped_trots_by_commands(new):
     assert not terminated and info["rewards"]["linear"] > 0.95
     assert info["rewards"]["height"] < 0.01
     env.close()
-    assert (folder / "config/sac.yaml").exists() and robot.control_period == 0.02
+    assert (
+        "num_envs: 8" in (folder / "config/ppo.yaml").read_text() and robot.control_period == 0.02
+    )
 
 
 def test_what_has_no_legs_is_refused(tmp_path, capsys):

@@ -25,6 +25,7 @@ import rospkg
 import yaml
 from bullet_gazebo_msgs.srv import RestoreStateRequest, SaveStateRequest, StepWorldRequest
 from gazebo_msgs.srv import GetWorldPropertiesRequest
+from std_srvs.srv import EmptyRequest
 
 from bullet_gazebo.clients import gzclient
 from bullet_gazebo.journal import journal_output
@@ -62,6 +63,7 @@ REQUESTS = {
     "/gazebo/step_world": StepWorldRequest,
     "/gazebo/save_state": SaveStateRequest,
     "/gazebo/restore_state": RestoreStateRequest,
+    "/gazebo/unpause_physics": EmptyRequest,
 }
 
 

@@ -140,6 +140,7 @@ class LockstepWorld(RobotBackend):
             raise self._refusal(answer.status_message)
         begun = self._look(self._names)
         self._begun = begun.now
+        self._variation.push(initial.pushes, self._begun)
         state = self._state(begun)
         self._held = self.scene.starting_commands(state.joints)
         return state._replace(commands=self._held)

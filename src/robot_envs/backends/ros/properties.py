@@ -1,7 +1,7 @@
 """Physical properties over Gazebo's services, and gains over ros_control's dynamic_reconfigure."""
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bullet_gazebo_msgs.srv import SetLinkFriction
@@ -9,6 +9,8 @@ from dynamic_reconfigure.msg import Config, DoubleParameter
 from dynamic_reconfigure.srv import Reconfigure
 from gazebo_msgs.msg import ODEJointProperties
 from gazebo_msgs.srv import (
+    ApplyBodyWrench,
+    BodyRequest,
     GetLinkProperties,
     GetLinkPropertiesResponse,
     GetPhysicsProperties,
@@ -18,7 +20,8 @@ from gazebo_msgs.srv import (
     SetLinkPropertiesRequest,
     SetPhysicsProperties,
 )
-from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
+from genpy import Duration, Time
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
 
 from robot_envs.backends.ros.bringup import full_name
 from robot_envs.backends.ros.running import SimulatorService, check_success
@@ -27,6 +30,8 @@ from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.variation.applying import Applier
 from robot_envs.variation.parts import RobotPart, gains_of
+from robot_envs.world_state import Push
+from robot_sim.constants import NANOSECONDS
 from robot_sim.control.errors import ControlError
 from robot_sim.control.pid import Gains
 from robot_sim.physics.description import Inertia
@@ -46,6 +51,7 @@ class RosVariation:
         self._timeout = timeout
         self._clients: dict[str, SimulatorService] = {}
         self._weightless: set[str] = set()
+        self._pushed: set[str] = set()  # links, in this episode
         self._apply = Applier(scene, self)
 
     def __call__(self, variation: Variation) -> None:
@@ -62,6 +68,21 @@ class RosVariation:
         """Closes the connections; the next call opens new ones."""
         for client in self._clients.values():
             client.close()
+
+    def push(self, pushes: Sequence[Push], begun: int) -> None:
+        """Queues the pushes of an episode, which began at `begun` [ns], in place of the last one's."""
+        for name in self._pushed:
+            self._call("/gazebo/clear_body_wrenches", BodyRequest, name)
+        self._pushed = {each.link for each in pushes}
+        for each in pushes:
+            start, duration = (round(time * NANOSECONDS) for time in each[2:])
+            wrench, times = (
+                Wrench(force=Vector3(*each.force)),
+                (Time(0, begun + start), Duration(0, duration)),
+            )
+            name, link = "/gazebo/apply_body_wrench", each.link
+            answer = self._call(name, ApplyBodyWrench, link, "", Point(), wrench, *times)
+            check_success(answer, f"link {link} can't be pushed")
 
     def _call(self, name: str, kind: Any, *request: Any) -> Any:
         # A persistent connection makes a call several times as fast.

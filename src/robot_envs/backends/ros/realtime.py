@@ -41,6 +41,7 @@ from robot_envs.world_state import (
     StateQuery,
     WorldState,
 )
+from robot_sim.constants import NANOSECONDS
 from robot_sim.physics.pose import Pose
 from ros_calls.waiting import wait_until
 
@@ -207,6 +208,7 @@ class RealtimeWorld(RobotBackend):
         joints = {name: JointState(positions[name], 0.0, 0.0) for name in self.scene.joints}
         self._held = self.scene.starting_commands(joints)
         self._begin = self._states.time or 0.0
+        self._variation.push(initial.pushes, round(self._begin * NANOSECONDS))
         return WorldState(0.0, joints, self._held, sensors=self._sensors.read(self._begin))
 
     def _await_sensors(self) -> None:

@@ -210,7 +210,7 @@ def test_a_vehicle_drives_to_its_goal_by_laser_and_odometry_and_stops_when_they_
 
 def test_a_walker_stands_until_cmd_vel_says_where_to(clock: SimpleNamespace) -> None:
     seen: list[np.ndarray] = []
-    act = lambda observed: seen.append(observed) or np.zeros(12, np.float32)  # noqa: E731
+    act = lambda observed: seen.append(observed) or np.zeros(15, np.float32)  # noqa: E731
     node = PolicyNode(QUADRUPED, Walk(), act, 0.02, late=1.0)
     know_joints(node, QUADRUPED)
     header = Header(stamp=rospy.Time(clock.now))
@@ -220,9 +220,15 @@ def test_a_walker_stands_until_cmd_vel_says_where_to(clock: SimpleNamespace) -> 
         message = Twist(Vector3(x, y, 0.0), Vector3(0.0, 0.0, turn))
         SilentSubscriber.send("/cmd_vel", message)
         node._step(clock.now, 0.02)
-    wanted = [(0.0, 0.0, 0.0), (0.5, 0.1, -0.3), (0.6, 0.0, 0.0)]
+    wanted = [(0.0, 0.0, 0.0), (0.5, 0.1, -0.3), (0.8, 0.0, 0.0)]
     assert [tuple(each[6:9]) for each in seen] == [pytest.approx(each) for each in wanted]
     assert not seen[0][-2:].any() and seen[1][-2:].any(), "its gait begins"
+    clock.now += 0.4
+    node._step(clock.now, 0.42)
+    assert seen[-1][6] == pytest.approx(0.8)
+    clock.now += 0.2
+    node._step(clock.now, 0.62)
+    assert not seen[-1][6:9].any(), "nobody commands it any more"
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The walking task: what it measures and rewards, in the trunk's own frame."""
 
 import math
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -10,7 +11,8 @@ import robot_envs.robots  # noqa: F401 - registers the environments
 from robot_envs import RobotEnv
 from robot_envs.errors import TaskError
 from robot_envs.robots.quadruped import HEIGHT, ROBOT, Walk
-from robot_envs.world_state import Motion, Pose, Twist
+from robot_envs.world_state import Motion, Pose, Push, Twist
+from robot_sim.physics.dynamics import link_poses
 from robot_sim.physics.pose import from_rpy
 
 
@@ -42,16 +44,16 @@ def test_the_velocity_is_that_of_the_trunks_own_heading(env, yaw):
 def test_who_moves_as_commanded_gets_all_of_both_terms(env):
     env.task.aim((0.4, -0.1, 0.2))
     there = state_with(env, Pose((0, 0, HEIGHT)), Twist((0.4, -0.1, 0.0), (0.0, 0.0, 0.2)))
-    terms = env.task.terms(there)
+    terms = env.task.terms(there, env.task.velocity(there))
     assert terms["linear"] == pytest.approx(1.0) and terms["angular"] == pytest.approx(1.0)
     assert terms["height"] == terms["orientation"] == terms["fallen"] == 0.0
-    stands = env.task.terms(state_with(env, Pose((0, 0, HEIGHT)), Twist()))
-    assert stands["linear"] == pytest.approx(math.exp(-0.17 / 0.06))
+    stands = env.task.terms(there, (0.0, 0.0, 0.0))
+    assert stands["linear"] == pytest.approx(math.exp(-0.17 / 0.03))
 
 
 def test_commands_are_clipped_to_their_ranges(env):
     env.task.aim((9.0, -9.0, 9.0))
-    assert tuple(env.task.command(env.state)) == (0.6, -0.3, 0.8)
+    assert tuple(env.task.command(env.state)) == (0.8, -0.6, 1.0)
     for wrong in ((1.0,), (math.nan, 0.0, 0.0)):
         with pytest.raises(ValueError, match="a command is"):
             env.task.aim(wrong)
@@ -75,11 +77,50 @@ def test_it_stands_when_nothing_is_done_and_its_feet_touch(env):
     env.reset(seed=1)
     env.task.aim((0.0, 0.0, 0.0))
     for _ in range(100):
-        seen, reward, terminated, *_, info = env.step(np.zeros(12, np.float32))
+        seen, reward, terminated, *_, info = env.step(np.zeros(15, np.float32))
     assert not terminated and env.task.touching(env.state) == [True] * 4
     np.testing.assert_allclose(seen[:3], (0.0, 0.0, -1.0), atol=0.06)  # gravity
     assert not seen[-2:].any()  # no gait while it stands
     assert info["rewards"]["gait"] == 1.0 and reward > 0.04
+
+
+def feet_at(task, phase, velocity):
+    """Where the spheres at the ends of the shanks are, seen from the trunk."""
+    at = task.middle + task.gait.offsets(phase, np.array(velocity))
+    poses = link_poses(ROBOT.links, Pose(), dict(zip(task.joints, at.tolist(), strict=True)))
+    return np.array([poses[foot].compose(Pose((0.0, 0.0, -0.2))).position for foot in task.feet])
+
+
+@pytest.mark.parametrize("velocity", [(0.5, 0.0, 0.0), (0.0, -0.4, 0.0), (0.2, 0.1, 0.8)])
+def test_the_gaits_feet_move_against_the_command_and_swing_back_lifted(velocity):
+    task = Walk()
+    before, middle, after = (feet_at(task, phase, velocity) for phase in (0.2, 0.25, 0.3))
+    moved = (after - before) / (0.1 * task.gait.period)
+    ahead, left, about = velocity
+    for foot in (0, 3):  # lf, rh
+        x, y, _ = before[foot]
+        asked = (about * y - ahead, -about * x - left)
+        np.testing.assert_allclose(moved[foot, :2], asked, rtol=0.2, atol=0.05)
+    lifts = middle[:, 2] - feet_at(task, None, velocity)[:, 2]
+    np.testing.assert_allclose(lifts, (0.0, 0.08, 0.08, 0.0), atol=0.015)
+    assert task.gait.on_ground(0.25).tolist() == [True, False, False, True]
+
+
+def test_without_lift_actions_are_relative_to_the_stance():
+    assert not Walk(lift=0.0).gait.offsets(0.25, np.array((0.5, 0.0, 0.0))).any()
+
+
+@pytest.mark.parametrize("asked", [(0.7, 0.0, 0.0), (0.0, 0.6, 0.0), (0.0, 0.0, 1.0)])
+def test_the_gait_alone_moves_it_that_way(env, asked):
+    env.reset(seed=3)
+    env.task.aim(asked)
+    moved = []
+    for _ in range(200):
+        *_, terminated, _, info = env.step(np.zeros(15, np.float32))
+        assert not terminated
+        moved.append(info["velocity"])
+    mean = np.mean(moved[50:], axis=0)
+    assert mean @ np.array(asked) > 0.5 * np.dot(asked, asked)
 
 
 def test_an_episode_has_four_commands_of_which_some_ask_to_stand():
@@ -94,9 +135,36 @@ def test_an_episode_has_four_commands_of_which_some_ask_to_stand():
     made.close()
 
 
+def test_shoves_push_the_trunk_once_during_each_command():
+    assert not Walk().initial_state(np.random.default_rng(0)).pushes
+    pushes = Walk(shove=80.0).initial_state(np.random.default_rng(0)).pushes
+    assert [int(each.start / 5.0) for each in pushes] == [0, 1, 2, 3]
+    assert {each.link for each in pushes} == {"quadruped::base"}
+    assert all(0.0 < math.hypot(*each.force) <= 80.0 for each in pushes)
+
+
+def test_a_push_acts_for_its_time_and_in_its_own_episode_alone(env):
+    pushes = [Push("quadruped::base", (0.0, 90.0, 0.0), 0.1, 0.1)]
+    drawn = replace(env.task.initial_state(np.random.default_rng(0)), pushes=pushes)
+
+    def speeds(initial, steps):
+        env.reset(seed=0, options={"initial_state": initial})
+        env.task.aim((0.0, 0.0, 0.0))
+        given = []
+        for _ in range(steps):
+            env.step(np.zeros(15, np.float32))
+            given.append(env.state.models["quadruped"].twist.linear[1])
+        return given
+
+    pushed, free = speeds(drawn, 10), speeds(replace(drawn, pushes=()), 10)
+    assert pushed[:4] == free[:4] and pushed[9] > free[9] + 0.3
+    speeds(drawn, 2)
+    assert speeds(replace(drawn, pushes=()), 10) == free
+
+
 def test_other_weights_change_the_reward_and_unknown_terms_are_named():
     calm, plain = env_of(weights={"posture": 0.0}), env_of()
-    action = np.full(12, 0.5, np.float32)
+    action = np.full(15, 0.5, np.float32)
     for each in (calm, plain):
         each.reset(seed=0)
     difference = calm.step(action)[1] - plain.step(action)[1]
@@ -106,14 +174,14 @@ def test_other_weights_change_the_reward_and_unknown_terms_are_named():
 
 
 def test_without_an_imu_the_trunks_own_motion_says_the_same():
-    tasks = Walk(), Walk()
+    tasks = Walk(lift=0.0), Walk(lift=0.0)  # it stands: steps shake the trunk
     blind = tasks[1]
     blind.imu, blind.query = None, tasks[0].reward_query
     envs = [RobotEnv(ROBOT, task) for task in tasks]
     for each in envs:
         each.reset(seed=4)
     for _ in range(20):
-        one, other = (each.step(np.full(12, 0.2, np.float32))[0] for each in envs)
+        one, other = (each.step(np.full(15, 0.2, np.float32))[0] for each in envs)
     np.testing.assert_allclose(one, other, atol=0.02)  # the IMU's are of up to 5 ms ago
     for each in envs:
         each.close()
