@@ -25,9 +25,7 @@ from robot_envs.world_state import (
 from robot_sim.physics.pose import Pose, Vector, conjugate, from_rpy, rotate, to_rpy
 
 DOWN = (0.0, 0.0, -1.0)
-FALLEN = (
-    0.5  # share of the height at the start, below which it has fallen; cosine of the largest tilt
-)
+FALLEN = 0.5  # of the height at the start, and the cosine of the tilt: below, it has fallen
 COMMANDS = 4  # of an episode
 STANDING = 0.1  # share of commands that ask to stand still
 UNASKED = 0.3  # share of the others' numbers that are 0
