@@ -26,6 +26,7 @@ from viser.infra._async_message_buffer import AsyncMessageBuffer
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
+from web_viewer import keys
 from web_viewer.address import LOOPBACK, TOKEN_BYTES, Address, PortInUse, has_display, is_loopback
 
 Answer = Callable[[Any, Request], Response | None]
@@ -106,7 +107,7 @@ def _with_head(response: Response) -> Response:
     """Has viser's page say that it is loading until its program runs, and fit a telephone."""
     packed = response.headers.get("Content-Encoding") == "gzip"
     body = gzip.decompress(response.body) if packed else response.body
-    body = body.replace(BEFORE_PROGRAM, BEFORE_PROGRAM + HEAD, 1)
+    body = body.replace(BEFORE_PROGRAM, BEFORE_PROGRAM + HEAD + keys.SCRIPT, 1)
     body = gzip.compress(body, 1) if packed else body
     headers = Headers(response.headers)
     del headers["Content-Length"]
@@ -137,6 +138,7 @@ USED = {  # what pages of ours send, and its check, by type; for a field's value
     "GuiUpdateMessage": lambda each: isinstance(each.uuid, str) and [*each.updates] == ["value"],
     "ViewerCameraMessage": _is_camera,
     "GetRenderResponseMessage": lambda each: isinstance(each.payload, bytes),
+    "CommandTriggerMessage": lambda each: isinstance(each.uuid, str),
 }
 
 

@@ -18,6 +18,7 @@ from PIL import Image
 
 from bullet_gazebo.clients.gz import ControlFailed
 from bullet_gazebo.scene import from_light, from_model
+from bullet_gazebo.window.drive_panel import DrivePanel
 from bullet_gazebo.window.model_panel import ModelPanel
 from bullet_gazebo.window.panels import Controllers, TimePanel
 from bullet_gazebo.window.remote_scene import Commands, RemoteScene
@@ -73,6 +74,8 @@ class Window:
             )
         with tabs.add_tab("Controllers"):
             self._tree = gui.add_html("")
+        with tabs.add_tab("Drive"):
+            self._drive = DrivePanel(gui)
         with tabs.add_tab("Sensors"):
             self._sensors = SensorPanel(server, WORLD)
         TrainingTab(server, tabs).start()
@@ -175,6 +178,7 @@ class Window:
     def _show_rest(self) -> None:
         if self._scene.is_live:
             self._time.show_speed()
+        self._drive.look()
         self._controllers.look()
         tree = self._controllers.as_html()
         if tree != self._tree.content:
