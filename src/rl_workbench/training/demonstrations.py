@@ -20,6 +20,7 @@ from rl_workbench.storage import reading, write_file
 from rl_workbench.training.checked import Env
 from rl_workbench.training.environments import make_environment, succeeded
 from rl_workbench.training.folder import library_versions, other_versions
+from rl_workbench.training.options import RunOptions
 
 FORM = 1  # of the files
 NAMES = "episode_*.npz"
@@ -237,3 +238,23 @@ def replay(path: Path, episode: Episode, env: Env, exactly: bool = True) -> Iter
         compare(step + 1, rewards=(float(reward), float(episode.rewards[step])),
                 ends=(tuple(map(bool, ended)), last))  # fmt: skip
         played = Played(copy.deepcopy(observation), action, float(reward), *last, info)
+
+
+def replayed(folder: str, run: RunOptions, env: Env) -> Iterator[list[Played]]:
+    """Replays demonstrations in a training's environment; leaves out those that are marked as failures.
+
+    Its wrapper and options may show other observations than were recorded.
+    """
+    if not folder:
+        raise WorkbenchError(
+            "--demos FOLDER names the demonstrations, as `demonstrate` writes them"
+        )
+    here = Origin(run.env_id, run.training_environment, run.wrapper)
+    found = load_all(Path(folder))
+    good = {path: each for path, each in found.items() if each.success is not False}
+    if not good:
+        raise WorkbenchError(f"{folder}: none of the {len(found)} demonstrations succeeded")
+    for path, episode in good.items():
+        if not episode.origin.same_id(here.env_id):
+            raise WorkbenchError(f"{path} is of {episode.env_id}, not of {here.env_id}")
+        yield list(replay(path, episode, env, exactly=episode.origin[1:] == here[1:]))
