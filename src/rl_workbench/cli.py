@@ -26,6 +26,8 @@ COMMANDS = {
     "record": "episodes as GIF, MP4 or a page that plays them; needs no display",
     "plot": "the training curves of runs as PNG",
     "export": "a policy as TorchScript, which torch runs without this package",
+    "demonstrate": "episodes of a policy as demonstrations: seeds and actions, some kilobytes each",
+    "dataset": "replays demonstrations, and writes what was observed, with pictures and sensors",
     "compare": "groups of runs: table per seed, IQM, intervals, curves",
     TRAIN: "train with DQN, REINFORCE or Stable-Baselines3",
     "sweep": "search options with Optuna",

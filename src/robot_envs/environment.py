@@ -1,6 +1,6 @@
 """The Gymnasium environment: commands to robots, and the task's evaluation of the state."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -341,6 +341,25 @@ class RobotEnv(SavedEnv):
         observation = self._observe(measured)
         info = checks.checked(task, "info", evaluator.info(state), dict)
         return observation, reward, terminated, truncated, info
+
+    def sensor_reader(self, names: Sequence[str]) -> Callable[[], dict[str, Any]]:
+        """Has further sensors measure, as "camera" or "camera@640x480", from the next reset on.
+
+        Returns a function that returns what each has measured last, by "sensor.field"; it changes nothing of
+        what the robot does. Raises SimulatorError for a sensor that there isn't.
+        """
+        self._check_open()
+        query = both(self.task.query, self.task.reward_query)
+        self.backend.look(both(query, StateQuery(sensors=tuple(names))))
+
+        def read() -> dict[str, Any]:
+            assert self._state is not None, "after a reset"
+            readings = [(name, self._state.sensors[name].values) for name in names]
+            return {
+                f"{name}.{field}": each for name, all_ in readings for field, each in all_.items()
+            }
+
+        return read
 
     def __reduce__(self) -> Any:
         raise TypeError("an environment can't be copied or pickled; save_state() takes a snapshot")

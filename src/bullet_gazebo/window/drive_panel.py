@@ -2,6 +2,7 @@
 
 import threading
 import time
+from functools import partial
 
 import rosgraph
 import rospy
@@ -38,7 +39,7 @@ class DrivePanel:
         buttons.on_click(lambda _: self._press(shares[buttons.value]))
         for key, label, share in MOTIONS:
             command = gui.add_command(f"Drive: {label.lower()}", hotkey=key)  # type: ignore[arg-type]
-            command.on_trigger(lambda _, share=share: self._press(share))
+            command.on_trigger(partial(self._press, share))
         gui.add_command("Drive: stop", hotkey="K").on_trigger(lambda _: self._pressed.clear())
         self._pressed: dict[tuple[float, float, float], float] = {}  # until when [s of wall time]
         self._publisher: rospy.Publisher | None = None
@@ -57,7 +58,7 @@ class DrivePanel:
             self._topic.options = names
             self._topic.value = chosen if chosen in names else names[0]  # type: ignore[misc]
 
-    def _press(self, share: tuple[float, float, float]) -> None:
+    def _press(self, share: tuple[float, float, float], _event: object = None) -> None:
         self._pressed[share] = time.monotonic() + DEAD_MAN
         self._wake.set()
 

@@ -117,6 +117,26 @@ class ReinforceSettings:
 
 
 @dataclass(frozen=True)
+class CloningSettings:
+    """The options of behaviour cloning. Steps are gradient steps."""
+
+    demos: str = option(
+        "", "folder of demonstrations, as `demonstrate` writes them", metavar="FOLDER"
+    )
+    learning_rate: float = option(1e-3, "learning rate of AdamW", 0, 10)
+    weight_decay: float = option(
+        1e-4, "share of the weights that a step takes away, by the rate", 0, 1
+    )
+    batch_size: int = option(256, "moments of demonstrations per gradient step", 1, 2**24)
+    hidden_sizes: tuple[int, ...] = option((256, 256), "units in each hidden layer")
+
+    def __post_init__(self) -> None:
+        check_options(self)
+        if min(self.hidden_sizes, default=1) < 1:
+            raise WorkbenchError(f"hidden_sizes must be positive, not {self.hidden_sizes}")
+
+
+@dataclass(frozen=True)
 class DocumentSettings:
     """The options of the policy-gradient document's algorithm, which are constants in its script."""
 

@@ -68,6 +68,20 @@ _OURS = (
         settings=f"{_SETTINGS}:DocumentSettings",
         defaults=_EPISODIC,
     ),
+    AlgorithmKind(
+        name="bc",
+        about="a policy by behaviour cloning of demonstrations (--demos), from vectors or images",
+        config="bc.yaml",
+        implementation=f"{_TRAINING}.bc",
+        settings=f"{_SETTINGS}:CloningSettings",
+        keeps_dict=True,
+        defaults={
+            "total_timesteps": 4_000,
+            "eval_frequency": 2_000,
+            "eval_episodes": 20,
+            "checkpoint_frequency": 1_000,
+        },
+    ),
 )
 
 

@@ -213,6 +213,26 @@ class PickCubeGoal(Picking, GoalTask):
         return away.max(axis=-1) <= CLOSE / UNIT
 
 
+def pick(observation: Any, env: Any = None) -> np.ndarray:
+    """Returns a demonstrator's action in `PickCube` and `PickCubeGoal`: over the cube, down, grasp, lift."""
+    goal = None
+    if isinstance(observation, dict):
+        goal = (observation["desired_goal"] - observation["achieved_goal"])[:3].astype(float)
+        observation = observation["observation"]
+    seen = np.asarray(observation, float)
+    way, wanted = UNIT * seen[3:6], SIZE + 0.02 * seen[10]  # [m]
+    holds = wanted < SIZE  # closed, once it was there
+    move, is_near = np.zeros(3), float(np.linalg.norm(way)) < (NEAR if holds else 0.3 * NEAR)
+    if is_near and holds:
+        up = 1.5 * LIFTED + ON_TABLE - MIDDLE[2] - UNIT * seen[2]
+        move = np.array([0.0, 0.0, up]) if goal is None else UNIT * goal
+    elif not is_near:
+        above = min(2.0 * max(math.hypot(way[0], way[1]) - 0.006, 0.0), 0.06)
+        move = way + (0.0, 0.0, above)
+    closing = 1.0 if is_near else -1.0
+    return np.clip([*(move / STEP), closing], -1.0, 1.0).astype(np.float32)
+
+
 def draw_cube(rng: np.random.Generator) -> np.ndarray:
     """Returns a place of the cube on the table [m]."""
     x, y = rng.uniform(np.negative(SPREAD), SPREAD)

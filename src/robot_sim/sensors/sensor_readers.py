@@ -1,19 +1,21 @@
 """Sensor readings by name: for steps over ROS, in-process environments, and controllers."""
 
+import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache, partial
 from importlib import import_module
 from itertools import chain
 from pkgutil import iter_modules
 from typing import Any, NamedTuple
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
 from file_access.text import did_you_mean
 from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import RobotHardware, SensorHandle
-from robot_sim.physics.description import DescriptionError, Plugin, library_of
+from robot_sim.physics.description import DescriptionError, Plugin, Sensor, library_of
 from robot_sim.physics.model import Model
 from robot_sim.sensors.schedule import SensorClock
 from robot_sim.sensors.sensing import Measurement, Mount, Sensing
@@ -113,7 +115,11 @@ def _is_gone(mount: Mount) -> bool:
 
 
 def find_sensor(sim: Simulator, sensing: Sensing, name: str) -> tuple[Mount, type[Measurement]]:
-    """Returns the sensor of a name, and what makes it; raises UnknownName."""
+    """Returns the sensor of a name, and what makes it; raises UnknownName.
+
+    A name may ask for a camera's picture in another size: front_camera@640x480.
+    """
+    name, is_sized, size = name.partition("@")
     known: dict[str, list[tuple[Mount, type[Measurement]]]] = {}
     for plain, mount, maker in _sensors(sim, sensing):
         for each in (plain, f"{mount.model.name}{SCOPE}{plain}"):
@@ -125,7 +131,27 @@ def find_sensor(sim: Simulator, sensing: Sensing, name: str) -> tuple[Mount, typ
         there = [each for each in known if SCOPE not in each]
         near = did_you_mean(name, known) or f"; there are: {', '.join(there) or 'none'}"
         raise UnknownName(f"there is no sensor '{name}' that can be read{near}")
-    return found[0]
+    mount, maker = found[0]
+    return replace(mount, sensor=_sized(mount.sensor, size)) if is_sized else mount, maker
+
+
+def _sized(sensor: Sensor | None, size: str) -> Sensor:
+    """Returns a camera whose picture has a size, as 640x480; raises UnknownName."""
+    sides = size.split("x")
+    if len(sides) != 2 or not all(side.isdecimal() and side.isascii() for side in sides):
+        raise UnknownName(f"the size of a camera's picture is WIDTHxHEIGHT, not '{size}'")
+    element = copy.deepcopy(sensor.element) if sensor else WITHOUT.element
+    camera = element.find("camera")
+    if sensor is None or camera is None:
+        raise UnknownName(
+            f"only a camera has a size, as @{size}: '{sensor and sensor.name}' is none"
+        )
+    image = camera.find("image")
+    image = SubElement(camera, "image") if image is None else image
+    for tag, side in zip(("width", "height"), sides, strict=True):
+        found = image.find(tag)
+        (SubElement(image, tag) if found is None else found).text = side
+    return replace(sensor, element=element)
 
 
 def _sensors(sim: Simulator, sensing: Sensing) -> Iterator[tuple[str, Mount, type[Measurement]]]:

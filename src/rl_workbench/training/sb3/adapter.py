@@ -18,6 +18,7 @@ from rl_workbench.training.checked import CURVES
 from rl_workbench.training.checkpoints import fitting
 from rl_workbench.training.environments import succeeded
 from rl_workbench.training.options import TrainingOptions
+from rl_workbench.training.sb3.demonstrated import fill
 from rl_workbench.training.sb3.models import load_policy, make_learning_model
 from rl_workbench.training.sb3.positions import ModelMark, Positions, buffer_state, restore_buffer
 from rl_workbench.training.training import Training
@@ -53,6 +54,7 @@ class SB3Training(Algorithm):
 
     def __init__(self, options: TrainingOptions, model: Any) -> None:
         self._run, self._name, self._model = options.run, options.kind.name, model
+        self._demos = str(getattr(options.hyperparameters, "demos", ""))
         self._positions = Positions(model)
         self._callback: FrameCallback | None = None
 
@@ -134,10 +136,15 @@ class SB3Training(Algorithm):
         return self._positions.state_dict()
 
     def start_environment(self, state: dict[str, Any] | None, say: Say) -> None:
-        """Repeats the episodes under way. In a new training the model seeds and begins them."""
+        """Repeats the episodes under way. In a new training the model seeds and begins them.
+
+        Demonstrations begin a new training's buffer.
+        """
         if state is not None:
             for index in self._positions.load_state_dict(state):
                 self._say_lost(index, say)
+        elif self._demos and not self._model.replay_buffer.size():  # a checkpoint has them
+            fill(self._model, Path(self._demos), self._run, say)
 
     def _say_lost(self, index: int, say: Say) -> None:
         count = self._model.n_envs

@@ -46,7 +46,7 @@ class SB3Options:
     def own(self) -> dict[str, Any]:
         """The arguments of the algorithm's class and of its network."""
         ours = {"policy", "policy_kwargs", "lr_schedule", "her", "n_sampled_goal",
-                "goal_selection_strategy"}  # fmt: skip
+                "goal_selection_strategy", "demos"}  # fmt: skip
         return {
             each.name: getattr(self, each.name) for each in fields(self) if each.name not in ours
         }
@@ -115,6 +115,9 @@ class OffPolicyOptions(SB3Options):
         "future", "her: the goal is achieved later in the episode, at its end, or anywhere in it",
         choices=("future", "final", "episode"),
     )  # fmt: skip
+    demos: str = option(
+        "", "a folder of demonstrations, which begin the replay buffer", metavar="FOLDER"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,117 @@
+"""Behaviour cloning: it does what the demonstrator did, resumes to the bit, refuses wrong demonstrations."""
+
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from support.training.learning_fakes import POLE, register_with
+from support.training.training_runs import (
+    InterruptAfter,
+    assert_same_run,
+    failure,
+    options_of,
+    resume,
+    run,
+    summary,
+)
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training import demonstrations
+from rl_workbench.training.demonstrations import Origin, Recorder
+
+BC = {"total_timesteps": 60, "hidden_sizes": "16", "batch_size": 32, "eval_episodes": 2,
+      "eval_frequency": 30, "checkpoint_frequency": 25, "log_frequency": 10}  # fmt: skip
+
+
+class Follow(gymnasium.Env):
+    """A picture and a number, which say where to go: rewards are distances from there."""
+
+    observation_space = gymnasium.spaces.Dict({
+        "picture": gymnasium.spaces.Box(0, 255, (40, 40, 1), np.uint8),
+        "number": gymnasium.spaces.Box(-9.0, 9.0, (1,), np.float32),
+    })  # fmt: skip
+    action_space = gymnasium.spaces.Box(-2.0, 2.0, (2,), np.float32)
+    max_steps = 10
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self._taken = 0
+        return self._drawn(), {}
+
+    def _drawn(self):
+        self.place = self.np_random.uniform(-1.0, 1.0, 2)
+        picture = np.full((40, 40, 1), 255 * (self.place[0] + 1.0) / 2.0, np.uint8)
+        return {"picture": picture, "number": self.place[1:].astype(np.float32)}
+
+    def step(self, action):
+        self._taken += 1
+        away = float(np.linalg.norm(action - self.place))
+        return (
+            self._drawn(),
+            -away,
+            False,
+            self._taken == self.max_steps,
+            {"is_success": away < 0.5},
+        )
+
+
+def recorded(folder: Path, env_id: str, act, episodes: int = 8, success: bool = True) -> Path:
+    folder.mkdir()
+    origin = Origin(env_id, {})
+    env = origin.make()
+    recorder = Recorder(env, origin)
+    for seed in range(episodes):
+        observation = recorder.begin(seed)
+        for _ in range(10):
+            observation = recorder.step(act(observation, env))
+        demonstrations.save(folder, recorder.episode(success))
+    env.close()
+    return folder
+
+
+@pytest.fixture
+def balanced(tmp_path: Path) -> Path:
+    return recorded(tmp_path / "demos", POLE, lambda seen, env: int(seen[2] < 0.0))
+
+
+def cloning(demos: Path, **changed: object):
+    return options_of("bc", BC | {"env_id": POLE, "demos": str(demos)} | changed)
+
+
+@pytest.mark.parametrize("asked", [1, 20, 47])
+def test_interrupted_and_resumed_is_the_same_training(
+    balanced: Path, tmp_path: Path, asked: int
+) -> None:
+    whole = run(cloning(balanced), tmp_path / "whole")
+    stopped = run(cloning(balanced), tmp_path / "run", InterruptAfter(asked))
+    assert summary(stopped)["interrupted"]
+    assert_same_run(whole, resume(stopped))
+
+
+def test_pictures_and_numbers_are_learned_from(tmp_path: Path, monkeypatch) -> None:
+    env_id = register_with(monkeypatch, Follow)
+    demos = recorded(tmp_path / "demos", env_id, lambda _, env: env.unwrapped.place)
+    folder = run(
+        cloning(demos, env_id=env_id, total_timesteps=600, eval_frequency=0), tmp_path / "run"
+    )
+    best = torch.load(folder / "best.pt", weights_only=True)["best_at_the_end"]
+    assert best[1] > -2.0  # at random -13
+
+
+def test_wrong_demonstrations_are_one_line(balanced: Path, tmp_path: Path) -> None:
+    assert "--demos FOLDER" in failure(lambda: run(options_of("bc", BC), tmp_path / "0"))
+    text = failure(lambda: run(cloning(balanced, env_id="CartPole-v1"), tmp_path / "1"))
+    assert f"is of {POLE}, not of CartPole-v1" in text
+    bad = recorded(tmp_path / "bad", POLE, lambda *_: 0, 1, success=False)
+    assert "none of the 1 demonstrations succeeded" in failure(
+        lambda: run(cloning(bad), tmp_path / "2")
+    )
+
+
+def test_others_than_a_training_began_with_are_refused(balanced: Path, tmp_path: Path) -> None:
+    stopped = run(cloning(balanced), tmp_path / "run", InterruptAfter(20))
+    demonstrations.paths(balanced)[0].unlink()
+    with pytest.raises(WorkbenchError, match="are others than those"):
+        resume(stopped)
