@@ -119,7 +119,6 @@ class InProcessWorld(RobotBackend):
         self._reads_more = False  # than the joints
         self._held: dict[str, Any] = {}
         self._begin = 0  # [ns] of the episode
-        self._pushed: set[str] = set()  # links, in this episode
         self._knows_contacts = False
 
     def _add(self, robot: Robot) -> tuple[Model, RobotHardware, Loaded]:
@@ -195,9 +194,7 @@ class InProcessWorld(RobotBackend):
     def _push(self, pushes: Sequence[Push]) -> None:
         """Queues an episode's pushes, in place of those of the one before."""
         applied = self._sim.applied
-        for name in self._pushed:
-            applied.clear_wrenches(name)
-        self._pushed = {each.link for each in pushes}
+        applied.wrenches.clear()
         with _refusals():
             for each in pushes:
                 link = find_link(self._sim.world, each.link)

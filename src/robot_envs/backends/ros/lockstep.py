@@ -288,6 +288,8 @@ class LockstepWorld(RobotBackend):
             self._look(self._names)  # sensors that states have are read from now on
             request = RestoreStateRequest(data=whole.to_bytes(), seed=seed)
             self._succeed(self._restore, request)
+            wrenches = whole.state["applied"]["wrenches"]
+            self._variation.pushed.update(f"{model}::{link}" for model, link, *_ in wrenches)
         self._begun, self._held = begun, held
 
     def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:

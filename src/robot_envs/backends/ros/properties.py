@@ -51,7 +51,7 @@ class RosVariation:
         self._timeout = timeout
         self._clients: dict[str, SimulatorService] = {}
         self._weightless: set[str] = set()
-        self._pushed: set[str] = set()  # links, in this episode
+        self.pushed: set[str] = set()  # links, in any episode so far
         self._apply = Applier(scene, self)
 
     def __call__(self, variation: Variation) -> None:
@@ -71,9 +71,9 @@ class RosVariation:
 
     def push(self, pushes: Sequence[Push], begun: int) -> None:
         """Queues the pushes of an episode, which began at `begun` [ns], in place of the last one's."""
-        for name in self._pushed:
+        for name in self.pushed:
             self._call("/gazebo/clear_body_wrenches", BodyRequest, name)
-        self._pushed = {each.link for each in pushes}
+        self.pushed.update(each.link for each in pushes)
         for each in pushes:
             start, duration = (round(time * NANOSECONDS) for time in each[2:])
             wrench, times = (

@@ -162,6 +162,26 @@ def test_a_push_acts_for_its_time_and_in_its_own_episode_alone(env):
     assert speeds(replace(drawn, pushes=()), 10) == free
 
 
+@pytest.mark.parametrize("backend", ["bullet", pytest.param("ros-own", marks=pytest.mark.slow)])
+def test_a_push_of_a_restored_moment_ends_with_its_episode(env, backend):
+    drawn = replace(env.task.initial_state(np.random.default_rng(0)), pushes=[])
+    pushed = replace(drawn, pushes=[Push("quadruped::base", (0.0, 90.0, 0.0), 0.1, 0.1)])
+    env.reset(seed=0, options={"initial_state": pushed})
+    moment = env.save_state()
+    other = env_of(backend=backend)
+    twists = []
+    for restored in (False, True):
+        other.reset(seed=0)
+        if restored:
+            other.restore_state(moment)
+        other.reset(seed=0, options={"initial_state": drawn})
+        for _ in range(10):
+            other.step(np.zeros(15, np.float32))
+        twists.append(other.state.models["quadruped"].twist)
+    assert twists[0] == twists[1]
+    other.close()
+
+
 def test_other_weights_change_the_reward_and_unknown_terms_are_named():
     calm, plain = env_of(weights={"posture": 0.0}), env_of()
     action = np.full(15, 0.5, np.float32)
