@@ -41,7 +41,7 @@ class Stretch(Task):
         return gymnasium.spaces.Box(-10.0, 10.0, (2,), np.float32)  # [rad]
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
-        return InitialState(joints={"elbow": rng.uniform(0.0, 2.0)})
+        return InitialState(joints={"elbow": rng.uniform(0.0, 1.5)})
 
     def apply(self, action: np.ndarray, state: WorldState) -> Commands:
         return {"shoulder_controller": float(action[0]), "elbow_controller": float(action[1])}

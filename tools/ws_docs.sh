@@ -9,7 +9,7 @@ API=(
         robot_envs.backends.ros.session.RosSession"
     "robot_envs.testing"
     "rl_workbench rl_workbench.agents.dqn_agent.DQNAgent rl_workbench.agents.settings rl_workbench.tools.policies
-        rl_workbench.tools.runs"
+        rl_workbench.tools.runs rl_workbench.training.demonstrations"
     "robot_sim"
     "bullet_gazebo.plugins.plugin_loader.PluginContext bullet_gazebo.plugins.sensor_topics.SensorPlugin"
     "ros_utils ros_utils.readiness ros_utils.ros_controllers ros_utils.ros_gazebo ros_utils.ros_launch

@@ -45,8 +45,8 @@ class Origin(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Episode:
-    """A demonstration. It need not have ended: a driver may stop it where it has succeeded."""
+class Demonstration:
+    """An episode. It need not have ended: a driver may stop it where it has succeeded."""
 
     env_id: str
     env_kwargs: dict[str, Any]
@@ -132,10 +132,10 @@ class Recorder:
             observation = self.step(action)
         return observation
 
-    def episode(self, success: bool | None = None) -> Episode:
+    def episode(self, success: bool | None = None) -> Demonstration:
         """Returns the episode so far; `success` overrides what the environment says in its last info."""
         success = self._success if success is None else success
-        return Episode(
+        return Demonstration(
             *self._origin, self._seed, success, self._terminated, self._truncated, self._versions,
             np.array(self._actions), np.array(self._rewards), np.array(self._seen, np.uint64),
         )  # fmt: skip
@@ -151,11 +151,11 @@ def _digest(env: Env, observation: Any) -> int:
     return int.from_bytes(hashlib.blake2b(flat.tobytes(), digest_size=8).digest(), "little")
 
 
-def save(folder: Path, episode: Episode) -> Path:
+def save(folder: Path, episode: Demonstration) -> Path:
     """Writes an episode behind those of a folder; returns its file."""
     taken = [int(path.stem.rpartition("_")[2]) for path in paths(folder)]
     path = folder / f"episode_{max(taken, default=-1) + 1:05d}.npz"
-    values = {each.name: getattr(episode, each.name) for each in fields(Episode)}
+    values = {each.name: getattr(episode, each.name) for each in fields(Demonstration)}
     arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
     header = {name: value for name, value in values.items() if name not in arrays}
     text, memory = json.dumps({"form": FORM, **header}), io.BytesIO()
@@ -169,18 +169,20 @@ def paths(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob(NAMES) if path.stem[8:].isdecimal())
 
 
-def load(path: Path) -> Episode:
+def load(path: Path) -> Demonstration:
     """Reads an episode."""
     with reading(path, "isn't a demonstration, or it is damaged: {}"), np.load(path) as content:
         header = json.loads(str(content[_HEADER]))
         if header.pop("form", None) != FORM:
             raise ValueError("it is of another version of this program")
-        episode = Episode(**header, **{name: content[name] for name in set(content) - {_HEADER}})
+        episode = Demonstration(
+            **header, **{name: content[name] for name in set(content) - {_HEADER}}
+        )
         steps, kinds = (
             len(episode.actions),
             (str, dict, str, int, bool | NoneType, bool, bool, dict),
         )
-        for field, kind in zip(fields(Episode), kinds, strict=False):
+        for field, kind in zip(fields(Demonstration), kinds, strict=False):
             if not isinstance(getattr(episode, field.name), kind):
                 raise ValueError(f"its {field.name} is {getattr(episode, field.name)!r:.50}")
         if not steps or (len(episode.rewards), len(episode.seen)) != (steps, steps + 1):
@@ -188,7 +190,7 @@ def load(path: Path) -> Episode:
     return episode
 
 
-def load_all(folder: Path) -> dict[Path, Episode]:
+def load_all(folder: Path) -> dict[Path, Demonstration]:
     """Reads the episodes of a folder, which have to be of one environment."""
     found = {path: load(path) for path in paths(folder)}
     if not found:
@@ -204,7 +206,7 @@ def load_all(folder: Path) -> dict[Path, Episode]:
     return found
 
 
-def replay(path: Path, episode: Episode, env: Env, exactly: bool = True) -> Iterator[Played]:
+def replay(path: Path, episode: Demonstration, env: Env, exactly: bool = True) -> Iterator[Played]:
     """Plays an episode again, in an environment like its own, and compares it to the bit.
 
     Without `exactly` the observations may differ, as those of an environment with other options do; rewards
