@@ -21,8 +21,8 @@ MOTIONS = (
 )  # fmt: skip
 HELP = (
     "<div style='padding: 0 0.8em'><small>Hold I and M (ahead, back), J and L (turn), U and O (to the"
-    " sides), or push a gamepad's sticks, with the mouse on the scene. Half a second without a key, and it"
-    " stops.</small></div>"
+    " sides), or push a gamepad's sticks, with the mouse on the scene. It stops when all"
+    " keys are let go.</small></div>"
 )
 
 
