@@ -5,6 +5,7 @@ nothing and runs no code of theirs: what this process doesn't know stays a `Reco
 `MOST` entries, and is nested at most `DEEPEST` times.
 """
 
+import math
 import re
 import sys
 from collections import Counter, deque
@@ -14,7 +15,7 @@ from typing import Any, NamedTuple
 import msgpack
 import numpy as np
 
-from robot_sim.state_dict import Held, StateError, fields_of
+from robot_sim.state_dict import ATOMS, Held, StateError, fields_of, plain_key
 
 DEEPEST = 100
 MOST = 2**22  # entries of lists and dictionaries, those of records and arrays included
@@ -49,10 +50,9 @@ def pack(value: Any) -> bytes:
     Raises:
         StateError: If something isn't plain data.
     """
-    try:
-        return bytes(msgpack.packb(value, default=_extension, strict_types=True))
-    except (ValueError, OverflowError) as error:  # too deep
-        raise StateError(f"it can't be written: {error}") from error
+    for _ in _entries(value):
+        pass  # raises if it is nested too deeply
+    return _pack(value)
 
 
 def unpack(data: bytes) -> Any:
@@ -61,7 +61,10 @@ def unpack(data: bytes) -> Any:
     Raises:
         StateError: If they are damaged, or refer to a class that isn't imported.
     """
-    return _unpack(data, 0, Counter())
+    value = _unpack(data, 0, Counter())
+    for _ in _entries(value):
+        pass  # raises if it is nested too deeply
+    return value
 
 
 def resolve(value: Any) -> Any:
@@ -71,45 +74,63 @@ def resolve(value: Any) -> Any:
         StateError: If a class is still unknown.
     """
     resolved = unpack(pack(value))
-    if record := next(_unknown(resolved), None):
-        raise StateError(f"there is no class {record.module}.{record.name}"[:300])
+    for entry in _entries(resolved):
+        if isinstance(entry, Record):
+            raise StateError(f"there is no class {f'{entry.module}.{entry.name}'!r:.300}")
     return resolved
 
 
-def _unknown(value: Any) -> Iterator[Record]:
-    if isinstance(value, Record):
-        yield value
-    elif isinstance(value, dict):
-        for each in value.values():
-            yield from _unknown(each)
-    elif isinstance(value, (list, tuple, deque)):
-        for each in value:
-            yield from _unknown(each)
-    elif hasattr(value, "__dataclass_fields__"):
-        for name in fields_of(type(value)):
-            yield from _unknown(getattr(value, name))
+def _entries(value: Any) -> Iterator[Any]:
+    """Yields a value and all that is in it, level by level.
+
+    Raises:
+        StateError: If it is nested too deeply.
+    """
+    level = [value]
+    for _ in range(DEEPEST):
+        yield from level
+        level = [entry for container in level for entry in _within(container)]
+        if not level:
+            return
+    raise StateError("it is nested too deeply")
+
+
+def _within(value: Any) -> Iterable[Any]:
+    kind = type(value)
+    if kind in ATOMS:
+        return ()
+    if isinstance(value, dict):
+        return value.values()
+    if isinstance(value, (list, tuple, deque)):
+        return value
+    fields = fields_of(kind) if hasattr(kind, "__dataclass_fields__") else ()
+    return [getattr(value, name) for name in fields]
+
+
+def _pack(value: Any) -> bytes:
+    return bytes(msgpack.packb(value, default=_extension, strict_types=True))
 
 
 def _extension(value: Any) -> msgpack.ExtType:
     kind: Any = type(value)
     if kind is tuple:
-        return msgpack.ExtType(TUPLE, pack(list(value)))
+        return msgpack.ExtType(TUPLE, _pack(list(value)))
     if kind is np.ndarray:
         _dtype(value.dtype.str)
         content = [value.dtype.str, list(value.shape), value.flags.writeable, value.tobytes()]
-        return msgpack.ExtType(ARRAY, pack(content))
+        return msgpack.ExtType(ARRAY, _pack(content))
     if isinstance(value, np.generic):
         _dtype(value.dtype.str)
-        return msgpack.ExtType(SCALAR, pack([value.dtype.str, value.tobytes()]))
+        return msgpack.ExtType(SCALAR, _pack([value.dtype.str, value.tobytes()]))
     if kind is int:
         size = value.bit_length() // 8 + 1
         if size > LONGEST_INTEGER:
             raise StateError(f"it has an integer of {size} bytes")
         return msgpack.ExtType(INTEGER, value.to_bytes(size, "little", signed=True))
     if kind is deque:
-        return msgpack.ExtType(DEQUE, pack([value.maxlen, list(value)]))
+        return msgpack.ExtType(DEQUE, _pack([value.maxlen, list(value)]))
     if kind is Record:
-        return msgpack.ExtType(RECORD, pack(list(value)))
+        return msgpack.ExtType(RECORD, _pack(list(value)))
     if isinstance(value, dict):
         fields: Any = dict(value)
     elif hasattr(kind, "_fields"):
@@ -118,12 +139,14 @@ def _extension(value: Any) -> msgpack.ExtType:
         fields = [getattr(value, name) for name in fields_of(kind)]
     else:
         raise StateError(f"a {kind.__qualname__} isn't plain data")
-    return msgpack.ExtType(RECORD, pack([kind.__module__, kind.__qualname__, fields]))
+    return msgpack.ExtType(RECORD, _pack([kind.__module__, kind.__qualname__, fields]))
 
 
 def _unpack(data: bytes, depth: int, count: Counter[str]) -> Any:
     if depth > DEEPEST:
         raise StateError("it is nested too deeply")
+
+    longest = min(MOST, len(data))  # lists are made as long as they say
 
     def counted(entries: list[Any]) -> list[Any]:
         count["entries"] += len(entries)
@@ -132,8 +155,9 @@ def _unpack(data: bytes, depth: int, count: Counter[str]) -> Any:
         return entries
 
     def dictionary(pairs: list[Any]) -> dict[Any, Any]:
-        if len(counted(pairs)) > ALIKE:
-            hashes = Counter([hash(key) for key, _ in pairs])
+        keys = [plain_key(key) for key, _ in counted(pairs)]
+        if len(keys) > ALIKE:
+            hashes = Counter(map(hash, keys))
             if max(hashes.values()) > ALIKE:
                 raise StateError("it has a dictionary whose keys are too much alike")
         return dict(pairs)
@@ -146,7 +170,7 @@ def _unpack(data: bytes, depth: int, count: Counter[str]) -> Any:
             return tuple(given)
         if code == ARRAY:
             dtype, shape, is_writeable, numbers = given
-            memory: Any = bytearray(numbers) if is_writeable else numbers
+            memory: Any = bytearray(memoryview(numbers)) if is_writeable else numbers
             return np.frombuffer(memory, _dtype(dtype)).reshape(shape)
         if code == SCALAR:
             dtype, number = given
@@ -161,11 +185,11 @@ def _unpack(data: bytes, depth: int, count: Counter[str]) -> Any:
     try:
         return msgpack.unpackb(
             data, ext_hook=extension, list_hook=counted, object_pairs_hook=dictionary,
-            strict_map_key=False, max_array_len=MOST, max_map_len=MOST,
+            strict_map_key=False, max_array_len=longest, max_map_len=longest, timestamp=1,
         )  # fmt: skip
-    except (TypeError, ValueError, MemoryError, msgpack.exceptions.UnpackException) as error:
-        if isinstance(error, StateError):
-            raise
+    except StateError:
+        raise
+    except (ArithmeticError, TypeError, ValueError, MemoryError, msgpack.UnpackException) as error:
         raise StateError(f"it is damaged: {error!r:.200}") from error
 
 
@@ -186,6 +210,8 @@ def _record(module: Any, name: Any, fields: Any) -> Any:
         if kind is Record:
             raise StateError("it has a record of records")
         if issubclass(kind, dict) and isinstance(fields, dict):
+            if kind.__basicsize__ != dict.__basicsize__:  # an OrderedDict has a memory of its own
+                raise StateError(f"it has a wrong record of {module}.{name}"[:300])
             entries: dict[Any, Any] = dict.__new__(kind)
             dict.update(entries, fields)
             return entries
@@ -220,13 +246,17 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
     )
     numbers = (int, float)
     if type(there) in numbers and type(given) in numbers:
+        is_number = math.isfinite(given) if isinstance(there, int) else True
         counts = isinstance(given, int) and abs(there) < LARGEST  # generators have larger numbers
-        return f"{place} is {given}" if counts and abs(given) >= LARGEST else ""
+        is_small = is_number and not (counts and abs(given) >= LARGEST)
+        return "" if is_small else f"{place} is {given}"
     both = type(there), type(given)
     if both[0] is not both[1] and set(both) != {list, tuple}:
         return f"{place} is a {type(given).__name__}, not a {type(there).__name__}"
-    if isinstance(there, np.ndarray) and (there.dtype, there.ndim) != (given.dtype, given.ndim):
-        return f"{place} is an array of {given.dtype}{list(given.shape)}"
+    if isinstance(there, np.ndarray):
+        sizes = [each.shape if exactly else each.ndim for each in (there, given)]
+        if there.dtype != given.dtype or sizes[0] != sizes[1]:
+            return f"{place} is an array of {given.dtype}{list(given.shape)}"
     if exactly and isinstance(there, (dict, list, tuple)):
         keys, others = (
             each if isinstance(each, dict) else range(len(each)) for each in (there, given)
@@ -235,6 +265,9 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
             return f"{place} has {list(others)!s:.200}, not {list(keys)!s:.200}"
     entries = there.items() if isinstance(there, dict) else ()
     lost = any(key not in given and _refers(each) for key, each in entries)
+    if isinstance(there, list):
+        objects = zip(there, given, strict=False)
+        lost = any(isinstance(one, Held) and other is None for one, other in objects)
     if lost or (isinstance(there, (list, tuple)) and len(there) != len(given) and _refers(there)):
         return f"{place} lacks joints, or other parts that are here"
     pairs: Iterable[tuple[Any, Any, Any]] = ()

@@ -225,12 +225,12 @@ def _saved(value: Any) -> Any:
     if kind is tuple:
         return tuple([_saved(each) for each in value])
     if kind is dict or kind is defaultdict:
-        return {_key(key): _saved(each) for key, each in value.items()}
+        return {plain_key(key): _saved(each) for key, each in value.items()}
     if kind is deque:
         return deque(map(_saved, value), value.maxlen)
     if isinstance(value, dict) and not hasattr(value, "__dict__"):  # one with other texts
         entries: dict[Any, Any] = dict.__new__(kind)
-        dict.update(entries, {_key(key): _saved(each) for key, each in value.items()})
+        dict.update(entries, {plain_key(key): _saved(each) for key, each in value.items()})
         return entries
     if kind is np.ndarray and not value.dtype.hasobject:
         return value.copy() if value.flags.writeable else value
@@ -265,9 +265,10 @@ def fields_of(kind: Any) -> tuple[str, ...]:
     return tuple([each.name for each in dataclasses.fields(kind)])
 
 
-def _key(key: Any) -> Any:
+def plain_key(key: Any) -> Any:
+    """Returns a dictionary's key, if it is plain data."""
     if type(key) is tuple:
-        return tuple([_key(each) for each in key])
+        return tuple([plain_key(each) for each in key])
     if type(key) not in ATOMS:
         raise _Unknown(f"a dictionary with a {type(key).__qualname__} as key")
     return key

@@ -142,6 +142,7 @@ def test_a_refused_one_changes_nothing():
     ("name", "change"),
     [
         ("gripper_controller", lambda own: own["pids"].update({"left_finger/pid": None})),
+        ("gripper_controller", lambda own: own["_loops"].__setitem__(0, None)),
         ("joint_state_controller", lambda own: own.pop("_joints")),
         ("joint_state_controller", lambda own: own["_joints"].pop()),
         ("joint_state_controller", lambda own: own.update(_joints=None)),
@@ -153,7 +154,9 @@ def test_no_controller_loses_what_it_refers_to(name, change):
     fits, state = unpack(good[BEGIN:])
     change(state["robots"][0]["manager"]["controllers"][name])
     data = signed(pack([fits, state]))
-    with pytest.raises(SimulatorError, match="can't be restored: .*(pid|_joints|controller)"):
+    with pytest.raises(
+        SimulatorError, match="can't be restored: .*(pid|_joints|_loops|controller)"
+    ):
         env.restore_state(EnvSnapshot.from_bytes(data))
     env.restore_state(EnvSnapshot.from_bytes(good))
     env.close()

@@ -34,6 +34,14 @@ class Frozen:
         raise AssertionError("no code of a class runs")
 
 
+@dataclass(frozen=True)
+class Hashed:
+    number: int
+
+    def __hash__(self):
+        raise AssertionError("no code of a class runs")
+
+
 ATOMS = (
     st.none()
     | st.booleans()
@@ -113,7 +121,26 @@ def alike(keys):
     return b"\xdf" + struct.pack(">I", len(keys)) + b"".join(pack(key) + b"\xc0" for key in keys)
 
 
+def extension(code, content):
+    """An extension with the content, as it is written by `pack`."""
+    packed = pack(content)
+    return b"\xc9" + struct.pack(">IB", len(packed), code) + packed
+
+
+def lists(depth, value):
+    return b"\x91" * depth + value
+
+
 FORGED = {
+    "an array whose content is a number": extension(2, ["|u1", [-1], True, 2**33]),
+    "a deque without end": extension(5, [2**64 - 1, []]),
+    "an ordered dictionary": extension(4, ["collections", "OrderedDict", {"a": 1}]),
+    "a dictionary with a factory": extension(4, ["collections", "defaultdict", {"a": 1}]),
+    "long lists in long lists": (b"\xdd" + struct.pack(">I", 2**22)) * 500,
+    "lists in lists, and in tuples": lists(
+        900, b"\xc7" + struct.pack(">BB", 3, 1) + lists(2, b"\xc0")
+    ),
+    "a record as a key": b"\x81" + extension(4, [__name__, "Hashed", [1]]) + b"\xc0",
     "integers with one hash": alike([each * (2**61 - 1) for each in range(1, 20_000)]),
     "tuples with one hash": alike([*itertools.product((-1, -2), repeat=14)]),
     "a huge array": b"\xdd\xff\xff\xff\xff",
@@ -185,6 +212,36 @@ print(read)
     )
     assert done.returncode == 0, done.stderr
     assert 0 < int(done.stdout) < 10_000
+
+
+def test_lists_that_nest_too_deeply_are_not_written_either():
+    value = []
+    for _ in range(200):
+        value = [value]
+    with pytest.raises(StateError, match="nested too deeply"):
+        pack(value)
+
+
+def test_a_time_of_messagepack_is_a_number():
+    assert unpack(b"\xd6\xff\x00\x00\x00\x05") == 5.0
+
+
+def test_the_name_of_an_unknown_class_is_one_line():
+    with pytest.raises(StateError) as error:
+        resolve([Record("some\nmodule", "Class", [])])
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("given", [float("nan"), float("inf")])
+def test_nothing_that_is_not_finite_takes_the_place_of_a_count(given):
+    assert misfit({"steps": 3}, {"steps": given}) == f"steps is {given}"
+
+
+def test_arrays_keep_their_shapes_where_all_has_to_be_the_same():
+    assert misfit(np.zeros(3), np.zeros(5)) == ""
+    assert misfit(np.zeros(3), np.zeros(5), "efforts", exactly=True).startswith(
+        "efforts is an array"
+    )
 
 
 def test_numpys_numbers_take_the_place_of_pythons():
