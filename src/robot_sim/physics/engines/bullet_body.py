@@ -89,6 +89,7 @@ class BulletBody(Body):
         for helper in description.loops:
             close_loop(client, body, helper, self._links, offsets)
         self._base = pose.compose(self._com)  # where the centre of mass was put last
+        self._base_there: Pose | None = None  # what PyBullet made of it in `move`
         if not description.is_plane:
             self.reset_base(pose)
 
@@ -164,7 +165,7 @@ class BulletBody(Body):
         """Returns the frame that PyBullet's constraints have for a link, in the world."""
         index = self._links[link]
         if index == BASE:
-            return Pose(*pybullet.getBasePositionAndOrientation(self.id, self._client))
+            return self._base_pose()
         state = pybullet.getLinkState(self.id, index, 0, 1, self._client)
         return Pose(state[0], state[1])
 
@@ -320,8 +321,11 @@ class BulletBody(Body):
         self._push(subtract(com.position, pose.position), twist)
 
     def set_base_twist(self, twist: Twist) -> None:
-        com = Pose(*pybullet.getBasePositionAndOrientation(self.id, self._client))
+        com = self._base_pose()
         self._push(subtract(com.position, com.compose(self._com.inverse()).position), twist)
+
+    def _base_pose(self) -> Pose:
+        return Pose(*pybullet.getBasePositionAndOrientation(self.id, self._client))
 
     def _push(self, arm: Vector, twist: Twist) -> None:
         """Gives the frame whose centre of mass is at `arm` from it [m] a twist."""
@@ -332,7 +336,7 @@ class BulletBody(Body):
             )
 
     def _put_base(self, com: Pose) -> None:
-        self._base = com
+        self._base, self._base_there = com, None
         self.moved = self.displaced = self._separation.placed = True
         pybullet.resetBasePositionAndOrientation(self.id, *com, physicsClientId=self._client)
 
@@ -340,13 +344,16 @@ class BulletBody(Body):
         joints = [(state[0], state[1]) for state in self._states()]
         if self._fixed:
             return BulletMotion(self._base, (ZERO, ZERO), joints)
-        com = Pose(*pybullet.getBasePositionAndOrientation(self.id, self._client))
+        com = self._base_pose()
+        if com == self._base_there:  # PyBullet normalises it anew each time
+            com = self._base
         return BulletMotion(com, pybullet.getBaseVelocity(self.id, self._client), joints)
 
     def move(self, motion: BulletMotion) -> None:
         """See `Body.move`; only the orientation of a free base isn't what PyBullet has returned."""
         if not self._fixed or motion.com != self._base:
             self._put_base(motion.com)
+            self._base_there = self._base_pose()
             pybullet.resetBaseVelocity(self.id, *motion.twist, physicsClientId=self._client)
         for index, (position, velocity) in enumerate(motion.joints):
             self.reset_joint(index, position, velocity)
@@ -378,7 +385,7 @@ class BulletBody(Body):
         return poses
 
     def _base_state(self) -> tuple[Pose, Twist]:
-        com = Pose(*pybullet.getBasePositionAndOrientation(self.id, self._client))
+        com = self._base_pose()
         linear, angular = pybullet.getBaseVelocity(self.id, self._client)
         pose = com.compose(self._com.inverse())
         return pose, (add(linear, cross(angular, subtract(pose.position, com.position))), angular)

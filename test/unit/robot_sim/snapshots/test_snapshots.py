@@ -71,6 +71,17 @@ def test_bodies_that_tumble_and_touch(sim):
     assert any(contacts for _, _, contacts, _ in first)
 
 
+def test_a_snapshot_of_what_was_restored_is_the_same(sim):
+    sim.world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 0.2), from_rpy(0.4, 0.3, 0.2)))
+    for _ in range(20):
+        future(sim, 7)  # to orientations that the engine normalises in other ways
+        first = sim.save_state().whole()
+        again = sim.save_state().whole()
+        sim.restore_state(first)
+        restored = sim.save_state().whole()
+        assert first.to_bytes() == again.to_bytes() == restored.to_bytes()
+
+
 def test_contacts_are_those_of_the_saved_tick_until_the_next_one(sim):
     sim.world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 0.05)))
     while not sim.world.contacts():
