@@ -98,7 +98,7 @@ class Recorder:
         self._actions: list[np.ndarray] = []
         self._rewards: list[float] = []
         self._terminated = self._truncated = False
-        self._success: bool | None = None
+        self.success: bool | None = None  # what the environment says in its last info
         observation, _ = self._env.reset(seed=seed)
         self._seen = [_digest(self._env, observation)]
         return observation
@@ -107,6 +107,16 @@ class Recorder:
     def has_ended(self) -> bool:
         """Whether the environment has ended the episode."""
         return self._terminated or self._truncated
+
+    @property
+    def length(self) -> int:
+        """The number of steps so far."""
+        return len(self._actions)
+
+    @property
+    def total_reward(self) -> float:
+        """The sum of the rewards so far."""
+        return sum(self._rewards)
 
     def step(self, action: Any) -> Any:
         """Carries out an action; returns what is observed then."""
@@ -118,7 +128,7 @@ class Recorder:
         self._rewards.append(float(reward))
         self._seen.append(_digest(self._env, observation))
         self._terminated, self._truncated = bool(terminated), bool(truncated)
-        self._success = succeeded(info)
+        self.success = succeeded(info)
         return observation
 
     def undo(self, steps: int = 1) -> Any:
@@ -134,7 +144,7 @@ class Recorder:
 
     def episode(self, success: bool | None = None) -> Demonstration:
         """Returns the episode so far; `success` overrides what the environment says in its last info."""
-        success = self._success if success is None else success
+        success = self.success if success is None else success
         return Demonstration(
             *self._origin, self._seed, success, self._terminated, self._truncated, self._versions,
             np.array(self._actions), np.array(self._rewards), np.array(self._seen, np.uint64),
