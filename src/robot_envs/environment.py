@@ -343,10 +343,10 @@ class RobotEnv(SavedEnv):
         return observation, reward, terminated, truncated, info
 
     def sensor_reader(self, names: Sequence[str]) -> Callable[[], dict[str, Any]]:
-        """Has further sensors measure, as "camera" or "camera@640x480", from the next reset on.
+        """Lets further sensors measure from the next reset on, such as "camera" or "camera@640x480".
 
-        Returns a function that returns what each has measured last, by "sensor.field"; it changes nothing of
-        what the robot does. Raises SimulatorError for a sensor that there isn't.
+        Returns a function that returns their latest measurements, by "sensor.field". The robot's motion stays
+        the same. Raises SimulatorError if there is no such sensor.
         """
         self._check_open()
         query = both(self.task.query, self.task.reward_query)

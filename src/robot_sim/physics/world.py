@@ -275,10 +275,10 @@ class World(Shared):
             model.reset(joints)
 
     def state_dict(self) -> dict[str, Any]:
-        """Returns all from which it steps on, but what services set once: properties and models.
+        """Returns what decides its next steps, except models and properties that services set.
 
-        Engines can't save contacts. So those begin anew, now and after each load: the next step finds
-        them again, but the solver of PyBullet starts without the forces of the last one.
+        Engines can't save contacts, so contacts restart now and after each load. The next step finds them
+        again, but PyBullet's solver starts without the forces of the last one.
         """
         contacts, fastened = self.contacts(), self.engine.fastened()
         self.engine.refasten(fastened)  # in the order that a load leads to
@@ -313,9 +313,9 @@ class World(Shared):
         self._recalled = contacts
 
     def check_state(self, state: Mapping[str, Any]) -> None:
-        """Checks that it can take a state.
+        """Checks that it can load a state.
 
-        Raises SnapshotError if models, or their properties, are others now.
+        Raises SnapshotError if its models or their properties have changed.
         """
         now = self.gravity, self.time_step, vars(self.solver)
         if now != (state["gravity"], state["time_step"], state["solver"]):
