@@ -114,7 +114,7 @@ def side_by_side(count: int) -> Iterator[None]:
     """Starts, or ends, `count` simulators of the backend "ros-own" at the same time.
 
     The end of the block waits for all environments that were made or closed in it. If one doesn't start, all
-    are ended, and the first error is raised; all are refused at once if there isn't the memory for them.
+    are ended, and the first error is raised.
     """
     group = _Group(count)
     token = _group.set(group)

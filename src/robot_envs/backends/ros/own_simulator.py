@@ -1,7 +1,6 @@
 """A simulator with a master of its own, for one client alone, under a supervisor process."""
 
 import contextlib
-import io
 import os
 import secrets
 import select
@@ -12,7 +11,6 @@ import time
 import weakref
 from pathlib import Path
 
-import psutil
 import rospkg
 
 import bullet_gazebo
@@ -23,7 +21,6 @@ from robot_envs.files import Source
 from ros_calls import master
 from ros_calls.waiting import POLL, service_answers
 
-MEMORY = 120_000_000  # [bytes] of a master and a simulator with a robot, without pages shared with others
 ANSWERING = "/gazebo/pause_physics"  # the last service that a client needs before it can begin
 NOTICING = 2.0  # [s] for a supervisor to notice that its simulator has died
 ENDING = 10.0  # [s] for all processes to end after SIGTERM
@@ -35,30 +32,12 @@ SOURCES = Path(bullet_gazebo.__file__).parents[1]
 NOT_INHERITED = ("ROS_HOSTNAME", "ROS_IPV6", "ROS_NAMESPACE")
 
 
-def check_memory(count: int) -> None:
-    """Raises RobotEnvError if there isn't the memory for so many simulators."""
-    needed, free = count * MEMORY, psutil.virtual_memory().available
-    if needed > free:
-        raise RobotEnvError(
-            f"{count} simulators need about {needed / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are "
-            'free: make fewer environments, or make them in this process (backend="bullet"), where each '
-            "needs a fraction"
-        )
-
-
 class OwnSimulator:
     """Master and simulator on loopback, in lock-step; they end with this process in any case.
 
-    The constructor only starts them; `wait` returns once they can be used.
-
-    Args:
-        slot: Its place among the simulators that start together.
-        world: The robot's world file, or its text, which is written next to the log.
-        seed: Of random numbers that plugins draw.
-        renderer: Of cameras' pictures.
-
-    Raises:
-        RobotEnvError: If no process can be started.
+    The constructor only starts them, or raises RobotEnvError; `wait` returns once they can be used. `slot` is
+    its place among those that start together, `world` the robot's world file or its text, `seed` that of
+    random numbers that plugins draw, and `renderer` draws cameras' pictures.
     """
 
     def __init__(self, slot: Slot, world: Source | None, seed: int, renderer: str = "rays") -> None:
@@ -72,8 +51,9 @@ class OwnSimulator:
                      f"__log:={folder / 'node.log'}", "_pub_clock_frequency:=100"]  # fmt: skip
 
         try:
-            path = world_path(world, folder)
-            self._process, self._report = _start([*arguments, *filter(None, [path])], self.log)
+            self._process = _start(
+                [*arguments, *filter(None, [world_path(world, folder)])], self.log
+            )
         except OSError as error:
             raise RobotEnvError(f"{slot} can't be started: {error.strerror}") from error
         self._started = time.monotonic()
@@ -93,10 +73,10 @@ class OwnSimulator:
         """Whether it has exited by itself with an error; another one would do the same."""
         return self._process.poll() in range(1, 128)
 
-    def has_died(self) -> bool:
-        """Returns whether it has died; gives the supervisor time to notice."""
+    def has_ended(self, timeout: float = NOTICING) -> bool:
+        """Returns whether it ends within a time [s], by default that which the supervisor takes to notice."""
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(NOTICING)
+            self._process.wait(timeout)
         return not self.is_alive
 
     def wait(self) -> None:
@@ -115,10 +95,9 @@ class OwnSimulator:
 
     def _read_report(self, deadline: float) -> None:
         """Waits for the master's address and the simulator's process id."""
-        poll = select.poll()
-        poll.register(self._report, select.POLLIN)
-        poll.poll(1000.0 * max(0.0, deadline - time.monotonic()))
-        words = self._report.readline().decode().split() if poll.poll(0) else []
+        report, timeout = self._process.stdout, max(0.0, deadline - time.monotonic())
+        assert report is not None
+        words = report.readline().split() if select.select([report], [], [], timeout)[0] else []
         if len(words) != 2:
             raise SimulatorFault("its master didn't start")
         self.uri, self.pid = words[0], int(words[1])
@@ -130,24 +109,16 @@ class OwnSimulator:
 
     def join(self) -> None:
         """Waits for the end after `terminate`, then kills the rest; may be called twice."""
-        if os.getpid() != self._owner:  # a forked child must not end its parent's simulator
-            return
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(ENDING)
-        self._finalizer()
-        self._report.close()
+        if os.getpid() == self._owner:  # a forked child must not end its parent's simulator
+            self.has_ended(ENDING)
+            self._finalizer()
 
     def post_mortem(self, hangs: bool) -> str:
-        """Kills a simulator that has failed; returns how it ended, and the last line of its log.
-
-        Args:
-            hangs: Whether it hangs, and so won't end by itself.
-        """
+        """Kills a simulator that has failed; returns how it ended, unless it hangs, and its last words."""
         how = ""
-        if not hangs and self.has_died():
+        if not hangs and self.has_ended():
             how = f"{_exit_reason(self._process.returncode)}, "
         self._finalizer()
-        self._report.close()
         try:
             lines = self.log.read_text(encoding="utf-8", errors="replace").split("\n")
         except OSError as error:
@@ -167,8 +138,8 @@ def _log_folder() -> Path:
     return folder
 
 
-def _start(arguments: list[str], log: Path) -> "tuple[subprocess.Popen[bytes], io.FileIO]":
-    """Starts a supervisor, which writes to a log; returns it, and the pipe to which it reports."""
+def _start(arguments: list[str], log: Path) -> subprocess.Popen[str]:
+    """Starts a supervisor, whose output goes to a log, but for its report on standard output."""
     # This process's sys.path isn't inherited: importing catkin's packages adds to it.
     kept = {name: value for name, value in os.environ.items() if name not in NOT_INHERITED}
     environment = kept | {
@@ -178,29 +149,24 @@ def _start(arguments: list[str], log: Path) -> "tuple[subprocess.Popen[bytes], i
         "ROS_IP": "127.0.0.1",
         "ROS_LOG_DIR": str(log.parent),
     }
-    with contextlib.ExitStack() as stack:
-        output = stack.enter_context(log.open("wb"))
-        reading, writing = os.pipe()
-        stack.callback(os.close, writing)
-        report = io.FileIO(reading)
-        try:
-            process = subprocess.Popen(
-                [sys.executable, "-P", str(SUPERVISOR), str(os.getpid()), str(writing), *arguments],
-                stdin=subprocess.DEVNULL, stdout=output, stderr=output, env=environment,
-                pass_fds=(writing,), start_new_session=True,
-            )  # fmt: skip
-        except BaseException:
-            report.close()
-            raise
-        return process, report
+    with log.open("wb") as output:
+        return subprocess.Popen(
+            [sys.executable, "-P", str(SUPERVISOR), str(os.getpid()), *arguments],
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=output, env=environment,
+            start_new_session=True, text=True,
+        )  # fmt: skip
 
 
-def _kill(supervisor: "subprocess.Popen[bytes]", owner: int) -> None:
+def _kill(supervisor: subprocess.Popen[str], owner: int) -> None:
     """Kills a supervisor and its session, unless a forked child asks."""
-    if os.getpid() == owner and supervisor.poll() is None:
+    if os.getpid() != owner:
+        return
+    if supervisor.poll() is None:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(supervisor.pid, signal.SIGKILL)
         supervisor.wait()
+    assert supervisor.stdout is not None
+    supervisor.stdout.close()
 
 
 def _exit_reason(code: int) -> str:

@@ -3,15 +3,14 @@
 import contextlib
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from robot_envs.backends import backend
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.ros.bringup import bring_up
 from robot_envs.backends.ros.lockstep import KeptSnapshot, LockstepWorld
-from robot_envs.backends.ros.own_simulator import OwnSimulator, check_memory
+from robot_envs.backends.ros.own_simulator import OwnSimulator
 from robot_envs.backends.ros.running import SharedWorld, physics_step
 from robot_envs.backends.world_files import world_models
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, SimulatorHangs
@@ -24,79 +23,45 @@ from robot_sim.physics.pose import Pose
 from robot_sim.snapshot import Snapshot
 from ros_calls import master
 
-DEADLINE = (
-    30.0  # [s] of wall time for an answer, on top of 10 ms a tick; others may need the processor
-)
+DEADLINE = 30.0  # [s] of wall time for an answer, on top of 10 ms a tick; many share the processor
 BOUND = 1e9  # [rad, m, rad/s, m/s, N m, N]; no joint of a world of metres and seconds gets there
 SEED = 0  # of the simulator's own random numbers, as for the backend "ros"
 
 logger = logging.getLogger(f"rosout.{__name__}")
 Result = TypeVar("Result")
-Begin = Callable[[LockstepWorld], WorldState | None]
-"""Brings a simulator to where an episode begins; returns the state, if it knows."""
+Action = Callable[[LockstepWorld], object]
 
 
-@dataclass
-class Journal:
-    """What the simulator was asked since the episode began: enough to bring another one to the same state."""
-
-    variation: Variation = field(default_factory=Variation)  # all that were applied, merged
-    begin: Begin | None = None  # None: no episode has begun
-    begun: int = 0  # [ns] of the episode that had passed then
-    commands: list[Commands] = field(default_factory=list)  # of each step since
-    saves: list[int] = field(default_factory=list)  # steps before each snapshot: it changes bits
-    last: WorldState | None = None  # the state after them
-
-    def forget_episode(self) -> None:
-        """Forgets all but the variation."""
-        self.begin, self.begun, self.commands, self.saves, self.last = None, 0, [], [], None
-
-    def copied(self) -> "Journal":
-        """Returns a copy, to which later steps don't come."""
-        return replace(self, commands=list(self.commands), saves=list(self.saves))
-
-    def replay(self, world: LockstepWorld, step: int) -> None:
-        """Brings another simulator to the same state.
-
-        Args:
-            world: Of that simulator, just brought up.
-            step: Simulated time of one action [ns].
-
-        Raises:
-            SimulatorFault: If it fails, or comes to another state.
-        """
-        if not self.variation.is_nominal:
-            world.vary(self.variation)
-        if self.begin is None:
-            return
-        state = self.begin(world)
-        self._save(world, 0)
-        for count, commands in enumerate(self.commands, 1):
-            state = checked(world.act(commands), self.begun + count * step)
-            self._save(world, count)
-        if state is None or self.last is None or repr(state) == repr(self.last):
-            return  # repr shows all bits of a number, and tells -0.0 from 0.0
-        raise SimulatorFault(
-            f"the same reset and {len(self.commands)} steps lead to another state, as where a plugin draws "
-            f"random numbers: {_difference(state, self.last)}"
-        )
-
-    def _save(self, world: LockstepWorld, count: int) -> None:
-        for _ in range(self.saves.count(count)):
-            world.save_state()
-
-
-@dataclass(frozen=True, eq=False)
-class JournalledSnapshot:
+class JournalledSnapshot(NamedTuple):
     """A snapshot that a simulator keeps, and how another one comes to the same state."""
 
     of: "OwnWorld"
     kept: KeptSnapshot
-    journal: Journal
+    journal: Sequence[Action]
+    passed: int  # [ns] of the episode
+    last: WorldState | None
 
     def whole(self) -> Snapshot:
         """See `WorldSnapshot.whole`."""
         return self.of.read(self.kept)
+
+
+def replay(journal: Sequence[Action], world: LockstepWorld, last: WorldState | None) -> None:
+    """Brings another simulator, just brought up, to the state `last` by the same actions.
+
+    Raises SimulatorFault if it fails, or comes to another state.
+    """
+    state, steps = None, -1  # the first state is the reset's
+    for action in journal:
+        answer = action(world)
+        if isinstance(answer, WorldState):
+            state, steps = answer, steps + 1
+    # repr shows all bits of a number, and tells -0.0 from 0.0.
+    if state is not None and last is not None and repr(state) != repr(last):
+        raise SimulatorFault(
+            f"the same reset and {steps} steps lead to another state, as where a plugin draws random "
+            f"numbers: {_difference(state, last)}"
+        )
 
 
 def _difference(state: WorldState, last: WorldState) -> str:
@@ -146,8 +111,7 @@ class OwnWorld(RobotBackend):
 
     Raises:
         ValueError: If the period isn't a whole number of physics steps.
-        RobotEnvError: If there is no memory for the simulator, it doesn't start, or the robots can't be
-            brought up.
+        RobotEnvError: If the simulator doesn't start, or the robots can't be brought up.
     """
 
     deterministic, complete, shared = True, True, False
@@ -163,10 +127,12 @@ class OwnWorld(RobotBackend):
         self._deadline = DEADLINE if deadline is None else deadline
         world_models(scene.robots[0].world)  # an unreadable file is reported before anything starts
         self._slot = backend.next_slot()
-        if self._slot.number == 1:
-            check_memory(self._slot.of)
         self._query = StateQuery()
-        self._journal = Journal()
+        self._variation = Variation()  # all that were applied, merged
+        # What the simulator was asked since the episode began, snapshots included: they change bits.
+        self._journal: list[Action] = []
+        self._passed = 0  # [ns] of the episode
+        self._last: WorldState | None = None  # the state after all of it
         self._world: LockstepWorld | None = None  # None: not connected
         self._failed = self._closed = False
         self.simulator = self._start()  # the one that moves the robots now
@@ -199,23 +165,19 @@ class OwnWorld(RobotBackend):
             raise
 
     def vary(self, variation: Variation) -> None:
-        self._journal.forget_episode()  # a reset follows
+        self._forget_episode()  # a reset follows
         self._perform(lambda world: world.vary(variation))
-        self._journal.variation = self._journal.variation.merged(variation)
+        self._variation = self._variation.merged(variation)
 
     def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         """See `RobotBackend.reset`; the state reached is exactly the one asked for."""
-        return self._begin(lambda world: checked(world.reset(initial, seed), 0))
+        self._forget_episode()
+        return self._advance(lambda world: checked(world.reset(initial, seed), 0))
 
     def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
         whole = state.whole()
-        return self._begin(lambda world: checked(world.begin_at(whole, seed), 0))
-
-    def _begin(self, begin: Callable[[LockstepWorld], WorldState]) -> WorldState:
-        self._journal.forget_episode()
-        state = self._perform(begin)
-        self._journal.begin, self._journal.last = begin, state
-        return state
+        self._forget_episode()
+        return self._advance(lambda world: checked(world.begin_at(whole, seed), 0))
 
     def begin(self, commands: Commands) -> None:
         """See `RobotBackend.begin`; if the simulator fails, `act` replaces it."""
@@ -226,35 +188,39 @@ class OwnWorld(RobotBackend):
 
     def act(self, commands: Commands) -> WorldState:
         self._need_episode()
-        journal = self._journal
-        then = journal.begun + (len(journal.commands) + 1) * self._step
-        journal.last = self._perform(lambda world: checked(world.act(commands), then))
-        journal.commands.append(commands)
-        return journal.last
+        then = self._passed + self._step
+        state = self._advance(lambda world: checked(world.act(commands), then))
+        self._passed = then
+        return state
 
-    def save_state(self) -> "JournalledSnapshot":
+    def _advance(self, action: Callable[[LockstepWorld], WorldState]) -> WorldState:
+        self._last = self._perform(action)
+        self._journal.append(action)
+        return self._last
+
+    def save_state(self) -> JournalledSnapshot:
         self._need_episode()
-        kept = self._perform(lambda world: world.save_state())
-        self._journal.saves.append(len(self._journal.commands))
-        return JournalledSnapshot(self, kept, self._journal.copied())
+        kept = self._perform(LockstepWorld.save_state)
+        self._journal.append(LockstepWorld.save_state)
+        return JournalledSnapshot(self, kept, tuple(self._journal), self._passed, self._last)
 
     def restore_state(self, state: WorldSnapshot) -> None:
-        if isinstance(state, JournalledSnapshot) and state.of is self:
-            kept, journal = state.kept, state.journal.copied()
-        else:
+        if not isinstance(state, JournalledSnapshot) or state.of is not self:
             whole = state.whole()
-            passed = whole.state["now"] - episode_of(whole)[0]
             begin = partial(LockstepWorld.restore_state, state=whole)
-            kept, journal = None, Journal(self._journal.variation, begin, passed)
+            self._perform(begin)
+            passed = whole.state["now"] - episode_of(whole)[0]
+            self._journal, self._passed, self._last = [begin], passed, None
+            return
 
         def restore(world: LockstepWorld) -> None:
-            if kept is not None and world is kept.of:
-                world.restore_state(kept)
-            else:  # another simulator's, or that one was replaced
-                journal.replay(world, self._step)
+            if world is state.kept.of:
+                world.restore_state(state.kept)
+            else:  # that one was replaced
+                replay(state.journal, world, state.last)
 
         self._perform(restore)
-        self._journal = journal
+        self._journal, self._passed, self._last = [*state.journal], state.passed, state.last
 
     def read(self, kept: KeptSnapshot) -> Snapshot:
         """Returns a snapshot that the simulator keeps; raises SimulatorError if it was replaced since."""
@@ -265,11 +231,14 @@ class OwnWorld(RobotBackend):
         with master.using(self.simulator.uri):
             return kept.whole()
 
+    def _forget_episode(self) -> None:
+        self._journal, self._passed, self._last = [], 0, None
+
     def poses(self, links: Sequence[str]) -> list[Pose]:
         return self._perform(lambda world: world.poses(links))
 
     def _need_episode(self) -> None:
-        if self._journal.begin is None:
+        if not self._journal:
             raise SimulatorError(f"{self.simulator} has no episode; begin one with reset()")
 
     def _perform(self, action: Callable[[LockstepWorld], Result]) -> Result:
@@ -289,7 +258,7 @@ class OwnWorld(RobotBackend):
             except RobotEnvError as error:
                 starting, hangs = self._world is None, isinstance(error, SimulatorHangs)
                 if not isinstance(error, SimulatorFault) and not (
-                    starting and (failures or self.simulator.has_died())
+                    starting and (failures or self.simulator.has_ended())
                 ):
                     raise
                 self._disconnect()
@@ -297,7 +266,7 @@ class OwnWorld(RobotBackend):
                 end = self.simulator.post_mortem(hangs)
                 failures.append(f"{self.simulator} failed: {error}; {end}")
                 if len(failures) == 2 or (starting and (hangs or self.simulator.gave_up)):
-                    self._journal.forget_episode()
+                    self._forget_episode()
                     raise SimulatorError("; before that ".join(reversed(failures))) from error
             self.restarts += 1
             logger.warning("%s; another one takes its place", failures[0])
@@ -316,7 +285,9 @@ class OwnWorld(RobotBackend):
                 world = LockstepWorld(self.scene, ticks, SharedWorld(), self._deadline)
                 self._world = world
                 world.look(self._query)
-                self._journal.replay(world, self._step)
+                if not self._variation.is_nominal:
+                    world.vary(self._variation)
+                replay(self._journal, world, self._last)
             return world
         except BaseException as error:
             if not isinstance(error, RobotEnvError):  # Ctrl-C: the simulator is in an unknown state
@@ -336,6 +307,6 @@ class OwnWorld(RobotBackend):
             return
         self._closed = True
         self._disconnect()
-        self._journal.forget_episode()
+        self._forget_episode()
         self.simulator.terminate()
         backend.join_in_turn(self.simulator.join)

@@ -46,11 +46,11 @@ def start_master() -> str:
 def main(argv: list[str]) -> int:
     """Runs master and simulator until the simulator or the client ends, or a signal comes.
 
-    `argv` has the client's process id, the file descriptor for the master's address and the simulator's
-    process id, and the simulator's arguments. Returns 0 after a signal, else the simulator's exit code, or
-    128 + signal.
+    `argv` has the client's process id and the simulator's arguments. Standard output gets the master's
+    address and the simulator's process id, standard error all else. Returns 0 after a signal, else the
+    simulator's exit code, or 128 + signal.
     """
-    client, report = int(argv[1]), int(argv[2])
+    client = int(argv[1])
     signalled, wakeup = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     signal.set_wakeup_fd(wakeup)
     for number in (signal.SIGTERM, signal.SIGINT):
@@ -60,11 +60,12 @@ def main(argv: list[str]) -> int:
         return 1
     uri = start_master()
     simulator = subprocess.Popen(
-        [sys.executable, "-P", "-c", SIMULATOR, str(os.getpid()), *argv[3:]],
+        [sys.executable, "-P", "-c", SIMULATOR, str(os.getpid()), *argv[2:]],
+        stdout=sys.stderr,
         env={**os.environ, "ROS_MASTER_URI": uri},
     )
-    os.write(report, f"{uri} {simulator.pid}\n".encode())
-    os.close(report)
+    print(uri, simulator.pid, flush=True)
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     poll = select.poll()
     for file in (signalled, watched, os.pidfd_open(simulator.pid)):
         poll.register(file, select.POLLIN)
