@@ -147,26 +147,24 @@ def _whole(out: Path) -> Iterator[Path]:
         shutil.rmtree(scratch, ignore_errors=True)
 
 
-class _Columns:
-    """What both formats hold of an episode."""
+def _columns(steps: "list[Played]") -> dict[str, Any]:
+    """Returns what both formats hold of an episode."""
+    import numpy as np
 
-    def __init__(self, steps: "list[Played]") -> None:
-        import numpy as np
-
-        seen = [each.observation for each in steps]
-        is_dict = isinstance(seen[0], dict)
-        self.observations: Any = (
-            {name: np.stack([each[name] for each in seen]) for name in seen[0]}
-            if is_dict
-            else np.stack(seen)
-        )
-        taken = steps[1:]
-        self.actions = np.array([each.action for each in taken])
-        self.rewards = np.array([each.reward for each in taken])
-        self.terminations = np.array([each.terminated for each in taken])
-        self.truncations = np.array([each.truncated for each in taken])
-        if not self.terminations[-1]:
-            self.truncations[-1] = True  # also where a driver has stopped
+    seen, taken = [each.observation for each in steps], steps[1:]
+    observations: Any = (
+        {name: np.stack([each[name] for each in seen]) for name in seen[0]}
+        if isinstance(seen[0], dict)
+        else np.stack(seen)
+    )
+    terminations = np.array([each.terminated for each in taken])
+    truncations = np.array([each.truncated for each in taken])
+    truncations[-1] |= not terminations[-1]  # also where a driver has stopped
+    return {
+        "observations": observations, "actions": np.array([each.action for each in taken]),
+        "rewards": np.array([each.reward for each in taken]),
+        "terminations": terminations, "truncations": truncations,
+    }  # fmt: skip
 
 
 class _Npz:
@@ -179,7 +177,7 @@ class _Npz:
     def add(self, path: Path, episode: Any, steps: Any, sensed: dict[str, Any]) -> None:
         import numpy as np
 
-        columns = dict(vars(_Columns(steps)))
+        columns = _columns(steps)
         if isinstance(seen := columns["observations"], dict):
             del columns["observations"]
             columns |= {f"observations.{name}": each for name, each in seen.items()}
@@ -205,7 +203,7 @@ class _Minari:
         from gymnasium import spaces
         from minari.data_collector import EpisodeBuffer
 
-        columns, space = vars(_Columns(steps)), self._env.observation_space
+        columns, space = _columns(steps), self._env.observation_space
         if sensed:
             boxes = {name: _box(each) for name, each in sensed.items()}
             space = spaces.Dict({"observation": space, **boxes})

@@ -7,7 +7,6 @@ FOLDER/NAME.cost.json   when and where each attempt ran, and what it took
 
 import contextlib
 import os
-import select
 import shutil
 import signal
 import socket
@@ -178,33 +177,29 @@ def _start(words: list[str], log: Path, modules: str, death_signal: str) -> subp
 
 def _finish(process: subprocess.Popen[bytes], stop_within: StopWithin) -> tuple[int, float, bool]:
     """Waits for a training; returns its exit code, its processor time [s] and whether it was stopped."""
-    descriptor = os.pidfd_open(process.pid)  # readable once the process has ended
     deadline, was_stopped = float("inf"), False
     try:
-        ended = select.poll()
-        ended.register(descriptor, select.POLLIN)
-        while True:
+        # wait4 reports this one process; getrusage only the sum over all children. Until then its id isn't
+        # reused.
+        while not (ended := os.wait4(process.pid, os.WNOHANG))[0]:
             try:
-                if ended.poll(1000 * POLL):
-                    break
+                time.sleep(POLL)
                 grace = stop_within()
             except KeyboardInterrupt:  # in a worker of Ray
                 grace = TIME_TO_SAVE
             if grace is not None:
                 deadline = min(deadline, time.monotonic() + grace)
                 if not was_stopped:
-                    signal.pidfd_send_signal(descriptor, signal.SIGTERM)
+                    os.kill(process.pid, signal.SIGTERM)
                     was_stopped = True
             if time.monotonic() > deadline:
                 os.killpg(process.pid, signal.SIGKILL)
     except BaseException:
-        os.killpg(process.pid, signal.SIGKILL)  # not waited for, so its id isn't reused
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
         raise
-    finally:
-        os.close(descriptor)
-        # wait4 reports this one process; getrusage only the sum over all children.
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
+    _, status, usage = ended
+    process.returncode = os.waitstatus_to_exitcode(status)
     return process.returncode, usage.ru_utime + usage.ru_stime, was_stopped
 
 

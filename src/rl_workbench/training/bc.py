@@ -67,12 +67,8 @@ class Cloning(Algorithm):
     """Learns from the demonstrations; can be saved after each step."""
 
     def __init__(self, agent: CloningAgent, env: Env, digest: str, log_frequency: int) -> None:
-        self._agent, self._env, self._digest, self._log_frequency = (
-            agent,
-            env,
-            digest,
-            log_frequency,
-        )
+        self._agent, self._env = agent, env
+        self._digest, self._log_frequency = digest, log_frequency
 
     @property
     def steps(self) -> int:

@@ -188,13 +188,11 @@ def load(path: Path) -> Demonstration:
         episode = Demonstration(
             **header, **{name: content[name] for name in set(content) - {_HEADER}}
         )
-        steps, kinds = (
-            len(episode.actions),
-            (str, dict, str, int, bool | NoneType, bool, bool, dict),
-        )
+        kinds = (str, dict, str, int, bool | NoneType, bool, bool, dict)
         for field, kind in zip(fields(Demonstration), kinds, strict=False):
             if not isinstance(getattr(episode, field.name), kind):
                 raise ValueError(f"its {field.name} is {getattr(episode, field.name)!r:.50}")
+        steps = len(episode.actions)
         if not steps or (len(episode.rewards), len(episode.seen)) != (steps, steps + 1):
             raise ValueError("it is not whole")
     return episode

@@ -282,6 +282,14 @@ class InProcessWorld(RobotBackend):
             self._sim.world.close()
 
 
+@contextlib.contextmanager
+def _changing(what: str) -> Iterator[None]:
+    try:
+        yield
+    except (PropertyError, DescriptionError) as error:
+        raise SimulatorError(f"{what} can't be changed: {error}") from error
+
+
 class InProcessChanges:
     """Varies the robots of a simulator in this process; see `Changeable`."""
 
@@ -298,26 +306,18 @@ class InProcessChanges:
     def set_link(self, link: RobotPart, inertia: Inertia) -> None:
         model = self._model(link)
         gravity = model.description.links[link.name].gravity
-        try:
+        with _changing(f"link {link.name}"):
             set_link_properties(self._sim.world, model, link.name, inertia, gravity)
-        except (PropertyError, DescriptionError) as error:
-            raise SimulatorError(f"link {link.name} can't be changed: {error}") from error
 
     def set_joint(self, joint: RobotPart, damping: float | None, friction: float | None) -> None:
         wanted = JointProperties(damping=damping, motor_effort=friction)
         step = self._sim.world.time_step
-        try:
+        with _changing(f"joint {joint.name}"):
             set_joint_properties(self._model(joint), joint.name, wanted, step)
-        except PropertyError as error:
-            raise SimulatorError(f"joint {joint.name} can't be changed: {error}") from error
 
     def set_surface(self, link: RobotPart, factor: float) -> None:
-        try:
+        with _changing(f"surfaces of link {link.name}"):
             set_link_friction(self._model(link), link.name, factor)
-        except PropertyError as error:
-            raise SimulatorError(
-                f"surfaces of link {link.name} can't be changed: {error}"
-            ) from error
 
     def pids(self, controller: RobotPart) -> Mapping[str, Gains]:
         pids = self._robots[controller.robot.model].manager.get(controller.name).pids.items()

@@ -15,9 +15,6 @@ from robot_envs.variation.variation import length_axis
 from robot_sim.control.errors import ControlError
 from robot_sim.control.pid import Gains
 
-# Of control_toolbox's server.
-MOST_GAINS = {"p": 1e5, "i": 1e5, "d": 1e3, "i_max": 1e5, "i_min": 1e5}
-
 
 class RobotPart(NamedTuple):
     """A link, joint or controller: its robot, and its plain name."""
@@ -85,16 +82,3 @@ def gains_of(controller: RobotPart) -> dict[str, Gains]:
     except ControlError as error:
         raise RobotEnvError(f"the robot '{robot.model}': {error}") from error
     return {place: pid.gains for place, pid in loaded[name].pids.items()}
-
-
-def check_tunable(pids: Mapping[str, Mapping[str, Gains]], factors: Mapping[str, float]) -> None:
-    """Raises ValueError for gains, times their largest factors, that dynamic_reconfigure would clip."""
-    for controller, factor in factors.items():
-        for place, gains in pids[controller].items():
-            for name, most in MOST_GAINS.items():
-                value = getattr(gains, name) * (factor if name in "pid" else 1.0)
-                if not abs(value) <= most:
-                    raise ValueError(
-                        f"randomisation of gains: {name} of {controller}/{place} would be up to {value:g}, "
-                        f"and dynamic_reconfigure takes {most:g} at most"
-                    )

@@ -8,7 +8,7 @@ import numpy as np
 from file_access.text import nearest_or_all
 from robot_envs.scene import Scene
 from robot_envs.variation.imperfections import by_name, is_number
-from robot_envs.variation.parts import Parts, check_tunable
+from robot_envs.variation.parts import Parts
 from robot_envs.variation.variation import LinkScale, Variation
 from robot_sim.state_dict import Shared
 
@@ -143,8 +143,6 @@ class UniformRandomisation(Shared):
                 _check_whole(option, options[option.name], parts.lumped)
                 able = list(pids) if option.of == CONTROLLERS else names
                 self._ranges[option.name] = ranges(option, options[option.name], able)
-        tuned = self._ranges.get("gains", {})
-        check_tunable(pids, {name: span.high for name, span in tuned.items()})
 
     def draw(self, rng: np.random.Generator) -> tuple[Variation, Drawn]:
         """Draws a variation; returns it, and the numbers by option and name."""

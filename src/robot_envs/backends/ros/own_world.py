@@ -3,9 +3,8 @@
 import contextlib
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from robot_envs.backends import backend
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
@@ -24,9 +23,7 @@ from robot_sim.physics.pose import Pose
 from robot_sim.snapshot import Snapshot
 from ros_calls import master
 
-DEADLINE = (
-    30.0  # [s] of wall time for an answer, on top of 10 ms a tick; others may need the processor
-)
+DEADLINE = 30.0  # [s] of wall time for an answer, on top of 10 ms a tick; many share the processor
 BOUND = 1e9  # [rad, m, rad/s, m/s, N m, N]; no joint of a world of metres and seconds gets there
 SEED = 0  # of the simulator's own random numbers, as for the backend "ros"
 
@@ -35,45 +32,36 @@ Result = TypeVar("Result")
 Action = Callable[[LockstepWorld], object]
 
 
-@dataclass
-class Journal:
-    """What a simulator was asked since the episode began: enough to bring another one to the same state."""
-
-    actions: list[Action] = field(default_factory=list)  # snapshots, too: they change bits
-    passed: int = 0  # [ns] of the episode
-    last: WorldState | None = None  # the state after all of it
-
-    def copied(self) -> "Journal":
-        """Returns a copy, to which later actions don't come."""
-        return replace(self, actions=list(self.actions))
-
-    def replay(self, world: LockstepWorld) -> None:
-        """Brings another simulator, just brought up, to the same state.
-
-        Raises:
-            SimulatorFault: If it fails, or comes to another state.
-        """
-        answers = [action(world) for action in self.actions]
-        states = [answer for answer in answers if isinstance(answer, WorldState)]
-        # repr shows all bits of a number, and tells -0.0 from 0.0.
-        if states and self.last is not None and repr(states[-1]) != repr(self.last):
-            raise SimulatorFault(
-                f"the same reset and {len(states) - 1} steps lead to another state, as where a plugin draws "
-                f"random numbers: {_difference(states[-1], self.last)}"
-            )
-
-
-@dataclass(frozen=True, eq=False)
-class JournalledSnapshot:
+class JournalledSnapshot(NamedTuple):
     """A snapshot that a simulator keeps, and how another one comes to the same state."""
 
     of: "OwnWorld"
     kept: KeptSnapshot
-    journal: Journal
+    journal: Sequence[Action]
+    passed: int  # [ns] of the episode
+    last: WorldState | None
 
     def whole(self) -> Snapshot:
         """See `WorldSnapshot.whole`."""
         return self.of.read(self.kept)
+
+
+def replay(journal: Sequence[Action], world: LockstepWorld, last: WorldState | None) -> None:
+    """Brings another simulator, just brought up, to the state `last` by the same actions.
+
+    Raises SimulatorFault if it fails, or comes to another state.
+    """
+    state, steps = None, -1  # the first state is the reset's
+    for action in journal:
+        answer = action(world)
+        if isinstance(answer, WorldState):
+            state, steps = answer, steps + 1
+    # repr shows all bits of a number, and tells -0.0 from 0.0.
+    if state is not None and last is not None and repr(state) != repr(last):
+        raise SimulatorFault(
+            f"the same reset and {steps} steps lead to another state, as where a plugin draws random "
+            f"numbers: {_difference(state, last)}"
+        )
 
 
 def _difference(state: WorldState, last: WorldState) -> str:
@@ -141,7 +129,10 @@ class OwnWorld(RobotBackend):
         self._slot = backend.next_slot()
         self._query = StateQuery()
         self._variation = Variation()  # all that were applied, merged
-        self._journal = Journal()
+        # What the simulator was asked since the episode began, snapshots included: they change bits.
+        self._journal: list[Action] = []
+        self._passed = 0  # [ns] of the episode
+        self._last: WorldState | None = None  # the state after all of it
         self._world: LockstepWorld | None = None  # None: not connected
         self._failed = self._closed = False
         self.simulator = self._start()  # the one that moves the robots now
@@ -197,39 +188,39 @@ class OwnWorld(RobotBackend):
 
     def act(self, commands: Commands) -> WorldState:
         self._need_episode()
-        then = self._journal.passed + self._step
+        then = self._passed + self._step
         state = self._advance(lambda world: checked(world.act(commands), then))
-        self._journal.passed = then
+        self._passed = then
         return state
 
     def _advance(self, action: Callable[[LockstepWorld], WorldState]) -> WorldState:
-        state = self._perform(action)
-        self._journal.last = state
-        self._journal.actions.append(action)
-        return state
+        self._last = self._perform(action)
+        self._journal.append(action)
+        return self._last
 
     def save_state(self) -> JournalledSnapshot:
         self._need_episode()
         kept = self._perform(LockstepWorld.save_state)
-        self._journal.actions.append(LockstepWorld.save_state)
-        return JournalledSnapshot(self, kept, self._journal.copied())
+        self._journal.append(LockstepWorld.save_state)
+        return JournalledSnapshot(self, kept, tuple(self._journal), self._passed, self._last)
 
     def restore_state(self, state: WorldSnapshot) -> None:
-        if isinstance(state, JournalledSnapshot) and state.of is self:
-            kept, journal = state.kept, state.journal.copied()
-        else:
+        if not isinstance(state, JournalledSnapshot) or state.of is not self:
             whole = state.whole()
-            restore = partial(LockstepWorld.restore_state, state=whole)
-            kept, journal = None, Journal([restore], whole.state["now"] - episode_of(whole)[0])
+            begin = partial(LockstepWorld.restore_state, state=whole)
+            self._perform(begin)
+            passed = whole.state["now"] - episode_of(whole)[0]
+            self._journal, self._passed, self._last = [begin], passed, None
+            return
 
-        def restored(world: LockstepWorld) -> None:
-            if kept is not None and world is kept.of:
-                world.restore_state(kept)
-            else:  # another simulator's, or that one was replaced
-                journal.replay(world)
+        def restore(world: LockstepWorld) -> None:
+            if world is state.kept.of:
+                world.restore_state(state.kept)
+            else:  # that one was replaced
+                replay(state.journal, world, state.last)
 
-        self._perform(restored)
-        self._journal = journal
+        self._perform(restore)
+        self._journal, self._passed, self._last = [*state.journal], state.passed, state.last
 
     def read(self, kept: KeptSnapshot) -> Snapshot:
         """Returns a snapshot that the simulator keeps; raises SimulatorError if it was replaced since."""
@@ -241,13 +232,13 @@ class OwnWorld(RobotBackend):
             return kept.whole()
 
     def _forget_episode(self) -> None:
-        self._journal = Journal()
+        self._journal, self._passed, self._last = [], 0, None
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         return self._perform(lambda world: world.poses(links))
 
     def _need_episode(self) -> None:
-        if not self._journal.actions:
+        if not self._journal:
             raise SimulatorError(f"{self.simulator} has no episode; begin one with reset()")
 
     def _perform(self, action: Callable[[LockstepWorld], Result]) -> Result:
@@ -296,7 +287,7 @@ class OwnWorld(RobotBackend):
                 world.look(self._query)
                 if not self._variation.is_nominal:
                     world.vary(self._variation)
-                self._journal.replay(world)
+                replay(self._journal, world, self._last)
             return world
         except BaseException as error:
             if not isinstance(error, RobotEnvError):  # Ctrl-C: the simulator is in an unknown state

@@ -46,9 +46,9 @@ def start_master() -> str:
 def main(argv: list[str]) -> int:
     """Runs master and simulator until the simulator or the client ends, or a signal comes.
 
-    `argv` has the client's process id and the simulator's arguments. One line on standard output reports the
-    master's address and the simulator's process id; all else goes to standard error. Returns 0 after a
-    signal, else the simulator's exit code, or 128 + signal.
+    `argv` has the client's process id and the simulator's arguments. Standard output gets the master's
+    address and the simulator's process id, standard error all else. Returns 0 after a signal, else the
+    simulator's exit code, or 128 + signal.
     """
     client = int(argv[1])
     signalled, wakeup = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)

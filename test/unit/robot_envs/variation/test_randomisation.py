@@ -1,6 +1,5 @@
 """What is drawn, from which options, and what options are refused."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +7,9 @@ import pytest
 from gymnasium.utils.env_checker import data_equivalence as same
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.robots.rig import RIG, SLEDGE, make_rig
+from support.robots.rig import RIG, SLEDGE
 
-from robot_envs import Robot, RobotEnv
+from robot_envs import Robot
 from robot_envs.scene import Scene
 from robot_envs.variation.randomisation import OPTIONS, UniformRandomisation
 
@@ -138,11 +137,3 @@ def test_surfaces_are_those_of_links_with_a_collision():
     assert list(draw({"surface_friction": 0.5}, scene=BOTH)[1]["surface_friction"]) == [
         "sledge::body"
     ]
-
-
-def test_gains_that_could_not_be_set_over_ros_are_refused_everywhere():
-    pid = {"p": 1, "i_clamp": 2e5}
-    tree = {**RIG.controllers, "servo_position": {**RIG.controllers["servo_position"], "pid": pid}}
-    robot = replace(RIG, controllers=tree)
-    with pytest.raises(ValueError, match="i_max of servo_position/pid would be up to 200000"):
-        RobotEnv(robot, make_rig().task, randomisation={"gains": 0.2})

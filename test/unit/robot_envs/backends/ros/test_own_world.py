@@ -239,7 +239,7 @@ def test_one_that_cannot_start_says_why_and_those_beside_it_end(monkeypatch) -> 
     assert text.count("\n") == 0
 
 
-def test_where_there_is_no_file_nothing_starts() -> None:
+def test_where_there_are_no_files_nothing_starts() -> None:
     limits = resource.getrlimit(resource.RLIMIT_NOFILE)
     lowest = max(map(int, os.listdir("/proc/self/fd"))) + 1
     held = [os.open("/dev/null", os.O_RDONLY) for _ in range(lowest)]

@@ -1,12 +1,11 @@
-"""The parts of a simulator of one's own that need none: its journal, the checks of its answers."""
+"""The parts of a simulator of one's own that need none: its journal, and the checks of its answers."""
 
 import math
-from functools import partial
 
 import pytest
 
 from robot_envs.backends.backend import Slot, connect_in_turn, join_in_turn, next_slot, side_by_side
-from robot_envs.backends.ros.own_world import Journal, checked
+from robot_envs.backends.ros.own_world import checked, replay
 from robot_envs.errors import RobotEnvError, SimulatorFault
 from robot_envs.variation import LinkScale, Variation
 from robot_envs.world_state import InitialState, Joints, JointState, WorldState
@@ -20,36 +19,38 @@ class Replayed:
     """A world that notes what it is asked, and whose state is the number of its steps."""
 
     def __init__(self, drift: float = 0.0) -> None:
-        self.asked, self._drift, self._acted = [], drift, 0
+        self.asked, self._drift = [], drift
 
     def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         self.asked.append(initial)
-        self.seed = seed
         return state(self._drift, 0.0, 0.0)
-
-    def save_state(self) -> None:
-        self.asked.append("save")
 
     def act(self, commands: dict) -> WorldState:
         self.asked.append(commands)
-        self._acted += 1
-        return state(self._acted + self._drift, 0.0, 0.0, time=0.008 * self._acted)
+        return state(len(self.asked) - 1 + self._drift, 0.0, 0.0)
+
+    def save_state(self) -> str:
+        self.asked.append("save")
+        return "a snapshot"
 
 
 def test_a_journal_brings_another_simulator_to_the_same_state_or_says_where_it_differs() -> None:
-    begun = InitialState()
-    commands = [{"a": 0.1}, {"a": -0.0}, {}, {"b": (1e-300, 2.0), "a": 3.0}]
-    last = state(4.0, 0.0, 0.0, time=0.032)
-    acts = [partial(Replayed.act, commands=each) for each in commands]
-    journal = Journal([lambda world: world.reset(begun, 7), Replayed.save_state, *acts], last=last)
+    begun, commands = InitialState(), [{"a": 0.1}, {"a": -0.0}, {}, {"b": (1e-300, 2.0), "a": 3.0}]
+    journal = [
+        lambda world: world.reset(begun, 7),
+        *(lambda world, each=each: world.act(each) for each in commands),
+        lambda world: world.save_state(),
+    ]
+    last = state(4.0, 0.0, 0.0)
     world = Replayed()
-    journal.replay(world)
-    assert world.asked == [begun, "save", *commands] and world.seed == 7
+    replay(journal, world, last)
+    assert world.asked == [begun, *commands, "save"]
     with pytest.raises(
         SimulatorFault,
         match="4 steps lead to another state.*: joints '[a-z]+': .*position=4.5.*, not ",
     ):
-        journal.replay(Replayed(drift=0.5))
+        replay(journal, Replayed(drift=0.5), last)
+    replay([], world, None)
 
 
 def test_a_variation_leaves_what_it_does_not_name() -> None:
