@@ -27,3 +27,11 @@ FACTS = {
     "world_text": None, "series": 1,
 }  # fmt: skip
 START = {"data": json.dumps(FACTS).encode()}
+
+
+def written_raw(path, data=b"", md5sum="0" * 32, definition=""):
+    """A bag with bytes as a journal of another definition."""
+    fields = {"_md5sum": md5sum, "_full_text": definition, "_type": JournalMessage._type}
+    raw = (JournalMessage._type, data, md5sum, type("Journal", (), fields))
+    with rosbag.Bag(str(path), "w") as bag:
+        bag.write("/gazebo/journal", raw, Time(1), raw=True)

@@ -9,6 +9,7 @@ import xacro
 import yaml
 from bullet_gazebo_msgs.srv import PreparedStepRequest, PrepareStepRequest, StepWorldRequest
 from support.robots.worlds import add_robot, start
+from support.ros.track import Track
 
 from bullet_gazebo.services import step_service
 from bullet_gazebo.services.step_service import StepService
@@ -69,7 +70,13 @@ def world(sim, root, monkeypatch):
 @pytest.fixture
 def objects(world):
     """The world with a robot, the ground, and a crate on it."""
-    world.add("slides", "effort_joint")
+    world.add("slides", "effort_joint", "states")
     world.sim.world.spawn("ground_plane", ground_plane(), Pose())
     world.sim.world.spawn("crate", parse_urdf(BOX), Pose((0.0, 3.0, 0.1)))
     return world
+
+
+@pytest.fixture
+def track(make_world, monkeypatch):
+    """Ground for a vehicle whose plugins' topics are caught."""
+    return Track(make_world(ground=True), monkeypatch)

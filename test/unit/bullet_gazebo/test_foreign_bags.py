@@ -10,8 +10,7 @@ import pytest
 import rosbag
 from bullet_gazebo_msgs.msg import Journal as JournalMessage
 from bullet_gazebo_msgs.msg import JournalEntry
-from genpy import Time
-from support.ros.journal_bags import FACTS, START, entry, written
+from support.ros.journal_bags import FACTS, START, entry, written, written_raw
 
 from bullet_gazebo.journal import recorded
 from bullet_gazebo.journal.recorded import NoRecording, RecordedJournal
@@ -47,10 +46,8 @@ def test_no_text_of_a_bag_becomes_an_option_or_a_path(text, world_text, tmp_path
 )  # fmt: skip
 def test_a_start_that_no_simulator_had_is_refused(wrong, tmp_path, capsys):
     data = json.dumps(FACTS | wrong if wrong else wrong).encode()
-    assert (
-        replay_command.main([str(written(tmp_path / "run.bag", entry(0, data=data), entry(1)))])
-        == 2
-    )
+    path = written(tmp_path / "run.bag", entry(0, data=data), entry(1))
+    assert replay_command.main([str(path)]) == 2
     assert "damaged" in capsys.readouterr().err
 
 
@@ -62,10 +59,7 @@ def test_a_start_that_no_simulator_had_is_refused(wrong, tmp_path, capsys):
         ({"/": [{"gazebo/plugins/libx.so": "os:abort"}]}, "os:abort"),
         ({"/arm//elbow": [{"type": "antigravity/X"}]}, "antigravity/X"),
         ({"/arm": [{"elbow": {"type": "antigravity/X"}}]}, "antigravity/X"),
-        (
-            {"/elbow/type": ["effort_controllers/JointPositionController"], "/gazebo/plugins": []},
-            "",
-        ),
+        ({"/elbow/type": ["effort_controllers/JointEffortController"], "/gazebo/plugins": []}, ""),
     ],
 )
 def test_a_bag_imports_code_only_if_it_is_trusted(parameters, code, tmp_path, capsys):
@@ -83,18 +77,7 @@ def test_the_definition_of_a_message_that_a_bag_holds_is_not_run(tmp_path):
     definition = f"string open({str(made)!r},'w').close();A=1\n{JournalMessage._full_text}"
     message = io.BytesIO()
     JournalMessage([entry(0, **START)]).serialize(message)
-    kind = type(
-        "Journal",
-        (),
-        {
-            "_md5sum": JournalMessage._md5sum,
-            "_full_text": definition,
-            "_type": JournalMessage._type,
-        },
-    )
-    with rosbag.Bag(str(path), "w") as bag:
-        raw = (JournalMessage._type, message.getvalue(), JournalMessage._md5sum, kind)
-        bag.write("/gazebo/journal", raw, Time(1), raw=True)
+    written_raw(path, message.getvalue(), JournalMessage._md5sum, definition)
     assert RecordedJournal(path).facts == FACTS
     assert not made.exists()
     list(rosbag.Bag(str(path)).read_messages(raw=True))

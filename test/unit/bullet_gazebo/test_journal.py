@@ -6,18 +6,18 @@ import json
 import math
 import os
 import threading
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 import rosbag
 import rospy
-from bullet_gazebo_msgs.msg import Journal as JournalMessage
 from bullet_gazebo_msgs.msg import JournalEntry
 from gazebo_msgs.srv import SpawnModel, SpawnModelRequest, SpawnModelResponse
 from genpy import Time
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
-from support.ros.journal_bags import FACTS, START, entry, written
+from support.ros.journal_bags import FACTS, START, entry, written, written_raw
 
 from bullet_gazebo.journal import journal_output
 from bullet_gazebo.journal.journal import Entry, WorldJournal
@@ -148,40 +148,19 @@ def test_a_bag_with_gaps_is_refused(made, reason, tmp_path):
         list(RecordedJournal(path).entries())
 
 
-def no_file(path):
-    path.unlink()
-
-
-def text(path):
-    path.write_text("no bag")
-
-
-def cut(path):
-    path.write_bytes(path.read_bytes()[:5000])
-
-
 def other_topics(path):
     with rosbag.Bag(str(path), "w") as bag:
         bag.write("/number", Float64(1.0), Time(1))
 
 
-def other_version(path):
-    with rosbag.Bag(str(path), "w") as bag:
-        kind = type(
-            "Journal", (), {"_md5sum": "0" * 32, "_full_text": "", "_type": JournalMessage._type}
-        )
-        raw = (JournalMessage._type, b"", "0" * 32, kind)
-        bag.write("/gazebo/journal", raw, Time(1), raw=True)
-
-
 @pytest.mark.parametrize(
     ("spoil", "reason"),
     [
-        (no_file, "No such file"),
-        (text, "no bag, or damaged"),
-        (cut, "rosbag reindex"),
+        (Path.unlink, "No such file"),
+        (lambda path: path.write_text("no bag"), "no bag, or damaged"),
+        (lambda path: path.write_bytes(path.read_bytes()[:5000]), "rosbag reindex"),
         (other_topics, "no journal is in this bag"),
-        (other_version, "another version"),
+        (written_raw, "another version"),
     ],
 )
 def test_a_bag_that_cannot_be_replayed_is_refused_in_one_line(spoil, reason, tmp_path, capsys):
@@ -215,15 +194,8 @@ def test_changes_that_change_nothing_are_refused(models, parameters, reason, tmp
 
 
 def moving(joint=0.0, velocity=0.0, model=MODEL, **fields):
-    numbers = (*model, joint, velocity)
-    return JournalEntry(
-        observed=True,
-        models=["arm"],
-        joints=["arm::elbow"],
-        numbers=numbers,
-        ended=1234 * MS,
-        **fields,
-    )
+    fields |= {"models": ["arm"], "joints": ["arm::elbow"], "ended": 1234 * MS}
+    return JournalEntry(observed=True, numbers=(*model, joint, velocity), **fields)
 
 
 @pytest.mark.parametrize(
@@ -303,54 +275,44 @@ def test_a_bag_in_no_folder_is_refused(tmp_path):
         JournalBag(tmp_path / "none" / "run.bag")
 
 
-def test_a_handler_that_waits_for_what_comes_later_ends_the_replay(
-    sim, journal, monkeypatch, tmp_path
-):
+@pytest.fixture
+def make_replay(sim, journal, tmp_path, monkeypatch):
+    """Make a replay of a service's call, which a handler serves now."""
+
+    def make(kind, handler, **call):
+        fields = {"kind": JournalEntry.SERVICE, "type": kind._type, "md5sum": kind._md5sum, **call}
+        path = written(tmp_path / "run.bag", entry(0, **START), entry(1, **fields))
+        protocol = SimpleNamespace(recv_data_class=kind._request_class)
+        service = SimpleNamespace(service_class=kind, protocol=protocol, handler=handler)
+        manager = SimpleNamespace(get_service=lambda _: service)
+        monkeypatch.setattr(replay, "get_service_manager", lambda: manager)
+        steps = SimpleNamespace(series=0)
+        node = SimpleNamespace(sim=sim, journal=journal, control=None, steps=steps)
+        return replay.Replay(RecordedJournal(path), node, replay.Changes({}, ()), 9.0)
+
+    return make
+
+
+def test_a_handler_that_waits_for_what_comes_later_ends_the_replay(make_replay, monkeypatch):
     """It was served beside others in the recorded run; a replay serves one after the other."""
     later = threading.Event()
-    call = entry(1, kind=JournalEntry.SERVICE, name="/hand/close", type=Trigger._type)
-    call.md5sum, call.data = Trigger._md5sum, b""
-    path = written(tmp_path / "run.bag", entry(0, **START), call)
-    service = SimpleNamespace(
-        service_class=Trigger,
-        protocol=SimpleNamespace(recv_data_class=Trigger._request_class),
-        handler=lambda _: later.wait(60.0),
-    )
-    monkeypatch.setattr(
-        replay, "get_service_manager", lambda: SimpleNamespace(get_service=lambda _: service)
-    )
     monkeypatch.setattr(replay, "ENTRY_PATIENCE", 0.05)
-    node = SimpleNamespace(sim=sim, journal=journal, control=None, steps=SimpleNamespace(series=0))
-    repeated = replay.Replay(RecordedJournal(path), node, replay.Changes({}, ()), 9.0)
+    repeated = make_replay(Trigger, lambda _: later.wait(60.0), name="/hand/close", data=b"")
     repeated.run()
     later.set()
     assert "/hand/close was done, and now waits" in repeated.difference
 
 
-def test_a_difference_for_want_of_a_package_is_none(sim, journal, tmp_path, monkeypatch):
-    request = io.BytesIO()
+def test_a_difference_for_want_of_a_package_is_none(make_replay, journal):
+    request, name = io.BytesIO(), "/gazebo/spawn_urdf_model"
     SpawnModelRequest(model_xml="<mesh filename='package://my_arm/a.stl'/>").serialize(request)
-    call = entry(
-        1, kind=JournalEntry.SERVICE, name="/gazebo/spawn_urdf_model", type=SpawnModel._type
-    )
-    call.md5sum, call.data, call.answer = SpawnModel._md5sum, request.getvalue(), 7
-    path = written(tmp_path / "run.bag", entry(0, **START), call)
 
     def refuse(_):
         with journal.command("spawn") as made:
-            made.kind, made.name = JournalEntry.SERVICE, call.name
+            made.kind, made.name = JournalEntry.SERVICE, name
         return SpawnModelResponse(False, "there is no package my_arm")
 
-    service = SimpleNamespace(
-        service_class=SpawnModel,
-        protocol=SimpleNamespace(recv_data_class=SpawnModelRequest),
-        handler=refuse,
-    )
-    monkeypatch.setattr(
-        replay, "get_service_manager", lambda: SimpleNamespace(get_service=lambda _: service)
-    )
-    node = SimpleNamespace(sim=sim, journal=journal, control=None, steps=SimpleNamespace(series=0))
-    repeated = replay.Replay(RecordedJournal(path), node, replay.Changes({}, ()), 9.0)
+    repeated = make_replay(SpawnModel, refuse, name=name, data=request.getvalue(), answer=7)
     with pytest.raises(NoRecording, match="package my_arm isn't found: ./ws --with"):
         repeated.run()
 

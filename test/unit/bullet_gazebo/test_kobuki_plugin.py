@@ -5,10 +5,10 @@ from kobuki_msgs.msg import BumperEvent, CliffEvent, MotorPower
 from std_msgs.msg import Empty
 from support.robots.vehicles import RADIUS, TRACK, two_wheels
 from support.ros.silent_topics import SilentSubscriber
-from support.ros.track import Track
 
 from bullet_gazebo.common.messages import from_pose_msg
 from robot_sim.physics.files.sdf import parse_sdf
+from robot_sim.physics.model import AT_REST
 from robot_sim.physics.pose import Pose, to_rpy
 
 CLIFFS = {"left": (0.15, 0.1), "center": (0.16, 0.0), "right": (0.15, -0.1)}
@@ -19,13 +19,11 @@ KOBUKI = {
     "imu_name": "imu", "publish_tf": 1, "update_rate": 50,
     **{f"cliff_sensor_{side}_name": f"cliff_{side}" for side in CLIFFS},
 }  # fmt: skip
+DROPS = {f"wheel_drop_{side}_sensor_name": f"drop_{side}" for side in ("left", "right")}
+WALL = """<sdf version="1.6"><model name="wall"><static>1</static><link name="l"><collision name="c">
+<geometry><box><size>0.1 0.2 1</size></box></geometry></collision></link></model></sdf>"""
 RAY = "<ray><scan><horizontal><samples>1</samples></horizontal></scan>"
 RAY += "<range><min>0.01</min><max>0.3</max></range></ray>"
-
-
-@pytest.fixture
-def track(make_world, monkeypatch):
-    return Track(make_world(ground=True), monkeypatch)
 
 
 def kobuki(**elements: object) -> str:
@@ -76,17 +74,11 @@ def test_a_kobuki_drives_for_its_time_out_and_measures_itself(track):
 
 
 def test_a_kobuki_tells_of_bumps_and_cliffs_once(track):
-    wall = '<sdf version="1.6"><model name="wall"><static>1</static><link name="l"><collision name="c">'
-    wall += (
-        "<geometry><box><size>0.1 0.2 1</size></box></geometry></collision></link></model></sdf>"
-    )
-    track.sim.world.spawn("wall", parse_sdf(wall), Pose((0.5, 0.0, 0.5)))
-    names = {f"wheel_drop_{side}_sensor_name": f"drop_{side}" for side in ("left", "right")}
-    track.spawn(kobuki(**names), height=RADIUS - 0.001)
+    track.sim.world.spawn("wall", parse_sdf(WALL), Pose((0.5, 0.0, 0.5)))
+    track.spawn(kobuki(**DROPS), height=RADIUS - 0.001)
     track.advance(300)
-    bumps, cliffs, drops = (
-        track.messages[f"/mobile_base/events/{each}"] for each in ("bumper", "cliff", "wheel_drop")
-    )
+    events = ("bumper", "cliff", "wheel_drop")
+    bumps, cliffs, drops = (track.messages[f"/mobile_base/events/{each}"] for each in events)
     assert bumps == cliffs == []
     assert not any(core.wheel_drop for core in track.messages["/mobile_base/sensors/core"][-5:])
     for _ in range(4):
@@ -95,7 +87,7 @@ def test_a_kobuki_tells_of_bumps_and_cliffs_once(track):
     assert bumps[0] == BumperEvent(BumperEvent.CENTER, BumperEvent.PRESSED)
     core = track.messages["/mobile_base/sensors/core"]
     assert 2 in {each.bumper for each in core}
-    track.sim.place_model(track.model, Pose((0.0, 0.0, 1.0)), ((0.0,) * 3, (0.0,) * 3))
+    track.sim.place_model(track.model, Pose((0.0, 0.0, 1.0)), AT_REST)
     track.advance(25)
     assert bumps[-1] == BumperEvent(BumperEvent.CENTER, BumperEvent.RELEASED)
     assert [each.sensor for each in cliffs] == [0, 1, 2]
@@ -105,12 +97,11 @@ def test_a_kobuki_tells_of_bumps_and_cliffs_once(track):
 
 
 def test_a_move_tells_nothing_of_bumpers_and_wheels_that_still_touch(track):
-    names = {f"wheel_drop_{side}_sensor_name": f"drop_{side}" for side in ("left", "right")}
-    track.spawn(kobuki(**names), height=RADIUS - 0.001)
+    track.spawn(kobuki(**DROPS), height=RADIUS - 0.001)
     track.advance(300)
     drops = track.messages["/mobile_base/events/wheel_drop"]
     drops.clear()
-    track.sim.place_model(track.model, track.model.state()[0], ((0.0,) * 3, (0.0,) * 3))
+    track.sim.place_model(track.model, track.model.state()[0], AT_REST)
     track.advance(5)
     assert not drops
 

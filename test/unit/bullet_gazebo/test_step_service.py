@@ -10,6 +10,9 @@ from geometry_msgs.msg import Pose as PoseMsg
 
 WORLD = StepWorldRequest.WORLD
 FREE = {"effort_a": 2.0, "position_a": 0.01, "velocity_a": 0.3}  # joints, and commands to them
+EFFORT, BOTH = "effort_joint", ["effort_b", "slides::effort_b"]
+NOWHERE = PoseMsg(Point(0.0, float("nan"), 0.0), Quaternion())
+FAST = Twist(Vector3(1e300, 0.0, 0.0), Vector3())
 HIGH = PoseMsg(Point(1.0, 2.0, 3.0), Quaternion(0.0, 0.0, 0.0, 0.0))  # turned by nothing
 
 
@@ -84,74 +87,26 @@ def test_a_reset_lets_go_of_what_was_commanded(world):
 def test_of_several_robots_plain_names_are_refused_and_full_ones_taken(world):
     for name in ("left", "right"):
         world.add(name, "effort_joint")
-    for fields, text in (
-        ({"controllers": ["effort_joint"], "commands": [1.0]}, "several robots have a controller"),
+    plain, full = (
         (
-            {"commanded_joints": ["effort_b"], "joint_commands": [1.0]},
-            "several robots have a joint",
-        ),
-        ({"joints": ["effort_b"], "positions": [1.0]}, "several models have a joint"),
-    ):
+            {"controllers": [f"{robot}effort_joint"], "commands": [1.0]},
+            {"commanded_joints": [f"{left}effort_b"], "joint_commands": [2.0]},
+            {"joints": [f"{right}velocity_b"], "positions": [0.5]},
+        )
+        for robot, left, right in (("", "", ""), ("/right/", "left::", "right::"))
+    )
+    for fields, kind in zip(plain, ("controller", "joint", "joint"), strict=True):
         answer = world.call(1, **fields)
         assert not answer.success
-        assert text in answer.status_message
-    joints = world.step(
-        1,
-        controllers=["/right/effort_joint"],
-        commands=[1.0],
-        commanded_joints=["left::effort_b"],
-        joint_commands=[2.0],
-        joints=["right::velocity_b"],
-        positions=[0.5],
-    )
+        assert f" have a {kind} '" in answer.status_message
+    joints = world.step(1, **full[0], **full[1], **full[2])
     assert len(joints) == 12
-    assert {name for name, state in joints.items() if state[2]} == {
-        "right::effort_a",
+    assert [name for name, state in joints.items() if state[2]] == [
         "left::effort_b",
-    }
+        "right::effort_a",
+    ]
     assert joints["right::velocity_b"][0] == pytest.approx(0.5)
     assert joints["left::velocity_b"][0] == 0.0
-
-
-@pytest.mark.parametrize(
-    ("fields", "text"),
-    [
-        ({"ticks": 0}, "ticks is 0"),
-        ({"ticks": -1}, "ticks is -1"),
-        ({"ticks": 2_000_000}, "ticks is 2000000"),
-        ({"reset": 7}, "reset is 7"),
-        ({"controllers": ["effort_joint"]}, "1 controllers but 0 commands"),
-        ({"controllers": ["effort_joint"], "commands": [float("nan")]}, "not finite"),
-        ({"controllers": ["effort_joint"], "commands": [float("inf")]}, "not finite"),
-        ({"controllers": ["effort_joint"], "commands": [1e300]}, "can't be beyond"),
-        ({"controllers": ["states"], "commands": [0.1]}, "takes no numbers"),
-        ({"joints": ["effort_b"]}, "1 joints but 0 positions"),
-        ({"joints": ["effort_b"], "positions": [float("nan")]}, "not finite"),
-        ({"joints": ["effort_b", "effort_b"], "positions": [0, 1]}, "names one twice"),
-        (
-            {"joints": ["effort_b", "slides::effort_b"], "positions": [0, 1]},
-            "names 'slides::effort_b' twice",
-        ),
-        (
-            {"commanded_joints": ["effort_b", "slides::effort_b"], "joint_commands": [0, 1]},
-            "commanded_joints names one twice",
-        ),
-        (
-            {"commanded_joints": ["effort_a"], "joint_commands": [1]},
-            "belongs to controller 'effort_joint'",
-        ),
-        (
-            {"controllers": ["effort_joint", "/slides/effort_joint"], "commands": [0, 1]},
-            "controllers names one twice",
-        ),
-    ],
-)
-def test_what_is_refused_leaves_the_world_as_it_was(world, fields, text):
-    world.add("slides", "effort_joint", "states")
-    answer = world.call(**{"ticks": 1, **fields})
-    assert not answer.success
-    assert text in answer.status_message
-    assert answer.sim_time == 0.0
 
 
 def test_nothing_is_told_that_was_not_asked_for(objects):
@@ -217,35 +172,42 @@ def test_a_placing_alone_needs_no_ticks(objects):
 @pytest.mark.parametrize(
     ("fields", "text"),
     [
+        ({"reset": 0, "ticks": 0}, "ticks is 0"),
+        ({"ticks": -1}, "ticks is -1"),
+        ({"ticks": 2_000_000}, "ticks is 2000000"),
+        ({"reset": 7}, "reset is 7"),
+        ({"controllers": [EFFORT]}, "1 controllers but 0 commands"),
+        ({"controllers": [EFFORT], "commands": [float("nan")]}, "not finite"),
+        ({"controllers": [EFFORT], "commands": [float("inf")]}, "not finite"),
+        ({"controllers": [EFFORT], "commands": [1e300]}, "can't be beyond"),
+        ({"controllers": ["states"], "commands": [0.1]}, "takes no numbers"),
+        ({"controllers": ["effort_jiont"], "commands": [0.0]}, "did you mean 'effort_joint'?"),
+        ({"controllers": [EFFORT, f"/slides/{EFFORT}"], "commands": [0, 1]}, "controllers names one twice"),
+        ({"joints": ["effort_b"]}, "1 joints but 0 positions"),
+        ({"joints": ["effort_b"], "positions": [float("nan")]}, "not finite"),
+        ({"joints": ["effort_b", "effort_b"], "positions": [0, 1]}, "names one twice"),
+        ({"joints": BOTH, "positions": [0, 1]}, "names 'slides::effort_b' twice"),
+        ({"joints": ["efort_b"], "positions": [0.0]}, "did you mean 'effort_b'?"),
+        ({"commanded_joints": BOTH, "joint_commands": [0, 1]}, "commanded_joints names one twice"),
+        ({"commanded_joints": ["effort_a"], "joint_commands": [1]}, "belongs to controller 'effort_joint'"),
+        ({"commanded_joints": ["slides::efort_b"], "joint_commands": [0.0]}, "mean 'slides::effort_b'?"),
         ({"models": ["crat"], "poses": [HIGH]}, "no model 'crat'; did you mean 'crate'?"),
         ({"models": ["crate"]}, "1 models but 0 poses"),
         ({"models": ["crate"], "poses": [HIGH], "twists": [Twist()] * 2}, "1 models but 2 twists"),
         ({"models": ["crate"] * 2, "poses": [HIGH] * 2}, "models names one twice"),
-        (
-            {"models": ["crate"], "poses": [PoseMsg(Point(0.0, float("nan"), 0.0), Quaternion())]},
-            "poses[0].position.y is nan",
-        ),
-        (
-            {"models": ["crate"], "poses": [HIGH], "twists": [Twist(Vector3(1e300, 0, 0), Vector3())]},
-            "twists[0].linear.x is 1e+300",
-        ),
+        ({"models": ["crate"], "poses": [NOWHERE]}, "poses[0].position.y is nan"),
+        ({"models": ["crate"], "poses": [HIGH], "twists": [FAST]}, "twists[0].linear.x is 1e+300"),
         ({"model_states_of": ["crat"]}, "no model 'crat'; did you mean 'crate'?"),
         ({"link_states_of": ["crat"]}, "no link 'crat'; did you mean 'crate'?"),
         ({"link_states_of": ["crate"], "link_frames": ["grond"]}, "no link 'grond'"),
         ({"link_states_of": ["crate"], "link_frames": ["", ""]}, "1 link_states_of but 2 link_frames"),
         ({"link_frames": [""]}, "0 link_states_of but 1 link_frames"),
         ({"contacts_of": ["crate_colision"]}, "did you mean 'crate_collision'?"),
-        ({"joints": ["efort_b"], "positions": [0.0]}, "did you mean 'effort_b'?"),
-        ({"controllers": ["effort_jiont"], "commands": [0.0]}, "did you mean 'effort_joint'?"),
-        (
-            {"commanded_joints": ["slides::efort_b"], "joint_commands": [0.0]},
-            "did you mean 'slides::effort_b'?",
-        ),
     ],
 )  # fmt: skip
-def test_what_cannot_be_placed_or_told_is_refused_and_nothing_done(objects, fields, text):
+def test_what_is_refused_leaves_the_world_as_it_was(objects, fields, text):
     before = [model.state() for model in objects.sim.world.models.values()]
-    answer = objects.call(1, reset=WORLD, **fields)
+    answer = objects.call(**{"ticks": 1, "reset": WORLD, **fields})
     assert not answer.success
     assert text in answer.status_message
     assert answer.sim_time == 0.0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,6 +11,7 @@ from xml.etree import ElementTree
 
 import pytest
 import rospy
+from support.python import run_python
 
 from bullet_gazebo.node import watchdog as module
 from bullet_gazebo.node.gzserver import GazeboNode
@@ -63,31 +62,29 @@ def raises(error: BaseException):
     return run
 
 
+def ended(sim: FakeSimulator) -> Watchdog:
+    """A watchdog whose thread has ended by itself."""
+    watchdog = Watchdog(sim)
+    watchdog.start()
+    watchdog._thread.join(BOUND)
+    assert not watchdog._thread.is_alive()
+    return watchdog
+
+
 @pytest.mark.parametrize(
     "error",
-    [
-        ZeroDivisionError("zero"),
-        SystemExit("x"),
-        SystemExit(),
-        KeyboardInterrupt(),
-        GeneratorExit(),
-    ],
+    [ZeroDivisionError("0"), SystemExit("x"), SystemExit(), KeyboardInterrupt(), GeneratorExit()],
     ids=repr,
 )
 def test_whatever_is_raised_in_the_thread_is_a_fault_and_told(error, told) -> None:
-    watchdog = Watchdog(FakeSimulator(raises(error)))
-    watchdog.start()
-    watchdog._thread.join(BOUND)
+    watchdog = ended(FakeSimulator(raises(error)))
     assert watchdog.failed() and watchdog.failed()
     assert len(told) == 1
     assert type(error).__name__ in told[0] and "Traceback" in told[0]
 
 
 def test_a_thread_that_ends_without_a_word_is_a_fault_too(told) -> None:
-    watchdog = Watchdog(FakeSimulator(lambda: None))
-    watchdog.start()
-    watchdog._thread.join(BOUND)
-    assert watchdog.failed()
+    assert ended(FakeSimulator(lambda: None)).failed()
 
 
 def test_a_fault_of_somebody_else_who_moves_the_world_counts(told) -> None:
@@ -149,11 +146,9 @@ def test_a_process_whose_threads_do_not_end_ends_all_the_same_with_its_exit_code
         "import threading; from bullet_gazebo.common.node_process import end_within;"
         "threading.Thread(target=threading.Event().wait).start(); end_within(0.1, 7)"
     )
-    result = subprocess.run(
-        [sys.executable, "-c", code], check=False, timeout=BOUND, capture_output=True
-    )
+    result = run_python(code, check=False, timeout=BOUND)
     assert result.returncode == 7
-    assert b"doesn't end" in result.stderr
+    assert "doesn't end" in result.stderr
 
 
 class Stalled:
@@ -256,10 +251,8 @@ class StuckController(Controller):
 
 def add_plugin(sim: Simulator, code: Stuck) -> str:
     plugin = Plugin("librude.so", "rude", ElementTree.Element("plugin"))
-    context = PluginContext(
-        sim, SimpleNamespace(name="robot"), plugin, None, None, "robot", None, None
-    )
-    context.on_update(code.update)
+    model = SimpleNamespace(name="robot")
+    PluginContext(sim, model, plugin, None, None, "robot", None, None).on_update(code.update)
     return "plugin librude.so of model 'robot'"
 
 
