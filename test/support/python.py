@@ -8,6 +8,6 @@ from typing import Any
 def run_python(
     code: str, *arguments: str, check: bool = True, **options: Any
 ) -> subprocess.CompletedProcess[str]:
-    """Runs the code and returns what it wrote; with `check` it has to succeed."""
+    """What a process has written that ran the code; with `check` it has to succeed."""
     command = [sys.executable, "-c", code, *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=check, **options)

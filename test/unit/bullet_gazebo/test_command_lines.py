@@ -14,16 +14,25 @@ from bullet_gazebo.services.spawn_services import model_paths
 from ros_calls.service import ServiceFailed, ServiceGone
 
 
-def test_options_stand_in_any_order():
-    line = "physics:=ode -s libx.so --seed 7 w.world __name:=g -u --verbose -e dart --lockstep -r"
-    args = parse_args(line.split())
-    assert (args.world, args.paused, args.physics) == ("w.world", True, "dart")
-    assert (args.lockstep, args.seed, args.ignored) == (True, 7, [])
-
-
-@pytest.mark.parametrize("line", ["-o a.world", "-o fast a.world", "--nix 5 a.world", "a.world -o"])
-def test_the_world_is_found(line):
-    assert parse_args(line.split()).world == "a.world"
+@pytest.mark.parametrize(
+    ("line", "wanted"),
+    [
+        (
+            "physics:=ode -s libx.so --seed 7 w.world __name:=g -u --verbose -e dart --lockstep -r",
+            {"world": "w.world", "paused": True, "physics": "dart", "lockstep": True, "seed": 7,
+             "ignored": []},
+        ),
+        (
+            "--video a.mp4 --video-size 320 240 w.world --video-rate 60",
+            {"video": ["a.mp4"], "video_size": [320, 240], "video_rate": 60.0, "video_model": "",
+             "world": "w.world"},
+        ),
+        *((line, {"world": "a.world"}) for line in (
+            "-o a.world", "-o fast a.world", "--nix 5 a.world", "a.world -o")),
+    ],
+)  # fmt: skip
+def test_options_stand_in_any_order(line, wanted):
+    assert vars(parse_args(line.split())).items() >= wanted.items()
 
 
 def test_the_environment_wins_over_a_launch_file(monkeypatch):
@@ -40,13 +49,6 @@ def test_the_environment_wins_over_a_launch_file(monkeypatch):
     (args,) = seen
     assert (args.physics, args.camera_scale, args.seed) == ("mujoco", 0.25, 0)
     assert args.world == "my.world"
-
-
-def test_a_video_has_its_options():
-    line = "--video a.mp4 --video-size 320 240 w.world --video-rate 60"
-    args = parse_args(line.split())
-    assert (args.video, args.video_size, args.video_rate) == (["a.mp4"], [320, 240], 60.0)
-    assert (args.video_model, args.world) == ("", "w.world")
 
 
 def test_the_seed_decides_random_numbers():
@@ -161,3 +163,28 @@ def test_a_spawner_that_ends_with_the_simulator_has_nothing_to_complain_of(
     spawner._Spawner(Manager()).run(["arm_controller"], stopped=True)
     leave[0]()
     assert bool(told) == warns
+
+
+class LateManager:
+    """One that comes up after some waits in vain."""
+
+    def __init__(self, waits):
+        self.waits = waits
+
+    def wait(self, services, timeout):
+        self.waits -= 1
+        return services[0] if self.waits >= 0 else None
+
+
+@pytest.mark.parametrize(
+    ("spawns", "waits", "found"),
+    [
+        ([[0, 0], [1, 0], [1, 0], [0, 1]], 3, True),  # also where it has just ended
+        ([[0, 1], [0, 1]], 1, False),
+        ([[], []], 1, False),  # Gazebo itself says nothing
+    ],
+)
+def test_a_spawner_waits_while_a_model_is_being_spawned(monkeypatch, spawns, waits, found):
+    monkeypatch.setattr(spawner.rospy, "get_param", lambda *_: False)  # time has begun
+    monkeypatch.setattr(spawner, "spawns", lambda: spawns.pop(0))
+    assert (spawner._find(LateManager(waits), 30.0) is None) == found

@@ -20,6 +20,17 @@ from bullet_gazebo.node.start import arguments_of, check_facts
 from file_access.limited import LimitedProcess
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _one_reader():
+    """Read all bags in one process, where each would start its own."""
+    shared = LimitedProcess(f"{recorded.__name__}:read_journal", recorded.LIMITS)
+    asking = SimpleNamespace(ask=shared.ask, close=lambda: None)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(recorded, "LimitedProcess", lambda *_: asking)
+        yield
+    shared.close()
+
+
 def test_a_world_file_that_has_gone_is_written_again(tmp_path):
     facts = FACTS | {"physics": "mujoco", "paused": True, "seed": 3, "world_text": "<sdf/>"}
     *options, path = arguments_of(facts, tmp_path)
@@ -92,11 +103,8 @@ def test_a_pipe_and_a_device_are_refused_at_once(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_damaged_bag_is_refused_or_read(tmp_path, monkeypatch):
+def test_a_damaged_bag_is_refused_or_read(tmp_path):
     """Whatever bytes are wrong; what can be read is compared as any recording is."""
-    shared = LimitedProcess(f"{recorded.__name__}:read_journal", recorded.LIMITS)
-    asking = SimpleNamespace(ask=shared.ask, close=lambda: None)
-    monkeypatch.setattr(recorded, "LimitedProcess", lambda *_: asking)
     start, step = entry(0, **START), entry(1, kind=JournalEntry.COMMAND, name="advance", data=b"5")
     step.parameters = '{"/arm": [{"p": 1.0}]}'
     whole = written(tmp_path / "run.bag", start, step).read_bytes()
@@ -112,5 +120,4 @@ def test_a_damaged_bag_is_refused_or_read(tmp_path, monkeypatch):
         except NoRecording as fault:
             assert str(fault).startswith(f"{path}: ") and "\n" not in str(fault)
             outcomes.add("refused")
-    shared.close()
     assert outcomes == {"read", "refused"}

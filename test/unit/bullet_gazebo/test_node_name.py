@@ -27,9 +27,8 @@ def test_a_twin_is_refused_while_it_lives_with_a_way_out(master) -> None:
     master.nodes["/gazebo"] = "http://127.0.0.1:1"  # killed
     refuse_twin("/gazebo")
     master.nodes["/gazebo"] = master.uri
-    with pytest.raises(
-        NodeNameTaken, match="/gazebo runs at .* ROS_MASTER_URI=http://127.0.0.1:.* replace:=true"
-    ):
+    way_out = "/gazebo runs at .* ROS_MASTER_URI=http://127.0.0.1:.* replace:=true"
+    with pytest.raises(NodeNameTaken, match=way_out):
         refuse_twin("/gazebo")
 
 
@@ -60,10 +59,9 @@ def test_the_loss_of_the_name_is_told_apart_from_other_ends(master, monkeypatch)
     hooks = []
     monkeypatch.setattr(node_name.rospy.core, "add_preshutdown_hook", hooks.append)
     loss = node_name.NameLoss()
-    hooks[0]("external shutdown request from [/rosnode]: [user request]")
+    request = "external shutdown request from [{}]: [{}]"
+    hooks[0](request.format("/rosnode", "user request"))
     assert not loss.happened
-    hooks[0](
-        "external shutdown request from [master]: [[/gazebo] Reason: new node registered with same name]"
-    )
+    hooks[0](request.format("master", "[/gazebo] Reason: new node registered with same name"))
     assert loss.happened
     assert "another node has taken the name /gazebo" in loss.text("/gazebo")

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import sys
 import threading
+from contextlib import ExitStack
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import rospy
 
-from bullet_gazebo.plugins import plugin_loader
+from bullet_gazebo.plugins import control_plugin, plugin_loader
+from bullet_gazebo.plugins.control_plugin import ControlPlugin
 from bullet_gazebo.plugins.plugin_loader import PluginRegistry
 from lockstep_runner import world
 from robot_sim.physics.files.sdf import parse_sdf
@@ -148,9 +151,8 @@ def test_a_nested_models_plugin_means_its_own_links(setting):
 
 
 @pytest.mark.parametrize(
-    "place",
-    ["os:X", "os:sep", "os", "", ":", "a b:c", None, 3, ["os", "X"], {"os": "X"}],
-)  # fmt: skip
+    "place", ["os:X", "os:sep", "os", "", ":", "a b:c", None, 3, ["os", "X"], {"os": "X"}]
+)
 def test_a_place_without_a_plugin_is_reported(setting, place) -> None:
     setting.places = {"librude.so": place}
     setting.delete(setting.spawn("rude"))
@@ -200,11 +202,7 @@ def test_an_update_that_would_wait_for_itself_is_told(setting, call: str) -> Non
     setting.places = {"libwaiting.so": "waiting:Waiting", "libgood.so": "good:Good"}
     setting.spawn("waiting", "good")
 
-    def move() -> None:
-        with setting.sim.lock:
-            setting.sim.advance(3)
-
-    world = threading.Thread(target=move, daemon=True)
+    world = threading.Thread(target=setting.step, daemon=True)
     world.start()
     world.join(60.0)
     assert not world.is_alive(), "the world stands still"
@@ -256,3 +254,18 @@ def test_a_clock_ends_with_its_plugin_or_its_fault_and_what_is_open_is_closed(se
     assert len(setting.errors) == 1 and setting.sim.listeners == []
     setting.delete(model)
     assert closed[-1] == "topic" and closed.count("topic") == 1 and len(setting.errors) == 1
+
+
+def test_what_a_robots_control_lacks_is_told_in_lines_of_its_own(setting, monkeypatch):
+    """A foreign kind of simulation, and control that fails."""
+    monkeypatch.setattr(rospy, "logfatal", lambda text, *args: setting.errors.append(text % args))
+    monkeypatch.setattr(control_plugin, "find_param", lambda *_: "no XML")
+    plugin = ControlPlugin.__new__(ControlPlugin)
+    arm = SimpleNamespace(name="arm")
+    plugin._context = SimpleNamespace(model=arm, text=lambda *_: "their_sim/TheirSim")
+    plugin._namespace, plugin._parameter = "/arm", "robot_description"
+    plugin._gone, plugin._lock, plugin._started = threading.Event(), threading.Lock(), ExitStack()
+    assert plugin._try_start()
+    kind, control = setting.errors
+    assert kind.startswith("Model 'arm': the <robotSimType> their_sim/TheirSim is not simulated")
+    assert "model 'arm' can't start, so this robot has no control here: robot_desc" in control

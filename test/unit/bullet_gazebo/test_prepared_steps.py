@@ -1,5 +1,7 @@
 """Prepared steps: handles, their numbers, and what makes one stale."""
 
+from functools import partial
+
 import pytest
 from bullet_gazebo_msgs.srv import PreparedStepRequest, PrepareStepRequest, StepWorldRequest
 
@@ -120,9 +122,8 @@ def test_numbers_that_do_not_fit_are_refused_and_nothing_done(world, ticks, comm
 def test_a_prepared_step_says_what_has_gone_during_a_long_request(objects, monkeypatch):
     sim = objects.sim
     every = objects.prepare(model_states=True)
-    monkeypatch.setattr(
-        sim.lock, "yield_turn", lambda: sim.world.spawn("new", ground_plane(), Pose())
-    )
+    spawn = partial(sim.world.spawn, "new", ground_plane(), Pose())
+    monkeypatch.setattr(sim.lock, "yield_turn", spawn)
     answer = objects.prepared(every, 600)
     assert "the ticks are done, but meanwhile robots or models" in answer.status_message
     linked = objects.prepare(link_states_of=["crate::crate"])

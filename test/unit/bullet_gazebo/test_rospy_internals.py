@@ -16,7 +16,6 @@ from rospy.impl.registration import Registration, RegManager
 from rospy.impl.tcpros_pubsub import QueuedConnection
 from rospy.topics import _PublisherImpl, _TopicImpl
 from std_msgs.msg import String
-from support.ros.ros_fakes import FakeMaster
 
 from bullet_gazebo.common import rospy_internals
 from bullet_gazebo.common.rospy_internals import (
@@ -106,39 +105,45 @@ def test_a_topic_that_is_gone_leaves_no_file_open(monkeypatch) -> None:
     assert len(os.listdir("/proc/self/fd")) == len(before)
 
 
-def test_services_are_registered_together(monkeypatch) -> None:
+def test_services_are_registered_together(master) -> None:
     """Else a client finds some of them, and calls one that isn't there yet."""
-    fake = FakeMaster()
-    monkeypatch.setenv("ROS_MASTER_URI", fake.uri)
-    manager = SimpleNamespace(uri="http://127.0.0.1:1", master_uri=fake.uri)
+    manager = SimpleNamespace(uri="http://127.0.0.1:1", master_uri=master.uri)
     names = ["/gazebo/spawn_sdf_model", "/gazebo/pause_physics"]
     with registered_together():
         for name in names:
             RegManager.reg_added(manager, name, "rosrpc://127.0.0.1:1", Registration.SRV)
-            assert not fake.services
-    assert list(fake.services) == names
-    fake.close()
+            assert not master.services
+    assert list(master.services) == names
 
 
-def test_a_connection_that_comes_while_its_node_does_is_diverted(monkeypatch) -> None:
-    """The node comes right after the connection has been looked at, and before the topic has it."""
+@pytest.fixture
+def _put_back(monkeypatch) -> None:
     for kind in (_TopicImpl, _PublisherImpl):
-        monkeypatch.setattr(kind, "add_connection", kind.add_connection)  # so that it is put back
+        monkeypatch.setattr(kind, "add_connection", kind.add_connection)
+
+
+def connection() -> SimpleNamespace:
+    """That of a script."""
+    return SimpleNamespace(
+        endpoint_id="/script", cleanup_cb=None, fileno=lambda: None, set_cleanup_callback=print
+    )
+
+
+@pytest.mark.usefixtures("_put_back")
+def test_a_connection_that_comes_while_its_node_does_is_diverted() -> None:
+    """The node comes right after the connection has been looked at, and before the topic has it."""
     got: list[object] = []
     sinks = iter([None, lambda *message: got.append(message)])
     rospy_internals.divert_messages(lambda node: next(sinks))
-    node = SimpleNamespace(
-        endpoint_id="/script", cleanup_cb=None, fileno=lambda: None, set_cleanup_callback=print
-    )
+    node = connection()
     _PublisherImpl("/scan", String).add_connection(node)
     node.write_data(b"1")
     assert got == [("/scan", b"1")]
 
 
+@pytest.mark.usefixtures("_put_back")
 def test_a_node_is_connected_once_the_topic_s_listeners_know_of_it(monkeypatch) -> None:
     """Else what a sensor measures for it comes before or after the messages of the same request."""
-    for kind in (_TopicImpl, _PublisherImpl):
-        monkeypatch.setattr(kind, "add_connection", kind.add_connection)  # so that it is put back
     rospy_internals.divert_messages(lambda node: None)
     topic, seen = _PublisherImpl("/scan", String), []
     topics = SimpleNamespace(get_publisher_impl=lambda name: topic)
@@ -149,9 +154,7 @@ def test_a_node_is_connected_once_the_topic_s_listeners_know_of_it(monkeypatch) 
 
     listener = SimpleNamespace(peer_subscribe=lambda *_: seen.append(is_connected()))
     topic.add_subscriber_listener(listener)
-    node = SimpleNamespace(
-        endpoint_id="/script", cleanup_cb=None, fileno=lambda: None, set_cleanup_callback=print
-    )
+    node = connection()
     seen.append(is_connected())
     topic.add_connection(node)
     assert [*seen, is_connected()] == [False, False, True]

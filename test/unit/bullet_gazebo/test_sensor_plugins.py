@@ -204,11 +204,8 @@ def test_an_unheard_laser_of_a_million_rays_keeps_no_memory(node, monkeypatch):
 @pytest.mark.parametrize(("heard", "pictures"), [(True, MOST_WAITING), (False, 0)])
 def test_a_storm_of_triggers_costs_no_more_than_some_pictures(node, monkeypatch, heard, pictures):
     monkeypatch.setattr(SilentPublisher, "has_connections", lambda self: heard)
-    taken = []
-    picture = PinholeCamera.picture
-    monkeypatch.setattr(
-        PinholeCamera, "picture", lambda *args: taken.append(args) or picture(*args)
-    )
+    taken, take = [], PinholeCamera.picture
+    monkeypatch.setattr(PinholeCamera, "picture", lambda *a: taken.append(a) or take(*a))
     text = MODEL.format(SENSOR.format("camera", CAMERA.format(""), "triggered_camera", ""), "")
     model = node.sim.world.spawn("m", parse_sdf(text), Pose())
     node.plugins.load(model, "/")
@@ -270,8 +267,7 @@ def test_mutated_sensors_measure_or_are_refused(root):
 
 
 @pytest.mark.parametrize(("scale", "size"), [(1.0, (40, 30)), (0.25, (10, 8)), (0.001, (1, 1))])
-def test_pictures_are_made_smaller_where_that_is_asked_for(monkeypatch, scale, size):
-    node = Node(silence(monkeypatch))
+def test_pictures_are_made_smaller_where_that_is_asked_for(node, scale, size):
     node.plugins = PluginRegistry(node.sim, None, camera_scale=scale)
     plugin = '<plugin name="p" filename="libgazebo_ros_camera.so"/>'
     camera = (
@@ -282,21 +278,16 @@ def test_pictures_are_made_smaller_where_that_is_asked_for(monkeypatch, scale, s
     [image, *_], [info, *_] = published(Image), published(CameraInfo)
     assert (image.width, image.height) == (info.width, info.height) == size
     assert info.K[0] == pytest.approx(size[0] / (2.0 * math.tan(1.047 / 2.0)))
-    node.sim.world.close()
 
 
-def test_in_real_time_pictures_of_all_kinds_come_from_beside_the_ticks(monkeypatch):
-    node = Node(silence(monkeypatch))
+def test_in_real_time_pictures_of_all_kinds_come_from_beside_the_ticks(node):
     node.sim.lockstep = False
     pictures = PictureProcess(node.sim, "rays")
     node.plugins = PluginRegistry(node.sim, None, renderer=pictures)
-    sensors = (
-        camera(own="<cameraName>eye</cameraName>"),
-        SENSOR.format(
-            "depth", CAMERA.format(""), "openni_kinect", "<cameraName>deep</cameraName>"
-        ).replace("bad", "deep"),
-    )
-    model = node.sim.world.spawn("m", parse_sdf(MODEL.format("".join(sensors), "")), Pose())
+    kinect = ("depth", CAMERA.format(""), "openni_kinect", "<cameraName>deep</cameraName>")
+    sensors = SENSOR.format(*kinect).replace("bad", "deep")
+    sensors += camera(own="<cameraName>eye</cameraName>")
+    model = node.sim.world.spawn("m", parse_sdf(MODEL.format(sensors, "")), Pose())
     node.plugins.load(model, "/")
     kinds = {"/eye/image_raw", "/eye/image_raw/compressed", "/deep/depth/image_raw", "/deep/points"}
     for _ in range(30_000):
@@ -312,4 +303,3 @@ def test_in_real_time_pictures_of_all_kinds_come_from_beside_the_ticks(monkeypat
     for _ in range(5):
         node.sim.step(1)
     assert {topic: [*each] for topic, each in SilentPublisher.messages.items()} == sent
-    node.sim.world.close()

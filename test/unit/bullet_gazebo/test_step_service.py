@@ -109,34 +109,6 @@ def test_of_several_robots_plain_names_are_refused_and_full_ones_taken(world):
     assert joints["left::velocity_b"][0] == 0.0
 
 
-def test_nothing_is_told_that_was_not_asked_for(objects):
-    answer = objects.call(1)
-    assert answer.success
-    for name in ("model_names", "model_poses", "link_poses", "link_twists", "contacts"):
-        assert list(getattr(answer, name)) == [], name
-
-
-def test_links_models_and_contacts_are_told_after_the_ticks(objects):
-    fields = {"link_states_of": ["crate", "effort_a", "crate"], "link_frames": ["", "", "effort_a"]}
-    links = [joint.child for joint in objects.sim.robots[0].model.description.movable_joints]
-    fields["link_states_of"][1] = fields["link_frames"][2] = links[0]
-    answer = objects.call(500, model_states_of=["crate"], contacts_of=["crate"], **fields)
-    assert answer.success, answer.status_message
-    assert answer.model_names == ["crate"]
-    assert answer.model_poses[0].position.z == pytest.approx(0.1, abs=1e-3)
-    assert answer.link_poses[0] == answer.model_poses[0]
-    assert len(answer.link_poses) == len(answer.link_twists) == 3
-    away = answer.link_poses[0].position.y - answer.link_poses[1].position.y
-    assert answer.link_poses[2].position.y == pytest.approx(away)
-    (pair,) = answer.contacts
-    assert pair.collision1_name == "crate::crate::crate_collision"
-    assert pair.collision2_name == "ground_plane::link::collision"
-    assert pair.total_wrench.force.z == pytest.approx(2 * 9.8, rel=0.01)
-    assert sum(each.force.z for each in pair.wrenches) == pytest.approx(pair.total_wrench.force.z)
-    counts = {len(getattr(pair, f"contact_{name}")) for name in ("positions", "normals")}
-    assert counts == {len(pair.depths)} == {len(pair.wrenches)}
-
-
 def test_all_models_and_all_contacts(objects):
     answer = objects.call(500, model_states=True, contacts=True)
     # Without a tick they are still those of the last one.

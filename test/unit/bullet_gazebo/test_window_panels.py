@@ -49,22 +49,30 @@ def joint(name):
     return Joint(name, "revolute", "", "base", axis=(0.0, 0.0, 1.0), lower=-1.0, upper=1.0)
 
 
+def panel_of(server, stands=True, controllers=None, act=None):
+    """A panel of models, whose time may stand still."""
+    world, controllers = server.scene.add_frame("/world"), controllers or NoControllers()
+    return ModelPanel(server, world, None, controllers, act, lambda: stands)
+
+
+def at_rest(count=1):
+    """Poses of links."""
+    return np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]] * count)
+
+
 def test_models_are_chosen_while_another_thread_shows_them(server, interleaved):
     """Time that runs and stands by turns switches sliders off and on, which removed ones refuse."""
     stands = False
-    panel = ModelPanel(
-        server, server.scene.add_frame("/world"), None, NoControllers(), None, lambda: stands
-    )
+    world = server.scene.add_frame("/world")
+    panel = ModelPanel(server, world, None, NoControllers(), None, lambda: stands)
     picture = Picture(server, pytest.fail)
     names = {name: [f"{name}_{i}" for i in range(count)] for name, count in JOINTS.items()}
-    picture.draw(
-        [
-            VisibleModel(number, name, [Link("base")], [joint(each) for each in names[name]])
-            for number, name in enumerate(names)
-        ],
-        [],
-    )
-    picture.move(np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]] * len(names)))
+    drawn = [
+        VisibleModel(number, name, [Link("base")], list(map(joint, names[name])))
+        for number, name in enumerate(names)
+    ]
+    picture.draw(drawn, [])
+    picture.move(at_rest(len(names)))
     models = list(picture.models.values())
     panel.set_models(models)
     choice = handles(server, viser.GuiDropdownHandle)["Model"]
@@ -92,21 +100,18 @@ def test_models_are_chosen_while_another_thread_shows_them(server, interleaved):
 
 
 def test_the_only_one_that_moves_is_followed_unless_another_is_chosen(server):
-    world = server.scene.add_frame("/world")
-    panel = ModelPanel(server, world, None, NoControllers(), None, lambda: True)
+    panel = panel_of(server)
+    world = panel._world
     fixed = VisibleModel(1, "ground", [Link("base")], static=True)
     models = [fixed, VisibleModel(2, "walker", [Link("base")])]
     switch = handles(server, viser.GuiCheckboxHandle)["Follow"]
 
     def seen(place):
         panel.set_models(models)
-        places = {"ground": 0.0, "walker": place, "other": 0.0}
-        panel.follow(
-            {
-                each.name: np.array([[places[each.name], 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
-                for each in models
-            }
-        )
+        poses = {each.name: at_rest() for each in models}
+        if "walker" in poses:
+            poses["walker"][0, 0] = place
+        panel.follow(poses)
         return float(world.position[0])
 
     assert [seen(1.0), seen(3.0), seen(-4.0)] == [0.0, -2.0, 5.0]
@@ -141,15 +146,11 @@ def test_foreign_names_and_numbers_are_only_text_to_a_browser(server):
         Joint(f"{name} joint", "revolute", "", "base", lower=-limit, upper=limit)
         for name, limit in zip(NAMES, limits, strict=True)
     ]
-    models = [
-        VisibleModel(number, name, [Link("base")], joints) for number, name in enumerate(NAMES)
-    ]
-    panel = ModelPanel(
-        server, server.scene.add_frame("/world"), None, NoControllers(), None, lambda: False
-    )
+    models = [VisibleModel(place, name, [Link("base")], joints) for place, name in enumerate(NAMES)]
+    panel = panel_of(server, stands=False)
     picture = Picture(server, lambda line: None)
     picture.draw(models, [], joint_frames=True)
-    picture.move(np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]] * len(models)))
+    picture.move(at_rest(len(models)))
     panel.set_models(models)
     handles(server, viser.GuiDropdownHandle)["Model"].value = NAMES[0]
     positions = {name: [1e300, 0.0, -1e20, float("nan"), 1e308, 0.0] for name in NAMES}
@@ -184,9 +185,7 @@ def test_a_slider_that_is_dragged_leaves_its_joint_where_it_was_left(server):
             assert listens.wait(60.0)
             commanded.append(positions[joint])
 
-    panel = ModelPanel(
-        server, server.scene.add_frame("/world"), None, Slow(), lambda act: act(), lambda: False
-    )
+    panel = panel_of(server, False, Slow(), lambda act: act())
     picture = Picture(server, pytest.fail)
     picture.draw([VisibleModel(1, "arm", [Link("base")], [joint("elbow")])], [])
     panel.set_models(list(picture.models.values()))
@@ -252,8 +251,8 @@ class Odd:
 
 
 def test_a_camera_that_cant_be_moved_ends_nothing(server):
-    world = server.scene.add_frame("/world")
-    panel = ModelPanel(server, world, None, NoControllers(), None, lambda: True)
+    panel = panel_of(server)
+    world = panel._world
     panel.set_models([VisibleModel(0, "arm", [Link("base")], [])])
     panel._followed, world.position = "arm", (1.0, 0.0, 0.0)
     server.get_clients = lambda: {0: Odd()}

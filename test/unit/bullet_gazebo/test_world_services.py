@@ -56,7 +56,7 @@ def test_what_is_no_command_is_refused(control, arguments) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(
     st.tuples(COMMANDS, COUNTS) | st.lists(ANY, max_size=4).map(tuple)
     | st.tuples(COMMANDS | ANY) | st.tuples(COMMANDS, ANY)

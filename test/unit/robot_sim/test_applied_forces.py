@@ -42,13 +42,9 @@ class FakeModel:
 
     def __init__(self):
         self.body, self.speed = FakeBody(), 0.0
-        limits = {"a": (-1.0, -1.0), "b": (2.0, 7.0)}
-        self.description = SimpleNamespace(
-            joints={
-                name: SimpleNamespace(effort=effort, velocity=velocity)
-                for name, (effort, velocity) in limits.items()
-            }
-        )
+        free = SimpleNamespace(effort=-1.0, velocity=-1.0)
+        bound = SimpleNamespace(effort=2.0, velocity=7.0)
+        self.description = SimpleNamespace(joints={"a": free, "b": bound})
 
     def joint_index(self, name):
         return self.joint_names.index(name)
@@ -117,6 +113,4 @@ def test_in_a_frame_the_wrench_is_turned_into_the_body_and_applied_as_if_in_the_
     body, frame = turned(math.pi / 2, (1.0, 0.0, 0.0)), turned(0.0, (1.0, 3.0, 0.0))
     force, torque = in_world(((1.0, 0.0, 0.0), NOTHING), NOTHING, body, frame)
     assert force == pytest.approx((0.0, -1.0, 0.0))
-    assert torque == pytest.approx(
-        (0.0, 0.0, -3.0)
-    )  # the frame is at (3, 0, 0), seen from the body
+    assert torque == pytest.approx((0.0, 0.0, -3.0))  # the body sees the frame at (3, 0, 0)

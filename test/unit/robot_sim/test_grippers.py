@@ -55,9 +55,8 @@ def test_an_environment_gives_followers_their_gains(gains, lags):
     world.reset(InitialState())
     for _ in range(15):
         world.act({"grip": 0.5})
-    states = dict(
-        zip(robot.links.joints, world._sim.world.models["gripper"].joint_states(), strict=True)
-    )
+    states = world._sim.world.models["gripper"].joint_states()
+    states = dict(zip(robot.links.joints, states, strict=True))
     off = states["left"][0] - states["right"][0]
     assert states["left"][0] > 0.005
     assert (abs(off) > 1e-4) == lags
@@ -148,14 +147,8 @@ def test_one_finger_grips_nothing(world):
 
 def test_after_a_reset_a_grip_takes_as_long_as_the_first_one(world, monkeypatch):
     silence(monkeypatch)
-    arm = "".join(
-        f"<{tag}_link>{link}</{tag}_link>"
-        for tag, link in (
-            ("palm", "lift_link"),
-            ("gripper", "left_link"),
-            ("gripper", "right_link"),
-        )
-    )
+    arm = "<palm_link>lift_link</palm_link>"
+    arm += "".join(f"<gripper_link>{side}_link</gripper_link>" for side in ("left", "right"))
     fix = plugin("libgazebo_grasp_fix.so", arm=arm, update_rate=10)
     sim = Simulator(world, lockstep=True)
     robot = world.spawn("gripper", parse_urdf(gripper(more=fix)), Pose())

@@ -1,9 +1,7 @@
 """The C library's heap, as the C library tells of it."""
 
-import subprocess
-import sys
-
 import pytest
+from support.python import run_python
 
 COUNT = """
 import ctypes, threading
@@ -27,7 +25,4 @@ libc.fclose(file)
 
 @pytest.mark.parametrize(("call", "one"), [("use_one_arena()", True), ("", False)])
 def test_threads_share_one_arena_once_it_is_asked_for(call, one):
-    done = subprocess.run(
-        [sys.executable, "-c", COUNT.format(call)], capture_output=True, text=True, check=True
-    )
-    assert (done.stdout.count("<heap nr=") == 1) == one
+    assert (run_python(COUNT.format(call)).stdout.count("<heap nr=") == 1) == one

@@ -48,9 +48,8 @@ def tracks(indices: Sequence[int]) -> dict[int, list[tuple[float, ...]]]:
             sim.advance(TICKS)
             for index, robot in robots.items():
                 joints = robot.hardware.joints.values()
-                found[index].append(
-                    tuple(x for j in joints for x in (j.position, j.velocity, j.effort))
-                )
+                state = ((j.position, j.velocity, j.effort) for j in joints)
+                found[index].append(sum(state, ()))
     sim.world.close()
     return found
 

@@ -3,7 +3,6 @@
 import itertools
 import random
 import struct
-import subprocess
 import sys
 from collections import deque
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from support.python import run_python
 
 from robot_sim.physics.pose import Pose
 from robot_sim.plain_data import Record, differences, misfit, pack, resolve, unpack
@@ -42,30 +42,21 @@ class Hashed:
         raise AssertionError("no code of a class runs")
 
 
-ATOMS = (
-    st.none()
-    | st.booleans()
-    | st.integers(-(2**200), 2**200)
-    | st.floats()
-    | st.text()
-    | st.binary()
-)
-ARRAYS = arrays.arrays(
-    st.sampled_from(["<f8", "<i4", "|u1", "|b1", "<f4"]), arrays.array_shapes(min_dims=0)
-)
-VALUES = st.recursive(
-    ATOMS | ARRAYS,
-    lambda inner: (
-        st.lists(inner, max_size=4)
-        | st.lists(inner, max_size=4).map(tuple)
-        | st.lists(inner, max_size=4).map(lambda each: deque(each, 5))
-        | st.dictionaries(
-            st.text() | st.integers(-(2**63), 2**63) | st.tuples(st.text()), inner, max_size=4
-        )
-        | st.builds(Named, st.floats(), st.text())
-    ),
-    max_leaves=20,
-)
+NUMBERS = st.integers(-(2**200), 2**200) | st.floats()
+ATOMS = st.none() | st.booleans() | NUMBERS | st.text() | st.binary()
+KINDS = st.sampled_from(["<f8", "<i4", "|u1", "|b1", "<f4"])
+ARRAYS = arrays.arrays(KINDS, arrays.array_shapes(min_dims=0))
+KEYS = st.text() | st.integers(-(2**63), 2**63) | st.tuples(st.text())
+LISTS = st.sampled_from([list, tuple, lambda each: deque(each, 5)])
+
+
+def containers(inner):
+    lists = st.builds(lambda kind, each: kind(each), LISTS, st.lists(inner, max_size=4))
+    named = st.builds(Named, st.floats(), st.text())
+    return lists | st.dictionaries(KEYS, inner, max_size=4) | named
+
+
+VALUES = st.recursive(ATOMS | ARRAYS, containers, max_leaves=20)
 
 
 @given(VALUES)
@@ -207,9 +198,7 @@ for _ in range(10_000):
 assert set(sys.modules) == modules, set(sys.modules) - modules
 print(read)
 """
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=False
-    )
+    done = run_python(program, check=False)
     assert done.returncode == 0, done.stderr
     assert 0 < int(done.stdout) < 10_000
 

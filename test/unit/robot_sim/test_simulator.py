@@ -4,7 +4,7 @@ import threading
 
 import pytest
 from support.robots.cartpole import CONTROLLERS, cartpole_urdf
-from support.robots.worlds import add_robot, start
+from support.robots.worlds import add_robot, advance, start
 
 from robot_sim.simulator import NotInLockstep, Simulator
 
@@ -15,11 +15,6 @@ def make_robot(sim):
     robot = add_robot(sim, "cartpole", cartpole_urdf())
     start(robot, CONTROLLERS)
     return robot
-
-
-def advance(sim, ticks):
-    with sim.lock:
-        sim.advance(ticks)
 
 
 def test_an_effort_is_reported_on_the_tick_after_it_acted(sim):

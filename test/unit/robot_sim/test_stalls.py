@@ -12,6 +12,7 @@ from robot_sim.physics.pose import Pose
 LENGTH = 0.2  # [m] of a link
 GOALS = (0.2, 0.6, 0.3, 0.6, 0.2, 0.5)  # [rad]
 EFFORT = 50.0  # [N m]
+STALLED = "joint '{}' of model 'chain' has been stalled for a second"
 POSITION = "effort_controllers/JointPositionController"
 BOX = """<sdf version="1.6"><model name="box"><static>1</static><link name="side"><collision name="c">
 <geometry><box><size>0.4 0.4 0.4</size></box></geometry></collision></link></model></sdf>"""
@@ -75,9 +76,7 @@ def test_joints_that_a_contact_stops_stand_still_and_say_so(rig):
     assert told
     assert len(told) == len(set(told)) <= np.count_nonzero(off > 1e-3)
     assert {level for level, _ in robot.told} == {logging.INFO}  # a gripper does that, too
-    assert told[0].startswith(
-        "joint 'j1' of model 'chain' has been stalled for a second, its motor"
-    )
+    assert told[0].startswith(STALLED.format("j1") + ", its motor")
     assert told[0].endswith("touches link 'side' of another model")
 
 
@@ -98,7 +97,7 @@ def test_a_stalled_effort_is_told_once(make_world):
     assert robot.told == []
     robot.run(2.0)
     ((_, text),) = robot.told
-    assert text.startswith("joint 'j1' of model 'chain' has been stalled for a second")
+    assert text.startswith(STALLED.format("j1"))
     robot.run(1.5)
     assert len(robot.told) == 1
 
@@ -110,10 +109,8 @@ NEAR_UP = (0.0, 0.4, 0.5)
 def folding(gains, goals, collide="true"):
     """Links in a plane that are led to `goals` within a second, by PIDs."""
     text = chain("Effort", len(goals)).replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"')
-    own = "".join(
-        f'<gazebo reference="l{i}"><selfCollide>{collide}</selfCollide></gazebo>'
-        for i in range(len(goals))
-    )
+    own = '<gazebo reference="l{}"><selfCollide>{}</selfCollide></gazebo>'
+    own = "".join(own.format(i, collide) for i in range(len(goals)))
 
     def lead(world):
         robot = Rig(world, text.replace("</robot>", f"{own}</robot>"))
@@ -139,9 +136,7 @@ def test_what_its_own_links_hold_off_its_goal_is_told_below_the_limit_too(make_w
     told = [text for _, text in robot.told if "stalled" in text]
     assert len(told) == 2 and told == [text for text in robot.warnings() if "stalled" in text]
     for joint, text in zip(("j1", "j2"), sorted(told), strict=True):
-        assert text.startswith(
-            f"joint '{joint}' of model 'chain' has been stalled for a second, 0."
-        )
+        assert text.startswith(STALLED.format(joint) + ", 0.")
         assert "rad or m off its goal: link 'l2' touches link 'l0' of its own model" in text
     assert max(abs(each.effort) for each in robot.hardware.joints.values()) < 0.99 * EFFORT
 

@@ -100,10 +100,9 @@ def test_the_description_gives_joints_limits_and_transmissions():
 
 
 def test_parameters_override_limits_field_by_field():
-    params = {
-        "stand_cart": {"has_effort_limits": True, "max_effort": 3, "has_position_limits": False}
-    }
-    limits = read_description(cartpole_urdf()).limited_by(params).joints["stand_cart"].limits
+    own = {"has_effort_limits": True, "max_effort": 3, "has_position_limits": False}
+    description = read_description(cartpole_urdf()).limited_by({"stand_cart": own})
+    limits = description.joints["stand_cart"].limits
     assert limits == JointLimits(None, None, 7.0, 3.0)
 
 
@@ -116,18 +115,16 @@ def test_parameters_override_limits_field_by_field():
     ],
 )
 def test_odd_transmissions_are_skipped_with_a_warning(old, new, warning):
-    assert any(
-        warning in text for text in read_description(cartpole_urdf().replace(old, new)).warnings
-    )
+    warnings = read_description(cartpole_urdf().replace(old, new)).warnings
+    assert any(warning in text for text in warnings)
 
 
 def test_of_several_transmissions_of_a_joint_the_first_counts():
     pole, cart = (f'<joint name="{name}">\n      <hard' for name in ("cart_pole", "stand_cart"))
     description = read_description(cartpole_urdf().replace(pole, cart))
     assert [t.joint for t in description.transmissions] == ["stand_cart"]
-    assert description.warnings == [
-        "Joint 'stand_cart' has several transmissions; the first is used."
-    ]
+    [warning] = description.warnings
+    assert warning == "Joint 'stand_cart' has several transmissions; the first is used."
 
 
 def test_a_negative_limit_would_push_so_it_is_refused():

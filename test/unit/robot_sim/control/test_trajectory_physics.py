@@ -15,6 +15,7 @@ from robot_sim.simulator import Simulator
 
 S = 1_000_000_000  # [ns]
 JOINTS = ("shoulder", "elbow")
+REST = (0.0, 0.0)
 GAINS = {"p": 400.0, "i": 400.0, "d": 20.0, "i_clamp": 20.0}
 KINDS = {
     "Effort": {"gains": dict.fromkeys(JOINTS, GAINS)},
@@ -95,9 +96,7 @@ def test_a_way_too_fast_for_the_motors_aborts_the_goal(sim):
     _, controller = run_arm(sim, "Effort")
     with sim.lock:
         sim.advance(1)
-        told = pursue(
-            controller, [TrajectoryPoint(S // 10, (1.5, 1.5), (0.0, 0.0), (0.0, 0.0))], 0.05
-        )
+        told = pursue(controller, [TrajectoryPoint(S // 10, (1.5, 1.5), REST, REST)], 0.05)
         sim.advance(200)
     assert told.outcomes[0].kind == "aborted"
     assert "path error" in told.outcomes[0].text
@@ -113,6 +112,5 @@ def test_after_a_reset_the_arm_hangs_where_it_was_put(sim, interface):
     assert [outcome.kind for outcome in told.outcomes] == ["canceled"]
     with sim.lock:
         sim.advance(500)
-    assert [joint.position for joint in robot.hardware.joints.values()] == pytest.approx(
-        [0.0, 0.0], abs=1e-6
-    )
+    places = [joint.position for joint in robot.hardware.joints.values()]
+    assert places == pytest.approx([0.0, 0.0], abs=1e-6)

@@ -135,10 +135,9 @@ def test_radius_and_separation_come_from_the_description_or_parameters(world):
         track = Track(world, two_wheels(), DIFF | params)
         track.controller.command((0.0, 0.0, 1.0))
         track.advance(1)
-        left, right = (
-            track.robot.hardware.joints[f"{side}_joint"].command for side in ("left", "right")
-        )
-        assert (left, right) == pytest.approx((-0.5 * TRACK / RADIUS, 0.5 * TRACK / RADIUS))
+        joints, speed = track.robot.hardware.joints, 0.5 * TRACK / RADIUS
+        assert joints["left_joint"].command == pytest.approx(-speed)
+        assert joints["right_joint"].command == pytest.approx(speed)
         track.sim.remove_robot(track.robot)
         track.sim.delete_model(track.model)
 
@@ -152,9 +151,8 @@ def test_a_running_controller_is_tuned(world):
     track.controller.command((0.1, 0.0, 0.0))
     track.advance(100)
     joints = track.robot.hardware.joints
-    assert (joints["left_joint"].command, joints["right_joint"].command) == pytest.approx(
-        (2.0, 1.0)
-    )
+    commands = [joints[f"{side}_joint"].command for side in ("left", "right")]
+    assert commands == pytest.approx([2.0, 1.0])
     assert track.stamps()[:3] == [11, 21, 31]
     assert track.sent["/tf"] == []
 
@@ -232,10 +230,8 @@ def test_a_bicycle_of_no_length_is_refused(sim, key, value):
 
 def test_a_bicycle_follows_the_circle_of_its_fork(world):
     track = Track(world, bicycle(), ACKERMANN)
-    assert {
-        claim.hardware_interface: claim.resources
-        for claim in track.robot.manager.listed()[0].claims
-    } == {
+    claims = track.robot.manager.listed()[0].claims
+    assert {claim.hardware_interface: claim.resources for claim in claims} == {
         "hardware_interface::VelocityJointInterface": ("rear_joint",),
         "hardware_interface::PositionJointInterface": ("front_steering",),
     }

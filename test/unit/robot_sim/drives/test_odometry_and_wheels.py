@@ -95,9 +95,8 @@ WHEELS = SteeredWheels(base=0.6, track=0.4, offset=0.05)
 
 @given(SPEEDS, SPEEDS, SPEEDS)
 def test_steered_wheels_measure_the_velocity_that_they_were_steered_for(ahead, left, turn):
-    assert WHEELS.velocity(WHEELS.steering(ahead, left, turn)) == pytest.approx(
-        (ahead, left, turn), abs=1e-9
-    )
+    measured = WHEELS.velocity(WHEELS.steering(ahead, left, turn))
+    assert measured == pytest.approx((ahead, left, turn), abs=1e-9)
 
 
 def test_steered_wheels_straight_on_the_spot_and_backwards():

@@ -16,11 +16,8 @@ from robot_sim.sensors.sensing import Sensing
 from robot_sim.sensors.sensor_readers import SensorReaders
 from robot_sim.simulator import Simulator
 
-WAY = (
-    (0.0, "0 0 1 0 0 0"),
-    (2.0, "4 0 1 0 0 1.5707963267948966"),
-    (3.0, "4 2 1 0 0 1.5707963267948966"),
-)
+LEFT = math.pi / 2
+WAY = (0.0, "0 0 1 0 0 0"), (2.0, f"4 0 1 0 0 {LEFT}"), (3.0, f"4 2 1 0 0 {LEFT}")
 BOX = '<link name="body"><visual name="v"><geometry><box><size>1 1 1</size></box></geometry></visual></link>'
 RED = "<material><diffuse>1 0 0 1</diffuse></material></visual>"
 EYES = """<model name="eyes"><static>1</static><pose>-2 0 1 0 0 0</pose><link name="l">
@@ -80,9 +77,8 @@ def test_between_waypoints_it_moves_straight_and_turns_evenly():
     poses = path(script(), 0.0, 0.5, 2.0, 2.25)
     assert [each.position for each in poses] == [(0, 0, 1), (1, 0, 1), (4, 0, 1), (4, 0.5, 1)]
     for pose, turned in zip(poses, (0.0, 22.5, 90.0, 90.0), strict=True):
-        assert pose.orientation == pytest.approx(
-            from_rpy(0.0, 0.0, math.radians(turned)), abs=1e-12
-        )
+        wanted = from_rpy(0.0, 0.0, math.radians(turned))
+        assert pose.orientation == pytest.approx(wanted, abs=1e-12)
 
 
 def test_it_turns_the_shorter_way():
@@ -159,10 +155,7 @@ def test_it_is_a_model_behind_the_others_with_one_link(start):
 def test_cameras_and_rendered_lasers_see_it_where_it_is_and_rays_pass_through(start):
     sim = start(sdf(EYES.format(RAY, CAMERA), actor(BOX.replace("</visual>", RED), script())))
     seen = SensorReaders(sim, Sensing(sim), ("solid", "seen", "depth", "eye"))
-    for distance, angle in (
-        (3.0, 22.5),
-        (4.0, 45.0),
-    ):  # of its middle, and by how much it is turned
+    for distance, angle in ((3.0, 22.5), (4.0, 45.0)):  # of its middle, and how it is turned
         sim.advance(500)
         reach = distance - 0.5 / math.cos(math.radians(angle))
         solid, rendered, depth, eye = (each.values for each in seen.read())
@@ -215,9 +208,8 @@ def test_a_skin_has_its_materials(tmp_path):
     <library_geometries>"""
     text = skinned().replace('<instance_controller url="#c"/>',
                              f'<instance_controller url="#c">{material}</instance_controller>')  # fmt: skip
-    text = text.replace("<library_geometries>", effects).replace(
-        "<triangles ", '<triangles material="m" '
-    )
+    text = text.replace("<library_geometries>", effects)
+    text = text.replace("<triangles ", '<triangles material="m" ')
     (tmp_path / "skin.dae").write_text(text)
     triangles, rgba, *_ = read_parts(tmp_path / "skin.dae")
     assert rgba.tolist() == [1.0, 0.0, 0.0, 1.0]
@@ -238,9 +230,8 @@ def test_a_skin_is_found_beside_the_file_and_scaled(tmp_path):
 def test_an_actor_of_an_included_model(tmp_path):
     (tmp_path / "person").mkdir()
     (tmp_path / "person/model.sdf").write_text(f'<sdf version="1.6">{actor(BOX, script())}</sdf>')
-    include = (
-        "<include><uri>model://person</uri><name>anna</name><pose>1 2 3 0 0 0</pose></include>"
-    )
+    own = "<name>anna</name><pose>1 2 3 0 0 0</pose>"
+    include = f"<include><uri>model://person</uri>{own}</include>"
     found = parse_world(sdf(include), Resources((tmp_path,)))
     assert found.warnings == []
     assert found.models["anna"].initial_pose == Pose((1.0, 2.0, 3.0), IDENTITY)
@@ -292,9 +283,8 @@ def test_times_that_go_backwards_are_sorted_and_the_last_of_equal_ones_counts():
     way = trajectory((0, "0 0 0 0 0 0"), (2, "2 0 0 0 0 0"), (1, "5 0 0 0 0 0"), (1, "7 0 0 0 0 0"))
     found = described(BOX, script("", way))
     assert [found.script(t, Pose()).position[0] for t in (0.5, 1.0, 1.5)] == [3.5, 7.0, 4.5]
-    assert found.warnings == [
-        "script, trajectory 0: its waypoints are taken in the order of their times"
-    ]
+    [warning] = found.warnings
+    assert warning == "script, trajectory 0: its waypoints are taken in the order of their times"
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,9 @@ import math
 
 import pytest
 from support.robots.grippers import cube, gripper
-from support.robots.worlds import run
+from support.robots.worlds import begin_anew, run
 
+from robot_sim.physics.description import Inertia
 from robot_sim.physics.files.urdf import parse_urdf
 from robot_sim.physics.model import AT_REST
 from robot_sim.physics.pose import Pose, from_rpy
@@ -137,14 +138,8 @@ def test_it_ends_with_either_model(world, name):
 def test_it_stays_when_a_link_changes_and_when_the_engine_begins_anew(world):
     robot, box, _ = pair(world)
     before = between(robot, box)
-    inertia = box.description.links["cube_link"].inertia
-    world.set_inertia(
-        box, "cube_link", type(inertia)(mass=0.2, ixx=1e-3, iyy=1e-3, izz=1e-3, ixy=1e-5)
-    )
-    world.engine._most_waste = 0  # of PyBullet: it begins anew
-    world.spawn("other", parse_urdf(cube()), Pose((2.0, 0.0, 0.1)))
-    world.delete("other")
-    world.spawn("again", parse_urdf(cube()), Pose((2.0, 0.0, 0.1)))
+    world.set_inertia(box, "cube_link", Inertia(0.2, ixx=1e-3, iyy=1e-3, izz=1e-3, ixy=1e-5))
+    begin_anew(world, parse_urdf(cube()))
     run(world, 300)
     assert near(between(robot, box), before)
 

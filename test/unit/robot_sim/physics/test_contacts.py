@@ -1,9 +1,12 @@
 """Contacts on each engine, compared with statics, with sliding friction, and with ODE's `max_vel`."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
+from support.mutations.mesh_files import obj
+from support.robots.worlds import run as step
 
 from robot_sim.physics.description import Inertia, Link, ModelDescription, Shape
 from robot_sim.physics.engines.bullet_engine import BulletEngine
@@ -56,19 +59,22 @@ def carried(world, model, steps=200):
 @pytest.mark.parametrize("kind", list(SHAPES))
 def test_what_is_put_into_the_ground_comes_out_at_max_vel(world, kind, depth):
     model = world.spawn("solid", solid(kind, SHAPES[kind]), Pose((0.0, 0.0, SIDE / 2 - depth)))
-    heights, speeds = run(world, model, 500 + round(1.05 * depth / MAX_VEL * 1000))
+    seconds = 4.0 if depth > 0.1 else 0.5 + 1.05 * depth / MAX_VEL
+    heights, speeds = run(world, model, round(1000 * seconds))
     assert speeds.max() < 1.05 * MAX_VEL
+    if depth > 0.1:  # it would take 20 s; that it comes steadily is enough
+        assert heights[-1] - heights[999] == pytest.approx(3.0 * MAX_VEL, rel=0.05)
+        return
     assert heights[-1] == pytest.approx(SIDE / 2, abs=1e-4)
     assert heights.max() < SIDE / 2 + 1e-4
 
 
-@pytest.mark.parametrize("times", [1, 3])
 @pytest.mark.parametrize("kind", list(SHAPES))
-def test_what_rests_and_is_put_into_the_ground_comes_out_at_max_vel(world, kind, times):
+def test_what_rests_and_is_put_into_the_ground_comes_out_at_max_vel(world, kind):
     """Points of the contacts that it had would push it as a spring."""
     model = world.spawn("solid", solid(kind, SHAPES[kind]), Pose((0.0, 0.0, SIDE / 2)))
     run(world, model, 500)
-    for _ in range(times):
+    for _ in range(3):
         model.place(Pose((0.0, 0.0, SIDE / 2 - 0.02)))
         heights, speeds = run(world, model, 1990)
         assert speeds.max() < 1.05 * MAX_VEL
@@ -78,15 +84,13 @@ def test_what_rests_and_is_put_into_the_ground_comes_out_at_max_vel(world, kind,
 
 def test_a_mesh_comes_out_of_the_ground_at_max_vel(world, tmp_path):
     path = tmp_path / "box.obj"
-    corners = [(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)]
-    faces = ["124", "143", "578", "586", "156", "162", "348", "387", "137", "175", "268", "284"]
-    lines = [f"v {x} {y} {z}" for x, y, z in corners] + [f"f {' '.join(face)}" for face in faces]
-    path.write_text("\n".join(lines))
+    path.write_bytes(obj())
     text = f"""<robot name="box"><link name="link"><inertial><mass value="1"/>
         <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
-        <collision><geometry><mesh filename="file://{path}"/></geometry></collision></link></robot>"""
-    model = world.spawn("box", parse_urdf(text), Pose((0.0, 0.0, 0.037)))
-    heights, speeds = run(world, model, 7500)
+        <collision><geometry><mesh filename="file://{path}" scale="0.1 0.1 0.1"/></geometry></collision>
+        </link></robot>"""
+    model = world.spawn("box", parse_urdf(text), Pose((0.0, 0.0, 0.08)))
+    heights, speeds = run(world, model, 3000)
     assert speeds.max() < 1.05 * MAX_VEL
     assert heights[-1] == pytest.approx(0.1, abs=0.0012)  # PyBullet's margin around meshes
 
@@ -103,9 +107,8 @@ def test_two_models_that_overlap_separate_at_max_vel(world):
 @pytest.mark.parametrize(("text", "read"), [("0.1", 0.1), ("", 0.01), ("0.0", 0.0)])
 def test_max_vel_is_that_of_the_file(world, text, read):
     inertial = "<inertial><mass>1</mass></inertial>"
-    surface = f"<surface><contact><ode><max_vel>{text}</max_vel></ode></contact></surface>" * bool(
-        text
-    )
+    ode = f"<ode><max_vel>{text}</max_vel></ode>"
+    surface = f"<surface><contact>{ode}</contact></surface>" * bool(text)
     sdf = f"""<sdf version="1.6"><model name="box"><link name="link">{inertial}<collision name="c">
         <geometry><box><size>0.2 0.2 0.2</size></box></geometry>{surface}</collision></link></model></sdf>"""
     extension = f'<gazebo reference="link"><maxVel>{text}</maxVel></gazebo>' * bool(text)
@@ -142,9 +145,7 @@ def part(name, shape, mass, place="0 0 0", turn="0 0 0", kind="fixed", smooth=Fa
     moment = 0.01 * mass
     friction = f'<gazebo reference="{name}"><mu1>0</mu1></gazebo>'
     # Fixed joints are kept, so that contacts are told apart by link.
-    kept = (
-        f'<gazebo reference="{name}_joint"><preserveFixedJoint>true</preserveFixedJoint></gazebo>'
-    )
+    kept = f'<gazebo reference="{name}_joint"><preserveFixedJoint>1</preserveFixedJoint></gazebo>'
     return f"""<link name="{name}"><inertial><mass value="{mass}"/>
         <inertia ixx="{moment}" iyy="{moment}" izz="{moment}" ixy="0" ixz="0" iyz="0"/></inertial>
         <collision><origin rpy="{turn}"/><geometry>{shape}</geometry></collision></link>
@@ -167,8 +168,7 @@ def vehicle():
 
 def test_wheels_between_two_casters_carry_and_drive(world):
     model = world.spawn("vehicle", vehicle(), Pose((0.0, 0.0, 0.08)))
-    for _ in range(500):
-        world.step()
+    step(world, 500)
     loads = carried(world, model)
     weight = 2.4 * GRAVITY
     assert sum(loads.values()) == pytest.approx(weight, rel=0.01)
@@ -202,8 +202,7 @@ def table(feet):
 def test_a_table_gives_each_of_four_legs_a_quarter(world):
     corners = [(0.5, 0.3), (0.5, -0.3), (-0.5, -0.3), (-0.5, 0.3)]
     model = world.spawn("table", table(corners), Pose((0.0, 0.0, 0.42)))
-    for _ in range(1000):
-        world.step()
+    step(world, 1000)
     loads = carried(world, model)
     for number in range(4):
         assert loads[f"leg{number}"] == pytest.approx(10.0 * GRAVITY / 4, rel=0.2)
@@ -212,8 +211,7 @@ def test_a_table_gives_each_of_four_legs_a_quarter(world):
 def test_three_unequal_legs_carry_what_statics_says(world):
     places = [(0.5, 0.3), (-0.2, -0.3), (-0.5, 0.2)]
     model = world.spawn("table", table(places), Pose((0.0, 0.0, 0.42)))
-    for _ in range(1000):
-        world.step()
+    step(world, 1000)
     loads = carried(world, model)
     # Forces add up to the weight, and so do their torques about the origin.
     (x, y) = np.array(places).T
@@ -270,8 +268,7 @@ def test_five_boxes_on_each_other_stand(world):
         world.spawn(f"box{n}", solid("box", SHAPES["box"], mass=1.0 + n), Pose((0.0, 0.0, 0.1 + 0.2 * n)))
         for n in range(5)
     ]  # fmt: skip
-    for _ in range(5000):
-        world.step()
+    step(world, 5000)
     for number, box in enumerate(boxes):
         (x, y, z) = box.state()[0].position
         assert z == pytest.approx(0.1 + 0.2 * number, abs=0.001)
@@ -281,8 +278,7 @@ def test_five_boxes_on_each_other_stand(world):
 def test_what_carries_much_more_than_its_own_mass_sinks_less_than_a_millimetre(world):
     light = world.spawn("light", solid("box", SHAPES["box"]), Pose((0.0, 0.0, 0.1)))
     heavy = world.spawn("heavy", solid("box", SHAPES["box"], mass=50.0), Pose((0.0, 0.0, 0.3)))
-    for _ in range(3000):
-        world.step()
+    step(world, 3000)
     assert light.state()[0].position[2] == pytest.approx(0.1, abs=0.001)
     assert heavy.state()[0].position[2] == pytest.approx(0.3, abs=0.001)
 
@@ -293,22 +289,17 @@ def test_another_mass_stands_as_high(world):
     assert run(world, model, 2000)[0][-1] == pytest.approx(0.1, abs=2e-4)
 
 
-@pytest.mark.parametrize("speed", [0.5, 1.0, 3.0])
+@pytest.mark.parametrize("speed", [0.5, 3.0])
 @pytest.mark.parametrize("effort", [0.1, 1.0])
 def test_a_wall_throws_nothing_back_faster_than_it_came(world, speed, effort):
     """Wheels as light as real ones turn on against the wall, and climb it as far as their motors allow."""
     wall = solid("box", (0.2, 4.0, 2.0), static=True)
     world.spawn("wall", wall, Pose((1.0, 0.0, 1.0)))
     turn = f"{math.pi / 2} 0 0"
-    places = {
-        "a": "0.15 0.12 -0.03",
-        "b": "0.15 -0.12 -0.03",
-        "c": "-0.15 0.12 -0.03",
-        "d": "-0.15 -0.12 -0.03",
-    }
+    rim = '<cylinder radius="0.05" length="0.03"/>'
     wheels = "".join(
-        part(name, '<cylinder radius="0.05" length="0.03"/>', 0.1, place, turn, "continuous")
-        for name, place in places.items()
+        part(f"w{number}", rim, 0.1, f"{x} {y} -0.03", turn, "continuous")
+        for number, (x, y) in enumerate(itertools.product((0.15, -0.15), (0.12, -0.12)))
     ).replace('"0.001"', '"0.000125"')  # of a disc: m r² / 2
     text = VEHICLE.format(parts=part("base", '<box size="0.2 0.2 0.05"/>', 2.0) + wheels)
     model = world.spawn("vehicle", parse_urdf(text), Pose((0.3, 0.0, 0.08)))

@@ -181,9 +181,8 @@ def test_a_world_has_a_line_of_its_own_and_each_model_too():
         "no effect here: <linear_velocity> of world 'w', <type> of world 'w', physics; "
         "unknown: <models> of world 'w' (docs/files.md)"
     ]
-    assert found.models["m"].warnings == [
-        "no effect here: <enable_wind> of link 'l' (docs/files.md)"
-    ]
+    [warning] = found.models["m"].warnings
+    assert warning == "no effect here: <enable_wind> of link 'l' (docs/files.md)"
 
 
 def test_a_urdf_names_its_blocks():

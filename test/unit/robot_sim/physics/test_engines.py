@@ -2,11 +2,10 @@
 
 import importlib.util
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from support.python import run_python
 from support.robots import engine_runs as runs
 
 from robot_sim.physics.engines import BULLET, EngineError, make_engine
@@ -42,10 +41,9 @@ def test_a_wide_swing_loses_energy_with_the_first_order_of_the_step(new_engine):
 @pytest.mark.extras("mujoco")
 @pytest.mark.parametrize(("state", "force"), [(runs.FALL, 0.0), (runs.SWING, runs.PUSH)])
 def test_both_engines_go_the_same_way(state, force):
-    tracks = [
-        runs.Run(make_engine(name), 0.001, state).track(1.0, force) for name in ("ode", "mujoco")
-    ]
-    assert np.abs(tracks[0] - tracks[1]).max() < 1e-9
+    begun = (runs.Run(make_engine(name), 0.001, state) for name in ("ode", "mujoco"))
+    one, other = (run.track(1.0, force) for run in begun)
+    assert np.abs(one - other).max() < 1e-9
 
 
 @pytest.mark.extras("mujoco")
@@ -68,10 +66,7 @@ def test_names_of_gazebos_engines_mean_pybullet_which_needs_no_mujoco(name):
         "import sys; from robot_sim.physics.engines import make_engine;"
         f" print(type(make_engine({name!r})).__name__, 'mujoco' in sys.modules)"
     )
-    answer = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert answer.stdout.split() == ["BulletEngine", "False"]
+    assert run_python(code).stdout.split() == ["BulletEngine", "False"]
 
 
 def test_an_engine_that_is_not_installed_is_named_with_the_command_that_installs_it(monkeypatch):
@@ -89,17 +84,13 @@ def test_mujoco_stands_in_where_there_is_no_pybullet_and_says_so():
         "from robot_sim.physics.engines import make_engine; print(type(make_engine()).__name__);"
         "env = gymnasium.make('cartpole/Balance-v0'); env.reset(seed=0); print(len(env.step(0)[0]))"
     )
-    answer = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False
-    )
+    answer = run_python(code, check=False)
     assert answer.stdout.split() == ["MujocoEngine", "4"], answer.stderr
     assert "There is no PyBullet for " in answer.stderr
 
 
-CHAIN = """<robot name="chain"><link name="base"><inertial><mass value="1"/>
-  <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
-  <link name="slider"><inertial><mass value="1"/>
-  <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+BODY = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>'
+CHAIN = f"""<robot name="chain"><link name="base">{BODY}</link><link name="slider">{BODY}</link>
   <joint name="rail" type="prismatic"><parent link="base"/><child link="slider"/><axis xyz="1 0 0"/>
   <limit lower="-1e6" upper="1e6" effort="0" velocity="0"/></joint></robot>"""
 
@@ -132,9 +123,8 @@ def test_a_motor_has_the_force_it_is_given_again_after_the_step_has_changed(make
 @pytest.mark.extras("mujoco")
 def test_in_mujoco_many_fast_joints_that_are_each_slow_enough_go_on():
     world = World(make_engine("mujoco"), gravity=(0.0, 0.0, 0.0))
-    models = [
-        world.spawn(f"chain{n}", parse_urdf(CHAIN), Pose((0.0, 3.0 * n, 0.0))) for n in range(4)
-    ]
+    chain, places = parse_urdf(CHAIN), (0.0, 3.0, 6.0, 9.0)
+    models = [world.spawn(f"chain{y}", chain, Pose((0.0, y, 0.0))) for y in places]
     for model in models:
         model.body.reset_joint(0, 0.0, 3000.0)
     world.step()

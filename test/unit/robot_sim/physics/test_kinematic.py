@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from support.robots.worlds import run
+from support.robots.worlds import assert_near, begin_anew, run
 
 from robot_sim.physics.description import Inertia
 from robot_sim.physics.dynamics import effective_inertias, poses_at_zero
@@ -23,16 +23,8 @@ def box(name, size="1 1 0.2", kinematic=True, com="0 0 0", mass=1.0, more=""):
 
 
 def sdf(*parts, static=False):
-    return parse_sdf(
-        f'<sdf version="1.6"><model name="m"><static>{int(static)}</static>{"".join(parts)}</model></sdf>'
-    )
-
-
-def close(a, b, tolerance):
-    """Compares two poses; quaternions by the angle between them."""
-    dot = abs(sum(x * y for x, y in zip(a.orientation, b.orientation, strict=True)))
-    assert a.position == pytest.approx(b.position, abs=tolerance)
-    assert 2.0 * math.acos(min(1.0, dot)) < tolerance + 1e-7
+    model = f'<model name="m"><static>{int(static)}</static>{"".join(parts)}</model>'
+    return parse_sdf(f'<sdf version="1.6">{model}</sdf>')
 
 
 def test_neither_weight_nor_loads_move_it(world):
@@ -42,13 +34,11 @@ def test_neither_weight_nor_loads_move_it(world):
     for _ in range(3000):
         shelf.body.add_wrench("link", (100.0, 0.0, 50.0), (0.0, 30.0, 0.0))
         world.step()
-    close(shelf.state()[0], pose, 1e-8)
+    assert_near(shelf.state()[0], pose, 1e-8)
     assert load.state()[0].position == pytest.approx((0.0, 0.0, 2.2), abs=2e-3)
     assert load.state()[1][0] == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
-    assert {side.body for each in world.contacts() for side in (each.first, each.second)} == {
-        shelf.body,
-        load.body,
-    }
+    [touching] = {frozenset((each.first.body, each.second.body)) for each in world.contacts()}
+    assert touching == {shelf.body, load.body}
 
 
 def test_it_keeps_its_twist(world):
@@ -60,12 +50,12 @@ def test_it_keeps_its_twist(world):
     # The centre begins at (0.5, 0, 0.3), with (0.2, 2 · 0.5, -0.3).
     turned = (0.5 * math.cos(4.0), 0.5 * math.sin(4.0))
     wanted = Pose((0.9 - turned[0], 2.0 - turned[1], -0.3), from_rpy(0.0, 0.0, 4.0))
-    close(pose, wanted, 1e-3)
+    assert_near(pose, wanted, 1e-3)
     assert angular == pytest.approx((0.0, 0.0, 2.0), abs=1e-6)
     assert linear[2] == pytest.approx(-0.3, abs=1e-6)
     model.place(Pose((0.0, 0.0, 0.3)))
     run(world, 100)
-    close(model.state()[0], Pose((0.0, 0.0, 0.3)), 1e-9)
+    assert_near(model.state()[0], Pose((0.0, 0.0, 0.3)), 1e-9)
 
 
 def test_a_spin_about_any_axis_goes_on(make_world):
@@ -79,9 +69,8 @@ def test_a_spin_about_any_axis_goes_on(make_world):
 
 def test_it_pushes_and_carries_others(world):
     paddle = world.spawn("paddle", sdf(box("link", "0.2 1 1")), Pose((-0.5, 0.0, 0.6)))
-    crate = world.spawn(
-        "crate", sdf(box("link", "0.4 0.4 0.4", False, mass=20.0)), Pose((0, 0, 0.2))
-    )
+    heavy = sdf(box("link", "0.4 0.4 0.4", False, mass=20.0))
+    crate = world.spawn("crate", heavy, Pose((0.0, 0.0, 0.2)))
     lift = world.spawn("lift", sdf(box("link")), Pose((5.0, 0.0, 0.5)))
     load = world.spawn("load", sdf(box("link", "0.4 0.4 0.4", False)), Pose((5.0, 0.0, 0.8)))
     run(world, 500)
@@ -97,9 +86,8 @@ def test_it_pushes_and_carries_others(world):
 def test_kinematic_and_static_ones_do_not_touch(world):
     wall = [box("a", kinematic=False), box("b", kinematic=False, more="<pose>3 0 0 0 0 0</pose>")]
     world.spawn("wall", sdf(*wall, static=True), Pose((0.0, 0.0, 1.0)))
-    models = [
-        world.spawn(f"m{x}", sdf(box("link")), Pose((x, 0.1, 1.05))) for x in (0.0, 3.0, 3.05)
-    ]
+    plate, places = sdf(box("link")), (0.0, 3.0, 3.05)
+    models = [world.spawn(f"m{x}", plate, Pose((x, 0.1, 1.05))) for x in places]
     world.reset(joints=True)
     for model in models:
         model.place(model.state()[0], ((0.1, 0.0, 0.0), REST[1]))
@@ -122,15 +110,13 @@ def test_a_tree_hangs_from_it(world):
     bound = world.spawn("bound", sdf(box("base"), *parts, fixed), Pose((5.0, 0.0, 3.0)))
     for model in (free, bound):
         model.set_joint_positions({"j": 0.5})
-    inertias = [
-        effective_inertias(model.description, poses_at_zero(model.description))["j"]
-        for model in (free, bound)
-    ]
+    descriptions = free.description, bound.description
+    inertias = [effective_inertias(each, poses_at_zero(each))["j"] for each in descriptions]
     assert inertias[0] == pytest.approx(inertias[1])
     for _ in range(5):
         run(world, 300)
         assert free.joint_state("j") == pytest.approx(bound.joint_state("j"), abs=1e-6)
-    close(free.state()[0], Pose((0.0, 0.0, 3.0)), 1e-8)
+    assert_near(free.state()[0], Pose((0.0, 0.0, 3.0)), 1e-8)
 
 
 def test_properties(world):
@@ -142,7 +128,7 @@ def test_properties(world):
     set_link_properties(world, model, "link", heavier, True)
     assert link_inertia(model, "link") == heavier
     run(world, 500)
-    close(model.state()[0], Pose((0.0, 0.0, 2.0)), 1e-9)
+    assert_near(model.state()[0], Pose((0.0, 0.0, 2.0)), 1e-9)
 
 
 def test_its_velocity_decays(world):
@@ -167,10 +153,7 @@ def test_snapshots_and_engines_that_begin_anew(make_world):
     world.load_state_dict(snapshot)
     run(world, 100)
     assert (model.state(), load.state()) == first
-    world.engine._most_waste = 0  # of PyBullet: it begins anew
-    world.spawn("other", sdf(box("link")), Pose((5.0, 0.0, 2.0)))
-    world.delete("other")
-    world.spawn("again", sdf(box("link")), Pose((5.0, 0.0, 2.0)))
+    begin_anew(world, sdf(box("link")))
     before = model.state()[0].position
     run(world, 1000)
     after = model.state()[0].position
@@ -189,27 +172,24 @@ def test_urdf(world, link):
       <gazebo reference="{link}"><kinematic>1</kinematic></gazebo></robot>"""
     model = world.spawn("u", parse_urdf(text), Pose((0.0, 0.0, 2.0)))
     run(world, 500)
-    close(model.state()[0], Pose((0.0, 0.0, 2.0)), 1e-9)
+    assert_near(model.state()[0], Pose((0.0, 0.0, 2.0)), 1e-9)
     assert not model.description.warnings
 
 
 def test_one_that_a_joint_moves_is_told(world):
     arm = box("arm", more="<pose>2 0 0 0 0 0</pose>")
-    model = world.spawn(
-        "m", sdf(box("base", kinematic=False), arm, ARM.format(at="0 0 0")), Pose((0.0, 0.0, 5.0))
-    )
-    assert model.description.warnings == [
-        "link 'arm', kinematic: left out, since joint 'j' moves it"
-    ]
+    text = sdf(box("base", kinematic=False), arm, ARM.format(at="0 0 0"))
+    model = world.spawn("m", text, Pose((0.0, 0.0, 5.0)))
+    [warning] = model.description.warnings
+    assert warning == "link 'arm', kinematic: left out, since joint 'j' moves it"
     run(world, 100)
     assert model.state()[0].position[2] < 4.97
 
 
 def test_one_that_is_fixed_to_the_root_holds_it(world):
     fixed = '<joint name="f" type="fixed"><parent>base</parent><child>tip</child></joint>'
-    model = world.spawn(
-        "m", sdf(box("base", kinematic=False), box("tip"), fixed), Pose((0.0, 0.0, 5.0))
-    )
+    text = sdf(box("base", kinematic=False), box("tip"), fixed)
+    model = world.spawn("m", text, Pose((0.0, 0.0, 5.0)))
     run(world, 100)
     assert not model.description.warnings
-    close(model.state()[0], Pose((0.0, 0.0, 5.0)), 1e-9)
+    assert_near(model.state()[0], Pose((0.0, 0.0, 5.0)), 1e-9)

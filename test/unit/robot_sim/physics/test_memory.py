@@ -185,9 +185,8 @@ def history(monkeypatch: pytest.MonkeyPatch, most_waste: int) -> list:
         cart.body.apply_efforts((0.1, -0.2))
         world.step()
         clients.add(engine._client)
-        seen.append(
-            [cart.joint_states(), chained.joint_states(), *free.state()[0], *free.state()[1]]
-        )
+        pose, twist = free.state()
+        seen.append([cart.joint_states(), chained.joint_states(), *pose, *twist])
     world.close()
     assert (len(clients) > 1) == (most_waste == 0)
     return seen

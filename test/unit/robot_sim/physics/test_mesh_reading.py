@@ -43,6 +43,9 @@ WELL = {
         "\nf 1 3 2", " 0.1 0.2 0.3\nvn 0 0 1\nvt 0 0\nusemtl m\nf 1/1/1 3//1 2/1"
     ),
     "back.obj": OBJ.replace("f 1 3 2", "f -8 -6 -7") + "v 5 5 5\nv 6 6 6\n",
+    "first.obj": OBJ[OBJ.index("f ") :] + OBJ[: OBJ.index("f ")],
+    "groups.obj": "# x\no name\ng a\n" + OBJ.replace("1.0", "1e0").replace("\nf", "\ng b\nf", 1),
+    "late.obj": OBJ.replace("f 2 3 4", "o late\nvn 0 0 1\nusemtl v\nf 2 3 4"),
     "mark.obj": "\ufeff" + OBJ,
     "quads.obj": OBJ[: OBJ.index("f ")] + "f 1 2 4 3\nf 5 7 \\\n8 6\nf 1 5 6 2\nf 3 4 8\nf 3 8 7\n",
     "cube.dae": DAE,
@@ -120,9 +123,8 @@ def test_a_cube_is_a_cube_in_every_kind_of_file(tmp_path, name):
     corners = mesh.vertices[mesh.faces]
     assert np.unique(mesh.vertices, axis=0) == pytest.approx(CUBE)
     assert corners.shape[1:] == (3, 3)
-    sides = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
+    a, b, c = np.moveaxis(corners, 1, 0)
+    sides = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     area = {"solids.stl": 48.0, "quads.obj": 16.0}.get(name, 24.0)
     assert sides.sum() / 2 == pytest.approx(area)
 
@@ -155,15 +157,8 @@ def test_nodes_that_show_each_other_ten_times_over_do_not_fill_the_memory(tmp_pa
         f'<node id="l{level + 1}">' + f'<instance_node url="#l{level}"/>' * 10 + "</node>"
         for level in range(8)
     )
-    text = (
-        library()
-        .decode()
-        .replace('id="l"', 'id="l0"')
-        .replace("</library_nodes>", f"{levels}</library_nodes>")
-    )
-    path = written(
-        tmp_path, "a.dae", text.replace('<instance_node url="#l"/>', '<instance_node url="#l8"/>')
-    )
+    text = library().decode().replace('id="l"', 'id="l0"').replace('#l"', '#l8"')
+    path = written(tmp_path, "a.dae", text.replace("</library_nodes>", f"{levels}</library_nodes>"))
     monkeypatch.setattr(meshes._process, "_limits", Limits(1, 60.0, 1 << 30, 1 << 20))
     meshes._process.close()
     with pytest.raises(DescriptionError, match="of processor time|of memory"):

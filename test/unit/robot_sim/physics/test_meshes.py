@@ -1,22 +1,20 @@
 """Mesh files: found by every kind of URI, and really colliding."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from support.mutations.mesh_files import (
     CORNERS,
     FACES,
-    ascii_stl,
     binary_stl,
     dae,
-    library,
     obj,
-    polylist,
 )
+from support.python import run_python
 from support.robots.worlds import run
 
 from robot_sim.physics.description import DescriptionError
@@ -36,22 +34,11 @@ BALL = (
 )
 FILES = {
     "cube.stl": binary_stl(),
-    "ascii.stl": ascii_stl(),
     "cube.obj": obj(),
-    "cube.dae": dae(),
     "cube.DAE": dae(),
-    "polylist.dae": polylist(),
     "millimetres.dae": dae(unit="0.001"),
     "y_up.dae": dae(up="Y_UP"),
-    "library.dae": library(),
-}
-
-
-@pytest.fixture
-def folder(tmp_path):
-    for name, data in FILES.items():
-        (tmp_path / name).write_bytes(data)
-    return tmp_path
+}  # test_mesh_reading.py has the others
 
 
 def urdf(mesh, scale="0.1 0.1 0.2", tag="collision"):
@@ -71,10 +58,11 @@ def rest_height(world, description, start=0.5):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_mesh_box_comes_to_rest_at_half_its_height(sim, folder, name):
+def test_a_mesh_box_comes_to_rest_at_half_its_height(sim, tmp_path, name):
+    (tmp_path / name).write_bytes(FILES[name])
     scale = "100 100 200" if name.startswith("milli") else "0.1 0.1 0.2"
     sim.world.spawn("ground_plane", ground_plane(), Pose())
-    box = parse_urdf(urdf(folder / name, scale))
+    box = parse_urdf(urdf(tmp_path / name, scale))
     assert rest_height(sim.world, box) == pytest.approx(0.2, abs=0.01)
 
 
@@ -138,16 +126,13 @@ def test_a_static_mesh_is_hollow_where_it_is_hollow(sim, tmp_path):
 
 def test_static_models_of_one_mesh_are_loaded_once_and_stand_by_themselves(sim, tmp_path):
     (tmp_path / "cube.stl").write_bytes(binary_stl())
-    loaded = []
     with pytest.MonkeyPatch.context() as patch:
-        write = bullet_meshes.write_mesh
-        patch.setattr(
-            bullet_meshes, "write_mesh", lambda *a, **k: loaded.append(1) or write(*a, **k)
-        )
+        spied = Mock(wraps=bullet_meshes.write_mesh)
+        patch.setattr(bullet_meshes, "write_mesh", spied)
         for x in range(3):
             model = parse_sdf(static_mesh(tmp_path / "cube.stl"))
             sim.world.spawn(f"m{x}", model, Pose((5.0 * x, 0.0, 0.0)))
-    assert len(loaded) == 1
+    assert spied.call_count == 1
     sim.world.delete("m0")
     for x in range(3):
         sim.world.spawn(f"b{x}", parse_sdf(BALL.format(0.1)), Pose((5.0 * x, 0.0, 1.5)))
@@ -161,9 +146,8 @@ def test_pybullet_keeps_no_meshes_to_draw(sim, tmp_path):
     (tmp_path / "cube.stl").write_bytes(binary_stl())
     text = urdf(tmp_path / "cube.stl")
     for static, name in enumerate("ab"):
-        model = parse_urdf(
-            text.replace("</robot>", f"<gazebo><static>{static}</static></gazebo></robot>")
-        )
+        block = f"<gazebo><static>{static}</static></gazebo></robot>"
+        model = parse_urdf(text.replace("</robot>", block))
         body = sim.world.spawn(name, model, Pose((0.0, 0.0, 3.0 + static))).body
         drawn = pybullet.getVisualShapeData(body.id, physicsClientId=body._client)
         assert [each[2] for each in drawn] == [pybullet.GEOM_SPHERE]
@@ -216,11 +200,7 @@ def test_a_world_without_meshes_does_not_pay_for_them():
         "there.spawn('m', parse_sdf(sys.argv[1]), world.Pose())\n"
         "assert not {'trimesh', 'collada', 'manifold3d'} & set(sys.modules)"
     )
-    subprocess.run(
-        [sys.executable, "-c", code, BALL.format(1)],
-        check=True,
-        env=os.environ | {"PYTHONPATH": SRC},
-    )
+    run_python(code, BALL.format(1), env=os.environ | {"PYTHONPATH": SRC})
 
 
 @pytest.mark.parametrize(

@@ -78,9 +78,8 @@ def test_a_grid_has_rows_and_columns_instead_of_a_count():
 
 
 def test_a_uniform_population_has_its_count():
-    assert places("<type>uniform</type>", BOX, 8) == [
-        (x, y, 0.0) for y in (-0.5, 0.5) for x in (-1.5, -0.5, 0.5, 1.5)
-    ]
+    grid = [(x, y, 0.0) for y in (-0.5, 0.5) for x in (-1.5, -0.5, 0.5, 1.5)]
+    assert places("<type>uniform</type>", BOX, 8) == grid
     disc = places("<type>uniform</type>", DISC, 50)
     assert len(disc) == 50
     assert max(math.hypot(x, y) for x, y, _ in disc) < 2.0

@@ -59,9 +59,8 @@ def test_what_c_writes_meanwhile_comes_afterwards(tmp_path: Path) -> None:
 
 
 def test_a_library_that_cannot_be_loaded_says_why(tmp_path: Path) -> None:
-    (tmp_path / "pybullet.py").write_text(
-        "import sys; print('a reason', file=sys.stderr); raise ImportError('broken')"
-    )
+    text = "import sys; print('a reason', file=sys.stderr); raise ImportError('broken')"
+    (tmp_path / "pybullet.py").write_text(text)
     code = f"sys.path.insert(0, {str(tmp_path)!r}); import robot_sim.physics.engines.bullet_engine"
     with pytest.raises(subprocess.CalledProcessError) as caught:
         outcome(code)

@@ -3,11 +3,12 @@
 from math import cos, pi, sin
 
 import pytest
+from support.robots.worlds import assert_near
 
 from bullet_gazebo.services.spawn_services import fill_world
 from robot_sim.physics.files.reading import Resources
 from robot_sim.physics.files.world_file import parse_world
-from robot_sim.physics.pose import from_rpy
+from robot_sim.physics.pose import Pose, from_rpy
 from robot_sim.physics.world import World
 from robot_sim.simulator import Simulator
 
@@ -40,11 +41,7 @@ def begun(new_engine):
 
 
 def near(pose, position, rpy=(0.0, 0.0, 0.0)):
-    assert pose.position == pytest.approx(position, abs=1e-5)
-    # A quaternion and its negative are the same rotation.
-    assert abs(sum(a * b for a, b in zip(pose.orientation, from_rpy(*rpy), strict=True))) == (
-        pytest.approx(1.0, abs=1e-7)
-    )
+    assert_near(pose, Pose(position, from_rpy(*rpy)), 1e-5, turn=1e-3)
 
 
 def place_of(sim, name):
@@ -157,26 +154,17 @@ NESTED = f"""<model name="m"><link name="l">{BODY}</link><model name="in"><pose>
 
 def test_loops_are_closed_in_the_state(begun):
     """A parallelogram begins leaning; its last joint, which closes it, too."""
-    up, across = (
-        f"<inertial><pose>{pose} 0 0 0</pose></inertial>" for pose in ("0 0 .5", ".5 0 0")
-    )
-    bars = (
-        ("base", "0 0 0", ""),
-        ("left", "0 0 0", up),
-        ("right", "1 0 0", up),
-        ("top", "0 0 1", across),
-    )
-    links = "".join(
-        f'<link name="{n}"><pose>{at} 0 0 0</pose>{mass}</link>' for n, at, mass in bars
-    )
+    bar = '<link name="{}"><pose>{} 0 0 0</pose><inertial><pose>{} 0 0 0</pose></inertial></link>'
+    links = "".join([
+        '<link name="base"/>', bar.format("left", "0 0 0", "0 0 .5"),
+        bar.format("right", "1 0 0", "0 0 .5"), bar.format("top", "0 0 1", ".5 0 0"),
+    ])  # fmt: skip
     hinge = """<joint name="{0}" type="revolute"><pose>0 0 {3} 0 0 0</pose><parent>{1}</parent>
         <child>{2}</child><axis><xyz>0 1 0</xyz></axis></joint>"""
     joints = [("a", "base", "left", 0), ("b", "base", "right", 0), ("c", "left", "top", 0),
               ("d", "top", "right", 1)]  # fmt: skip
-    foot = '<joint name="foot" type="fixed"><parent>world</parent><child>base</child></joint>'
-    model = (
-        f'<model name="m">{links}{foot}{"".join(hinge.format(*each) for each in joints)}</model>'
-    )
+    links += '<joint name="foot" type="fixed"><parent>world</parent><child>base</child></joint>'
+    model = f'<model name="m">{links}{"".join(hinge.format(*each) for each in joints)}</model>'
     ends = {"left": f"0 0 0 0 {ANGLE} 0", "right": f"1 0 0 0 {ANGLE} 0",
             "top": f"{sin(ANGLE)} 0 {cos(ANGLE)} 0 0 0"}  # fmt: skip
     state = "".join(f'<link name="{n}"><pose>{pose}</pose></link>' for n, pose in ends.items())
@@ -268,10 +256,8 @@ BEGINS = "it begins where the model says"
     ],
 )  # fmt: skip
 def test_a_damaged_state_is_one_line_and_the_rest_stands(begun, state, warning):
-    sim = begun(
-        WALL + CRATE + pendulum(FREE),
-        state + '<model name="crate"><pose>3 2 1 0 0 0</pose></model>',
-    )
+    state += '<model name="crate"><pose>3 2 1 0 0 0</pose></model>'
+    sim = begun(WALL + CRATE + pendulum(FREE), state)
     assert sim.warnings == [warning]
     near(place_of(sim, "crate"), (3.0, 2.0, 1.0))
     if "wall" in warning:

@@ -13,10 +13,7 @@ from robot_sim.physics.pose import Pose
 
 pytestmark = pytest.mark.slow
 
-INERTIAL = (
-    '<inertial><mass value="1"/>'
-    '<inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>'
-)
+INERTIAL = '<inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1"/></inertial>'
 LIMIT = 1.6
 # A post and a foot, an upper arm over them, and a fore arm that hangs into the angle between the two.
 ARM = """<robot name="arm"><gazebo><self_collide>true</self_collide></gazebo><link name="world"/>
@@ -90,13 +87,14 @@ def test_pieces_are_computed_once(stand, tmp_path, monkeypatch):
 
 
 def test_what_cannot_be_split_keeps_its_hull(stand, monkeypatch):
-    def refuse(_):
-        raise RequestRefused("No module named 'vhacdx'")
-
     ask = meshes._process.ask
-    monkeypatch.setattr(
-        meshes._process, "ask", lambda data: (refuse if b'"pieces"' in data[:20] else ask)(data)
-    )
+
+    def answer(data):
+        if b'"pieces"' in data[:20]:
+            raise RequestRefused("No module named 'vhacdx'")
+        return ask(data)
+
+    monkeypatch.setattr(meshes._process, "ask", answer)
     (warning,) = arm(stand).warnings
     assert warning == f"mesh '{stand}' collides by its convex hull: No module named 'vhacdx'"
 

@@ -39,9 +39,8 @@ def image(tmp_path):
 def terrain(path, size="20 20 4", more="", static="<static>1</static>", tags=("collision",)):
     shape = f"<geometry><heightmap><uri>file://{path}</uri><size>{size}</size>{more}</heightmap></geometry>"
     shapes = "".join(f'<{tag} name="c">{shape}</{tag}>' for tag in tags)
-    return parse_sdf(
-        f'<sdf version="1.6"><model name="m">{static}<link name="l">{shapes}</link></model></sdf>'
-    )
+    link = f'{static}<link name="l">{shapes}</link>'
+    return parse_sdf(f'<sdf version="1.6"><model name="m">{link}</model></sdf>')
 
 
 def ball():
@@ -79,11 +78,8 @@ def in_triangles(x, y, pixels, side=20.0, top=4.0):
     shares = pixels[::-1] / pixels.max() * top
     low, high = shares[r, c], shares[r + 1, c + 1]
     right, above = shares[r, c + 1], shares[r + 1, c]
-    return np.where(
-        u > v,
-        low + u * (right - low) + v * (high - right),
-        low + v * (above - low) + u * (high - above),
-    )
+    one, other = u * (right - low) + v * (high - right), v * (above - low) + u * (high - above)
+    return low + np.where(u > v, one, other)
 
 
 @pytest.mark.parametrize("bits", [8, 16])
@@ -93,9 +89,8 @@ def test_a_ball_rests_in_the_hollow_and_the_images_top_is_at_y(make_world, image
     bowl = np.maximum(abs(row - 8), abs(column - 24)) / 24.0
     pixels = (bowl * (2**bits - 1)).round().astype(f"uint{bits}")
     world = make_world()
-    world.spawn(
-        "terrain", terrain(image(pixels), more="<sampling>1</sampling>"), Pose((0.0, 0.0, 1.0))
-    )
+    ground = terrain(image(pixels), more="<sampling>1</sampling>")
+    world.spawn("terrain", ground, Pose((0.0, 0.0, 1.0)))
     thing = world.spawn("ball", ball(), Pose((4.9, 5.1, 2.0)))
     run(world, 4000)
     x, y, z = thing.state()[0].position
@@ -137,11 +132,8 @@ def test_rays_meet_the_bilinear_surface_between_pixels(make_world, image):
     """At the samples, of which a pixel has four; visuals are the same."""
     pixels = np.random.default_rng(1).integers(0, 256, (SIDE, SIDE)).astype(np.uint8)
     world = make_world()
-    world.spawn(
-        "terrain",
-        terrain(image(pixels), more="<sampling>4</sampling><pos>0 0 -1</pos>"),
-        Pose((3.0, 0.0, 0.5), from_rpy(0.0, 0.0, math.pi / 2)),
-    )
+    ground = terrain(image(pixels), more="<sampling>4</sampling><pos>0 0 -1</pos>")
+    world.spawn("terrain", ground, Pose((3.0, 0.0, 0.5), from_rpy(0.0, 0.0, math.pi / 2)))
     places = np.random.default_rng(2).integers(0, 4 * (SIDE - 1), (200, 2)) * 20.0 / 128 - 10.0
     scene = RayScene(world)
     for x, y in places:
@@ -180,9 +172,8 @@ def huge_png(path, side):
     """A PNG's header and nothing behind it."""
 
     def chunk(kind, data):
-        return (
-            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-        )
+        sum_of_all = struct.pack(">I", zlib.crc32(kind + data))
+        return struct.pack(">I", len(data)) + kind + data + sum_of_all
 
     header = chunk(b"IHDR", struct.pack(">IIBBBBB", side, side, 16, 0, 0, 0, 0))
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", b""))
@@ -211,11 +202,9 @@ def test_a_map_that_cannot_be_read_is_one_line(tmp_path, image, case):
 
 def test_an_image_is_no_mesh(image):
     shape = f"<geometry><mesh><uri>file://{image(ramp())}</uri></mesh></geometry>"
+    link = f'<link name="l"><collision name="c">{shape}</collision></link>'
     with pytest.raises(DescriptionError, match=r"only \.stl, \.dae, \.obj files"):
-        parse_sdf(
-            f'<sdf version="1.6"><model name="m"><link name="l"><collision name="c">{shape}</collision>'
-            "</link></model></sdf>"
-        )
+        parse_sdf(f'<sdf version="1.6"><model name="m">{link}</model></sdf>')
 
 
 def test_a_rover_drives_over_hills_and_keeps_to_them(make_world):

@@ -84,9 +84,8 @@ def test_a_gripper_with_gains_holds_a_box_and_lifts_it(world):
     gains = {name: {"p": 2000.0, "d": 40.0} for name in ("left", "right")}
     bench = Bench(world, gripper(), Pose(), kind, ["left", "right", "lift"], gains)
     text = link("box", 0.5, '<box size="0.08 0.08 0.1"/>', 0.001)
-    box = world.spawn(
-        "box", parse_urdf(f'<robot name="box">{text}</robot>'), Pose((0.0, 0.0, 0.05))
-    )
+    description = parse_urdf(f'<robot name="box">{text}</robot>')
+    box = world.spawn("box", description, Pose((0.0, 0.0, 0.05)))
     bench.advance(0.3, 0.0, 0.0, 0.0)
     bench.advance(2.0, 0.06, 0.06, 0.0)
     fingers = [bench.robot.hardware.joints[name].position for name in ("left", "right")]

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.robots.worlds import run
 
@@ -84,11 +85,10 @@ def test_a_mesh_of_gazebos_database_inside_a_world_file_becomes_simple_shapes(fo
     assert model.warnings == []
     assert set(model.stand_ins) == {folder}
     for shapes in (model.links["l"].collisions, model.links["l"].visuals):
-        heights = [
-            (each.pose.position[2], (each.size[2:] or each.size[1:])[0] / 2) for each in shapes
-        ]
-        assert min(middle - half for middle, half in heights) == pytest.approx(low, abs=1e-3)
-        assert max(middle + half for middle, half in heights) == pytest.approx(high, abs=1e-3)
+        middles = np.array([each.pose.position[2] for each in shapes])
+        halves = np.array([(each.size[2:] or each.size[1:])[0] / 2 for each in shapes])
+        assert (middles - halves).min() == pytest.approx(low, abs=1e-3)
+        assert (middles + halves).max() == pytest.approx(high, abs=1e-3)
         assert all(each.kind in ("box", "cylinder") and each.rgba for each in shapes)
         assert len({each.name for each in shapes}) == len(shapes)
     link = link.replace(folder, "robot")
@@ -128,9 +128,8 @@ def test_ground_plane_and_sun_are_found_inside_of_a_model_too(make_world):
     assert found.models["place"].stand_ins == ["cube_20k"]
     made = make_world()
     made.spawn("place", found.models["place"], Pose())
-    ball = made.spawn(
-        "ball", world(INCLUDE.format("unit_sphere")).models["unit_sphere"], Pose((-3.0, 0.0, 0.5))
-    )
+    ball = world(INCLUDE.format("unit_sphere")).models["unit_sphere"]
+    ball = made.spawn("ball", ball, Pose((-3.0, 0.0, 0.5)))
     run(made, 200)
     assert ball.state()[0].position[2] == pytest.approx(0.5, abs=2e-3)
 
@@ -139,12 +138,9 @@ def test_an_include_overrides_name_pose_and_static(tmp_path):
     folder = tmp_path / "crate"
     folder.mkdir()
     (folder / "model.sdf").write_text(f'<sdf version="1.5">{box("crate")}</sdf>')
-    text = (
-        '<sdf version="1.6"><world name="w"><include><uri>model://crate</uri></include><include>'
-        "<uri>model://crate</uri><name>c2</name><pose>1 0 0 0 0 0</pose><static>1</static></include>"
-        "</world></sdf>"
-    )
-    found = parse_world(text, Resources(models=(tmp_path,)))
+    own = "<name>c2</name><pose>1 0 0 0 0 0</pose><static>1</static></include>"
+    first = INCLUDE.format("crate")
+    found = world(first, first.replace("</include>", own), resources=Resources(models=(tmp_path,)))
     assert list(found.models) == ["crate", "c2"]
     assert found.models["crate"].initial_pose.position == (0.0, 0.0, 0.5)
     assert found.models["c2"].initial_pose.position == (1.0, 0.0, 0.0)
@@ -227,9 +223,7 @@ def test_a_fault_of_the_whole_file_is_one_line_with_its_place(tmp_path, text, fa
     assert "\n" not in str(raised.value)
 
 
-def test_a_world_is_looked_up_as_given_on_the_resource_path_and_in_gazebo_ros(
-    tmp_path, monkeypatch
-):
+def test_a_world_is_looked_up_as_given_on_a_path_and_in_gazebo_ros(tmp_path, monkeypatch):
     monkeypatch.setenv("GAZEBO_RESOURCE_PATH", str(tmp_path))
     (tmp_path / "worlds").mkdir()
     mine = tmp_path / "worlds" / "mine.world"
@@ -263,15 +257,9 @@ def test_a_world_is_not_read_or_filled_to_the_end_once_that_is_interrupted(tmp_p
 
 def test_a_world_that_is_filled_at_once_has_the_bits_of_one_filled_model_by_model(new_engine):
     """Also where the engine refuses one of the models, which alone is left out."""
-    heavy = box("heavy").replace(
-        '<link name="link">', '<link name="link"><inertial><mass>1e12</mass></inertial>'
-    )
-    text = [
-        box("a", "0 0 1 0.3 0.2 0"),
-        heavy,
-        box("b", "0.2 0 3 0 0.1 0"),
-        box("c", "0 0.1 5 0 0 0"),
-    ]
+    heavy = box("heavy").replace("</link>", "<inertial><mass>1e12</mass></inertial></link>")
+    text = [heavy, box("b", "0.2 0 3 0 0.1 0"), box("c", "0 0.1 5 0 0 0")]
+    text.insert(0, box("a", "0 0 1 0.3 0.2 0"))
     seen = []
     for at_once in (True, False):
         found = world(*text, "<include><uri>model://ground_plane</uri></include>")
@@ -283,8 +271,7 @@ def test_a_world_that_is_filled_at_once_has_the_bits_of_one_filled_model_by_mode
         else:
             for name in ("a", "b", "c", "ground_plane"):
                 made.spawn(name, found.models[name], found.models[name].initial_pose)
-        for _ in range(1500):
-            made.step()
+        run(made, 1500)
         seen.append({name: model.state() for name, model in made.models.items()})
         made.close()
     assert seen[0] == seen[1]

@@ -1,11 +1,9 @@
 """Many shapes of many models as few objects of a page."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from support.pages.viser_recording import Recording
+from support.python import run_python
 
 from robot_sim.physics.description import Link, Shape
 from robot_sim.physics.pose import Pose, normalized
@@ -144,6 +142,5 @@ with hidden_page() as server:
     shapes = [Shape("box", (1, 1, 1)), Shape("sphere", (1,)), Shape("cylinder", (1, 1))]
     Picture(server, sys.exit).draw([VisibleModel(1, "m", [Link("l", visuals=shapes)])], [])
 """
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = run_python(program, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (0, "")

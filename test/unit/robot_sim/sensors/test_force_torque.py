@@ -88,10 +88,8 @@ def test_a_falling_arm_weighs_less(make):
 def test_what_velocity_decay_takes_is_no_load_of_the_joint(make_world):
     """Nothing but the centripetal force of the arm and its tip acts, though the arm slows down."""
     sim = Simulator(make_world(gravity=(0.0, 0.0, 0.0)), lockstep=True)
-    block = "".join(
-        f'<gazebo reference="{link}"><dampingFactor>0.01</dampingFactor></gazebo>'
-        for link in ("arm", "tip")
-    )
+    block = '<gazebo reference="{}"><dampingFactor>0.01</dampingFactor></gazebo>'
+    block = block.format("arm") + block.format("tip")
     text = ROBOT.format(kind="revolute", rpy="0 0 0", low=-3, z=1.0)
     model = sim.world.spawn("r", parse_urdf(text.replace("</robot>", f"{block}</robot>")), Pose())
     model.set_stops("wrist", None, 3.0)

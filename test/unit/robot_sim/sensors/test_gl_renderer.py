@@ -25,6 +25,7 @@ pytestmark = pytest.mark.extras("mujoco", "OpenGL")
 CAMERA = """<camera><horizontal_fov>1.3</horizontal_fov>
 <image><width>{}</width><height>{}</height></image><clip><near>0.05</near><far>50</far></clip></camera>"""
 EYE = Pose((-3.0, 0.2, 1.0), from_rpy(0.1, 0.2, 0.05))
+SUN = "directional"
 SIZES = {"box": (0.4, 0.6, 0.8), "cylinder": (0.3, 0.8), "sphere": (0.35,)}
 MESH = """<sdf version="1.6"><model name="m"><static>{}</static><link name="l">
 <inertial><mass>1</mass></inertial>
@@ -87,10 +88,8 @@ def test_shapes_lights_and_ground_look_as_by_rays_wherever_they_are(world, put, 
     world.models["thing3"].place(Pose((-1.5, 0.3, 0.7)))
     world.models["thing2"].place(Pose((-1.5, -0.3, 0.7)))
     assert (compare(gl, scene).colours != first.colours).any()
-    world.lights["red"] = Light("red", (0.8, 0, 0, 1), direction=(0, 0, -2.0), kind="directional")
-    world.lights["low"] = Light(
-        "low", (0, 0.8, 0.3, 1), direction=(0.8, 0, -0.5), kind="directional"
-    )
+    world.lights["red"] = Light("red", (0.8, 0, 0, 1), direction=(0, 0, -2.0), kind=SUN)
+    world.lights["low"] = Light("low", (0, 0.8, 0.3, 1), direction=(0.8, 0, -0.5), kind=SUN)
     compare(gl, scene, size=(200, 90))
     world.delete("thing4")
     for link in (Pose((500.3, -200.7, 1.0), from_rpy(0.0, 0.2, 1.0)), Pose((0.0, 0.0, -2.0))):

@@ -20,9 +20,8 @@ SIZES = {"box": (0.4, 0.6, 0.8), "cylinder": (0.3, 0.8), "sphere": (0.35,)}
 
 def fan(count):
     angles = np.linspace(-math.pi, math.pi, count)
-    return np.stack([np.cos(angles), np.sin(angles), 0.05 * np.sin(7 * angles)], axis=1) / np.sqrt(
-        1 + (0.05 * np.sin(7 * angles)[:, None]) ** 2
-    )
+    ways = np.stack([np.cos(angles), np.sin(angles), 0.05 * np.sin(7 * angles)], axis=1)
+    return ways / np.linalg.norm(ways, axis=1, keepdims=True)
 
 
 def test_near_and_far_bound_a_ray(world, put):
@@ -44,9 +43,8 @@ def test_shapes_are_met_where_the_engine_meets_them_or_exactly(world, put, kind,
     hits = scene.cast(origin, directions, far=5.0)
     back = pose.inverse()
     start = np.array(back.compose(Pose(tuple(origin))).position)
-    ways = np.array(
-        [np.array(back.compose(Pose(tuple(origin + way))).position) - start for way in directions]
-    )
+    ends = [back.compose(Pose(tuple(origin + way))).position for way in directions]
+    ways = np.array(ends) - start
     size = np.zeros((721, 3))
     size[:, : len(SIZES[kind])] = SIZES[kind]
     exact = DISTANCES[kind](np.tile(start, (721, 1)), ways, size)
@@ -71,9 +69,8 @@ def test_a_robot_is_met_from_a_sensor_on_top_of_it(world, put, kind, above):
     hits = RayScene(world).cast(np.array(up.position), own @ turn.T)
     starts = np.tile((0.02, 0.01, 0.4 + above), (2000, 1))
     exact = DISTANCES[kind](starts, own, np.tile((*SIZES[kind], 0.0)[:3], (2000, 1)))
-    np.testing.assert_allclose(
-        np.where(hits.targets == 1, hits.distances, np.inf), exact, atol=1e-5
-    )
+    found = np.where(hits.targets == 1, hits.distances, np.inf)
+    np.testing.assert_allclose(found, exact, atol=1e-5)
     assert 20 < np.isfinite(exact).sum() < 1500
 
 
@@ -143,12 +140,8 @@ def test_what_a_model_looks_like_is_read_once_though_others_come(world, put, mon
 
 def test_without_embree_rays_meet_the_same(world, put, monkeypatch):
     for index, kind in enumerate(SIZES):
-        put(
-            f"thing{index}",
-            kind,
-            SIZES[kind],
-            Pose((1.5, index - 1.0, 0.4), from_rpy(index, 0.0, 0.3)),
-        )
+        at = Pose((1.5, index - 1.0, 0.4), from_rpy(index, 0.0, 0.3))
+        put(f"thing{index}", kind, SIZES[kind], at)
     origin, ways = np.array([0.0, 0.0, 0.4]), fan(180)
     expected = RayScene(world).cast(origin, ways, 0.1, 10.0)
     monkeypatch.setattr(rays, "Triangles", rays._EachTriangle)
@@ -187,9 +180,8 @@ def test_a_ball_is_met_without_trimesh(world, put, monkeypatch):
 
 def test_a_picture_in_pieces_is_the_same(world, put, monkeypatch):
     put("ball", "sphere", (0.5,), Pose((2.0, 0.1, 0.5)), tag="visual")
-    camera = fromstring(
-        "<camera><image><width>60</width><height>41</height></image><clip><far>9</far></clip></camera>"
-    )
+    size = "<image><width>60</width><height>41</height></image>"
+    camera = fromstring(f"<camera>{size}<clip><far>9</far></clip></camera>")
     seen = []
     for pixels in (1, 60 * 7, 1 << 17):
         monkeypatch.setattr(pinhole, "PIECE", pixels)

@@ -1,15 +1,19 @@
-"""When sensors measure (docs/contract/sensors.md 0.4)."""
+"""When sensors measure (docs/contract/sensors.md 0.4), and whose their noise is."""
 
 import threading
+from types import SimpleNamespace
 
 import pytest
+from support.robots.worlds import advance
 
 from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.model import AT_REST
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.schedule import Schedule
+from robot_sim.sensors.sensing import Sensing
+from robot_sim.simulator import Simulator
 
 MS = 1_000_000
-AT_REST = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 BALL = """<robot name="ball"><link name="b"><inertial><mass value="1"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
 
@@ -60,23 +64,56 @@ def make(sim, schedule, model):
     return lambda *args, on=model, **options: Sensor(sim, schedule, on, *args, **options)
 
 
-def advance(sim, ticks):
-    with sim.lock:
-        sim.advance(ticks)
+def reseed(sim):
+    with sim.lock, sim.moves.as_one():
+        sim.reseed(5)
+        sim.reset(everything=False)
 
 
-def test_measurements_come_with_the_period_and_do_not_drift(sim, make):
-    sensor = make(300.0)  # every 3.333333 ms
-    sensor.come()
-    advance(sim, 100)
-    assert sensor.times == [0, *(-(-k * 3_333_333 // MS) * MS for k in range(1, 31))]
+def reset_and_place(sim):
+    """In one request."""
+    with sim.lock, sim.moves.as_one():
+        sim.reset(everything=False)
+        sim.place_model(sim.world.models["ball"], Pose((0.0, 0.0, 1.0)), AT_REST)
 
 
-def test_without_a_rate_every_step_is_measured(sim, make):
-    sensor = make(0.0)
-    sensor.come()
-    advance(sim, 3)
-    assert sensor.times == [0, MS, 2 * MS, 3 * MS]
+COME, GO, DUE = Sensor.come, Sensor.go, {"at_once": False}
+PERIODS = [0, *(-(-k * 3_333_333 // MS) for k in range(1, 31))]
+COURSES = {  # the sensor's rate, since when [ms], what happens or how many ticks pass, and when it measures
+    "with the period, without a drift": (300.0, {}, [COME, 100], PERIODS),
+    "without a rate in each step": (0.0, {}, [COME, 3], [0, 1, 2, 3]),
+    "the slowest of rates is one": (1e-320, {}, [COME, 2], [0]),
+    "a newcomer gets one at once, if the last is a period old, and changes no later one": (
+        100.0, {"since": 4}, [13, COME, 12, COME, 5, GO, GO, 20, COME], [17, 24, 34, 54],
+    ),
+    "one that compares measurements begins when it is due": (100.0, DUE, [13, COME, 10], [20]),
+    "who comes after a reset gets what there is now": (
+        10.0, {}, [COME, GO, 20, Simulator.reset_simulation, COME], [0, 0],
+    ),
+    # rospy learns that a subscriber has gone when it sends the next time; the last one waits for a new one
+    "who comes instead of one who has left unnoticed gets what the other was sent": (
+        10.0, {}, [COME, Simulator.reset_simulation, COME, 100, COME, 5, COME], [0, 0, 0, 100, 100],
+    ),
+    "several moves of one request measure once": (100.0, DUE, [COME, reset_and_place], [0]),
+    # An episode measures at the same of its times, whenever it begins.
+    "a reset with a seed begins the clocks anew": (
+        100.0, {}, [COME, 13, reseed, 20], [0, 10, 13, 23, 33],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("course", COURSES)
+def test_it_measures_when(sim, make, course):
+    rate, options, events, wanted = COURSES[course]
+    if "since" in options:
+        advance(sim, options["since"])
+    sensor = make(rate, at_once=options.get("at_once", True))
+    for event in events:
+        if isinstance(event, int):
+            advance(sim, event)
+        else:
+            event(sensor if event in (COME, GO) else sim)
+    assert sensor.times == [each * MS for each in wanted]
 
 
 def test_nobody_listening_costs_the_tick_nothing(sim, make):
@@ -88,31 +125,6 @@ def test_nobody_listening_costs_the_tick_nothing(sim, make):
     assert sim.listeners != before
     sensor.go()
     assert sim.listeners == before
-
-
-def test_a_newcomer_gets_a_measurement_at_once_and_changes_no_later_one(sim, make):
-    advance(sim, 4)
-    sensor = make(100.0)
-    advance(sim, 13)
-    sensor.come()
-    advance(sim, 12)
-    assert sensor.times == [17 * MS, 24 * MS]
-    sensor.come()  # less than a period after the last measurement
-    assert sensor.times == [17 * MS, 24 * MS]
-    advance(sim, 5)
-    sensor.go()
-    sensor.go()
-    advance(sim, 20)
-    sensor.come()
-    assert sensor.times[2:] == [34 * MS, 54 * MS]
-
-
-def test_one_that_compares_measurements_begins_when_it_is_due(sim, make):
-    sensor = make(100.0, at_once=False)
-    advance(sim, 13)
-    sensor.come()
-    advance(sim, 10)
-    assert sensor.times == [20 * MS]
 
 
 def test_sensors_measure_in_the_order_in_which_they_were_added(sim, make):
@@ -157,47 +169,6 @@ def test_a_move_of_a_model_measures_what_it_carries_and_nothing_else(sim, schedu
     assert (len(own.times), len(other.times), len(far.times)) == (6, 17, 7)
 
 
-def test_several_moves_of_one_request_measure_once(sim, make, model):
-    sensor = make(100.0, at_once=False)
-    sensor.come()
-    with sim.lock, sim.moves.as_one():
-        sim.reset(everything=False)
-        sim.place_model(model, Pose((0.0, 0.0, 1.0)), AT_REST)
-    assert sensor.times == [0]
-
-
-def test_who_comes_after_a_reset_gets_what_there_is_now(sim, make):
-    sensor = make(10.0)
-    sensor.come()
-    sensor.go()
-    advance(sim, 20)
-    sim.reset_simulation()
-    sensor.come()
-    assert sensor.times == [0, 0]
-
-
-def test_who_comes_instead_of_one_who_has_left_unnoticed_gets_what_the_other_was_sent(sim, make):
-    """rospy learns that a subscriber has gone when it sends the next time."""
-    sensor = make(10.0)
-    sensor.come()
-    sim.reset_simulation()
-    sensor.come()
-    assert sensor.times == [0, 0, 0]
-    advance(sim, 100)
-    sensor.come()
-    assert sensor.times[3:] == [100 * MS, 100 * MS]
-    advance(sim, 5)
-    sensor.come()  # this one waits for a measurement that is new
-    assert len(sensor.times) == 5
-
-
-def test_the_slowest_of_rates_is_one(sim, make):
-    sensor = make(1e-320)
-    sensor.come()
-    advance(sim, 2)
-    assert sensor.times == [0]
-
-
 def test_a_clock_that_has_ended_measures_no_more(sim, make):
     sensor = make(100.0, lambda now: pytest.fail("measured"), at_once=False)
     sensor.come()
@@ -235,13 +206,23 @@ def test_a_callback_that_looks_under_the_worlds_lock_does_not_wait_for_it(sim, m
     assert sensor.times == [0, 10 * MS]
 
 
-def test_a_reset_with_a_seed_begins_the_clocks_anew(sim, make):
-    """So that an episode measures at the same of its times, whenever it begins."""
-    sensor = make(100.0)
-    sensor.come()
-    advance(sim, 13)
-    with sim.lock, sim.moves.as_one():
-        sim.reseed(5)
-        sim.reset(everything=False)
-    advance(sim, 20)
-    assert sensor.times == [0, 10 * MS, 13 * MS, 23 * MS, 33 * MS]
+def draws(sensing, key="base::eye", now=5):
+    model = SimpleNamespace(name="bot")
+    return sensing.noise(model, key, now).normal(size=3).tolist()
+
+
+def test_noise_is_that_of_seed_sensor_and_time(sim):
+    first, other = Sensing(sim, 1), Sensing(sim, 2)
+    assert draws(first) == draws(Sensing(sim, 1)) == draws(first)
+    assert draws(first) != draws(other)
+    assert draws(first) != draws(first, "base::ear") and draws(first) != draws(first, now=6)
+
+
+def test_resets_draw_other_noise_and_a_seed_the_same_again(sim):
+    sensing = Sensing(sim, 1)
+    sim.reseed(7)
+    before = draws(sensing)
+    sim.reset_simulation()
+    assert draws(sensing) != before
+    sim.reseed(7)
+    assert draws(sensing) == before
