@@ -84,11 +84,7 @@ def diff(first: EnvSnapshot, second: EnvSnapshot) -> list[Difference]:
 
 
 def episode_of(snapshot: Snapshot) -> tuple[int, dict[str, Any]]:
-    """Returns when the episode of an environment's snapshot has begun [ns], and what controllers hold.
-
-    Raises:
-        SimulatorError: If it doesn't say.
-    """
+    """Returns when an episode has begun [ns] and what controllers hold; raises SimulatorError for none."""
     episode = snapshot.state.get("episode")
     if isinstance(episode, dict):
         begun, held = episode.get("begun"), episode.get("held")
