@@ -17,24 +17,15 @@ def without_module(env_id: str) -> str:
     return env_id.partition(":")[2] or env_id
 
 
-def module_of(env_id: str) -> str:
-    """Returns the module that registers it; empty if the id names none."""
-    module, colon, _ = env_id.partition(":")
-    return module if colon else ""
-
-
 def as_file_name(env_id: str) -> str:
     """Returns an id as part of a file's name."""
     return re.sub("[/:]", "-", env_id)
 
 
-FORM = "One of your own is named with its module, as in my_module:my_robot/Reach-v0."
-
-
 def import_module_of(env_id: str) -> None:
     """Imports the module that an id names, if it names one."""
-    module = module_of(env_id)
-    if not module:
+    module, colon, _ = env_id.partition(":")
+    if not (module and colon):
         return
     try:
         import_module(module)

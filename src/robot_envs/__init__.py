@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from robot_envs.environment import RobotEnv as RobotEnv
     from robot_envs.errors import RobotEnvError as RobotEnvError
     from robot_envs.errors import SimulatorError as SimulatorError
-    from robot_envs.initial_states import InitialStates as InitialStates
     from robot_envs.registration import register as register
     from robot_envs.robot import EMPTY as EMPTY
     from robot_envs.robot import Robot as Robot
     from robot_envs.snapshot import EnvSnapshot as EnvSnapshot
+    from robot_envs.snapshot import InitialStates as InitialStates
     from robot_envs.snapshot import diff as diff
     from robot_envs.task import GoalTask as GoalTask
     from robot_envs.task import Object as Object

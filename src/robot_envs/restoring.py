@@ -5,14 +5,12 @@ from typing import Any
 
 import gymnasium
 
-from robot_envs.backends.backend import RobotBackend
 from robot_envs.errors import SimulatorError
 from robot_envs.pictures.drawn import DrawnEnv
 from robot_envs.snapshot import EnvSnapshot
-from robot_envs.task import Task
 from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Sensor
-from robot_envs.world_state import InitialState, WorldState
+from robot_envs.world_state import WorldState
 from robot_sim.plain_data import misfit, resolve
 from robot_sim.snapshot import SnapshotError
 from robot_sim.state_dict import StateError, load, state_of, undoable
@@ -21,16 +19,12 @@ from robot_sim.state_dict import StateError, load, state_of, undoable
 class SavedEnv(DrawnEnv):
     """An environment whose episode can be saved and restored."""
 
-    task: Task
-    backend: RobotBackend
     control_period: float  # [s]
     _sensor: Sensor | None
     _actuator: Actuator | None
     _randomisation: Randomisation | None
     _variation: Variation
-    _state: WorldState | None
     _first: dict[str, Any]  # commands that go along with an episode's first action
-    _initial: InitialState
     _steps: int | None  # None: no episode is under way
     _closed: bool
     _begun: Any  # the step that is under way

@@ -1,12 +1,16 @@
-"""The snapshot of an environment, and its file."""
+"""The snapshot of an environment, its file, and snapshots where episodes begin."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, Self
 
+import numpy as np
+
 from robot_envs.errors import SimulatorError
 from robot_sim.plain_data import Difference, differences
 from robot_sim.snapshot import Snapshot, SnapshotError
+from robot_sim.state_dict import Shared
 
 OWN = "environment"
 
@@ -73,6 +77,31 @@ class EnvSnapshot:
         return cls(fits, state, whole, is_foreign=True)
 
 
+class InitialStates(Shared):
+    """Snapshots, of which a task's `initial_state` may return one.
+
+    Args:
+        source: Snapshots, or a folder with files of them, `*.snapshot`, taken in the order of their names.
+
+    Raises:
+        ValueError: If there is none.
+        SnapshotError: If a file can't be read, or is no snapshot.
+    """
+
+    def __init__(self, source: Path | str | Sequence[EnvSnapshot]) -> None:
+        if isinstance(source, (Path, str)):
+            files = sorted(Path(source).glob("*.snapshot"))
+            self.snapshots = [EnvSnapshot.load(path) for path in files]
+        else:
+            self.snapshots = list(source)
+        if not self.snapshots:
+            raise ValueError(f"there is no snapshot in {source!s:.200}")
+
+    def draw(self, rng: np.random.Generator) -> EnvSnapshot:
+        """Returns one at random."""
+        return self.snapshots[int(rng.integers(len(self.snapshots)))]
+
+
 def diff(first: EnvSnapshot, second: EnvSnapshot) -> list[Difference]:
     """Returns where two snapshots differ: place, and both values.
 
@@ -84,11 +113,7 @@ def diff(first: EnvSnapshot, second: EnvSnapshot) -> list[Difference]:
 
 
 def episode_of(snapshot: Snapshot) -> tuple[int, dict[str, Any]]:
-    """Returns when the episode of an environment's snapshot has begun [ns], and what controllers hold.
-
-    Raises:
-        SimulatorError: If it doesn't say.
-    """
+    """Returns when an episode has begun [ns] and what controllers hold; raises SimulatorError for none."""
     episode = snapshot.state.get("episode")
     if isinstance(episode, dict):
         begun, held = episode.get("begun"), episode.get("held")

@@ -59,9 +59,7 @@ def job_pool(
             run, where = cluster.run, cluster.about()
             at_once = min(arguments.jobs or cluster.cpus, cluster.cpus)
             tell(where)
-        pool = JobPool(folder, run, at_once, interrupt, jobs)
-        pool.where = where
-        yield pool
+        yield JobPool(folder, run, at_once, interrupt, jobs, where)
 
 
 def claim(folder: Path, name: str, wanted: Any, refusal: str) -> None:
@@ -100,8 +98,9 @@ class JobPool:
         at_once: int,
         interrupt: Interrupt,
         jobs: Sequence[Job] = (),
+        where: str = "",
     ) -> None:
-        self.at_once, self.where = at_once, ""  # `where` describes the machines
+        self.at_once, self.where = at_once, where  # the latter describes the machines
         self.failure: BaseException | None = None  # it ends all jobs
         self._folder, self._run, self._interrupt = folder, run, interrupt
         self._lock = threading.Lock()

@@ -8,7 +8,7 @@ learning loop and the content of a checkpoint. Its module has two functions:
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -37,9 +37,9 @@ class Algorithm(ABC):
         """Steps between the last two calls of `step_done`."""
         return 1
 
-    @abstractmethod
     def start_environment(self, state: Any, say: Say) -> None:
         """Seeds the environment, then restores `environment_state` unless that is None; says if it fails."""
+        return
 
     @abstractmethod
     def learn(self, frame: Any) -> None:
@@ -61,9 +61,9 @@ class Algorithm(ABC):
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Loads what `state_dict` returned, from a checkpoint that may hold more."""
 
-    @abstractmethod
     def environment_state(self) -> Any:
-        """Returns where the environment is, as plain values and tensors."""
+        """Returns where the environment is, as plain values and tensors; None if no episode matters."""
+        return None
 
     def leave_environment(self) -> Any:
         """Returns what `restore_environment` needs after an evaluation in this environment."""
@@ -71,7 +71,7 @@ class Algorithm(ABC):
 
     def restore_environment(self, state: Any, say: Say) -> None:
         """Restores what `leave_environment` returned, after an evaluation; says if that fails."""
-        raise NotImplementedError
+        return
 
     def settle(self) -> bool:
         """Discards unfinished work after a failure; returns whether the training can now be saved."""
@@ -80,6 +80,12 @@ class Algorithm(ABC):
     def export(self, folder: Path) -> None:
         """Writes the networks in further formats, if it has any; raises OSError if that fails."""
         return
+
+
+def check_finite(parameters: Iterable[torch.Tensor]) -> None:
+    """Refuses weights that are NaN or infinite."""
+    if not all(torch.isfinite(each).all() for each in parameters):
+        raise WorkbenchError("the weights are NaN or infinite: a smaller learning_rate may help")
 
 
 def check_device(name: str) -> None:

@@ -7,14 +7,13 @@ import hashlib
 from typing import Any
 
 import numpy as np
-import torch
 from gymnasium import spaces
 
 from rl_workbench.agents.cloning import CloningAgent
 from rl_workbench.agents.policy_networks import Bounds
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training import demonstrations
-from rl_workbench.training.algorithm import Algorithm, Policy, Say
+from rl_workbench.training.algorithm import Algorithm, Policy, check_finite
 from rl_workbench.training.checked import Env
 from rl_workbench.training.checkpoints import fitting
 from rl_workbench.training.environments import is_continuous
@@ -85,10 +84,7 @@ class Cloning(Algorithm):
             frame.step_done()
 
     def check_weights(self) -> None:
-        if not all(torch.isfinite(each).all() for each in self._agent.network.parameters()):
-            raise WorkbenchError(
-                "the weights are NaN or infinite: a smaller learning_rate may help"
-            )
+        check_finite(self._agent.network.parameters())
 
     def state_dict(self) -> dict[str, Any]:
         self.check_weights()
@@ -101,13 +97,3 @@ class Cloning(Algorithm):
             )
         with fitting("agent"):
             self._agent.load_state_dict(state["agent"])
-
-    def environment_state(self) -> None:
-        """Returns nothing: no episode is under way."""
-        return
-
-    def start_environment(self, state: Any, say: Say) -> None:
-        """Does nothing; see `environment_state`."""
-
-    def restore_environment(self, state: Any, say: Say) -> None:
-        """Does nothing; see `environment_state`."""

@@ -21,7 +21,7 @@ import numpy as np
 from gymnasium import spaces
 
 from rl_workbench import errors
-from rl_workbench.env_ids import FORM, import_module_of, module_of, spec_of
+from rl_workbench.env_ids import import_module_of, spec_of
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
 from rl_workbench.option import imported
 from rl_workbench.training.checked import CheckedEnvironment, Env
@@ -66,7 +66,8 @@ def make_environment(
             hint = f" ({extras} may install them)" if extras else ""
             raise WorkbenchError(f"{env_id} needs more packages{hint}: {error}") from error
         except gymnasium.error.UnregisteredEnv as error:
-            hint = "" if module_of(env_id) else f" {FORM}"
+            form = " One of your own is named with its module, as in my_module:my_robot/Reach-v0."
+            hint = "" if ":" in env_id else form
             raise WorkbenchError(f"can't make {env_id}: {error}{hint}") from error
         except _REFUSED as error:
             reason = " ".join(str(error).split()) or type(error).__name__

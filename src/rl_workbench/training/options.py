@@ -121,20 +121,15 @@ class TrainingOptions(NamedTuple):
         return {"algorithm": self.kind.name, "run": run, "hyperparameters": hyperparameters}
 
     def doubt(self) -> str:
-        """Returns a line if nothing is left to learn, or exploration ends before learning; or else ""."""
-        steps, own = self.run.total_timesteps, self.hyperparameters
-        starts = getattr(own, "learning_starts", 0)
+        """Returns a line if the training ends before learning starts; else ""."""
+        steps, starts = (
+            self.run.total_timesteps,
+            getattr(self.hyperparameters, "learning_starts", 0),
+        )
         if steps and starts >= steps:
             return (
                 f"learning starts after {starts} steps (learning_starts), but the training ends after "
                 f"{steps} (total_timesteps): it learns next to nothing"
-            )
-        explored = getattr(own, "exploration_fraction", 0.0) * steps
-        is_linear = getattr(own, "epsilon_schedule", "linear") == "linear"
-        if is_linear and 0 < explored < starts:
-            return (
-                f"exploration has fallen to its end after {explored:.0f} steps (exploration_fraction of "
-                f"{steps} total_timesteps), before learning starts after {starts} (learning_starts)"
             )
         return ""
 

@@ -95,11 +95,9 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> np.ndarray | None:
-        """Repeats the episode.
+        """Repeats the episode; returns its last observation as a vector.
 
-        Returns:
-            Its last observation as a vector; None if it went another way. Then no episode is under way, and
-            the generator is as it was.
+        None means that it went another way: no episode is under way then, and the generator is as it was.
         """
         after = self.generator
         if self.env.spec is not None and self.env.spec.nondeterministic:

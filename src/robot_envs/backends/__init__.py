@@ -37,18 +37,9 @@ def make_backend(
 ) -> "RobotBackend":  # fmt: skip
     """Makes a scene's backend, one of `BACKENDS`; over ROS it starts a simulator if none runs.
 
-    Args:
-        scene: The robots and objects.
-        backend: None: in this process, with the first robot's engine.
-        control_period: Simulated time of one action [s]; in real time 0 takes the newest joint state at once.
-        deadline: Wall time for an answer in lock-step, on top of 10 ms for each tick [s]; None: the default.
-
-        renderer: Of cameras' pictures, see `RobotEnv`.
-
-    Raises:
-        ValueError: For an unknown backend, a renderer that can't be had, or a control period of a fraction of
-            physics steps.
-        RobotEnvError: If ROS isn't installed, or the robots can't be brought up.
+    The arguments are `RobotEnv`'s. Raises ValueError for an unknown backend, a renderer that can't be had, or
+    a control period of a fraction of physics steps; RobotEnvError if ROS isn't installed, or the robots can't
+    be brought up.
     """
     from file_access.text import nearest_or_all
     from robot_envs.backends.backend import PHYSICS_STEP, ticks_per_action

@@ -29,7 +29,6 @@ class RobotBackend(Protocol):
 
     def look(self, query: StateQuery) -> None:
         """Adds what a query names to all later states, which otherwise have only joints."""
-        ...
 
     def reset(self, initial: InitialState, seed: int = 0) -> WorldState:
         """Begins an episode; returns the state reached.
@@ -37,7 +36,6 @@ class RobotBackend(Protocol):
         `seed` is that of the sensors' noise; 0 continues it. A backend that can't set velocities puts joints
         at rest, and its state says so. The environment sends `initial.commands`.
         """
-        ...
 
     def begin(self, commands: Commands) -> None:
         """Sends commands and returns at once; `act` with the same commands waits for the result.
@@ -45,35 +43,27 @@ class RobotBackend(Protocol):
         Optional; without effect in this process and in real time. Any other call before `act` takes the
         answer first; a reset drops it.
         """
-        ...
 
     def act(self, commands: Commands) -> WorldState:
         """Commands controllers, with plain numbers; returns the state one control period later."""
-        ...
 
     def vary(self, variation: Variation) -> None:
         """Changes properties of robots and world, see `Variation`; call it before a reset."""
-        ...
 
     def save_state(self) -> WorldSnapshot:
         """Returns all that decides the world's future."""
-        ...
 
     def restore_state(self, state: WorldSnapshot) -> None:
         """Returns to what `save_state` of a backend has returned; the same commands lead to the same bits."""
-        ...
 
     def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
         """Begins an episode where a snapshot is; returns the state reached. `seed` as in `reset`."""
-        ...
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         """Returns poses of link frames in the world, each link named model::link."""
-        ...
 
     def close(self) -> None:
         """Frees what the backend holds; may be called twice."""
-        ...
 
 
 def ticks_per_action(control_period: float, physics_step: float) -> int:

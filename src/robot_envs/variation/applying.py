@@ -17,35 +17,27 @@ class Changeable(Protocol):
 
     def link(self, link: RobotPart) -> Inertia:
         """Returns a link's present inertia."""
-        ...
 
     def set_link(self, link: RobotPart, inertia: Inertia) -> None:
         """Changes a link's inertia; its axes stay."""
-        ...
 
     def set_joint(self, joint: RobotPart, damping: float | None, friction: float | None) -> None:
         """Changes a joint's viscous [N s/m, N m s/rad] and dry [N, N m] friction; None: unchanged."""
-        ...
 
     def set_surface(self, link: RobotPart, factor: float) -> None:
         """Multiplies the friction of a link's surfaces, as its file has it."""
-        ...
 
     def pids(self, controller: RobotPart) -> Mapping[str, Gains]:
         """Returns the present gains of a controller's PIDs, by their place below the controller."""
-        ...
 
     def set_pid(self, controller: RobotPart, place: str, gains: Gains) -> None:
         """Changes p, i and d of a PID."""
-        ...
 
     def gravity(self) -> Vector:
         """Returns the world's present gravity [m/s²]."""
-        ...
 
     def set_gravity(self, gravity: Vector) -> None:
         """Changes the world's gravity [m/s²]."""
-        ...
 
 
 class Applier:

@@ -78,7 +78,6 @@ class Randomisation(Protocol):
 
     def draw(self, rng: np.random.Generator) -> tuple[Variation, Any]:
         """Draws a variation; returns it, and what the reset's `info["variation"]` reports."""
-        ...
 
 
 _AXES = {  # of a length: index, the moments that scale with its square, the products that scale with it

@@ -6,14 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import check_optimizer
 from rl_workbench.storage import write_atomically
-from rl_workbench.training.algorithm import Algorithm, Say
+from rl_workbench.training.algorithm import Algorithm, Say, check_finite
 from rl_workbench.training.checked import CURVES
 from rl_workbench.training.checkpoints import fitting
 from rl_workbench.training.environments import succeeded
@@ -89,10 +88,7 @@ class SB3Training(Algorithm):
         return self._callback is not None and self._callback.go_back()
 
     def check_weights(self) -> None:
-        if not all(torch.isfinite(each).all() for each in self._model.policy.parameters()):
-            raise WorkbenchError(
-                "the weights are NaN or infinite: a smaller learning_rate may help"
-            )
+        check_finite(self._model.policy.parameters())
 
     def state_dict(self) -> dict[str, Any]:
         self.check_weights()

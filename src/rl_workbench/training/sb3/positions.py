@@ -36,11 +36,7 @@ class ModelMark(NamedTuple):
 
 
 class Positions:
-    """Where a model's environments are, and the generators that it explores with.
-
-    Args:
-        model: Each of its environments is a `RepeatableEnvironment` around all that counts its episodes.
-    """
+    """Where a model's environments, each a `RepeatableEnvironment`, and its exploration's generators are."""
 
     def __init__(self, model: Any) -> None:
         self._model = model
@@ -63,10 +59,7 @@ class Positions:
         )
 
     def take_back(self, mark: ModelMark) -> None:
-        """Undoes the steps since `mark`, so that `state_dict` describes that place.
-
-        The environments aren't moved.
-        """
+        """Undoes the steps since `mark`, so that `state_dict` describes that place; moves no environment."""
         model = self._model
         model.num_timesteps = mark.steps
         model._last_obs, model._last_episode_starts = mark.observations, mark.begins
@@ -89,11 +82,7 @@ class Positions:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> list[int]:
-        """Brings the environments back. One that doesn't repeat itself begins a new episode.
-
-        Returns:
-            The numbers of those whose episode was cut off.
-        """
+        """Brings the environments back; returns the numbers of those whose episode was cut off."""
         model = self._model
         model._last_obs = _apply(torch.Tensor.numpy, state["observations"])
         model._last_episode_starts = state["begins"].numpy()
@@ -107,11 +96,7 @@ class Positions:
         return index, env.state_dict(), env.generator
 
     def bring_back(self, left: tuple[int, Any, str]) -> bool:
-        """Repeats an environment's episode.
-
-        Returns:
-            Whether nothing was lost. An episode that goes another way is cut off there, as at a time limit.
-        """
+        """Repeats an episode, or cuts it off as at a time limit; returns whether nothing was lost."""
         index, episode, generator = left
         model, env = self._model, self._envs[index]
         set_generator(env.unwrapped.np_random, generator)

@@ -95,9 +95,11 @@ class OwnSimulator:
 
     def _read_report(self, deadline: float) -> None:
         """Waits for the master's address and the simulator's process id."""
-        report, timeout = self._process.stdout, max(0.0, deadline - time.monotonic())
+        report, poll = self._process.stdout, select.poll()
         assert report is not None
-        words = report.readline().split() if select.select([report], [], [], timeout)[0] else []
+        poll.register(report, select.POLLIN)
+        timeout = 1000.0 * max(0.0, deadline - time.monotonic())
+        words = report.readline().split() if poll.poll(timeout) else []
         if len(words) != 2:
             raise SimulatorFault("its master didn't start")
         self.uri, self.pid = words[0], int(words[1])

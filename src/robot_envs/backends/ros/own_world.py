@@ -75,14 +75,9 @@ def _difference(state: WorldState, last: WorldState) -> str:
 
 
 def checked(state: WorldState, expected: int) -> WorldState:
-    """Returns a simulator's answer if it is plausible.
+    """Returns a simulator's answer if it is of the time expected [ns] and all joints are within bounds.
 
-    Args:
-        state: The answer.
-        expected: Simulated time since the episode began [ns].
-
-    Raises:
-        SimulatorFault: If it is of another time, or a joint isn't finite and within bounds.
+    Raises SimulatorFault otherwise.
     """
     if not abs(state.time * NANOSECONDS - expected) < 0.5:  # NaN isn't
         raise SimulatorFault(
@@ -103,15 +98,8 @@ class OwnWorld(RobotBackend):
     that, and `restarts` counts it. If the other one fails as well, an error describes both failures, and the
     next reset begins with a new simulator.
 
-    Args:
-        scene: The robots and objects.
-        control_period: Simulated time of one action [s].
-        deadline: Wall time that an answer may take, on top of 10 ms for each tick [s]; None: 30 s.
-        renderer: Of cameras' pictures.
-
-    Raises:
-        ValueError: If the period isn't a whole number of physics steps.
-        RobotEnvError: If the simulator doesn't start, or the robots can't be brought up.
+    The arguments are `make_backend`'s. Raises ValueError if the period isn't a whole number of physics steps,
+    RobotEnvError if the simulator doesn't start, or the robots can't be brought up.
     """
 
     deterministic, complete, shared = True, True, False
@@ -146,12 +134,7 @@ class OwnWorld(RobotBackend):
         return OwnSimulator(self._slot, self.scene.robots[0].world, SEED, self._renderer)
 
     def connect(self) -> None:
-        """Waits for the simulator, and brings the robots up.
-
-        Raises:
-            ValueError: If the period isn't a whole number of its physics steps.
-            RobotEnvError: If something doesn't start.
-        """
+        """Waits for the simulator, and brings the robots up; raises as the class."""
         self._perform(lambda world: None)
 
     def look(self, query: StateQuery) -> None:

@@ -187,7 +187,6 @@ class SharedBackend(Protocol):
 
     def restore(self) -> None:
         """Undoes this backend's variations of the robots."""
-        ...
 
 
 class SharedWorld:

@@ -41,16 +41,16 @@ def _motion(message: Odometry) -> Values:
 @cache
 def sources() -> tuple[dict[str, TopicSource], dict[str, TopicSource]]:
     """Returns the sources of what tasks can see, by library and by the kind of the sensor."""
-    plugins: dict[str, Any] = {
-        library: plugin
-        for library, plugin in built_in("LIBRARIES").items()
-        if getattr(getattr(plugin, "source", None), "read", None) is not None
-    }
+    plugins: dict[str, Any] = dict(built_in("LIBRARIES"))
+    libraries: dict[str, TopicSource] = {}
     kinds: dict[str, TopicSource] = {}
-    for plugin in plugins.values():
-        for kind in plugin.measurement.kinds:
-            kinds.setdefault(kind, plugin.source)
-    return {library: plugin.source for library, plugin in plugins.items()}, kinds
+    for library, plugin in plugins.items():
+        source = getattr(plugin, "source", None)
+        if source is not None and source.read is not None:
+            libraries[library] = source
+            for kind in plugin.measurement.kinds:
+                kinds.setdefault(kind, source)
+    return libraries, kinds
 
 
 class _Heard(NamedTuple):

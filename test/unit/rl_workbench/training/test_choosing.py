@@ -174,9 +174,7 @@ def test_a_training_has_an_end(empty: str) -> None:
     ("kind", "flags", "words"),
     [
         (DQN, "1000 --learning-starts=5000", "learning starts after 5000 .* training ends after 1000"),
-        (DQN, "3000 --learning-starts=2000 --exploration-fraction=0.1", "end after 300 steps .* 2000"),
-        (DQN, "3000 --learning-starts=300 --exploration-fraction=0.1", ""),
-        (DQN, "3000 --learning-starts=2000 --epsilon-schedule=step", ""),
+        (DQN, "3000 --learning-starts=300", ""),
         (REINFORCE, "1000", ""),
         pytest.param(
             ALGORITHMS["sac"], "100", "after 100 .* ends after 100",
