@@ -15,6 +15,7 @@ from pathlib import Path
 
 import rospkg
 import rostest
+from support.ros.calls import executable
 
 from ros_calls import master
 from ros_calls.waiting import wait_until
@@ -39,17 +40,12 @@ BOUND = 300  # [s]
 
 
 def environment():
-    port = reserved_port()
-    return {
-        **os.environ,
-        "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
-        "ROS_IP": "127.0.0.1",
-        "PYTHONUNBUFFERED": "1",
-    }
+    uri = f"http://127.0.0.1:{reserved_port()}"
+    return os.environ | {"ROS_MASTER_URI": uri, "ROS_IP": "127.0.0.1", "PYTHONUNBUFFERED": "1"}
 
 
 def start(*arguments, **options):
-    return piped("rosrun", "cartpole", "lockstep.py", *arguments, **options)
+    return piped(executable("cartpole", "lockstep.py"), *arguments, **options)
 
 
 def piped(*command, **options):
@@ -132,40 +128,31 @@ class LaunchingTest(unittest.TestCase):
 
     def test_scripts_of_robots_on_wheels_repeat_to_the_bit(self):
         """Its model of a goal comes and goes; its callback keeps the newest cloud. Two worlds at once."""
-        for name, lengths in {"goal_model.py": (2, 10), "newest_cloud.py": (2, 5)}.items():
-            with contextlib.ExitStack() as stack:
+        with contextlib.ExitStack() as stack:
+            worlds = [stack.enter_context(scouting(GZSERVER_ARGS="--lockstep")) for _ in range(2)]
+            for name, lengths in {"goal_model.py": (2, 10), "newest_cloud.py": (2, 5)}.items():
                 arguments = "--seed", 3, SCRIPTS / name, *lengths
-                worlds = [
-                    stack.enter_context(scouting(GZSERVER_ARGS="--lockstep")) for _ in range(2)
-                ]
                 seen = [self.told(each) for each in [start(*arguments, env=e) for e in worlds]]
-            self.assertEqual(len(seen[0]), lengths[0] + 1)
-            self.assertEqual(*seen)
+                self.assertEqual(len(seen[0]), lengths[0] + 1)
+                self.assertEqual(*seen)
 
     def test_a_script_that_starts_roscore_and_places_its_robot_by_a_topic_repeats_to_the_bit(self):
-        both = [
-            start(
-                "--seed", 3, SCRIPTS / "state_topic.py", reserved_port(), 2, 10, env=environment()
-            )
-            for _ in range(2)
-        ]
+        arguments = "--seed", 3, SCRIPTS / "state_topic.py"
+        both = [start(*arguments, reserved_port(), 2, 10, env=environment()) for _ in range(2)]
         self.assertEqual(*map(self.told, both))
 
-    def test_scripts_of_robots_on_wheels_run_in_real_time(self):
+    def test_scripts_run_in_real_time_where_lockstep_refuses_them(self):
         own = piped(sys.executable, SCRIPTS / "state_topic.py", reserved_port(), 1, 3)
         with scouting() as here:
             for name in "goal_model.py", "newest_cloud.py":
                 process = piped(sys.executable, SCRIPTS / name, 1, 3, env=here)
                 self.assertEqual(len(self.told(process)), 2)
-        self.assertEqual(len(self.told(own)), 2)
-
-    def test_a_world_in_real_time_is_refused(self):
-        with Simulation() as simulation:
-            process = start(SCRIPTS / "rate_loop.py", env=simulation.environment())
+            process = start(SCRIPTS / "rate_loop.py", env=here)
             _, err = process.communicate(timeout=BOUND)
-        self.assertEqual(process.returncode, 2, err)
-        self.assertIn("runs in real time", err)
-        self.assertIn('GZSERVER_ARGS="--lockstep --seed 0"', err)
+            self.assertEqual(process.returncode, 2, err)
+            self.assertIn("runs in real time", err)
+            self.assertIn('GZSERVER_ARGS="--lockstep --seed 0"', err)
+        self.assertEqual(len(self.told(own)), 2)
 
     def run_script(self, text):
         """Runs a script at a simulator of its own; returns exit code, output and errors."""

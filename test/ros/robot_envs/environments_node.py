@@ -5,15 +5,14 @@ import os
 import signal
 import sys
 import unittest
-import xmlrpc.client
 from unittest import mock
 
 import gymnasium
 import numpy as np
-import rosgraph
 import rosservice
 import rostest
 from support.robots.cartpole import IDS, RICH
+from support.ros.calls import process_of
 
 import cartpole  # noqa: F401 - registers the environments
 from cartpole.robot import CONTROLLER
@@ -38,8 +37,7 @@ class Killed(unittest.TestCase):
     def test_a_simulator_that_is_killed_is_an_error_and_the_next_environment_starts_another(self):
         env = gymnasium.make("cartpole/Classic-v0", backend=BACKEND)
         env.reset(seed=1)
-        node = rosgraph.Master("/environments").lookupNode("/gazebo")
-        os.kill(xmlrpc.client.ServerProxy(node).getPid("/environments")[2], signal.SIGKILL)
+        os.kill(process_of(), signal.SIGKILL)
         for call in (lambda: env.step(1), env.reset):
             with self.assertRaisesRegex(SimulatorError, "its node has ended"):
                 call()

@@ -3,13 +3,12 @@
 
 import sys
 import unittest
-import xmlrpc.client
 from dataclasses import replace
 
 import numpy as np
-import rosgraph
 import rostest
 from support.robots.pendulum import MOTOR, PENDULUM, make_pendulum
+from support.ros.calls import process_of
 
 from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.backends.ros.session import RosSession
@@ -23,15 +22,6 @@ BACKEND = next((argument for argument in sys.argv if argument in ("ros", "ros-re
 REALTIME = BACKEND == "ros-realtime"
 
 
-def simulator() -> int | None:
-    """Its process id; None if there is none."""
-    try:
-        address = rosgraph.Master("/second_robot").lookupNode("/gazebo")
-        return int(xmlrpc.client.ServerProxy(address).getPid("/second_robot")[2])
-    except (rosgraph.MasterException, OSError):
-        return None
-
-
 class SecondRobot(unittest.TestCase):
     """One session, since a process becomes a ROS node once."""
 
@@ -43,7 +33,7 @@ class SecondRobot(unittest.TestCase):
         cls.session = RosSession(raised, "/learner", [], realtime=REALTIME, gui=False, seed=0)
         cls.addClassCleanup(cls.session.close)
         cls.session.start(cls.said.append)
-        cls.simulator = simulator()
+        cls.simulator = process_of()
 
     def test_what_was_missing_was_started_and_told(self):
         controllers = "starting joint_state_controller, hinge_effort_controller"
@@ -64,15 +54,15 @@ class SecondRobot(unittest.TestCase):
         second.reset(seed=1)
         second.step(np.ones(1, np.float32))
         second.close()
-        self.assertEqual(simulator(), self.simulator)
+        self.assertEqual(process_of(), self.simulator)
 
     def test_z_closing_ends_the_simulator_and_the_node(self):
         """The last one by its name."""
         self.session.close()
-        self.assertIsNone(simulator())
+        self.assertIsNone(process_of())
         with self.assertRaisesRegex(RobotEnvError, "a process becomes one only once"):
             make_pendulum(BACKEND, self.scene.robots[0])
-        self.assertIsNone(simulator())
+        self.assertIsNone(process_of())
 
 
 @unittest.skipIf(REALTIME, "time runs by itself")

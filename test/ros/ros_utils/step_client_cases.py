@@ -4,9 +4,8 @@ import os
 import signal
 import time
 import unittest
-import xmlrpc.client
 
-import rosgraph
+from support.ros.calls import process_of
 
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils.service_client import ServiceGone, ServiceHangs
@@ -70,7 +69,7 @@ class OneRobot(Clients):
 
     def test_a_simulator_that_hangs_is_an_error_in_time(self):
         client = self.client(timeout=1.0)
-        process = simulator_process(self.simulation.master_uri)
+        process = process_of(master_uri=self.simulation.master_uri)
         os.kill(process, signal.SIGSTOP)
         self.addCleanup(os.kill, process, signal.SIGCONT)
         with self.assertRaisesRegex(ServiceHangs, r"within 1(\.\d+)? s"):
@@ -119,9 +118,3 @@ class OwnSimulators(Clients):
                 if angle == 0.1:
                     with self.assertRaises(ServiceGone):
                         client.step(8, {CART: 0.1})
-
-
-def simulator_process(master_uri):
-    """Process id of the simulator under a master."""
-    uri = rosgraph.Master("/step_client", master_uri).lookupNode("/gazebo")
-    return xmlrpc.client.ServerProxy(uri).getPid("/step_client")[2]

@@ -22,12 +22,12 @@ def address(uri: str) -> Address:
     return str(place.hostname), int(place.port or 0)
 
 
-def _packed(data: bytes) -> bytes:
+def packed(data: bytes) -> bytes:
     return struct.pack("<I", len(data)) + data
 
 
-def _header(*fields: bytes) -> bytes:
-    return _packed(b"".join(map(_packed, fields)))
+def header(*fields: bytes) -> bytes:
+    return packed(b"".join(map(packed, fields)))
 
 
 def _hello(dice: random.Random) -> bytes:
@@ -38,7 +38,7 @@ def _hello(dice: random.Random) -> bytes:
         fields[at] = dice.choice(
             [b"", b"=", b"x", b"md5sum=", b"service=/none", dice.randbytes(20)]
         )
-    return _header(*fields)
+    return header(*fields)
 
 
 def _post(dice: random.Random) -> bytes:
@@ -64,7 +64,7 @@ def bad_bytes(dice: random.Random, xmlrpc: bool) -> bytes:
         lambda: dice.randbytes(dice.randrange(1, 3000)),
         lambda: struct.pack("<I", dice.choice([0, 1, 2**31 - 1, 2**32 - 1, 10**7])) + b"x",
         lambda: _hello(dice)[: dice.randrange(60)],
-        lambda: _hello(dice) + _packed(dice.randbytes(dice.randrange(80))),
+        lambda: _hello(dice) + packed(dice.randbytes(dice.randrange(80))),
         lambda: _hello(dice) + struct.pack("<I", dice.choice([2**31, 10**8])) + bytes(9),
         lambda: _post(dice),
         lambda: b"GET / HTTP/1.1\r\n" + b"X: " + b"y" * dice.randrange(70_000),

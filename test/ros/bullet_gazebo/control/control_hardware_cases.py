@@ -4,13 +4,11 @@ import math
 
 import rosgraph
 import rospy
-from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from control_msgs.msg import JointControllerState, PidState
 from sensor_msgs.msg import JointState
-from slides_client import SlidesTest, listen
+from slides_client import SlidesTest
 from std_msgs.msg import Float64
-from std_srvs.srv import Empty
-from support.ros.calls import call
+from support.ros.calls import delete_model, gazebo
 
 DESCRIPTION, LIMITS = "/slides/robot_description", "/slides/joint_limits"
 
@@ -22,7 +20,6 @@ class HardwareTest(SlidesTest):
         self.plain = rospy.get_param(DESCRIPTION)
 
     def tearDown(self):
-        super().tearDown()
         rospy.set_param(DESCRIPTION, self.plain)
         if rospy.has_param(LIMITS):
             rospy.delete_param(LIMITS)
@@ -46,7 +43,7 @@ class HardwareTest(SlidesTest):
     def test_the_control_period_is_a_whole_number_of_steps(self):
         self.begin("<eStopTopic>", "<controlPeriod>0.0025</controlPeriod><eStopTopic>")
         self.run_controllers("effort_position")
-        topic = listen("effort_position/state", JointControllerState)
+        topic = self.hear("/slides/effort_position/state", JointControllerState)
         self.step(1)
         self.assertTrue(topic.wait_for(len))
         self.step(30)
@@ -54,7 +51,6 @@ class HardwareTest(SlidesTest):
         first, second = topic.messages
         self.assertEqual((first.time_step, second.time_step), (0.003, 0.003))
         self.assertEqual((second.header.stamp - first.header.stamp).to_nsec(), 30_000_000)
-        topic.close()
 
     def test_a_reset_begins_a_control_period(self):
         self.begin("<eStopTopic>", "<controlPeriod>0.1</controlPeriod><eStopTopic>")
@@ -62,13 +58,12 @@ class HardwareTest(SlidesTest):
         rospy.set_param("/slides/effort_position/pid", pid)
         self.run_controllers("effort_position")
         self.step(150)
-        for reset in ("/gazebo/reset_world", "/gazebo/reset_simulation"):
-            topic = listen("effort_position/pid/state", PidState)
-            call(reset, Empty)
+        for reset in ("reset_world", "reset_simulation"):
+            topic = self.hear("/slides/effort_position/pid/state", PidState)
+            gazebo(reset)
             self.step(1)
             self.assertTrue(topic.wait_for(len))
             self.assertEqual(topic.messages[0].timestep, rospy.Duration(0, 100_000_000))
-            topic.close()
 
     def test_each_field_of_a_controllers_state(self):
         self.begin()
@@ -80,7 +75,7 @@ class HardwareTest(SlidesTest):
         ):
             rospy.set_param(f"/slides/{name}/pid", pid)
             self.run_controllers(name)
-            topic = listen(f"{name}/state", JointControllerState)
+            topic = self.hear(f"/slides/{name}/state", JointControllerState)
             before = self.step(20, **{name: 0.1})[joint]
             self.step(1)
             self.assertTrue(
@@ -93,14 +88,13 @@ class HardwareTest(SlidesTest):
             self.assertEqual(gains, (20.0, 2.0, 0.25, 3.0, True))
             wanted = 20.0 * state.error - 0.25 * before[1]
             self.assertAlmostEqual(state.command, wanted, delta=0.1)  # and a little of the integral
-            topic.close()
             self.step(9)
 
     def test_a_robot_that_comes_late_has_its_joint_states_at_their_rate(self):
         self.begin()
         self.step(2000)
-        self.delete()
-        self.spawn()
+        delete_model("slides")
+        self.spawn_robot()
         topic = self.start_states()
         for _ in range(35):
             self.step(1)
@@ -109,11 +103,10 @@ class HardwareTest(SlidesTest):
         )
         stamps = [message.header.stamp.to_nsec() // 1_000_000 for message in topic.messages]
         self.assertLessEqual(set(stamps), {2001, 2011, 2021, 2031})
-        topic.close()
 
     def start_states(self):
         self.assertTrue(self.manager.load("states"))
-        topic = listen("joint_states", JointState)
+        topic = self.hear("/slides/joint_states", JointState)
         self.assertTrue(self.manager.switch(["states"]))
         return topic
 
@@ -138,7 +131,7 @@ class HardwareTest(SlidesTest):
         self.run_controllers("effort_position")
         for where in ("update", "report"):
             self.assertTrue(self.load_rude(where))
-            topic = listen("rude/report", rospy.AnyMsg)
+            self.hear("/slides/rude/report", rospy.AnyMsg)
             self.assertTrue(self.manager.switch(["rude"]))
             joints = self.step(500, effort_position=0.1)
             self.assertEqual(
@@ -146,12 +139,11 @@ class HardwareTest(SlidesTest):
             )
             self.assertAlmostEqual(joints["effort_a"][0], 0.1, delta=0.01)
             self.assertTrue(self.manager.unload("rude"))
-            topic.close()
 
     def test_a_message_that_cannot_be_sent_silences_nobody(self):
         self.begin()
         self.assertTrue(self.load_rude("content"))
-        topic = listen("rude/report", rospy.AnyMsg)
+        self.hear("/slides/rude/report", rospy.AnyMsg)
         self.assertTrue(self.manager.switch(["rude"]))
         states = self.start_states()
         self.step(200)
@@ -159,19 +151,16 @@ class HardwareTest(SlidesTest):
         seen = len(states.messages)
         self.step(200)
         self.assertTrue(states.wait_for(lambda got: len(got) > seen))
-        states.close()
-        topic.close()
 
     def test_a_reader_that_raises_loses_its_message_and_goes_on(self):
         self.begin()
         self.assertTrue(self.load_rude("command"))
         self.assertTrue(self.manager.switch(["rude"]))
-        command = self.publisher("rude/command", Float64)
+        command = self.publisher("/slides/rude/command", Float64)
         self.publish_until(command, 1.0, lambda joints: joints["effort_b"][2] == 1.0)
         command.publish(-1.0)
         command.publish(math.nan)
-        request = StepWorldRequest(ticks=1, controllers=["rude"], commands=[-1.0])
-        answer = call("/gazebo/step_world", StepWorld, request)
+        answer = gazebo("step_world", ticks=1, controllers=["rude"], commands=[-1.0])
         self.assertFalse(answer.success)
         self.assertIn("the reader of 'command' raised SystemExit", answer.status_message)
         self.publish_until(command, 2.0, lambda joints: joints["effort_b"][2] == 2.0)

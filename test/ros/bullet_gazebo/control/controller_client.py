@@ -3,8 +3,9 @@
 import re
 
 import rospy
-from support.ros.calls import BOUND, delete_model, sim_time, spawn_model
+from support.ros.calls import sim_time
 from support.ros.manager import Manager
+from support.ros.world_case import WorldCase
 
 POSITION = "effort_controllers/JointPositionController"
 WEAK = {"p": 1e-6}  # so weak that the cart stays where it is
@@ -21,17 +22,18 @@ CONTROLLERS = {
 PLUGIN = re.compile(r"(<plugin [^>]*libgazebo_ros_control[^>]*)/>")
 
 
-def spawn(name="cartpole", robot_namespace="/", own_namespace=None, y=0.0):
-    """Spawn the cart-pole at `y` [m]; `own_namespace` goes into the plugin of its URDF."""
-    xml = rospy.get_param("/robot_description")
-    if own_namespace is not None:
-        tag = f"<robotNamespace>{own_namespace}</robotNamespace>"
-        xml = PLUGIN.sub(rf"\1>{tag}</plugin>", xml)
-    return spawn_model(name, xml, robot_namespace, y)
+class CartPoleCase(WorldCase):
+    def spawn_cartpole(self, name="cartpole", robot_namespace="/", own_namespace=None, y=0.0):
+        """Spawns one at `y` [m]; `own_namespace` goes into the plugin of its URDF."""
+        xml = rospy.get_param("/robot_description")
+        if own_namespace is not None:
+            tag = f"<robotNamespace>{own_namespace}</robotNamespace>"
+            xml = PLUGIN.sub(rf"\1>{tag}</plugin>", xml)
+        self.spawn(name, xml, robot_namespace, y=y)
 
 
-class PausedRobot:
-    """For test cases with one robot in a world that stands still: no call may need it to run."""
+class PausedRobot(CartPoleCase):
+    """One robot in a world that stands still: no call may need it to run."""
 
     @classmethod
     def setUpClass(cls):
@@ -39,14 +41,12 @@ class PausedRobot:
             rospy.set_param(f"/{name}", params)
 
     def setUp(self):
-        rospy.wait_for_service("/gazebo/get_world_properties", BOUND)
-        self.assertTrue(spawn().success)
+        self.spawn_cartpole()
         self.manager = Manager()
         self.began = sim_time()
 
     def tearDown(self):
         self.assertEqual(sim_time(), self.began, "the world wasn't paused")
-        delete_model()
 
     def load(self, *names):
         for name in names:

@@ -9,73 +9,38 @@ import io
 import os
 import socket
 import subprocess
-import unittest
+from unittest import mock
 
 import rospy
-from controller_client import CONTROLLERS, spawn
+from controller_client import CONTROLLERS, PausedRobot
 from controller_manager import controller_manager_interface as interface
 from support.ros.calls import BOUND, delete_model, executable
-from support.ros.manager import STRICT, Manager
+from support.ros.manager import STRICT
 
 from bullet_gazebo.clients.manager_commands import group_main
 from bullet_gazebo.clients.manager_commands import main as manager_main
 
 GROUPS = {"upper": ["pole"], "lower": ["cart", "pole"], "other": ["cart2", "pole"], "empty": []}
+COMMANDS = "bullet_gazebo.clients.manager_commands"
 NONE = "No controllers are loaded in mechanism control\n"
-PATIENCE = 30.0  # [s] that the scripts wait for a manager
 
 
 def listed(name, state):
     return f"'{name}' - 'hardware_interface::EffortJointInterface' ( {state} )\n"
 
 
-def start_script(script, *arguments, **environment):
-    return subprocess.Popen(
-        [executable("controller_manager", script), *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | environment,
-    )
-
-
-def finish(program, bound=BOUND):
-    """Returns exit code, output and errors."""
-    try:
-        output, errors = program.communicate(timeout=bound)
-    except subprocess.TimeoutExpired:
-        program.kill()
-        program.communicate()
-        raise
-    return program.returncode, output, errors
-
-
-class ScriptsTest(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        for name, params in CONTROLLERS.items():
-            rospy.set_param(f"/{name}", params)
-        # They wait for long, so the other tests run meanwhile.
-        cls.lonely = [
-            start_script("controller_manager", "list", ROS_NAMESPACE="/nowhere"),
-            start_script("controller_manager", "load", "cart", "__ns:=/nowhere"),
-        ]
-
-    @classmethod
-    def tearDownClass(cls):
-        for program in cls.lonely:
-            finish(program, PATIENCE + BOUND)
-
+class ScriptsTest(PausedRobot):
     def setUp(self):
-        self.assertTrue(spawn().success)
+        super().setUp()
         rospy.set_param("/controller_groups", GROUPS)
-        self.manager = Manager()
-
-    def tearDown(self):
-        delete_model()
 
     def run_script(self, script, *arguments, **environment):
-        return finish(start_script(script, *arguments, **environment))
+        """Exit code, output and errors of the program itself."""
+        done = subprocess.run(
+            [executable("controller_manager", script), *arguments],
+            capture_output=True, text=True, env=os.environ | environment, timeout=BOUND, check=False,
+        )  # fmt: skip
+        return done.returncode, done.stdout, done.stderr
 
     def expect(self, command, expected):
         """`command` is a command line of controller_manager, or of the script that it begins with."""
@@ -123,7 +88,7 @@ class ScriptsTest(unittest.TestCase):
 
     def test_in_a_namespace(self):
         delete_model()
-        self.assertTrue(spawn(robot_namespace="/my_robot").success)
+        self.spawn_cartpole(robot_namespace="/my_robot")
         rospy.set_param("/my_robot/cart", CONTROLLERS["cart"])
         code, output, _ = self.run_script("controller_manager", "load", "cart", "__ns:=/my_robot")
         self.assertEqual((code, output), (0, "Loaded 'cart'\n"))
@@ -131,16 +96,18 @@ class ScriptsTest(unittest.TestCase):
         self.assertEqual((code, output), (0, listed("cart", "initialized")))
 
     def test_without_a_manager_they_say_so(self):
-        name = "/nowhere/controller_manager/reload_controller_libraries"
-        for program in self.lonely:
-            code, output, errors = finish(program, PATIENCE + BOUND)
-            self.assertEqual((code, output), (1, ""))
-            self.assertIn(f"waiting up to 30 s for the service {name}", errors)
+        delete_model()
+        name = "/controller_manager/reload_controller_libraries"
+        patience = {"MANAGER_PATIENCE": 0.5, "NOTICE": 0.1}
+        for words in (["list"], ["load", "cart"]):
+            printed = io.StringIO()
+            with contextlib.redirect_stderr(printed), mock.patch.multiple(COMMANDS, **patience):
+                self.assertEqual(manager_main(["controller_manager", *words]), 1)
+            waiting, gone = printed.getvalue().splitlines()
+            self.assertEqual(waiting, f"waiting up to 0.5 s for the service {name}")
             self.assertIn(
-                f"there is no controller manager: no node offers the service {name}", errors
+                f"there is no controller manager: no node offers the service {name}", gone
             )
-            self.assertNotIn("Traceback", errors)
-        self.lonely.clear()
 
     def test_without_a_master_they_say_so(self):
         with socket.socket() as reserved:  # bound, and nobody listens

@@ -1,9 +1,7 @@
 """Controller managers in a world that moves: namespaces, several robots, resets, latched efforts."""
 
-import unittest
-
 import rospy
-from controller_client import spawn
+from controller_client import CartPoleCase
 from controller_manager_msgs.utils import (
     ControllerLister,
     ControllerManagerLister,
@@ -14,9 +12,8 @@ from controller_manager_msgs.utils import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
-from support.ros.calls import call, delete_model, wait_until
+from support.ros.calls import delete_model, gazebo
 from support.ros.manager import BEST_EFFORT, STRICT, Manager
-from support.ros.subscribed import Listener
 
 CONTROLLERS = {
     "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 200.0},
@@ -29,13 +26,9 @@ CONTROLLERS = {
 RUNNING = {"states": "running", "cart": "running"}
 
 
-class RobotsTest(unittest.TestCase):
+class RobotsTest(CartPoleCase):
     def setUp(self):
-        call("/gazebo/unpause_physics", Empty)
-
-    def tearDown(self):
-        for name in ("cartpole", "first", "second"):
-            delete_model(name)
+        gazebo("unpause_physics")
 
     def start(self, namespace=""):
         for name, params in CONTROLLERS.items():
@@ -45,25 +38,18 @@ class RobotsTest(unittest.TestCase):
         return manager
 
     def joints(self, topic="/joint_states"):
-        joints = Listener(topic, JointState)
-        self.addCleanup(joints.close)
+        joints = self.hear(topic, JointState)
         self.assertTrue(joints.wait_for(len), f"nothing on {topic}")
         return joints
-
-    def command(self, topic, value):
-        publisher = rospy.Publisher(topic, Float64, queue_size=1, latch=True)
-        self.addCleanup(publisher.unregister)
-        publisher.publish(value)
-        self.assertTrue(wait_until(publisher.get_num_connections))
 
     # namespaces
 
     def test_the_namespace_of_spawn_model_is_the_managers(self):
-        self.assertTrue(spawn(robot_namespace="/my_robot").success)
+        self.spawn_cartpole(robot_namespace="/my_robot")
         self.assertEqual(get_controller_managers(), ["/my_robot/controller_manager"])
 
     def test_the_robots_own_namespace_goes_before(self):
-        self.assertTrue(spawn(robot_namespace="/other", own_namespace="/mine").success)
+        self.spawn_cartpole(robot_namespace="/other", own_namespace="/mine")
         self.assertEqual(get_controller_managers(), ["/mine/controller_manager"])
         self.start("/mine")
         self.joints("/mine/joint_states")
@@ -71,9 +57,9 @@ class RobotsTest(unittest.TestCase):
     def test_two_robots_do_not_mix(self):
         # Side by side: they would push each other.
         for place, name in enumerate(("first", "second")):
-            self.assertTrue(spawn(name, robot_namespace=f"/{name}", y=float(place)).success)
+            self.spawn_cartpole(name, robot_namespace=f"/{name}", y=float(place))
         first, second = self.start("/first"), self.start("/second")
-        self.command("/first/cart/command", 0.4)
+        self.publisher("/first/cart/command", Float64).publish(0.4)
         moving, still = self.joints("/first/joint_states"), self.joints("/second/joint_states")
         self.assertTrue(moving.wait_for(lambda m: m[-1].effort[1] > 0.1))
         self.assertTrue(still.wait_for(lambda m: len(m) > 20))
@@ -87,16 +73,16 @@ class RobotsTest(unittest.TestCase):
     # efforts and resets
 
     def test_controllers_survive_resets(self):
-        self.assertTrue(spawn().success)
+        self.spawn_cartpole()
         manager, joints = self.start(), self.joints()
         for service in ("reset_world", "reset_simulation", "reset_world"):
             with self.subTest(service):
-                call(f"/gazebo/{service}", Empty)
+                gazebo(service)
                 self.assertEqual(manager.states(), RUNNING)
                 joints.messages.clear()
                 self.assertTrue(joints.wait_for(lambda m: len(m) > 20))
         self.assertTrue(manager.switch([], ["cart"], STRICT))
-        call("/gazebo/reset_simulation", Empty)
+        gazebo("reset_simulation")
         self.assertEqual(manager.states(), RUNNING | {"cart": "stopped"})
         self.assertTrue(manager.switch(["cart"], [], BEST_EFFORT))
 
@@ -106,7 +92,7 @@ class RobotsTest(unittest.TestCase):
         managers, controllers = ControllerManagerLister(), ControllerLister()
         self.assertEqual((managers(), controllers()), ([], []))
         for _ in range(2):
-            self.assertTrue(spawn().success)
+            self.spawn_cartpole()
             self.start()
             for _ in range(2):
                 self.assertEqual(managers(), ["/controller_manager"])
@@ -115,7 +101,7 @@ class RobotsTest(unittest.TestCase):
             self.assertEqual((managers(), controllers()), ([], []))
 
     def test_a_manager_has_all_six_services(self):
-        self.assertTrue(spawn(robot_namespace="/a/b").success)
+        self.spawn_cartpole(robot_namespace="/a/b")
         self.assertTrue(is_controller_manager("/a/b/controller_manager"))
         self.assertTrue(is_controller_manager("a/b/controller_manager"))
         for other in ("/a/b", "/", "/gazebo", "nowhere"):

@@ -3,14 +3,11 @@
 The world is paused, and no call may need it to run.
 """
 
-import unittest
-
 import rospy
 from control_msgs.msg import JointControllerState
 from controller_client import CONTROLLERS, PausedRobot
 from std_msgs.msg import Float64
-from std_srvs.srv import Empty
-from support.ros.calls import BOUND, sim_time, wait_until
+from support.ros.calls import BOUND, gazebo, sim_time, wait_until
 from support.ros.manager import BEST_EFFORT, STRICT
 
 # start, stop, ok if strict, states after it, ok if loose, states after it; `cart` runs before
@@ -36,7 +33,7 @@ SWITCHES = {
 }  # fmt: skip
 
 
-class SwitchTest(PausedRobot, unittest.TestCase):
+class SwitchTest(PausedRobot):
     def test_switch(self):
         wrong = {}  # rostest doesn't print what a subTest says
         for case, (start, stop, strict_ok, strict, loose_ok, loose) in SWITCHES.items():
@@ -90,10 +87,10 @@ class SwitchTest(PausedRobot, unittest.TestCase):
 
     def next_set_point(self):
         """Lets the world run until the controller tells its state."""
-        rospy.ServiceProxy("/gazebo/unpause_physics", Empty)()
+        gazebo("unpause_physics")
         try:
             # The first one may have been on its way.
             rospy.wait_for_message("/cart/state", JointControllerState, BOUND)
             return rospy.wait_for_message("/cart/state", JointControllerState, BOUND).set_point
         finally:
-            rospy.ServiceProxy("/gazebo/pause_physics", Empty)()
+            gazebo("pause_physics")

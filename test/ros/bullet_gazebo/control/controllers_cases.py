@@ -6,10 +6,9 @@ See docs/contract/ros_control.md 3.
 import math
 
 from geometry_msgs.msg import Vector3
-from slides_client import SlidesTest, listen
+from slides_client import SlidesTest
 from std_msgs.msg import Bool, Float64, Float64MultiArray
-from std_srvs.srv import Empty
-from support.ros.calls import call, wait_until
+from support.ros.calls import gazebo, wait_until
 
 TYPES = {
     "joint_state_controller/JointStateController",
@@ -39,9 +38,7 @@ class ControllersTest(SlidesTest):
 
     def test_effort_joint_takes_its_command_from_the_topic_once_it_runs(self):
         self.assertTrue(self.manager.load("effort_joint"))
-        command = self.publisher(
-            "effort_joint/command", Float64
-        )  # there is a subscriber from load on
+        command = self.publisher("/slides/effort_joint/command", Float64)  # from load on
         command.publish(9.0)
         self.assertTrue(self.manager.switch(["effort_joint"]))
         command.publish(1e9)
@@ -56,7 +53,7 @@ class ControllersTest(SlidesTest):
             ("velocity_group", {"velocity_b": 0.3, "velocity_a": -0.4}),
         ):
             self.run_controllers(name)
-            command = self.publisher(f"{name}/command", Float64MultiArray)
+            command = self.publisher(f"/slides/{name}/command", Float64MultiArray)
             index = {"effort_group": 2, "position_group": 0, "velocity_group": 1}[name]
             self.publish_until(
                 command, Float64MultiArray(data=[9.0]), lambda joints: True
@@ -73,7 +70,7 @@ class ControllersTest(SlidesTest):
     def test_a_reset_relatches_and_position_joints_stay_where_they_are_put(self):
         self.run_controllers("position_joint", "effort_position", "states")
         self.step(1000, position_joint=0.4, effort_position=0.3)
-        call("/gazebo/reset_simulation", Empty)
+        gazebo("reset_simulation")
         for ticks in (1, 1, 200):
             joints = self.step(ticks)
             self.assertAlmostEqual(joints["position_a"][0], 0.0, places=6)
@@ -81,7 +78,7 @@ class ControllersTest(SlidesTest):
 
     def test_a_users_own_controller(self):
         self.run_controllers("spring")
-        stretch = listen("spring/stretch", Vector3)
+        stretch = self.hear("/slides/spring/stretch", Vector3)
         joints = self.step(100, spring=0.1)
         self.assertIn("my_controllers/Spring", self.manager.types().types)
         self.assertEqual(self.manager.listed()[0].type, "my_controllers/Spring")
@@ -91,12 +88,11 @@ class ControllersTest(SlidesTest):
         angle = math.sqrt(30.0) * 0.1  # an oscillator of 1 kg
         self.assertAlmostEqual(joints["effort_b"][0], 0.1 * (1.0 - math.cos(angle)), delta=3e-4)
         self.assertTrue(stretch.wait_for(len))
-        stretch.close()
 
     def test_the_emergency_stop(self):
         self.run_controllers("effort_joint", "position_joint", "velocity_joint")
         self.step(100, effort_joint=1.0, position_joint=0.1, velocity_joint=0.5)
-        stop = self.publisher("e_stop", Bool)
+        stop = self.publisher("/slides/e_stop", Bool)
         self.publish_until(stop, True, lambda joints: joints["effort_a"][2] == 0.0)
         held = self.step(50)
         after = self.step(100, position_joint=0.4)

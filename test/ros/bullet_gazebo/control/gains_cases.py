@@ -7,10 +7,10 @@ import rospy
 from control_msgs.msg import JointControllerState, PidState
 from dynamic_reconfigure.msg import Config, ConfigDescription, DoubleParameter
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
-from gazebo_msgs.srv import SetLinkProperties, SetLinkPropertiesRequest
+from gazebo_msgs.srv import SetLinkPropertiesRequest
 from rosgraph_msgs.msg import Log
-from slides_client import SlidesTest, listen
-from support.ros.calls import call
+from slides_client import SlidesTest
+from support.ros.calls import call, gazebo
 
 PID = "/slides/effort_position/pid"
 NAMES = ["p", "i", "d", "i_clamp_min", "i_clamp_max", "antiwindup"]
@@ -30,13 +30,12 @@ class GainsTest(SlidesTest):
 
     def test_dynparam_of_the_command_line(self):
         self.run_controllers("effort_position")
-        state = listen("effort_position/state", JointControllerState)
+        state = self.hear("/slides/effort_position/state", JointControllerState)
         command = ["rosrun", "dynamic_reconfigure", "dynparam", "set", PID, "p", "250.0"]
         subprocess.run(command, check=True, timeout=60)
         self.step(1)
         self.assertTrue(state.wait_for(lambda got: got and got[-1].p == 250.0))
         self.assertEqual(rospy.get_param(f"{PID}/p"), 250.0)
-        state.close()
 
     def test_gains_are_written_to_the_parameter_server_at_load(self):
         self.assertTrue(self.manager.load("effort_position"))
@@ -45,7 +44,7 @@ class GainsTest(SlidesTest):
 
     def test_gains_take_effect_are_clamped_and_told(self):
         self.run_controllers("effort_position")
-        updates = listen("effort_position/pid/parameter_updates", Config)  # latched
+        updates = self.hear("/slides/effort_position/pid/parameter_updates", Config)  # latched
         self.assertTrue(updates.wait_for(len))
         answer = reconfigure(PID, p=1e9, d=-1e9, i_clamp_max=-3.0, i_clamp_min=2.0, i=5.0)
         wanted = {
@@ -58,7 +57,6 @@ class GainsTest(SlidesTest):
         }
         self.assertEqual(answer, wanted)
         self.assertTrue(updates.wait_for(lambda got: len(got) == 2))
-        updates.close()
         reconfigure(PID, p=100.0, i=0.0, d=0.0)
         joints = self.step(1, effort_position=0.1)
         self.assertAlmostEqual(joints["effort_a"][2], 10.0, places=9)
@@ -67,8 +65,8 @@ class GainsTest(SlidesTest):
         self.run_controllers("effort_position")
         light = SetLinkPropertiesRequest(link_name="slides::effort_a_carriage", mass=0.1)
         light.ixx = light.iyy = light.izz = 0.01
-        self.assertTrue(call("/gazebo/set_link_properties", SetLinkProperties, light).success)
-        log = listen("/rosout", Log)
+        self.assertTrue(gazebo("set_link_properties", light).success)
+        log = self.hear("/rosout", Log)
         reconfigure(PID, p=400.0, d=800.0)
         wanted = (
             "controller 'effort_position' drives joint 'effort_a' of model 'slides' with d = 800"
@@ -77,7 +75,6 @@ class GainsTest(SlidesTest):
         [told] = [each for each in log.messages if wanted in each.msg]
         self.assertEqual(told.level, Log.WARN)
         self.assertIn("(about 200)", told.msg)
-        log.close()
 
     def test_gains_that_are_no_numbers_are_refused(self):
         self.run_controllers("effort_position")
@@ -88,16 +85,15 @@ class GainsTest(SlidesTest):
 
     def test_the_descriptions_name_the_six_parameters(self):
         self.assertTrue(self.manager.load("effort_position"))
-        topic = listen("effort_position/pid/parameter_descriptions", ConfigDescription)
+        topic = self.hear("/slides/effort_position/pid/parameter_descriptions", ConfigDescription)
         self.assertTrue(topic.wait_for(len))
         description = topic.messages[0]
         self.assertEqual([p.name for p in description.groups[0].parameters], NAMES)
         self.assertEqual({p.name: p.value for p in description.max.doubles}["d"], 1000.0)
-        topic.close()
 
     def test_pid_state_is_published_on_each_computation_if_wanted(self):
         self.run_controllers("effort_position")
-        topic = listen("effort_position/pid/state", PidState)
+        topic = self.hear("/slides/effort_position/pid/state", PidState)
         self.step(1, effort_position=0.1)
         self.assertTrue(topic.wait_for(len))
         message = topic.messages[0]
@@ -105,7 +101,6 @@ class GainsTest(SlidesTest):
         self.assertAlmostEqual(message.p_term, 40.0, places=9)
         self.assertAlmostEqual(message.output, 40.0 + 40.0 * 0.1 / 0.001, places=6)
         self.assertEqual(message.timestep, rospy.Duration(0, 1_000_000))
-        topic.close()
 
     def test_every_joint_of_a_group_and_every_drive_has_gains(self):
         self.run_controllers("effort_group_position")

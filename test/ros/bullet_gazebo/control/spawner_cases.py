@@ -5,14 +5,12 @@ import signal
 import subprocess
 import tempfile
 import threading
-import unittest
 from pathlib import Path
 
 import rospy
-from controller_client import spawn
+from controller_client import CartPoleCase
 from std_msgs.msg import Bool
-from std_srvs.srv import Empty
-from support.ros.calls import BOUND, call, delete_model, executable, wait_until
+from support.ros.calls import BOUND, executable, gazebo, wait_until
 from support.ros.manager import STRICT, Manager
 
 LAUNCH = """
@@ -32,15 +30,16 @@ cart:
   pid: {p: 1.0}
 """
 SECOND = "pole: {type: effort_controllers/JointPositionController, joint: cart_pole, pid: {p: 1.0}}"
+RUNNING = {"states": "running", "cart": "running"}
 COLOUR, STAMP = re.compile(r"\x1b\[[0-9;]*m"), re.compile(r"^\[(\w+)\] \[[\d., ]+\]: ")
 
 
-class SpawnerTest(unittest.TestCase):
+class SpawnerTest(CartPoleCase):
     def setUp(self):
         for name in ("states", "cart", "pole"):
             if rospy.has_param(f"/{name}"):
                 rospy.delete_param(f"/{name}")
-        self.assertTrue(spawn().success)
+        self.spawn_cartpole()
         self.manager = Manager()
         self.programs = []
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
@@ -50,7 +49,6 @@ class SpawnerTest(unittest.TestCase):
     def tearDown(self):
         for program in list(self.programs):
             self.end(program, signal.SIGINT)
-        delete_model()
 
     def file(self, name):
         return str(self.folder / f"{name}.yaml")
@@ -64,6 +62,9 @@ class SpawnerTest(unittest.TestCase):
 
     def spawner(self, *arguments):
         return self.start(executable("controller_manager", "spawner"), *arguments)
+
+    def unspawner(self, *arguments):
+        return self.start(executable("controller_manager", "unspawner"), *arguments)
 
     def end(self, program, number):
         """Returns the lines that the program has printed, without colours and times."""
@@ -91,14 +92,13 @@ class SpawnerTest(unittest.TestCase):
 
     def test_a_launch_file_starts_controllers_and_takes_them_along_when_it_ends(self):
         launch = self.launch()
-        self.expect_states({"states": "running", "cart": "running"})
+        self.expect_states(RUNNING)
         self.end(launch, signal.SIGINT)
         self.expect_states({})
         self.assertEqual(launch.returncode, 0)
 
     def test_in_the_namespace_of_the_launch_file(self):
-        self.addCleanup(delete_model, "second")
-        self.assertTrue(spawn("second", robot_namespace="/my_robot").success)
+        self.spawn_cartpole("second", robot_namespace="/my_robot")
         launch = self.launch("my_robot", "--stopped --shutdown-timeout 3")
         robot = Manager("/my_robot")
         self.expect_states({"states": "initialized", "cart": "initialized"}, robot)
@@ -111,17 +111,16 @@ class SpawnerTest(unittest.TestCase):
 
     def test_files_and_names_in_any_order(self):
         spawner = self.spawner(self.file("second"), "--timeout", "-1", self.file("first"))
-        self.expect_states({"pole": "running", "states": "running", "cart": "running"})
+        self.expect_states({"pole": "running"} | RUNNING)
         self.assertEqual(rospy.get_param("/cart/pid/p"), 1.0)
         self.end(spawner, signal.SIGTERM)
         self.expect_states({})
         self.assertEqual(spawner.returncode, 0)
         spawner = self.spawner("pole", self.file("first"))
-        self.expect_states({"pole": "running", "states": "running", "cart": "running"})
+        self.expect_states({"pole": "running"} | RUNNING)
 
     def test_a_file_goes_into_the_namespace(self):
-        self.addCleanup(delete_model, "second")
-        self.assertTrue(spawn("second", robot_namespace="/my_robot").success)
+        self.spawn_cartpole("second", robot_namespace="/my_robot")
         self.spawner("--namespace", "/my_robot", self.file("second"))
         self.expect_states({"pole": "running"}, Manager("/my_robot"))
         self.assertTrue(rospy.has_param("/my_robot/pole/type"))
@@ -174,7 +173,7 @@ class SpawnerTest(unittest.TestCase):
 
     def test_one_that_somebody_else_stopped_keeps_no_other(self):
         spawner = self.spawner(self.file("second"), self.file("first"))
-        self.expect_states({"pole": "running", "states": "running", "cart": "running"})
+        self.expect_states({"pole": "running"} | RUNNING)
         self.assertTrue(self.manager.switch([], ["pole"], STRICT))
         self.end(spawner, signal.SIGINT)
         self.expect_states({})
@@ -211,16 +210,13 @@ class SpawnerTest(unittest.TestCase):
 
     def test_rosnode_kill_ends_both_well(self):
         spawner = self.spawner(self.file("first"), "__name:=my_spawner")
-        self.expect_states({"states": "running", "cart": "running"})
-        unspawner = self.start(
-            executable("controller_manager", "unspawner"), "cart", "__name:=my_unspawner"
-        )
+        self.expect_states(RUNNING)
+        unspawner = self.unspawner("cart", "__name:=my_unspawner")
         self.expect_states({"states": "running", "cart": "stopped"})
-        for program, states in (
-            (unspawner, {"states": "running", "cart": "running"}),
-            (spawner, {}),
+        for program, name, states in (
+            (unspawner, "/my_unspawner", RUNNING),
+            (spawner, "/my_spawner", {}),
         ):
-            name = "/my_unspawner" if program is unspawner else "/my_spawner"
             subprocess.run(["rosnode", "kill", name], check=True, stdout=subprocess.DEVNULL)
             self.lines(program)
             self.assertEqual(program.returncode, 0)
@@ -228,15 +224,13 @@ class SpawnerTest(unittest.TestCase):
 
     def test_unspawner_starts_only_what_it_has_stopped(self):
         self.spawner(self.file("first"))
-        self.expect_states({"states": "running", "cart": "running"})
+        self.expect_states(RUNNING)
         self.spawner("--stopped", self.file("second"))
-        self.expect_states({"states": "running", "cart": "running", "pole": "initialized"})
-        unspawner = self.start(
-            executable("controller_manager", "unspawner"), "pole", "cart", "nobody"
-        )
+        self.expect_states(RUNNING | {"pole": "initialized"})
+        unspawner = self.unspawner("pole", "cart", "nobody")
         self.expect_states({"states": "running", "cart": "stopped", "pole": "initialized"})
         lines = self.end(unspawner, signal.SIGTERM)
-        self.expect_states({"states": "running", "cart": "running", "pole": "initialized"})
+        self.expect_states(RUNNING | {"pole": "initialized"})
         self.assertEqual(unspawner.returncode, 0)
         service = "INFO: Unspawner: Waiting for service controller_manager"
         self.assertEqual(
@@ -251,20 +245,20 @@ class SpawnerTest(unittest.TestCase):
 
     def test_unspawner_gives_back_what_somebody_else_has_started_meanwhile(self):
         self.spawner(self.file("first"))
-        self.expect_states({"states": "running", "cart": "running"})
-        unspawner = self.start(executable("controller_manager", "unspawner"), "cart")
+        self.expect_states(RUNNING)
+        unspawner = self.unspawner("cart")
         self.expect_states({"states": "running", "cart": "stopped"})
         self.assertTrue(self.manager.switch(["cart"], [], STRICT))
         self.expect_states({"states": "running", "cart": "stopped"})
         self.end(unspawner, signal.SIGINT)
-        self.expect_states({"states": "running", "cart": "running"})
+        self.expect_states(RUNNING)
 
     # without a manager
 
     def test_z_without_a_manager_it_says_so_and_ends(self):
         """The last one by its name: from now on simulated time isn't zero any more."""
-        call("/gazebo/unpause_physics", Empty)
-        self.addCleanup(call, "/gazebo/pause_physics", Empty)
+        gazebo("unpause_physics")
+        self.addCleanup(gazebo, "pause_physics")
         spawner = self.spawner("--namespace", "/nowhere", "--timeout", "1", self.file("second"))
         lines = self.lines(spawner)
         self.assertEqual(spawner.returncode, 1)
@@ -275,8 +269,7 @@ class SpawnerTest(unittest.TestCase):
         # It says so, and the robot comes after several timeouts.
         for _, line in zip(range(3), filter(is_retry, spawner.stdout), strict=False):
             self.assertIn("/late/controller_manager/load_controller", line)
-        self.addCleanup(delete_model, "second")
-        self.assertTrue(spawn("second", robot_namespace="/late").success)
+        self.spawn_cartpole("second", robot_namespace="/late")
         reader = threading.Thread(target=spawner.stdout.read, daemon=True)
         reader.start()
         self.expect_states({"pole": "running"}, Manager("/late"))

@@ -1,7 +1,6 @@
 """JointTrajectoryController through ROS (docs/contract/ros_control.md 3.5)."""
 
 import math
-import unittest
 
 import rosgraph
 import rosnode
@@ -9,27 +8,15 @@ import rospy
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 from control_msgs.msg import JointTolerance
 from control_msgs.srv import QueryTrajectoryState
-from gazebo_msgs.srv import GetJointProperties
-from std_srvs.srv import Empty
-from support.ros.calls import call, delete_model, spawn_model, wait_until
+from support.ros.calls import call, delete_model, gazebo, joint, wait_until
 from support.ros.manager import STRICT, Manager
+from support.ros.world_case import WorldCase
 from trajectory_client import Arm, trajectory
 
 EFFORT = ["effort_a", "effort_b"]
 RESULTS = {"SUCCEEDED": 0, "INVALID_GOAL": -1, "INVALID_JOINTS": -2, "PATH": -4, "GOAL": -5}
+STATUS = "/slides/effort_arm/follow_joint_trajectory/status"
 ACTION = {"goal", "cancel", "status", "feedback", "result"}
-
-
-def position(joint):
-    return call("/gazebo/get_joint_properties", GetJointProperties, joint).position[0]
-
-
-def pause():
-    call("/gazebo/pause_physics", Empty)
-
-
-def unpause():
-    call("/gazebo/unpause_physics", Empty)
 
 
 def topics_below(namespace):
@@ -43,18 +30,11 @@ def topics_below(namespace):
     }
 
 
-class TrajectoryTest(unittest.TestCase):
+class TrajectoryTest(WorldCase):
     def setUp(self):
-        pause()
-        spawned = spawn_model("slides", rospy.get_param("/slides/robot_description"), "")
-        self.assertTrue(spawned.success)
+        gazebo("pause_physics")
+        self.spawn("slides", rospy.get_param("/slides/robot_description"), "")
         self.manager = Manager("/slides")
-        self.arms = []
-
-    def tearDown(self):
-        for arm in self.arms:
-            arm.close()
-        delete_model("slides")
 
     def arm(self, name="effort_arm", start=True):
         """Loads a controller, and starts it, while the world is paused."""
@@ -62,7 +42,7 @@ class TrajectoryTest(unittest.TestCase):
         if start:
             self.assertTrue(self.manager.switch([name], [], STRICT))
         arm = Arm(f"/slides/{name}")
-        self.arms.append(arm)
+        self.addCleanup(arm.close)
         self.assertTrue(arm.wait_connected(), name)
         return arm
 
@@ -80,28 +60,28 @@ class TrajectoryTest(unittest.TestCase):
         ):
             with self.subTest(name):
                 arm = self.arm(name)
-                unpause()
-                tolerance = [JointTolerance(name=joint, position=0.01) for joint in joints]
+                gazebo("unpause_physics")
+                tolerance = [JointTolerance(name=each, position=0.01) for each in joints]
                 wanted = [0.2, -0.1][: len(joints)]
                 plan = trajectory(joints, (0.0, [0.0] * len(joints)), (0.5, wanted))
                 pursuit = arm.pursue(plan, path=tolerance, goal=tolerance)
                 self.check(pursuit, "SUCCEEDED", "SUCCEEDED")
                 self.assertGreaterEqual(len(pursuit.feedback), 8)
-                for joint, place in zip(joints, wanted, strict=True):
-                    self.assertAlmostEqual(position(joint), place, delta=0.01)
-                pause()
+                for each, place in zip(joints, wanted, strict=True):
+                    self.assertAlmostEqual(joint(each)[0], place, delta=0.01)
+                gazebo("pause_physics")
 
     # goals that fail
 
     def test_path_tolerance(self):
         arm = self.arm()
-        unpause()
+        gazebo("unpause_physics")
         tolerance = [JointTolerance(name="effort_a", position=0.001)]
         pursuit = arm.pursue(trajectory(EFFORT, (0.1, [2.0, 0.0])), path=tolerance)
         self.check(pursuit, "ABORTED", "PATH", "effort_a path error 0.0")
         self.assertEqual(pursuit.text, pursuit.result.error_string)
         # The way goes on all the same.
-        self.assertTrue(wait_until(lambda: abs(position("effort_a") - 2.0) < 0.05))
+        self.assertTrue(wait_until(lambda: abs(joint("effort_a")[0] - 2.0) < 0.05))
 
     def test_wrong_joints(self):
         arm = self.arm()
@@ -112,7 +92,7 @@ class TrajectoryTest(unittest.TestCase):
 
     def test_states_and_query_state_tell_the_way(self):
         arm = self.arm()
-        unpause()
+        gazebo("unpause_physics")
         self.assertTrue(wait_until(lambda: arm.states))
         start = arm.states[-1].header.stamp + rospy.Duration(1)
         arm.command.publish(trajectory(EFFORT, (1.0, [1.0, 0.0]), stamp=start.to_sec()))
@@ -146,9 +126,9 @@ class TrajectoryTest(unittest.TestCase):
 
     def test_cancel_holds_the_joints(self):
         arm = self.arm()
-        unpause()
+        gazebo("unpause_physics")
         pursuit = arm.pursue(trajectory(EFFORT, (1.0, [1.0, 1.0])))
-        self.assertTrue(wait_until(lambda: position("effort_a") > 0.3))
+        self.assertTrue(wait_until(lambda: joint("effort_a")[0] > 0.3))
         pursuit.cancel()
         self.check(pursuit, "PREEMPTED", "SUCCEEDED", "canceled by its client")
         self.assertTrue(arm.wait_state(lambda state: state.desired.velocities == (0.0, 0.0)))
@@ -159,7 +139,7 @@ class TrajectoryTest(unittest.TestCase):
 
     def test_a_command_preempts_and_bad_ones_do_not(self):
         arm = self.arm()
-        unpause()
+        gazebo("unpause_physics")
         pursuit = arm.pursue(trajectory(EFFORT, (3.0, [1.0, 1.0])))
         self.assertTrue(pursuit.wait_active())
         before = len(arm.states)
@@ -176,25 +156,21 @@ class TrajectoryTest(unittest.TestCase):
         arm = self.arm()
         pursuit = arm.pursue(trajectory(EFFORT, (0.3, [0.1, 0.1])))
         self.assertTrue(pursuit.wait_active())
-        statuses = []
-        listener = rospy.Subscriber(
-            "/slides/effort_arm/follow_joint_trajectory/status", GoalStatusArray, statuses.append
-        )
-        self.assertTrue(wait_until(lambda: len(statuses) > 3), "no status while paused")
-        listener.unregister()
-        unpause()
+        heard = self.hear(STATUS, GoalStatusArray, connected=False)
+        self.assertTrue(heard.wait_for(lambda got: len(got) > 3), "no status while paused")
+        gazebo("unpause_physics")
         self.check(pursuit, "SUCCEEDED", "SUCCEEDED")
 
     def test_it_works_after_reset_simulation(self):
         arm = self.arm()
-        unpause()
+        gazebo("unpause_physics")
         self.check(arm.pursue(trajectory(EFFORT, (0.3, [0.5, 0.5]))), "SUCCEEDED", "SUCCEEDED")
         # A cancel request with a stamp, which after the reset lies in the future.
         later = rospy.Time.now() + rospy.Duration(100)
         cancel = arm.action.action_client.pub_cancel
         pursuit = arm.pursue(trajectory(EFFORT, (5.0, [1.0, 1.0])))
         self.assertTrue(pursuit.wait_active())
-        call("/gazebo/reset_simulation", Empty)
+        gazebo("reset_simulation")
         self.check(pursuit, "PREEMPTED", "SUCCEEDED", "started over")
         cancel.publish(GoalID(stamp=later))
         arm.states.clear()
@@ -205,18 +181,14 @@ class TrajectoryTest(unittest.TestCase):
 
     def test_many_goals_over_many_resets_leave_no_list_of_them(self):
         arm = self.arm()
-        statuses = []
-        listener = rospy.Subscriber(
-            "/slides/effort_arm/follow_joint_trajectory/status", GoalStatusArray, statuses.append
-        )
+        heard = self.hear(STATUS, GoalStatusArray, connected=False)
         for _ in range(120):
             plan = trajectory(["elbow"], (1.0, [0.0]))
             self.check(arm.pursue(plan), "REJECTED", "INVALID_JOINTS")
-            call("/gazebo/reset_simulation", Empty)
-        self.assertTrue(wait_until(lambda: statuses and len(statuses[-1].status_list) <= 101))
+            gazebo("reset_simulation")
+        self.assertTrue(heard.wait_for(lambda got: len(got[-1].status_list) <= 101))
         # Five seconds of wall time later nothing of them is told any more, though time stands still.
-        self.assertTrue(wait_until(lambda: not statuses[-1].status_list))
-        listener.unregister()
+        self.assertTrue(heard.wait_for(lambda got: not got[-1].status_list))
 
     def test_unloading_with_a_goal_tells_its_end_and_takes_everything_away(self):
         for round_ in range(3):  # reload must work
@@ -224,20 +196,19 @@ class TrajectoryTest(unittest.TestCase):
                 arm = self.arm()
                 action = {f"/slides/effort_arm/follow_joint_trajectory/{name}" for name in ACTION}
                 self.assertLessEqual(action, topics_below("/slides/effort_arm"))
-                unpause()
+                gazebo("unpause_physics")
                 pursuit = arm.pursue(trajectory(EFFORT, (5.0, [1.0, 1.0])))
                 self.assertTrue(pursuit.wait_active())
                 self.assertTrue(self.manager.reload(True))
                 self.check(pursuit, "PREEMPTED", "SUCCEEDED", "stopped")
-                self.arms.remove(arm)
                 arm.close()
                 self.assertTrue(wait_until(lambda: not topics_below("/slides/effort_arm")))
                 self.assertNotIn("effort_arm", rosnode.get_node_info_description("/gazebo"))
-                pause()
+                gazebo("pause_physics")
 
     def test_deleting_the_robot_ends_the_goal(self):
         arm = self.arm()
-        unpause()
+        gazebo("unpause_physics")
         pursuit = arm.pursue(trajectory(EFFORT, (5.0, [1.0, 1.0])))
         self.assertTrue(pursuit.wait_active())
         delete_model("slides")

@@ -1,22 +1,17 @@
 #!/usr/bin/env python3
 """Vehicles over ROS: commands, odometry, tf, times and resets of plugins and controllers."""
 
-import unittest
-
 import rospy
 import rostest
-from bullet_gazebo_msgs.srv import RestoreState, SaveState, StepWorld, StepWorldRequest
 from dynamic_reconfigure.client import Client as DynamicClient
 from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
-from gazebo_msgs.srv import GetModelState, SpawnModel, SpawnModelRequest
 from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
-from std_srvs.srv import Empty
 from support.robots.vehicles import RADIUS, TRACK, four_wheels, two_wheels
-from support.ros.calls import BOUND, call, delete_model, wait_until
+from support.ros.calls import BOUND, gazebo, step_world, wait_until
 from support.ros.manager import STRICT, Manager
-from support.ros.subscribed import Listener
+from support.ros.world_case import WorldCase
 from tf2_msgs.msg import TFMessage
 
 MS = 1_000_000
@@ -34,31 +29,14 @@ COVARIANCES = {
 }
 
 
-class Drives(unittest.TestCase):
-    def spawn(self, urdf, namespace="/"):
-        call("/gazebo/reset_simulation", Empty)
+class Drives(WorldCase):
+    def begin(self, urdf):
+        gazebo("reset_simulation")
         rospy.set_param("/robot_description", urdf)
-        request = SpawnModelRequest(model_name="bot", model_xml=urdf, robot_namespace=namespace)
-        request.initial_pose.position.z = RADIUS
-        answer = call("/gazebo/spawn_urdf_model", SpawnModel, request)
-        self.assertTrue(answer.success, answer.status_message)
-        self.addCleanup(delete_model, "bot")
+        self.spawn("bot", urdf, z=RADIUS)
 
     def step(self, ticks):
-        answer = call("/gazebo/step_world", StepWorld, StepWorldRequest(ticks=ticks))
-        self.assertTrue(answer.success, answer.status_message)
-        self.now = answer.sim_time
-
-    def hear(self, topic, kind):
-        heard = Listener(topic, kind)
-        self.addCleanup(heard.close)
-        return heard
-
-    def publisher(self, topic, kind=Twist):
-        publisher = rospy.Publisher(topic, kind, queue_size=1, latch=True)
-        self.addCleanup(publisher.unregister)
-        self.assertTrue(wait_until(publisher.get_num_connections))
-        return publisher
+        self.now = step_world(ticks).sim_time
 
     def stamps(self, heard, count):
         self.assertTrue(heard.wait_for(lambda messages: len(messages) >= count))
@@ -80,7 +58,7 @@ class Drives(unittest.TestCase):
         return [(m.header.stamp, repr(m.pose), repr(m.twist)) for m in since(heard.messages)]
 
     def state(self):
-        return call("/gazebo/get_model_state", GetModelState, "bot", "world")
+        return gazebo("get_model_state", "bot", "world")
 
     def follow(self, publisher, message, odometry):
         """Publishes until the robot moves: a message that is underway when a step begins is late."""
@@ -90,14 +68,16 @@ class Drives(unittest.TestCase):
         )
 
     def test_two_wheels_drive_by_their_plugin(self):
-        self.spawn(two_wheels(**DIFF))
+        self.begin(two_wheels(**DIFF))
         odometry, tf = self.hear("/odom", Odometry), self.hear("/tf", TFMessage)
         joints = self.hear("/joint_states", JointState)
         self.step(500)
         self.assertEqual(self.stamps(odometry, 49), list(range(11, 500, 10)))
         command = Twist()
         command.linear.x = 0.2
-        self.assertTrue(self.follow(self.publisher("/cmd_vel"), command, odometry))
+        self.assertTrue(
+            self.follow(self.publisher("/cmd_vel", Twist, latch=True), command, odometry)
+        )
         begin = self.state().pose.position.x
         for _ in range(10):  # a publisher's queue holds 100 messages
             self.step(500)
@@ -115,14 +95,14 @@ class Drives(unittest.TestCase):
 
     def test_a_vehicle_and_its_odometry_go_on_from_a_snapshot(self):
         by_wheels = {"odometrySource": "encoder"} | DIFF["libgazebo_ros_diff_drive.so"]
-        self.spawn(two_wheels(**{"libgazebo_ros_diff_drive.so": by_wheels}))
+        self.begin(two_wheels(**{"libgazebo_ros_diff_drive.so": by_wheels}))
         odometry = self.hear("/odom", Odometry)
-        command, publisher = Twist(), self.publisher("/cmd_vel")
+        command, publisher = Twist(), self.publisher("/cmd_vel", Twist, latch=True)
         command.linear.x, command.angular.z = 0.3, 0.5
         self.assertTrue(self.follow(publisher, command, odometry))
         self.step(200)
         begin = self.now
-        self.assertTrue(call("/gazebo/save_state", SaveState, name="driving").success)
+        self.assertTrue(gazebo("save_state", name="driving").success)
         runs = []
         for _ in range(2):
             odometry.messages.clear()
@@ -131,9 +111,9 @@ class Drives(unittest.TestCase):
             told = self.told_since(begin, odometry, 40)
             now = self.state()
             runs.append((told, repr(now.pose), repr(now.twist)))
-            call("/gazebo/reset_world", Empty)
+            gazebo("reset_world")
             self.step(30)
-            self.assertTrue(call("/gazebo/restore_state", RestoreState, name="driving").success)
+            self.assertTrue(gazebo("restore_state", name="driving").success)
         self.assertEqual(runs[0], runs[1])
 
     def test_a_diff_drive_controller_drives_and_tells(self):
@@ -142,7 +122,7 @@ class Drives(unittest.TestCase):
             "right_wheel": "right_joint", "publish_cmd": True, "cmd_vel_timeout": 100.0,
         }  # fmt: skip
         rospy.set_param("/base", params)
-        self.spawn(two_wheels(**CONTROL))
+        self.begin(two_wheels(**CONTROL))
         manager = Manager()
         self.assertIn(params["type"], manager.types().types)
         self.assertTrue(wait_until(lambda: manager.start("base")))
@@ -152,7 +132,9 @@ class Drives(unittest.TestCase):
         self.assertEqual(self.stamps(odometry, 4), [21, 41, 61, 81])
         command = Twist()
         command.linear.x = 0.2
-        self.assertTrue(self.follow(self.publisher("/base/cmd_vel"), command, odometry))
+        self.assertTrue(
+            self.follow(self.publisher("/base/cmd_vel", Twist, latch=True), command, odometry)
+        )
         tuner = DynamicClient("/base", timeout=BOUND)
         self.addCleanup(tuner.close)
         tuned = tuner.update_configuration({"wheel_separation_multiplier": 1.2})
@@ -164,7 +146,7 @@ class Drives(unittest.TestCase):
             tf.wait_for(lambda each: each[-1].transforms[0].header.stamp.to_nsec() >= 2e9)
         )
         self.assertGreater(len(odometry.messages), 100)
-        call("/gazebo/reset_simulation", Empty)
+        gazebo("reset_simulation")
         self.step(30)
         self.assertTrue(odometry.wait_for(lambda each: each[-1].header.stamp.to_nsec() == 21 * MS))
         self.assertEqual(self.stamps(odometry, 2)[-2:], [0, 21])
@@ -181,13 +163,13 @@ class Drives(unittest.TestCase):
             "rear_steering": [f"{each}_steering" for each in corners[2:]],
             "cmd_vel_timeout": 100.0,
         })  # fmt: skip
-        self.spawn(four_wheels(steered=tuple(corners), **CONTROL))
+        self.begin(four_wheels(steered=tuple(corners), **CONTROL))
         self.assertTrue(wait_until(lambda: Manager().start("base")))
         odometry = self.hear("/base/odom", Odometry)
         steering = self.hear("/base/odom_steer", FourWheelSteeringStamped)
         self.step(100)
         command = FourWheelSteering(speed=0.2, front_steering_angle=0.3, rear_steering_angle=-0.3)
-        topic = self.publisher("/base/cmd_four_wheel_steering", FourWheelSteering)
+        topic = self.publisher("/base/cmd_four_wheel_steering", FourWheelSteering, latch=True)
         self.assertTrue(self.follow(topic, command, odometry))
         self.step(1000)
         self.assertTrue(
@@ -204,7 +186,7 @@ class Drives(unittest.TestCase):
             kind = "".join(part.title() for part in (*name.split("_"), "sensor", "controller"))
             params = {"type": f"{name}_sensor_controller/{kind}", "publish_rate": 50}
             rospy.set_param(f"/{name}_reporter", params)
-        self.spawn(two_wheels(**CONTROL).replace("</robot>", f"{imu}{force}</robot>"))
+        self.begin(two_wheels(**CONTROL).replace("</robot>", f"{imu}{force}</robot>"))
         manager = Manager()
         self.assertTrue(wait_until(lambda: manager.start("imu_reporter", "force_torque_reporter")))
         heard = self.hear("/imu", Imu), self.hear("/hub/ft", WrenchStamped)
@@ -212,7 +194,7 @@ class Drives(unittest.TestCase):
         felt, borne = map(self.newest, heard)
         self.assertAlmostEqual(felt.linear_acceleration.z, 9.8, delta=0.5)
         self.assertEqual((felt.header.frame_id, borne.header.frame_id), ("base", "left_wheel"))
-        call("/gazebo/reset_simulation", Empty)
+        gazebo("reset_simulation")
         for each in heard:
             self.assertTrue(each.wait_for(lambda them: them[-1].header.stamp.to_nsec() == 0))
         self.step(100)

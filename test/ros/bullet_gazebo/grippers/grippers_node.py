@@ -4,12 +4,10 @@
 import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
-from gazebo_msgs.srv import SetModelConfiguration
 from gripper_case import CLOSE, SQUEEZE, GripperCase
 from holding_cases import Holding
-from std_srvs.srv import Empty
 from support.robots.grippers import CUBE, EFFORT, cube, plugin
-from support.ros.calls import call
+from support.ros.calls import gazebo, joint, position
 from support.ros.manager import Manager
 
 __all__ = ["Gripping", "Holding"]
@@ -30,13 +28,13 @@ class Gripping(GripperCase):
         self.assertLess(self.off(), CLOSE)
         for finger in ("left", "right"):
             self.assertAlmostEqual(self.squeeze(finger), SQUEEZE / 2, delta=0.1)
-        before = self.place("cube")
+        before = position("cube")
         self.raise_by(0.2)
-        self.assertAlmostEqual(self.place("cube").z - before.z, self.joint("lift"), delta=0.002)
-        self.assertGreater(self.joint("lift"), 0.15)
-        lifted = self.place("cube")
+        self.assertAlmostEqual(position("cube").z - before.z, joint("lift")[0], delta=0.002)
+        self.assertGreater(joint("lift")[0], 0.15)
+        lifted = position("cube")
         self.step(10.0)
-        self.assertAlmostEqual(self.place("cube").z, lifted.z, delta=0.002)
+        self.assertAlmostEqual(position("cube").z, lifted.z, delta=0.002)
         self.assertLess(self.off(), CLOSE)
 
     def test_goals_are_reached_preempted_and_refused(self):
@@ -59,25 +57,18 @@ class Gripping(GripperCase):
         self.spawn_gripper('<mimic joint="left" multiplier="0.5" offset="0.005"/>')
 
         def off():
-            return abs(0.5 * self.joint("left") + 0.005 - self.joint("right"))
+            return abs(0.5 * joint("left")[0] + 0.005 - joint("right")[0])
 
         self.send(0.03, EFFORT)
         self.step(0.5)
-        self.assertGreater(self.joint("right"), 0.015)
+        self.assertGreater(joint("right")[0], 0.015)
         self.assertLess(off(), CLOSE)
-        call("/gazebo/reset_world", Empty)
+        gazebo("reset_world")
         self.assertLess(off(), CLOSE)
-        call(
-            "/gazebo/set_model_configuration",
-            SetModelConfiguration,
-            "gripper",
-            "",
-            ["left"],
-            [0.04],
-        )
+        gazebo("set_model_configuration", "gripper", "", ["left"], [0.04])
         self.assertLess(off(), 1e-9)
-        call("/gazebo/reset_simulation", Empty)
-        self.assertEqual(self.joint("right"), 0.005)
+        gazebo("reset_simulation")
+        self.assertEqual(joint("right")[0], 0.005)
         self.step(0.5)
         self.assertLess(off(), CLOSE)
 

@@ -5,8 +5,7 @@ from gripper_case import GripperCase
 from std_msgs.msg import Bool
 from std_srvs.srv import Empty
 from support.robots.grippers import CUBE, cube, plugin
-from support.ros.calls import call
-from support.ros.subscribed import Listener
+from support.ros.calls import call, gazebo, joint, position
 
 LINKS = ("gripper", "lift_link", "cube", "cube_link")
 ARM = "".join(
@@ -31,12 +30,12 @@ class Holding(GripperCase):
         for _ in range(2):
             self.assertTrue(attacher("attach", *LINKS))
         self.raise_by(0.1)
-        self.assertAlmostEqual(self.place("cube").z, 0.1 + self.joint("lift"), delta=1e-3)
+        self.assertAlmostEqual(position("cube").z, 0.1 + joint("lift")[0], delta=1e-3)
         self.assertTrue(attacher("detach", *LINKS))
         self.step(1.0)
-        self.assertAlmostEqual(self.place("cube").z, CUBE / 2, delta=2e-3)
+        self.assertAlmostEqual(position("cube").z, CUBE / 2, delta=2e-3)
         self.assertTrue(attacher("attach", *LINKS))
-        call("/gazebo/reset_world", Empty)
+        gazebo("reset_world")
         self.assertFalse(attacher("detach", *LINKS))
 
     def test_what_is_gripped_is_held(self):
@@ -48,24 +47,23 @@ class Holding(GripperCase):
         self.step(2.0)
         self.send(0.05, effort=0.0)
         self.raise_by(0.1)
-        self.assertAlmostEqual(self.place("cube").z - CUBE / 2, self.joint("lift"), delta=2e-3)
+        self.assertAlmostEqual(position("cube").z - CUBE / 2, joint("lift")[0], delta=2e-3)
         self.send(0.0)
         self.step(2.0)
-        self.assertAlmostEqual(self.place("cube").z, CUBE / 2, delta=2e-3)
+        self.assertAlmostEqual(position("cube").z, CUBE / 2, delta=2e-3)
 
     def test_suction_holds_until_it_is_off(self):
         more = plugin("libgazebo_ros_vacuum_gripper.so", bodyName="lift_link", topicName="held")
         self.spawn_gripper(more=more)
-        held = Listener("/held", Bool)
-        self.addCleanup(held.close)
+        held = self.hear("/held", Bool)
         self.spawn("cube", cube(), z=0.26)
         call("/on", Empty)
         self.step(0.5)
         self.assertTrue(held.wait_for(lambda messages: messages[-1].data))
-        self.assertAlmostEqual(self.place("cube").z, 0.265, delta=2e-3)
+        self.assertAlmostEqual(position("cube").z, 0.265, delta=2e-3)
         self.raise_by(0.1)
-        self.assertAlmostEqual(self.place("cube").z, 0.265 + self.joint("lift"), delta=2e-3)
+        self.assertAlmostEqual(position("cube").z, 0.265 + joint("lift")[0], delta=2e-3)
         call("/off", Empty)
         self.step(1.0)
         self.assertTrue(held.wait_for(lambda messages: not messages[-1].data))
-        self.assertLess(self.place("cube").z, 0.1)
+        self.assertLess(position("cube").z, 0.1)

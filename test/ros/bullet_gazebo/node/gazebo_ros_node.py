@@ -14,12 +14,22 @@ import rosgraph
 import rosnode
 import rospy
 import rostest
-from gazebo_msgs.srv import DeleteModel, GetJointProperties, GetModelState, GetWorldProperties
+from gazebo_msgs.srv import GetWorldProperties
 from gazebo_ros import gazebo_interface
 from geometry_msgs.msg import Pose
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Empty
-from support.ros.calls import BOUND, call, executable, sim_time, wait_until
+from support.ros.calls import (
+    BOUND,
+    call,
+    executable,
+    gazebo,
+    joint,
+    model_names,
+    position,
+    sim_time,
+    time_passes,
+    wait_until,
+)
 from support.ros.manager import Manager
 
 PACKAGE = """<package format="2"><name>my_arm</name><version>0.0.1</version>
@@ -154,17 +164,11 @@ class GazeboRos(unittest.TestCase):
     def spawn(self, *arguments, **kwargs):
         return self.run_command(executable("gazebo_ros", "spawn_model"), *arguments, **kwargs)
 
-    def models(self):
-        return call("/gazebo/get_world_properties", GetWorldProperties).model_names
-
     def test_1_a_users_launch_file(self):
-        self.assertTrue(wait_until(lambda: "arm" in self.models()))
+        self.assertTrue(wait_until(lambda: "arm" in model_names()))
         state = rospy.wait_for_message("/joint_states", JointState, BOUND)
         self.assertEqual(state.name, ["elbow"])
-        self.assertTrue(wait_until(lambda: abs(self.elbow() - 0.25) < 0.2))
-
-    def elbow(self):
-        return call("/gazebo/get_joint_properties", GetJointProperties, "arm::elbow").position[0]
+        self.assertTrue(wait_until(lambda: abs(joint("arm::elbow")[0] - 0.25) < 0.2))
 
     def test_2_joint_state_publisher(self):
         heard = []
@@ -176,15 +180,15 @@ class GazeboRos(unittest.TestCase):
             for a, b in zip(heard, heard[1:], strict=False)
         }
         self.assertEqual(steps, {0.02})
-        call("/gazebo/pause_physics", Empty)
+        gazebo("pause_physics")
         stopped = sim_time()
         time.sleep(0.3)
         stamps = [message.header.stamp.to_sec() for message in heard]
         self.assertEqual(len(set(stamps)), len(stamps))
         self.assertLessEqual(max(stamps), stopped, "time stands still")
         heard.clear()
-        call("/gazebo/reset_simulation", Empty)
-        call("/gazebo/unpause_physics", Empty)
+        gazebo("reset_simulation")
+        gazebo("unpause_physics")
         self.assertTrue(
             wait_until(lambda: any(message.header.stamp.to_sec() < 0.1 for message in list(heard)))
         )
@@ -194,28 +198,26 @@ class GazeboRos(unittest.TestCase):
         from std_msgs.msg import Int32
 
         self.assertEqual(rospy.wait_for_message("/mine/count", Int32, BOUND).data, 50)
-        before = sim_time()
-        self.assertTrue(wait_until(lambda: sim_time() > before))
+        self.assertTrue(time_passes())
 
     def test_4_spawn_model(self):
         path = f"{self.folder.name}/my_arm/urdf/arm.urdf"
         pose = ("-x", "-1e-1", "-Y", "1.5708", "-reference_frame", "arm")
         self.spawn("-urdf", "-file", path, "-model", "a", "-robot_namespace", "/a", *pose)
-        turned = call("/gazebo/get_model_state", GetModelState, "a", "arm").pose
+        turned = gazebo("get_model_state", "a", "arm").pose
         self.assertAlmostEqual(turned.orientation.z, 0.7071, places=2)
         self.spawn(
             "-urdf", "-stdin", "-model", "b", "-robot_namespace", "/b", "-wait", "a", text=URDF
         )
-        self.assertIn("b", self.models())
+        self.assertIn("b", model_names())
         self.assertIn("already exists", self.spawn("-urdf", "-file", path, "-model", "b", code=1))
         self.assertIn("not set", self.spawn("-urdf", "-param", "nix", "-model", "c", code=1))
         self.assertIn("can't be read", self.spawn("-urdf", "-file", "/nix", "-model", "c", code=1))
         self.spawn("-urdf", "-stdin", "-model", "c", text="<robot", code=1)
-        call("/gazebo/pause_physics", Empty)
+        gazebo("pause_physics")
         self.spawn("-urdf", "-file", path, "-model", "d", "-robot_namespace", "/d", "-wait", "a",
                    "-unpause", "-package_to_model")  # fmt: skip
-        before = sim_time()
-        self.assertTrue(wait_until(lambda: sim_time() > before))
+        self.assertTrue(time_passes())
 
     def test_4_spawn_model_from_sdf(self):
         rospy.set_param("/sdf_arm/robot_description", URDF)
@@ -223,24 +225,21 @@ class GazeboRos(unittest.TestCase):
         rospy.set_param("/sdf_arm/states", states)
         self.spawn("-sdf", "-file", f"{self.folder.name}/my_arm/sdf/arm.sdf", "-model", "sdf_arm",
                    "-robot_namespace", "/sdf_arm", "-x", "4", "-J", "elbow", "0.5")  # fmt: skip
-        position = call(
-            "/gazebo/get_joint_properties", GetJointProperties, "sdf_arm::elbow"
-        ).position
-        self.assertAlmostEqual(position[0], 0.5, places=2)
+        self.assertAlmostEqual(joint("sdf_arm::elbow")[0], 0.5, places=2)
         self.assertTrue(Manager("/sdf_arm").start("states"))
         state = rospy.wait_for_message("/sdf_arm/joint_states", JointState, BOUND)
         self.assertEqual(state.name, ["elbow"])
 
     def test_4_spawn_model_from_the_database_and_a_parameter(self):
         self.spawn("-sdf", "-database", "crate", "-model", "crate_1", "-x", "8", "-z", "0.5")
-        place = call("/gazebo/get_model_state", GetModelState, "crate_1", "").pose.position
+        place = position("crate_1")
         self.assertEqual((place.x, place.z), (8.0, 0.5))
         text = self.spawn("-sdf", "-database", "nix", "-model", "crate_2", code=1)
         self.assertIn("model://nix", text)
         rospy.set_param("/a_crate", CRATE)
         self.spawn("-sdf", "-param", "/a_crate", "-model", "crate_3", "-x", "8", "-z", "1",
                    "-reference_frame", "crate_1", "-R", "1.5708")  # fmt: skip
-        pose = call("/gazebo/get_model_state", GetModelState, "crate_3", "").pose
+        pose = gazebo("get_model_state", "crate_3", "").pose
         self.assertEqual((pose.position.x, pose.position.z), (16.0, 1.5))
         self.assertAlmostEqual(pose.orientation.x, 0.7071, places=3)
 
@@ -260,28 +259,23 @@ class GazeboRos(unittest.TestCase):
                           "-robot_namespace", "/bond", "-b", stdin=subprocess.PIPE)  # fmt: skip
         bond.stdin.write(URDF.encode())
         bond.stdin.close()
-        self.assertTrue(wait_until(lambda: "bond" in self.models()))
+        self.assertTrue(wait_until(lambda: "bond" in model_names()))
         bond.send_signal(signal.SIGINT)
         bond.wait(BOUND)
-        self.assertTrue(wait_until(lambda: "bond" not in self.models()))
+        self.assertTrue(wait_until(lambda: "bond" not in model_names()))
 
     def test_6_gz(self):
         self.run_command("gz", "world", "-p", "1")
         before = sim_time()
-        self.run_command("gz", "world", "-m", "1500")
-        self.assertAlmostEqual(sim_time(), before + 1.5, places=6)
-        self.run_command("gz", "world", "-s")
-        self.assertAlmostEqual(sim_time(), before + 1.501, places=6)
-        self.run_command("gz", "world", "-o")
-        self.assertAlmostEqual(sim_time(), before + 1.501, places=6)
-        self.run_command("gz", "world", "-t")
-        self.assertEqual(sim_time(), 0.0)
-        self.run_command("gz", "world", "-s")
-        self.run_command("gz", "world", "-r")
-        self.assertEqual(sim_time(), 0.0)
-        with xmlrpc.client.ServerProxy(
-            rosnode.get_api_uri(rosgraph.Master("/test"), "/gazebo")
-        ) as node:
+        for arguments, passed in ((("-m", "1500"), 1.5), (("-s",), 1.501), (("-o",), 1.501)):
+            self.run_command("gz", "world", *arguments)
+            self.assertAlmostEqual(sim_time(), before + passed, places=6)
+        for reset in ("-t", "-r"):
+            self.run_command("gz", "world", reset)
+            self.assertEqual(sim_time(), 0.0)
+            self.run_command("gz", "world", "-s")
+        address = rosnode.get_api_uri(rosgraph.Master("/test"), "/gazebo")
+        with xmlrpc.client.ServerProxy(address) as node:
             self.assertEqual(node.gazeboWorld()[0], -1)
         self.run_command("gz", "world", "-p", "0")
         self.assertTrue(wait_until(lambda: sim_time() > 0.0))
@@ -295,7 +289,7 @@ class GazeboRos(unittest.TestCase):
         move = gazebo_interface.set_model_configuration_client
         self.assertTrue(move("e", "", ["shoulder"], [0.5], "/gazebo"))
         self.assertIs(move("nix", "", ["shoulder"], [0.5], "/gazebo"), False)
-        self.assertTrue(call("/gazebo/delete_model", DeleteModel, "e").success)
+        self.assertTrue(gazebo("delete_model", "e").success)
 
     def test_8_gazebo_is_server_and_window_in_one(self):
         gazebo = self.start("rosrun", "gazebo_ros", "gazebo", "-u", "__ns:=/second", "--seed", "1")

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 """Arguments of empty_world.launch that matter when the simulator is killed, fails or meets another one."""
 
+import contextlib
 import os
 import signal
 import unittest
-import xmlrpc.client
 
 import rosgraph
 import rostest
-from support.ros.calls import wait_until
+from support.ros.calls import process_of, wait_until
 from support.ros.programs import BOUND, Place
 
 SERVER = ("rosrun", "gazebo_ros", "gzserver")
@@ -34,13 +34,10 @@ class LaunchArgumentsTest(unittest.TestCase):
         """Process id of the simulator once it is up, and another one than `unlike`."""
 
         def up():
-            try:
-                uri = self.master.lookupNode("/gazebo")
+            with contextlib.suppress(rosgraph.MasterException, OSError):
+                pid = process_of(master_uri=self.uri)
                 self.master.lookupService("/gazebo/pause_physics")
-                pid = xmlrpc.client.ServerProxy(uri).getPid("/launch_arguments")[2]
-            except (rosgraph.MasterException, OSError):
-                return None
-            return pid if pid != unlike else None
+                return pid if pid != unlike else None
 
         found = wait_until(up, BOUND)
         self.assertTrue(found, "no simulator came up")

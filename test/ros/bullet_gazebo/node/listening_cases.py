@@ -2,22 +2,14 @@
 
 import os
 import socket
-import time
 import unittest
-import xmlrpc.client
 from pathlib import Path
 
 import rosgraph
+from support.ros.calls import process_of, wait_until
 
 LISTENING = "0A"  # the state of a socket in /proc/net/tcp
 LOOPBACK, EVERYWHERE = "127.0.0.1", "0.0.0.0"
-BOUND = 60.0  # [s]
-
-
-def pid_of(uri: str) -> int:
-    """The process of a node or master."""
-    with xmlrpc.client.ServerProxy(uri) as proxy:
-        return int(proxy.getPid("/listening")[2])
 
 
 def addresses(pid: int) -> list[str]:
@@ -46,24 +38,21 @@ def _readable(number: str) -> str:
 class Listening(unittest.TestCase):
     def node(self, name: str) -> list[str]:
         """A node's addresses, once it has both of its ports."""
-        deadline = time.monotonic() + BOUND
-        master = rosgraph.Master("/listening")
-        while time.monotonic() < deadline:
-            try:
-                found = addresses(pid_of(master.lookupNode(name)))
-                if len(found) == 2:
-                    return found
-            except rosgraph.MasterException:  # not registered yet
-                pass
-            time.sleep(0.1)
-        raise self.failureException(f"{name} doesn't listen at two ports")
+
+        def look() -> list[str]:
+            pid = process_of(name)
+            return addresses(pid) if pid else []
+
+        found = wait_until(lambda: len(seen := look()) == 2 and seen)
+        self.assertTrue(found, f"{name} doesn't listen at two ports")
+        return found
 
     def test_the_workspace_asks_for_loopback(self):
         self.assertEqual(os.environ["ROS_IP"], LOOPBACK)
 
     def test_the_master(self):
         """With roslaunch's own server, which is the same process here."""
-        self.assertEqual(set(addresses(pid_of(rosgraph.get_master_uri()))), {LOOPBACK})
+        self.assertEqual(set(addresses(rosgraph.Master("/listening").getPid())), {LOOPBACK})
 
     def test_python(self):
         for name in ("/gazebo", "/joint_state_publisher"):

@@ -8,11 +8,9 @@ import rospy
 import rosservice
 import rostest
 from gazebo_msgs.msg import ModelStates
-from gazebo_msgs.srv import GetPhysicsProperties, SetPhysicsProperties
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Empty
-from support.ros.calls import call, sim_time, spawn_model
+from support.ros.calls import gazebo, sim_time, spawn_model
 from support.ros.manager import Manager
 from support.ros.subscribed import Listener
 
@@ -45,13 +43,13 @@ class ThinningTest(unittest.TestCase):
             topic.close()
 
     def tearDown(self):
-        call("/gazebo/pause_physics", Empty)
+        gazebo("pause_physics")
         self.set_rate(REAL_TIME)
 
     def set_rate(self, rate):
-        now = call("/gazebo/get_physics_properties", GetPhysicsProperties)
-        answer = call("/gazebo/set_physics_properties", SetPhysicsProperties,
-                      now.time_step, rate, now.gravity, now.ode_config)  # fmt: skip
+        now = gazebo("get_physics_properties")
+        fields = now.time_step, rate, now.gravity, now.ode_config
+        answer = gazebo("set_physics_properties", *fields)
         self.assertTrue(answer.success, answer.status_message)
 
     def time(self):
@@ -63,9 +61,9 @@ class ThinningTest(unittest.TestCase):
 
     def run_until(self, time):
         begin = len(self.clock.messages)
-        call("/gazebo/unpause_physics", Empty)
+        gazebo("unpause_physics")
         self.assertTrue(self.clock.wait_for(lambda got: got[-1] >= time))
-        call("/gazebo/pause_physics", Empty)
+        gazebo("pause_physics")
         self.assert_last_is(self.time())
         return self.clock.messages[begin:]
 

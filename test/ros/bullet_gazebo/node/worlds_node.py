@@ -7,31 +7,29 @@ See docs/contract/gazebo.md 2.3 to 2.5.
 import math
 import subprocess
 import tempfile
-import threading
 import time
 import unittest
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import rospy
 import rostest
 from gazebo_msgs.msg import ModelStates
-from gazebo_msgs.srv import (
-    DeleteLight,
-    DeleteModel,
-    GetLinkState,
-    GetModelProperties,
-    GetModelState,
-    GetPhysicsProperties,
-    GetWorldProperties,
-    SpawnModel,
-    SpawnModelRequest,
+from support.ros.calls import (
+    BOUND,
+    delete_model,
+    executable,
+    gazebo,
+    model_names,
+    position,
+    spawn_model,
 )
-from geometry_msgs.msg import Point, Pose, Quaternion
-from std_srvs.srv import Empty
-from support.ros.calls import BOUND, call, executable
+from support.ros.world_case import WorldCase
 
 from ros_utils import ros_gazebo
 
 STILL = 0.2  # [s of simulated time]
+EXISTS = "SpawnModel: Failure - entity already exists."
 UNKNOWN = (
     "GazeboRosApiPlugin SpawnModel Failure: input model_xml not SDF or URDF, or cannot be converted "
     "to Gazebo compatible format."
@@ -60,30 +58,14 @@ URDF = (
 )
 
 
-def spawn(name, xml, service="sdf", **kwargs):
-    request = SpawnModelRequest(model_name=name, model_xml=xml, **kwargs)
-    return call(f"/gazebo/spawn_{service}_model", SpawnModel, request)
-
-
-def delete(name):
-    return call("/gazebo/delete_model", DeleteModel, name)
-
-
-def position(name, relative_to=""):
-    found = call("/gazebo/get_model_state", GetModelState, name, relative_to)
-    assert found.success, found.status_message
-    return found.pose.position
-
-
-def models():
-    return call("/gazebo/get_world_properties", GetWorldProperties).model_names
+spawn_sdf = partial(spawn_model, kind="sdf")
 
 
 def resting_height(name):
     """Waits until `name` has stood still for a time of the simulation's; returns its origin's height [m]."""
     deadline, before = time.monotonic() + BOUND, None
     while time.monotonic() < deadline:
-        found = call("/gazebo/get_model_state", GetModelState, name, "")
+        found = gazebo("get_model_state", name, "")
         now, height = found.header.stamp.to_sec(), found.pose.position.z
         if before is None or now - before[0] > STILL:
             if before is not None and abs(height - before[1]) < 1e-5:
@@ -93,14 +75,10 @@ def resting_height(name):
     raise AssertionError(f"{name} still moves")
 
 
-def at(x=0.0, y=0.0, z=0.0):
-    return Pose(Point(x, y, z), Quaternion(0, 0, 0, 0))
-
-
 class WorldFile(unittest.TestCase):
     def test_models_that_can_be_read_are_there_in_order(self):
-        self.assertEqual(models()[:4], ["ground_plane", "table", "box", "crate_one"])
-        self.assertNotIn("broken", models())
+        self.assertEqual(model_names()[:4], ["ground_plane", "table", "box", "crate_one"])
+        self.assertNotIn("broken", model_names())
 
     def test_boxes_rest_on_what_is_under_them(self):
         self.assertAlmostEqual(resting_height("box"), 0.65, delta=0.005)  # on the table
@@ -108,65 +86,57 @@ class WorldFile(unittest.TestCase):
         self.assertAlmostEqual(position("table").z, 0.0, delta=1e-6)
 
     def test_links_of_a_static_model_stand_where_the_file_puts_them(self):
-        state = call("/gazebo/get_link_state", GetLinkState, "table::leg", "").link_state
+        state = gazebo("get_link_state", "table::leg", "").link_state
         self.assertAlmostEqual(state.pose.position.z, 0.225, delta=1e-6)
 
     def test_it_begins_as_it_was_saved_and_a_reset_returns_to_the_models_poses(self):
-        found = call("/gazebo/get_model_state", GetModelState, "shelf", "")
+        found = gazebo("get_model_state", "shelf", "")
         self.assertAlmostEqual(found.pose.position.y, -4.0, delta=1e-6)
         self.assertAlmostEqual(found.pose.orientation.z, math.sin(0.35), delta=1e-6)
-        call("/gazebo/reset_world", Empty)
-        found = call("/gazebo/get_model_state", GetModelState, "shelf", "")
+        gazebo("reset_world")
+        found = gazebo("get_model_state", "shelf", "")
         self.assertAlmostEqual(found.pose.position.y, -8.0, delta=1e-6)
         self.assertAlmostEqual(found.pose.orientation.z, 0.0, delta=1e-6)
 
     def test_an_actor_is_a_model_that_is_where_time_has_brought_it(self):
-        self.assertIn("walker", models())
+        self.assertIn("walker", model_names())
         states = rospy.wait_for_message("/gazebo/model_states", ModelStates, BOUND)
         self.assertEqual(states.pose[states.name.index("walker")].position.x, -5.0)
-        found = call("/gazebo/get_model_state", GetModelState, "walker", "")
+        found = gazebo("get_model_state", "walker", "")
         self.assertAlmostEqual(found.pose.position.y, found.header.stamp.to_sec() - 5.0, delta=1e-6)
 
     def test_physics_is_the_files(self):
-        physics = call("/gazebo/get_physics_properties", GetPhysicsProperties)
+        physics = gazebo("get_physics_properties")
         self.assertAlmostEqual(physics.gravity.z, -9.81)
         self.assertAlmostEqual(physics.time_step, 0.002)
         self.assertAlmostEqual(physics.max_update_rate, 500.0)
         self.assertEqual(physics.ode_config.sor_pgs_iters, 80)
 
 
-class Spawning(unittest.TestCase):
-    def spawned(self, name, xml, **kwargs):
-        answer = spawn(name, xml, **kwargs)
-        self.addCleanup(delete, name)
-        self.assertEqual(
-            (answer.success, answer.status_message),
-            (True, "SpawnModel: Successfully spawned entity"),
-        )
-
+class Spawning(WorldCase):
     def test_an_sdf_robot_has_its_names_and_stands(self):
-        self.spawned("sdf_robot", ROBOT, initial_pose=at(0.0, 5.0, 0.2), robot_namespace="/arm")
-        found = call("/gazebo/get_model_properties", GetModelProperties, "sdf_robot")
+        self.spawn("sdf_robot", ROBOT, "/arm", kind="sdf", y=5.0, z=0.2)
+        found = gazebo("get_model_properties", "sdf_robot")
         self.assertEqual((found.body_names, found.geom_names), (["base", "arm"], ["c1"]))
         self.assertEqual(found.joint_names, ["shoulder"])
         self.assertAlmostEqual(resting_height("sdf_robot"), 0.1, delta=0.01)
 
     def test_the_files_pose_is_taken_in_the_requested_one(self):
         more = "<pose>0 0 1 0 0 0</pose><static>1</static>"
-        self.spawned("high", BOX.format(more=more), initial_pose=at(1.0), reference_frame="table")
+        self.spawn("high", BOX.format(more=more), kind="sdf", x=1.0, frame="table")
         self.assertAlmostEqual(position("high").x, 3.0, delta=1e-6)
         self.assertAlmostEqual(position("high").z, 1.0, delta=1e-6)
 
     def test_a_world_include_brings_a_model_from_the_path(self):
         include = '<sdf version="1.4"><world name="d"><include><uri>model://{}</uri></include></world></sdf>'
-        self.spawned("mine", include.format("crate"), initial_pose=at(0.0, -5.0, 0.3))
+        self.spawn("mine", include.format("crate"), kind="sdf", y=-5.0, z=0.3)
         self.assertAlmostEqual(resting_height("mine"), 0.2, delta=0.01)
-        self.spawned("floor", include.format("ground_plane"), initial_pose=at(0.0, 0.0, -1.0))
-        self.assertIn("floor", models())
+        self.spawn("floor", include.format("ground_plane"), kind="sdf", z=-1.0)
+        self.assertIn("floor", model_names())
 
     def test_a_urdf_root_is_taken_too_and_collisions_are_named(self):
-        self.spawned("urdf", URDF, initial_pose=at(-5.0, 0.0, 1.0))
-        found = call("/gazebo/get_model_properties", GetModelProperties, "urdf")
+        self.spawn("urdf", URDF, kind="sdf", x=-5.0, z=1.0)
+        found = gazebo("get_model_properties", "urdf")
         self.assertEqual(found.geom_names, ["a_collision", "a_fixed_joint_lump__b_collision_1"])
 
     def test_thousands_of_faults_are_a_few_lines(self):
@@ -174,45 +144,41 @@ class Spawning(unittest.TestCase):
         blocks = '<gazebo reference="gone"><mu1>1</mu1></gazebo>' * 20_000
         plugins = '<gazebo><plugin filename="libnobody_has.so"/></gazebo>' * 10_000
         xml = URDF.replace("</robot>", f"{blocks}{plugins}</robot>")
-        self.spawned("wordy", xml, initial_pose=at(0.0, -30.0, 1.0))
+        self.spawn("wordy", xml, kind="sdf", y=-30.0, z=1.0)
 
     def test_a_light_is_spawned_under_the_models_name(self):
         xml = (
             '<sdf version="1.6"><light name="l" type="point"><pose>0 0 1 0 0 0</pose></light></sdf>'
         )
-        self.assertTrue(spawn("torch", xml).success)
-        again = spawn("torch", xml)
-        self.assertEqual(
-            (again.success, again.status_message),
-            (False, "SpawnModel: Failure - entity already exists."),
-        )
-        self.assertNotIn("torch", models())
-        self.assertTrue(spawn("box", xml).success)  # a model of that name is no hindrance
+        self.assertTrue(spawn_sdf("torch", xml).success)
+        self.assertEqual(spawn_sdf("torch", xml).status_message, EXISTS)
+        self.assertNotIn("torch", model_names())
+        self.assertTrue(spawn_sdf("box", xml).success)  # a model of that name is no hindrance
         for name in ("torch", "box"):
-            self.assertTrue(call("/gazebo/delete_light", DeleteLight, name).success)
+            self.assertTrue(gazebo("delete_light", name).success)
 
 
 class Refusals(unittest.TestCase):
     def refused(self, text, name, xml, **kwargs):
-        before = models()
-        answer = spawn(name, xml, **kwargs)
+        before = model_names()
+        answer = spawn_sdf(name, xml, **kwargs)
         self.assertFalse(answer.success)
         self.assertIn(text, answer.status_message)
-        self.assertEqual(models(), before)
+        self.assertEqual(model_names(), before)
 
     def test_texts_of_gazebo(self):
-        self.refused("SpawnModel: Failure - entity already exists.", "box", BOX.format(more=""))
+        self.refused(EXISTS, "box", BOX.format(more=""))
         self.refused(UNKNOWN, "new", "<world/>")
         self.refused(UNKNOWN, "new", BOX[:50])
         self.refused(UNKNOWN, "new", "")
         self.refused(
             "SpawnModel: reference reference_frame not found, did you forget to scope the link by model "
-            "name?", "new", BOX.format(more=""), reference_frame="nowhere",
+            "name?", "new", BOX.format(more=""), frame="nowhere",
         )  # fmt: skip
 
     def test_a_sdf_is_no_urdf(self):
         with self.assertRaises(rospy.ServiceException):
-            spawn("new", BOX.format(more=""), service="urdf")
+            spawn_model("new", BOX.format(more=""))
 
     def test_traps_and_giants(self):
         bomb = '<!DOCTYPE a [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><sdf>&b;</sdf>'
@@ -225,9 +191,9 @@ class Refusals(unittest.TestCase):
         links = "".join(f'<link name="l{i}"/>' for i in range(400_000))
         self.refused("links", "new", f'<robot name="r">{links}</robot>')
         with self.assertRaises(rospy.ServiceException):
-            spawn("new", "<!--" * 2_500_000, service="urdf")
+            spawn_model("new", "<!--" * 2_500_000)
         with self.assertRaises(rospy.ServiceException):
-            spawn("new", "<?" * 5_000_000, service="urdf")
+            spawn_model("new", "<?" * 5_000_000)
 
 
 class OddFiles(unittest.TestCase):
@@ -243,20 +209,14 @@ class OddFiles(unittest.TestCase):
             f'<joint name="j{i}" type="{"fixed" if i < 698 else "planar"}">' + ends.format(i, i + 1)
             for i in range(699)
         )
-        answers = []
-
-        def spawn_slowly():
-            answers.append(spawn("slow", f'<robot name="r">{links}{joints}</robot>'))
-
-        client = threading.Thread(target=spawn_slowly)
-        client.start()
         served = 0
-        while not answers:
-            self.assertTrue(spawn("quick", BOX.format(more=""), initial_pose=at(40.0)).success)
-            self.assertTrue(delete("quick").success)
-            served += not answers
-        client.join()
-        self.assertIn("a planar joint is only simulated", answers[0].status_message)
+        with ThreadPoolExecutor(1) as pool:
+            answer = pool.submit(spawn_sdf, "slow", f'<robot name="r">{links}{joints}</robot>')
+            while not answer.done():
+                self.assertTrue(spawn_sdf("quick", BOX.format(more=""), x=40.0).success)
+                self.assertTrue(delete_model("quick").success)
+                served += not answer.done()
+        self.assertIn("a planar joint is only simulated", answer.result().status_message)
         # One may come before the slow one is looked at; if they waited, no second one would.
         self.assertGreater(served, 2)
 
@@ -274,9 +234,9 @@ class OddFiles(unittest.TestCase):
                 with open(file.name, "rb") as piped:
                     code = subprocess.call([*command, *source, "-x", "60"], stdin=piped)
                 self.assertEqual(code, 0, (encoding, source))
-                self.assertTrue(delete("from_file").success)
+                self.assertTrue(delete_model("from_file").success)
                 self.assertTrue(ros_gazebo.gazebo_spawn_sdf_path(file.name, "from_file", pos_x=60))
-                self.assertTrue(delete("from_file").success)
+                self.assertTrue(delete_model("from_file").success)
 
     def test_a_description_on_the_parameter_server_may_begin_with_anything(self):
         """Also for the control plugin, which reads it there by itself."""
@@ -297,18 +257,9 @@ class OddFiles(unittest.TestCase):
             ros_gazebo.gazebo_spawn_sdf_param("robot_description", "odd2", "/odd", pos_x=80)
         )
         for name in ("odd", "odd2"):
-            self.assertTrue(delete(name).success)
-
-
-class Worlds(unittest.TestSuite):
-    def __init__(self):
-        super().__init__()
-        loader = unittest.defaultTestLoader
-        self.addTests(
-            loader.loadTestsFromTestCase(kind) for kind in (WorldFile, Spawning, Refusals, OddFiles)
-        )
+            self.assertTrue(delete_model(name).success)
 
 
 if __name__ == "__main__":
     rospy.init_node("worlds_test")
-    rostest.rosrun("cartpole", "worlds", "__main__.Worlds")
+    rostest.rosrun("cartpole", "worlds", "__main__")

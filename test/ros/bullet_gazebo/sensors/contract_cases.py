@@ -4,21 +4,16 @@ import itertools
 import math
 import signal
 import subprocess
-import xmlrpc.client
 
 import numpy as np
-import rosgraph
-import rospy
 from gazebo_msgs.msg import ContactsState, LinkState, ModelState
-from gazebo_msgs.srv import GetLinkState, SetLinkState
 from geometry_msgs.msg import Point, Pose, WrenchStamped
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
 from sensor_case import MS, UPRIGHT, SensorCase
 from sensor_msgs.msg import CameraInfo, Image, Imu, LaserScan, PointCloud, PointCloud2, Range
-from std_srvs.srv import Empty
 from support.memory import resident
-from support.ros.calls import call, wait_until
+from support.ros.calls import gazebo, process_of
 
 G = 9.8  # [m/s²]
 TILTED = """<sdf version="1.6"><model name="steady"><static>1</static><link name="l"/>
@@ -56,7 +51,7 @@ TOPICS = {  # of the bot: type, and period [ms]
 
 class Contract(SensorCase):
     def test_tilted_imus(self):
-        self.spawn("st", TILTED, x=-20.0)
+        self.spawn("st", TILTED, kind="sdf", x=-20.0)
         expected = np.array([math.sin(math.radians(30.0)), 0.0, math.cos(math.radians(30.0))])
         topics = {"/tilted": G, "/tilted_hector": G, "/turned_hector": G, "/tilted_old": 0.0}
         for topic, share in topics.items():
@@ -64,7 +59,7 @@ class Contract(SensorCase):
             np.testing.assert_allclose((felt.x, felt.y, felt.z), share * expected, atol=1e-6)
 
     def test_a_lifted_bumper_feels_nothing_and_a_lumped_one_works(self):
-        self.spawn("lumped", LUMPED, x=-5.0, z=0.06, kind="urdf")
+        self.spawn("lumped", LUMPED, x=-5.0, z=0.06)
         self.step(1000)
         heard = self.hear("/touched", ContactsState)
         now = self.step(100)
@@ -76,7 +71,7 @@ class Contract(SensorCase):
 
     def test_a_wrong_collision_of_a_bumper_is_a_warning_in_rosout(self):
         heard = self.hear("/rosout", Log)
-        self.spawn("wrong", LUMPED.replace("pad_collision", "nonsense"), x=-5.0, z=5.0, kind="urdf")
+        self.spawn("wrong", LUMPED.replace("pad_collision", "nonsense"), x=-5.0, z=5.0)
         self.assertTrue(heard.wait_for(lambda got: any("nonsense" in each.msg for each in got)))
         [told] = [each for each in heard.messages if "nonsense" in each.msg]
         self.assertEqual((told.level, told.name), (Log.WARN, "/gazebo"))
@@ -98,7 +93,7 @@ class Contract(SensorCase):
         self.put(z=5.0, turning=1.0)
         for number in range(1, 6):
             self.step(9)
-            state = call("/gazebo/get_link_state", GetLinkState, "bot::base", "world").link_state
+            state = gazebo("get_link_state", "bot::base", "world").link_state
             message = heard.from_time(self.step(1))
             self.assertEqual(message.header.stamp.to_nsec(), number * 10 * MS)
             self.assertEqual(message.pose.pose, state.pose)
@@ -110,7 +105,7 @@ class Contract(SensorCase):
         self.step(500)
         for each in heard.values():
             each.from_time(400 * MS)
-        call("/gazebo/reset_simulation", Empty)
+        gazebo("reset_simulation")
         self.step(110)
         for topic, (_, period) in TOPICS.items():
             each = heard[topic]
@@ -124,7 +119,7 @@ class Contract(SensorCase):
 
     def test_a_subscriber_that_stops_reading_costs_no_memory(self):
         """200 MB of clouds are sent to it."""
-        self.spawn("large", LARGE, x=-5.0)
+        self.spawn("large", LARGE, kind="sdf", x=-5.0)
         heard = self.hear("/large/depth/image_raw", Image, read=stamp)
         with subprocess.Popen(
             ["rostopic", "echo", "--noarr", "/large/points/header"], stdout=subprocess.PIPE
@@ -132,11 +127,11 @@ class Contract(SensorCase):
             try:
                 assert stopped.stdout.readline()  # a newcomer's
                 stopped.send_signal(signal.SIGSTOP)
-                before = resident(simulator())
+                before = resident(process_of())
                 for _ in range(8):
                     now = self.step(100)
                 assert heard.wait_for(lambda stamps: stamps[-1] >= now)
-                self.assertLess(resident(simulator()) - before, 100e6)
+                self.assertLess(resident(process_of()) - before, 100e6)
             finally:
                 stopped.kill()
         now = self.step(20)
@@ -146,29 +141,21 @@ class Contract(SensorCase):
         heard = self.hear("/scan", LaserScan)
         self.step(150)
         heard.after(2)  # the newcomer's, and that of 100 ms
-        topic = rospy.Publisher("/gazebo/set_model_state", ModelState, queue_size=1)
-        self.addCleanup(topic.unregister)
-        self.assertTrue(wait_until(topic.get_num_connections))
+        topic = self.publisher("/gazebo/set_model_state", ModelState)
         pose = Pose(Point(0.25, 0.0, 0.0), UPRIGHT)
         link = LinkState("bot::base", Pose(Point(0.5, 0.0, 0.05), UPRIGHT), None, "world")
         link.twist = ModelState().twist
         for move, expected in (
             (lambda: self.put(x=0.75), 0.75),
             (lambda: topic.publish(ModelState("bot", pose, ModelState().twist, "world")), 1.25),
-            (lambda: call("/gazebo/set_link_state", SetLinkState, link), 1.0),
-            (lambda: call("/gazebo/reset_world", Empty), 1.5),
+            (lambda: gazebo("set_link_state", link), 1.0),
+            (lambda: gazebo("reset_world"), 1.5),
         ):
             count = len(heard.messages)
             move()
             message = heard.after(count + 1)[count]
             self.assertEqual(stamp(message), 150 * MS)
             self.assertAlmostEqual(message.ranges[0], expected, delta=0.05)
-
-
-def simulator():
-    """The process of the simulator."""
-    with xmlrpc.client.ServerProxy(rosgraph.Master("").lookupNode("/gazebo")) as node:
-        return node.getPid("/test")[2]
 
 
 def stamp(message):

@@ -1,15 +1,11 @@
 """A world in lock-step with the model of all sensors, whose topics tests listen to."""
 
-import unittest
-
 import rospy
-from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from gazebo_msgs.msg import ModelState
-from gazebo_msgs.srv import DeleteModel, SetModelState, SpawnModel, SpawnModelRequest
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
-from std_srvs.srv import Empty
-from support.ros.calls import call
+from support.ros.calls import delete_model, gazebo, spawn_model, step_world
 from support.ros.subscribed import Listener
+from support.ros.world_case import WorldCase
 
 SHAPE = "<geometry><box><size>1 1 1</size></box></geometry>"
 RED = "<material><ambient>1 0 0 1</ambient><diffuse>1 0 0 1</diffuse></material>"
@@ -38,41 +34,33 @@ class Heard(Listener):
         return self.messages[-1]
 
 
-class SensorCase(unittest.TestCase):
+class SensorCase(WorldCase):
     """Each test begins with the bot at the origin, a red wall 1.5 m before it, and time 0."""
 
     @classmethod
     def setUpClass(cls):
-        cls.spawn(cls, "wall", WALL, x=2.0, z=0.5, cleanup=cls.addClassCleanup)
-        cls.spawn(cls, "bot", rospy.get_param("~model"), cleanup=cls.addClassCleanup)
+        bot = rospy.get_param("~model")
+        for name, xml, place in (("wall", WALL, {"x": 2.0, "z": 0.5}), ("bot", bot, {})):
+            assert spawn_model(name, xml, kind="sdf", **place).success
+            cls.addClassCleanup(delete_model, name)
 
     def setUp(self):
-        call("/gazebo/reset_simulation", Empty)
-
-    def spawn(self, name, xml, x=0.0, z=0.0, kind="sdf", cleanup=None):
-        pose = Pose(Point(x, 0.0, z), UPRIGHT)
-        request = SpawnModelRequest(model_name=name, model_xml=xml, initial_pose=pose)
-        request.robot_namespace = "/"
-        answer = call(f"/gazebo/spawn_{kind}_model", SpawnModel, request)
-        assert answer.success, answer.status_message
-        (cleanup or self.addCleanup)(call, "/gazebo/delete_model", DeleteModel, name)
+        gazebo("reset_simulation")
 
     def put(self, x=0.0, y=0.0, z=0.0, turning=0.0, name="bot"):
         """Puts a model somewhere, turning about z at a speed [rad/s]."""
         state = ModelState(model_name=name, reference_frame="world")
         state.pose = Pose(Point(x, y, z), UPRIGHT)
         state.twist = Twist(Vector3(), Vector3(0.0, 0.0, turning))
-        self.assertTrue(call("/gazebo/set_model_state", SetModelState, state).success)
+        self.assertTrue(gazebo("set_model_state", state).success)
 
     def hear(self, name, kind, **options):
         heard = Heard(name, kind, **options)
         self.addCleanup(heard.close)
         return heard
 
-    def step(self, ticks, **more):
-        answer = call("/gazebo/step_world", StepWorld, StepWorldRequest(ticks=ticks, **more))
-        self.assertTrue(answer.success, answer.status_message)
-        return round(1000 * answer.sim_time) * MS
+    def step(self, ticks):
+        return round(1000 * step_world(ticks).sim_time) * MS
 
     def newest(self, name, kind, ticks=300):
         heard = self.hear(name, kind)

@@ -90,9 +90,7 @@ class Sensors(SensorCase):
 
     def test_each_trigger_takes_one_picture(self):
         heard = self.hear("/shot/image_raw", Image)
-        trigger = rospy.Publisher("/shot/image_trigger", EmptyMsg, queue_size=5)
-        self.addCleanup(trigger.unregister)
-        self.assertTrue(wait_until(trigger.get_num_connections))
+        trigger = self.publisher("/shot/image_trigger", EmptyMsg)
         self.step(50)
         self.assertEqual(heard.messages, [])
         for triggers, count in ((1, 1), (2, 3)):

@@ -9,16 +9,17 @@ import subprocess
 import sys
 import threading
 import time
-import unittest
-from urllib.parse import urlsplit
+from concurrent.futures import ThreadPoolExecutor
 
 import rosgraph
 import rospy
 import rostest
 from gazebo_msgs.msg import ModelState
-from gazebo_world import BOX, call, now, spawn
+from gazebo_world import BOX
 from geometry_msgs.msg import Point, Pose, Twist
-from support.ros.calls import BOUND, wait_until
+from support.ros.calls import BOUND, gazebo, model_names, sim_time, time_passes
+from support.ros.world_case import WorldCase
+from support.stress.bad_clients import address, header, packed
 
 CROWD = 30
 LISTENER = """
@@ -35,23 +36,17 @@ rospy.spin()
 
 def connect(service):
     """Opens a connection to the node that offers `service`, and says nothing."""
-    place = urlsplit(rosgraph.Master("/gazebo_clients").lookupService(f"/gazebo/{service}"))
-    return socket.create_connection((place.hostname, place.port), BOUND)
+    uri = rosgraph.Master("/gazebo_clients").lookupService(f"/gazebo/{service}")
+    return socket.create_connection(address(uri), BOUND)
 
 
-def packed(data):
-    return struct.pack("<I", len(data)) + data
-
-
-class ClientsTest(unittest.TestCase):
+class ClientsTest(WorldCase):
     def setUp(self):
-        spawn("box", BOX, (0.0, 0.0, 1.0))
-        self.addCleanup(call, "delete_model", "box")
+        self.spawn("box", BOX, z=1.0)
 
     def check_alive(self):
-        before = now()
-        self.assertTrue(wait_until(lambda: now() > before), "time stands still")
-        self.assertEqual(call("get_world_properties").model_names, ["ground_plane", "box"])
+        self.assertTrue(time_passes(), "time stands still")
+        self.assertEqual(model_names(), ["ground_plane", "box"])
 
     def test_a_client_that_says_nothing_keeps_nobody_out(self):
         with contextlib.ExitStack() as silent:
@@ -66,7 +61,7 @@ class ClientsTest(unittest.TestCase):
         service = b"service=/gazebo/get_model_state"
         fields = (b"callerid=/raw", b"md5sum=*", service, b"persistent=1")
         with connect("get_model_state") as client:
-            client.sendall(packed(b"".join(packed(field) for field in fields)))
+            client.sendall(header(*fields))
             (length,) = struct.unpack("<I", client.recv(4, socket.MSG_WAITALL))
             client.recv(length, socket.MSG_WAITALL)
             client.sendall(packed(b"\xff" * 8))
@@ -85,35 +80,26 @@ class ClientsTest(unittest.TestCase):
         self.check_alive()
 
     def test_a_crowd_is_served(self):
-        faults = []
-
         def work(place):
-            try:
-                for step in range(5):
-                    pose = Pose(position=Point(place, step, 3.0))
-                    answers = [
-                        call("get_model_state", "box", "world"),
-                        call("set_model_state", ModelState("box", pose, Twist(), "")),
-                        call("get_physics_properties"),
-                    ]
-                    call("pause_physics" if step % 2 else "unpause_physics")
-                    faults.extend(each.status_message for each in answers if not each.success)
-            except (rospy.ROSException, rospy.ServiceException) as error:
-                faults.append(str(error))
+            for step in range(5):
+                pose = Pose(position=Point(place, step, 3.0))
+                for answer in (
+                    gazebo("get_model_state", "box", "world"),
+                    gazebo("set_model_state", ModelState("box", pose, Twist(), "")),
+                    gazebo("get_physics_properties"),
+                ):
+                    self.assertTrue(answer.success, answer.status_message)
+                gazebo("pause_physics" if step % 2 else "unpause_physics")
 
-        threads = [threading.Thread(target=work, args=(place,)) for place in range(CROWD)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join(BOUND)
-        self.assertEqual((faults, [t for t in threads if t.is_alive()]), ([], []))
-        call("unpause_physics")
+        with ThreadPoolExecutor(CROWD) as pool:
+            list(pool.map(work, range(CROWD)))
+        gazebo("unpause_physics")
         self.check_alive()
 
     def test_stamps_are_the_walls_time_without_use_sim_time(self):
-        stamp = call("get_model_state", "box", "").header.stamp.to_sec()
+        stamp = gazebo("get_model_state", "box", "").header.stamp.to_sec()
         self.assertAlmostEqual(stamp, time.time(), delta=BOUND)
-        self.assertLess(now(), BOUND * 10)
+        self.assertLess(sim_time(), BOUND * 10)
         self.assertIs(rospy.get_param("/use_sim_time"), False)
 
 

@@ -1,35 +1,36 @@
 """Services that apply and clear efforts and wrenches."""
 
 import rospy
-from gazebo_world import BOX, INF, NAN, GazeboTest, call, now, physics, run, spawn
+from gazebo_world import BOX, INF, NAN, GazeboTest, physics, run
 from geometry_msgs.msg import Point, Vector3, Wrench
+from support.ros.calls import gazebo, joint, sim_time
 
 
 class ForcesTest(GazeboTest):
     def test_apply_joint_effort(self):
-        call("set_physics_properties", physics(gravity=Vector3()))
+        gazebo("set_physics_properties", physics(gravity=Vector3()))
         text = "ApplyJointEffort: effort set"
         push = ("apply_joint_effort", "cart_pole")
         for duration in (rospy.Duration(0), rospy.Duration(0, 999_999)):
             self.succeeds(text, *push, 1.0, rospy.Time(), duration)
         run(0.02)
-        self.assertEqual(self.joint("cart_pole")[1], 0.0)
+        self.assertEqual(joint("cart_pole")[1], 0.0)
         self.succeeds(text, *push, 0.1, rospy.Time(), rospy.Duration(0.05))
-        start = rospy.Time.from_sec(now() + 1.0)
+        start = rospy.Time.from_sec(sim_time() + 1.0)
         self.succeeds(text, *push, 0.1, start, rospy.Duration(-1))
         run(0.1)
-        position, rate = self.joint("cart_pole")
+        position, rate = joint("cart_pole")
         self.assertGreater(rate, 0.1)
         run(0.1)
-        self.assertAlmostEqual(self.joint("cart_pole")[1], rate, delta=0.05)
-        call("clear_joint_forces", "cartpole::cart_pole")  # matches nothing
+        self.assertAlmostEqual(joint("cart_pole")[1], rate, delta=0.05)
+        gazebo("clear_joint_forces", "cartpole::cart_pole")  # matches nothing
         run(1.0)
-        self.assertGreater(self.joint("cart_pole")[1], rate + 0.1)
-        call("clear_joint_forces", "cart_pole")
-        call("reset_simulation")
+        self.assertGreater(joint("cart_pole")[1], rate + 0.1)
+        gazebo("clear_joint_forces", "cart_pole")
+        gazebo("reset_simulation")
         run(0.05)
-        self.assertEqual(self.joint("cart_pole"), (0.0, 0.0))
-        call("set_physics_properties", physics())
+        self.assertEqual(joint("cart_pole"), (0.0, 0.0))
+        gazebo("set_physics_properties", physics())
 
     def test_apply_joint_effort_failures(self):
         late = (rospy.Time(), rospy.Duration(1))
@@ -46,14 +47,14 @@ class ForcesTest(GazeboTest):
         run(0.1)
         self.assertAlmostEqual(self.box().twist.linear.z, 0.0, places=4)
         wrench = Wrench(force=Vector3(1.0, 0, 2.0 * 9.8))  # takes the other one's place
-        call("apply_body_wrench", "body", "", Point(0, 0, 1), wrench, rospy.Time(), forever)
+        gazebo("apply_body_wrench", "body", "", Point(0, 0, 1), wrench, rospy.Time(), forever)
         time = run(0.1)
         found = self.box().twist
         self.assertAlmostEqual(found.linear.x, 0.5 * time, places=4)
         self.assertAlmostEqual(found.linear.z, 0.0, places=4)
         self.assertAlmostEqual(found.angular.y, 1.0 / 0.1 * time, delta=0.2)
-        call("clear_body_wrenches", "body")  # matches nothing
-        call("clear_body_wrenches", "box::body")
+        gazebo("clear_body_wrenches", "body")  # matches nothing
+        gazebo("clear_body_wrenches", "box::body")
         speed = self.box().twist.linear
         time = run(0.1)
         found = self.box().twist.linear
@@ -72,20 +73,20 @@ class ForcesTest(GazeboTest):
         )
 
     def without_gravity(self):
-        call("set_physics_properties", physics(gravity=Vector3()))
-        self.addCleanup(call, "set_physics_properties", physics())
+        gazebo("set_physics_properties", physics(gravity=Vector3()))
+        self.addCleanup(gazebo, "set_physics_properties", physics())
 
     def push(self, force, start=0.0, duration=0.0, frame="", point=(0, 0, 0)):
         wrench = Wrench(force=Vector3(*force))
-        call("apply_body_wrench", "box::body", frame, Point(*point), wrench,
+        gazebo("apply_body_wrench", "box::body", frame, Point(*point), wrench,
              rospy.Time.from_sec(start), rospy.Duration.from_sec(duration))  # fmt: skip
 
     def test_a_wrench_acts_for_exactly_as_many_steps_as_its_time_holds(self):
         self.without_gravity()
         for duration, later, steps in ((0.0, 0.0, 0), (0.0009, 0.0, 0), (0.05, 0.0, 50), (0.0105, 0.0, 10),
                                        (0.05, 0.01, 51), (0.0, 0.01, 1)):  # fmt: skip
-            call("reset_world")
-            self.push((2.0, 0, 0), now() + later if later else 0.0, duration)
+            gazebo("reset_world")
+            self.push((2.0, 0, 0), sim_time() + later if later else 0.0, duration)
             run(0.08)
             # 2 N on 2 kg
             self.assertAlmostEqual(self.box().twist.linear.x, steps * 0.001, places=6)
@@ -101,22 +102,22 @@ class ForcesTest(GazeboTest):
     def test_resets_keep_what_is_applied(self):
         self.without_gravity()
         self.push((2.0, 0, 0), duration=-1.0)
-        call("reset_world")
+        gazebo("reset_world")
         time = run(0.02)
         self.assertAlmostEqual(self.box().twist.linear.x, time, places=6)
-        call("reset_simulation")  # its start is not adjusted: it sleeps until time has caught up
+        gazebo("reset_simulation")  # its start is not adjusted: it sleeps until time has caught up
         run(0.0)
         self.assertEqual(self.box().twist.linear.x, 0.0)
-        call("clear_body_wrenches", "box::body")
+        gazebo("clear_body_wrenches", "box::body")
 
     def test_a_deleted_model_takes_its_forces_and_the_efforts_on_joints_of_its_names_along(self):
         self.without_gravity()
         self.push((5.0, 0, 0), duration=-1.0)
-        call("delete_model", "box")
-        spawn("box", BOX, (3.0, 0.0, 20.0))
-        self.add("twin", rospy.get_param("/robot_description"), (0.0, 5.0, 0.0), "/twin")
-        call("apply_joint_effort", "cartpole::cart_pole", 0.1, rospy.Time(), rospy.Duration(-1))
-        call("delete_model", "twin")
+        gazebo("delete_model", "box")
+        self.spawn("box", BOX, x=3.0, z=20.0)
+        self.spawn("twin", rospy.get_param("/robot_description"), "/twin", y=5.0)
+        gazebo("apply_joint_effort", "cartpole::cart_pole", 0.1, rospy.Time(), rospy.Duration(-1))
+        gazebo("delete_model", "twin")
         run(0.02)
-        self.assertEqual(self.joint("cartpole::cart_pole")[1], 0.0)
+        self.assertEqual(joint("cartpole::cart_pole")[1], 0.0)
         self.assertEqual(self.box().twist.linear.x, 0.0)

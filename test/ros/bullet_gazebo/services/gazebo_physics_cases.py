@@ -6,11 +6,11 @@ import rospy
 from dynamic_reconfigure.client import Client
 from dynamic_reconfigure.msg import BoolParameter, Config, DoubleParameter, IntParameter
 from dynamic_reconfigure.srv import Reconfigure
-from gazebo_world import INF, NAN, GazeboTest, call, now, ode, physics, run
+from gazebo_world import INF, NAN, GazeboTest, ode, physics, run
 from geometry_msgs.msg import Pose, Vector3
 from roscpp.srv import GetLoggers, SetLoggerLevel
 from std_msgs.msg import ColorRGBA
-from support.ros.calls import BOUND, wait_until
+from support.ros.calls import BOUND, call, gazebo, sim_time, wait_until
 
 PARAMETERS = {  # type, default, least, most
     "time_step": ("double", 0.001, 0.0, 10.0),
@@ -42,33 +42,33 @@ class PhysicsTest(GazeboTest):
         changed = physics(gravity=Vector3(1.0, 0, 0), time_step=0.002, ode_config=wanted)
         self.succeeds(text, "set_physics_properties", changed)
         passed = run(0.1)
-        found = call("get_physics_properties")
+        found = gazebo("get_physics_properties")
         self.assertEqual((found.time_step, found.pause, found.ode_config), (0.002, True, wanted))
         self.assertAlmostEqual(self.box().twist.linear.x, passed, places=5)
-        self.assertEqual(round(now() * 1e9) % 1_000_000, 0)
+        self.assertEqual(round(sim_time() * 1e9) % 1_000_000, 0)
         self.succeeds(text, "set_physics_properties", physics())
 
     def test_the_update_rate_acts(self):
         # Steps of 10 ms, so that a busy machine, too, is well beyond real time where nothing holds it.
         slow, free = (20.0, 0.0, 0.4), [(rate, 1.5, INF) for rate in (0.0, -1.0)]
         for rate, slowest, fastest in (slow, free[0], slow, free[1]):
-            call("set_physics_properties", physics(time_step=0.01, max_update_rate=rate))
-            start, begin = now(), time.monotonic()
-            call("unpause_physics")
+            gazebo("set_physics_properties", physics(time_step=0.01, max_update_rate=rate))
+            start, begin = sim_time(), time.monotonic()
+            gazebo("unpause_physics")
             rospy.rostime.wallsleep(0.5)
-            call("pause_physics")
-            factor = (now() - start) / (time.monotonic() - begin)
+            gazebo("pause_physics")
+            factor = (sim_time() - start) / (time.monotonic() - begin)
             self.assertTrue(slowest <= factor <= fastest, f"rate {rate}: {factor}")
-        call("set_physics_properties", physics())
+        gazebo("set_physics_properties", physics())
 
     def test_physics_that_no_world_can_have_is_refused(self):
-        before = call("get_physics_properties")
+        before = gazebo("get_physics_properties")
         for changes in ({"time_step": 0.0}, {"time_step": -0.001}, {"time_step": NAN},
                         {"time_step": 1e9}, {"time_step": 1e-12}, {"max_update_rate": NAN},
                         {"gravity": Vector3(0, 0, INF)}, {"ode_config": ode(erp=NAN)}):  # fmt: skip
             self.refuses(f"SetPhysicsProperties: .*{next(iter(changes))}",
                          "set_physics_properties", physics(**changes))  # fmt: skip
-        self.assertEqual(call("get_physics_properties"), before)
+        self.assertEqual(gazebo("get_physics_properties"), before)
 
     def test_reconfigure(self):
         update = rospy.wait_for_message("/gazebo/parameter_updates", Config, BOUND)
@@ -76,10 +76,10 @@ class PhysicsTest(GazeboTest):
         wanted = Config(doubles=[DoubleParameter("gravity_z", -1000.0), DoubleParameter("nobody", 1.0)],
                         ints=[IntParameter("max_contacts", 7), IntParameter("time_step", 3)],
                         bools=[BoolParameter("auto_disable_bodies", True)])  # fmt: skip
-        answer = call("set_parameters", wanted, kind=Reconfigure).config
+        answer = call("/gazebo/set_parameters", Reconfigure, wanted).config
         self.assertEqual({p.name: p.value for p in answer.doubles}["gravity_z"], -100.0)  # clamped
         self.assertEqual(len(answer.doubles + answer.ints + answer.bools), 15)
-        found = call("get_physics_properties")
+        found = gazebo("get_physics_properties")
         self.assertEqual((found.gravity.z, found.time_step), (-100.0, 0.001))
         self.assertEqual(
             (found.ode_config.max_contacts, found.ode_config.auto_disable_bodies), (7, True)
@@ -89,19 +89,19 @@ class PhysicsTest(GazeboTest):
         self.assertEqual({p.name: p.value for p in update.doubles}["gravity_z"], -100.0)
 
     def test_reconfigure_takes_back_what_the_service_set(self):
-        call("set_physics_properties", physics(gravity=Vector3(3.0, 0, 0)))
+        gazebo("set_physics_properties", physics(gravity=Vector3(3.0, 0, 0)))
         config = Config(doubles=[DoubleParameter("gravity_z", -9.8)], ints=[IntParameter("max_contacts", 20)],
                         bools=[BoolParameter("auto_disable_bodies", False)])  # fmt: skip
-        call("set_parameters", config, kind=Reconfigure)
-        self.assertEqual(call("get_physics_properties").gravity, Vector3(0, 0, -9.8))
+        call("/gazebo/set_parameters", Reconfigure, config)
+        self.assertEqual(gazebo("get_physics_properties").gravity, Vector3(0, 0, -9.8))
 
     def test_reconfigure_refuses_what_the_world_cannot_take(self):
-        before = call("get_physics_properties")
+        before = gazebo("get_physics_properties")
         for value in (0.0, -3.0, NAN):
             config = Config(doubles=[DoubleParameter("time_step", value)])
-            answer = call("set_parameters", config, kind=Reconfigure).config
+            answer = call("/gazebo/set_parameters", Reconfigure, config).config
             self.assertEqual({p.name: p.value for p in answer.doubles}["time_step"], 0.001)
-        self.assertEqual(call("get_physics_properties"), before)
+        self.assertEqual(gazebo("get_physics_properties"), before)
 
     def test_lights(self):
         text = "getLightProperties: Requested light lamp not found!"
@@ -119,7 +119,7 @@ class PhysicsTest(GazeboTest):
         bad = (*settings[:3], NAN, *settings[4:])
         self.refuses("attenuation_constant is nan", "set_light_properties", "sun", *bad)
         self.succeeds("DeleteLight: sun successfully deleted", "delete_light", "sun")
-        self.assertFalse(call("get_light_properties", "sun").success)
+        self.assertFalse(gazebo("get_light_properties", "sun").success)
 
     def test_the_parameters_are_described_as_gazebo_describes_them(self):
         client = Client("/gazebo", timeout=BOUND)
@@ -134,7 +134,7 @@ class PhysicsTest(GazeboTest):
             self.assertEqual(rospy.get_param(f"/gazebo/{name}"), value)
         found = client.update_configuration({"sor_pgs_iters": 60, "cfm": 0.5})
         self.assertEqual((found["sor_pgs_iters"], found["cfm"]), (60, 0.5))
-        config = call("get_physics_properties").ode_config
+        config = gazebo("get_physics_properties").ode_config
         self.assertEqual((config.sor_pgs_iters, config.cfm), (60, 0.5))
         client.update_configuration({"sor_pgs_iters": 50, "cfm": 0.0})
 
@@ -142,7 +142,7 @@ class PhysicsTest(GazeboTest):
 
     def test_loggers(self):
         for level in ("debug", "warn", "info"):
-            call("set_logger_level", "rosout", level, kind=SetLoggerLevel)
-            loggers = call("get_loggers", kind=GetLoggers).loggers
+            call("/gazebo/set_logger_level", SetLoggerLevel, "rosout", level)
+            loggers = call("/gazebo/get_loggers", GetLoggers).loggers
             levels = {each.name: each.level for each in loggers}
             self.assertEqual(levels["rosout"].lower()[:4], level[:4])

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Gazebo's services, case by case, in one paused world."""
+"""Gazebo's services and topics, case by case, in one paused world."""
 
 import rospy
 import rostest
@@ -8,8 +8,9 @@ from gazebo_joints_cases import JointsTest
 from gazebo_links_cases import LinksTest
 from gazebo_models_cases import ModelsTest
 from gazebo_physics_cases import PhysicsTest
+from stand_in_cases import StandInTest
 
-__all__ = ["ForcesTest", "JointsTest", "LinksTest", "ModelsTest", "PhysicsTest"]
+__all__ = ["ForcesTest", "JointsTest", "LinksTest", "ModelsTest", "PhysicsTest", "StandInTest"]
 
 if __name__ == "__main__":
     rospy.init_node("gazebo_services")

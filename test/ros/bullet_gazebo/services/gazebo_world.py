@@ -1,14 +1,12 @@
-"""The world that the tests of Gazebo's services start from, calls, and checks of answers."""
-
-import unittest
+"""The world that the tests of Gazebo's services start from, and checks of answers."""
 
 import rosgraph
 import rospy
 from gazebo_msgs import srv
 from gazebo_msgs.msg import ODEPhysics
-from geometry_msgs.msg import Point, Pose, Vector3
-from std_srvs.srv import Empty
-from support.ros.calls import BOUND
+from geometry_msgs.msg import Vector3
+from support.ros.calls import gazebo, sim_time
+from support.ros.world_case import WorldCase
 
 from bullet_gazebo.clients.gz import RemoteWorld
 
@@ -17,33 +15,13 @@ SCOPE = "did you forget to scope the link by model name?"
 BOX = """<robot name="box"><link name="body"><inertial><mass value="2"/>
 <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial>
 <collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link></robot>"""
-OTHERS = {"spawn_urdf_model": srv.SpawnModel, "clear_joint_forces": srv.JointRequest,
-          "clear_body_wrenches": srv.BodyRequest, "pause_physics": Empty, "unpause_physics": Empty,
-          "reset_world": Empty, "reset_simulation": Empty}  # fmt: skip
-
-
-def call(name, *args, kind=None, **kwargs):
-    """Calls a service of Gazebo's; its type follows from its name where it isn't given."""
-    rospy.wait_for_service(f"/gazebo/{name}", BOUND)
-    title = "".join(word.capitalize() for word in name.split("_"))
-    kind = kind or OTHERS.get(name) or getattr(srv, title)
-    return rospy.ServiceProxy(f"/gazebo/{name}", kind)(*args, **kwargs)
-
-
-def now():
-    return call("get_world_properties").sim_time
 
 
 def run(seconds):
     """Moves the paused world by `seconds` [s] of its time, one step at least; returns how long that was."""
-    start, step = now(), call("get_physics_properties").time_step
+    start, step = sim_time(), gazebo("get_physics_properties").time_step
     RemoteWorld("/gazebo", rosgraph.get_master_uri()).step(max(1, round(seconds / step)))
-    return now() - start
-
-
-def spawn(name, xml, position=(0.0, 0.0, 0.0), namespace="/"):
-    answer = call("spawn_urdf_model", name, xml, namespace, Pose(position=Point(*position)), "")
-    assert answer.success, answer.status_message
+    return sim_time() - start
 
 
 def ode(**changes):
@@ -63,45 +41,31 @@ def physics(**changes):
     return request
 
 
-class GazeboTest(unittest.TestCase):
+class GazeboTest(WorldCase):
     """A paused world with the cart-pole and a box in the air, anew for each test."""
 
     def setUp(self):
-        call("pause_physics")
-        spawn("cartpole", rospy.get_param("/robot_description"))
-        spawn("box", BOX, (3.0, 0.0, 20.0))
-
-    def tearDown(self):
-        call("pause_physics")
-        for name in ("cartpole", "box"):
-            call("delete_model", name)
+        gazebo("pause_physics")
+        self.spawn("cartpole", rospy.get_param("/robot_description"))
+        self.spawn("box", BOX, x=3.0, z=20.0)
 
     def fails(self, text, name, *args, **kwargs):
-        answer = call(name, *args, **kwargs)
+        answer = gazebo(name, *args, **kwargs)
         self.assertEqual((answer.success, answer.status_message), (False, text))
         return answer
 
     def succeeds(self, text, name, *args, **kwargs):
-        answer = call(name, *args, **kwargs)
+        answer = gazebo(name, *args, **kwargs)
         self.assertEqual((answer.status_message, answer.success), (text, True))
         return answer
 
     def refuses(self, pattern, name, *args, **kwargs):
-        answer = call(name, *args, **kwargs)
+        answer = gazebo(name, *args, **kwargs)
         self.assertFalse(answer.success)
         self.assertRegex(answer.status_message, pattern)
 
-    def add(self, name, xml, position=(0.0, 0.0, 0.0), namespace="/"):
-        """Spawns a model that goes when the test ends."""
-        spawn(name, xml, position, namespace)
-        self.addCleanup(call, "delete_model", name)
-
-    def joint(self, name):
-        found = call("get_joint_properties", name)
-        return found.position[0], found.rate[0]
-
     def box(self, frame=""):
-        return call("get_model_state", "box", frame)
+        return gazebo("get_model_state", "box", frame)
 
     def close(self, pairs, places=6):
         for got, wanted in pairs:

@@ -1,48 +1,41 @@
 """save_state and restore_state, case by case, in a world in lock-step with the cart-pole in it."""
 
-import unittest
 from pathlib import Path
 
 import rospkg
-from bullet_gazebo_msgs.srv import RestoreState, SaveState, StepWorld, StepWorldRequest
+from lockstep_case import LockstepCase, step
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import Empty
-from support.ros.calls import call, delete_model, spawn_model
-from support.ros.subscribed import Listener
+from support.ros.calls import gazebo
 
-from ros_utils import ros_gazebo
 from ros_utils.step_client import PreparedSteps, StepNames
 
-CART = "stand_cart_position_controller"
 MOST = 1000  # states
 MS = 1_000_000  # [ns]
-BOT = str(Path(rospkg.RosPack().get_path("cartpole"), "test/data/sensors/bot.sdf"))
+BOT = Path(rospkg.RosPack().get_path("cartpole"), "test/data/sensors/bot.sdf")
 
 
 def save(name, forget=()):
-    return call("/gazebo/save_state", SaveState, name=name, forget=list(forget))
+    return gazebo("save_state", name=name, forget=list(forget))
 
 
 def restore(name):
-    return call("/gazebo/restore_state", RestoreState, name=name)
+    return gazebo("restore_state", name=name)
 
 
-def step(ticks, command=None):
-    request = StepWorldRequest(ticks=ticks)
-    if command is not None:
-        request.controllers, request.commands = [CART], [command]
-    answer = call("/gazebo/step_world", StepWorld, request)
+def told(ticks, command=None):
+    """What a step tells of time and joints."""
+    answer = step(ticks, command)
     joints = answer.joint_states
     return answer.sim_time, joints.position, joints.velocity, joints.effort
 
 
 def future():
-    return [step(3, 0.05 * (index % 5)) for index in range(30)]
+    return [told(3, 0.05 * (index % 5)) for index in range(30)]
 
 
-class SnapshotsTest(unittest.TestCase):
+class SnapshotsTest(LockstepCase):
     def setUp(self):
-        call("/gazebo/reset_simulation", Empty)
+        super().setUp()
         step(50, 0.2)
 
     def test_the_same_commands_lead_to_the_same_bits(self):
@@ -50,7 +43,7 @@ class SnapshotsTest(unittest.TestCase):
         first = future()
         self.assertTrue(restore("here").success)
         self.assertEqual(future(), first)
-        call("/gazebo/reset_world", Empty)
+        gazebo("reset_world")
         step(7, -0.3)
         self.assertTrue(restore("here").success)
         self.assertEqual(future(), first)
@@ -58,11 +51,11 @@ class SnapshotsTest(unittest.TestCase):
     def test_states_go_and_come_as_bytes(self):
         self.assertTrue(save("here").success)
         first = future()
-        read = call("/gazebo/save_state", SaveState, read="here")
+        read = gazebo("save_state", read="here")
         self.assertTrue(read.success and len(read.data) < 12_000)
         save("", ["here"])
-        call("/gazebo/reset_world", Empty)
-        answer = call("/gazebo/restore_state", RestoreState, data=read.data, name="back")
+        gazebo("reset_world")
+        answer = gazebo("restore_state", data=read.data, name="back")
         self.assertTrue(answer.success, answer.status_message)
         self.assertEqual(future(), first)
         self.assertTrue(restore("back").success)
@@ -71,17 +64,15 @@ class SnapshotsTest(unittest.TestCase):
 
     def test_bytes_that_are_no_state_are_refused_and_change_nothing(self):
         self.assertTrue(save("here").success)
-        data = call("/gazebo/save_state", SaveState, read="here").data
+        data = gazebo("save_state", read="here").data
         first = future()
         restore("here")
         for wrong in (b"x", data[:-1], data[:60] + bytes([data[60] ^ 1]) + data[61:], data + b"x"):
-            answer = call("/gazebo/restore_state", RestoreState, data=wrong)
+            answer = gazebo("restore_state", data=wrong)
             self.assertFalse(answer.success)
             self.assertNotIn("\n", answer.status_message)
         self.assertEqual(future(), first)
-        self.assertIn(
-            "no state 'her'", call("/gazebo/save_state", SaveState, read="her").status_message
-        )
+        self.assertIn("no state 'her'", gazebo("save_state", read="her").status_message)
         save("", ["here"])
 
     def test_a_name_stands_for_its_newest_state(self):
@@ -93,8 +84,7 @@ class SnapshotsTest(unittest.TestCase):
         self.assertEqual(future(), later)
 
     def test_time_goes_back_and_the_clock_says_so(self):
-        clock = Listener("/clock", Clock)
-        self.addCleanup(clock.close)
+        clock = self.hear("/clock", Clock)
         save("early")
         step(100)
         self.assertTrue(clock.wait_for(lambda each: each[-1].clock.to_nsec() == 150 * MS))
@@ -102,11 +92,11 @@ class SnapshotsTest(unittest.TestCase):
         self.assertTrue(clock.wait_for(lambda each: each[-1].clock.to_nsec() == 50 * MS))
 
     def test_an_unknown_name_is_refused_and_nothing_moves(self):
-        before = step(1)
+        before = step(1).sim_time
         answer = restore("nowhere")
         self.assertFalse(answer.success)
         self.assertIn("nowhere", answer.status_message)
-        self.assertAlmostEqual(step(1)[0], before[0] + 0.001, places=9)
+        self.assertAlmostEqual(step(1).sim_time, before + 0.001, places=9)
 
     def test_a_state_of_another_world_is_refused(self):
         save("alone")
@@ -114,16 +104,14 @@ class SnapshotsTest(unittest.TestCase):
             '<robot name="ball"><link name="l"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" '
             'ixy="0" ixz="0" iyz="0"/></inertial></link></robot>'
         )
-        self.assertTrue(spawn_model("ball", ball, y=3.0).success)
+        self.spawn("ball", ball, y=3.0)
         answer = restore("alone")
         self.assertFalse(answer.success)
         self.assertIn("models", answer.status_message)
-        delete_model("ball")
 
     def test_sensors_of_prepared_steps_measure_at_the_same_times(self):
         """Also those that another client's steps have ended since, and none that have begun since."""
-        self.assertTrue(ros_gazebo.gazebo_spawn_sdf_path(BOT, "bot", pos_y=3.0))
-        self.addCleanup(delete_model, "bot")
+        self.spawn("bot", BOT.read_text(), kind="sdf", y=3.0)
         steps, names = PreparedSteps(), StepNames(sensors=("scanner",))
         self.addCleanup(steps.close)
 
@@ -152,11 +140,11 @@ class SnapshotsTest(unittest.TestCase):
             kept += 1
         self.assertLessEqual(kept, MOST)
         self.assertFalse(save("one more").success)
-        data = call("/gazebo/save_state", SaveState, read="state_0").data
-        before = step(1)[0]
-        answer = call("/gazebo/restore_state", RestoreState, data=data, name="one more")
+        data = gazebo("save_state", read="state_0").data
+        before = step(1).sim_time
+        answer = gazebo("restore_state", data=data, name="one more")
         self.assertFalse(answer.success)
-        self.assertAlmostEqual(step(1)[0], before + 0.001, places=9)  # nothing has changed
+        self.assertAlmostEqual(step(1).sim_time, before + 0.001, places=9)  # nothing has changed
         self.assertTrue(save("state_0").success)  # a new one in the place of the old one
         names = [f"state_{number}" for number in range(kept)]
         self.assertTrue(save("one more", forget=[*names, "never saved"]).success)
