@@ -71,7 +71,7 @@ def make_world(
         pose = Pose((0.0, APART * index, HEIGHT))
         add_robot(sim, f"robot{index}", urdf, pose, controllers, listener=None)
     for model in list(sim.world.models.values())[1:]:
-        sim.set_joint_states(model, {"cart_pole": LEAN}, {})
+        sim.set_joint_states(model, {"cart_pole": LEAN})
     return sim
 
 

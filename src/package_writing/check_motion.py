@@ -57,7 +57,7 @@ def _of_robot(
         sim.world.spawn("ground_plane", ground_plane(), Pose())
         height = standing_height(robot, starts) or 0.0
     model = sim.world.spawn(robot.name, deepcopy(robot), Pose((0.0, 0.0, height)))
-    sim.set_joint_states(model, starts, {})
+    sim.set_joint_states(model, starts)
     if robot.static:
         return _run(sim, [model])
     driven = [each for each in robot.movable_joints if each.name not in robot.mimics]

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, Protocol
 
 from robot_sim.applied_forces import AppliedForces
@@ -213,21 +214,19 @@ class Simulator(Shared):
             del self._robots_of[robot.model]
         self._robots_version += 1
 
-    def set_joint_positions(self, model: Model, positions: Mapping[str, float]) -> None:
-        """Puts joints of `model` at `positions` [rad, m], at rest; the caller holds the lock."""
-        model.set_joint_positions(positions)
-        self._joints_moved(model)
-        self.moves.tell([model])
-
     def set_joint_states(
-        self, model: Model, positions: Mapping[str, float], velocities: Mapping[str, float]
+        self,
+        model: Model,
+        positions: Mapping[str, float],
+        velocities: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
-        """Begins an episode with joints of `model` at `positions` [rad, m] and `velocities` [rad/s, m/s].
+        """Puts joints of `model` at `positions` [rad, m], with `velocities` [rad/s, m/s].
 
         What the joints carry is at rest, but for joints in `velocities`. The caller holds the lock.
         """
         model.set_joint_positions(positions)
-        model.set_joint_velocities(velocities)
+        if velocities:
+            model.set_joint_velocities(velocities)
         self._joints_moved(model)
         self.moves.tell([model])
 

@@ -73,7 +73,7 @@ class JointServices:
                 raise ServiceRefused(f"joint positions must be finite, not {list(positions)}")
             plain = [name.removeprefix(f"{model.name}::") for name in names]
             wanted = dict(zip(plain, positions, strict=True))
-            self._sim.set_joint_positions(model, wanted)
+            self._sim.set_joint_states(model, wanted)
             for name in wanted.keys() & set(model.joint_names):
                 stop = model.clamped(name, wanted[name])
                 if abs(stop - wanted[name]) > BEYOND:

@@ -178,10 +178,7 @@ class Axis(Stateful):
         joint = self.joint
         self.position_error = self.velocity_error = 0.0
         self.desired = State(joint.position, joint.velocity)
-        if duration > 0:
-            self.spline = JointSpline([stop_ramp(0, self.desired, duration)])
-        else:
-            self.spline = JointSpline([still(0, joint.position)])
+        self._stop(0, self.desired, duration)
         if self.pid is None:
             joint.command = joint.position
         else:
@@ -190,10 +187,11 @@ class Axis(Stateful):
 
     def hold(self, start: int, duration: int) -> None:
         """Stops from uptime `start` [ns] on: at once where the joint is, or in a ramp of `duration` [ns]."""
-        if duration > 0:
-            self.spline = JointSpline([stop_ramp(start, self.spline.at(start), duration)])
-        else:
-            self.spline = JointSpline([still(start, self.joint.position)])
+        self._stop(start, self.spline.at(start), duration)
+
+    def _stop(self, start: int, state: State, duration: int) -> None:
+        ramp = stop_ramp(start, state, duration) if duration > 0 else None
+        self.spline = JointSpline([ramp or still(start, self.joint.position)])
 
     def follow(self, now: int, start: int, points: list[tuple[int, Waypoint]]) -> None:
         """Leaves the present spline at uptime `start` [ns] for `points`, all of them after `now`."""

@@ -139,14 +139,6 @@ class Tolerance(NamedTuple):
         return Tolerance(*(w if w else own for own, w in zip(self, wish, strict=True)))
 
 
-class Constraints(NamedTuple):
-    """The parameters `constraints`: tolerances of each joint, and how late [ns] a goal may be reached."""
-
-    path: tuple[Tolerance, ...]
-    goal: tuple[Tolerance, ...]
-    goal_time: int = 0
-
-
 class GoalOutcome(NamedTuple):
     """How a goal ended; `code` is FollowJointTrajectory's error code."""
 
@@ -185,11 +177,16 @@ class GoalRequest(NamedTuple):
 
 
 class MonitoredJoint(NamedTuple):
-    """A joint of a goal, and its tolerances on the way and at the end."""
+    """A joint, and its tolerances on the way and at the end."""
 
     axis: Axis
     path: Tolerance
     goal: Tolerance
+
+    def changed(self, request: GoalRequest) -> "MonitoredJoint":
+        """Returns the joint with its tolerances as a goal changes them."""
+        path, goal = (each.get(self.axis.joint.name) for each in (request.path, request.goal))
+        return MonitoredJoint(self.axis, self.path.changed(path), self.goal.changed(goal))
 
 
 @dataclass
@@ -228,24 +225,6 @@ def check_tolerances(request: GoalRequest) -> None:
     for joint, tolerance in (*request.path.items(), *request.goal.items()):
         if any(math.isnan(value) for value in tolerance):
             raise TrajectoryRefused(INVALID_GOAL, f"A tolerance of joint '{joint}' is not a number")
-
-
-def monitored_joints(
-    request: GoalRequest, axes: Sequence[Axis], constraints: Constraints
-) -> tuple[list[MonitoredJoint], int]:
-    """Returns the goal's joints with their tolerances, and how late [ns] they may arrive."""
-    wanted = request.trajectory.names
-    monitored = [
-        MonitoredJoint(
-            axis,
-            path.changed(request.path.get(axis.joint.name)),
-            goal.changed(request.goal.get(axis.joint.name)),
-        )
-        for axis, path, goal in zip(axes, constraints.path, constraints.goal, strict=True)
-        if axis.joint.name in wanted
-    ]
-    late = max(0, request.goal_time) if request.goal_time else constraints.goal_time
-    return monitored, late
 
 
 def _aborted(code: int, axis: Axis, where: str, fault: str) -> GoalOutcome:

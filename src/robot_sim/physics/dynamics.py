@@ -79,19 +79,20 @@ def link_poses(
     poses = {model.root: root}
     poses.update({name: root.compose(pose) for name, pose in model.islands.items()})
     for joint in model.joints_below(*poses):
-        motion = _motion(joint, 0.0 if model.static else positions.get(joint.name, 0.0))
-        moved = joint.pose.compose(joint.anchor).compose(motion)
-        poses[joint.child] = poses[joint.parent].compose(moved.compose(joint.anchor.inverse()))
+        moved = child_pose(joint, 0.0 if model.static else positions.get(joint.name, 0.0))
+        poses[joint.child] = poses[joint.parent].compose(moved)
     return poses
 
 
-def _motion(joint: Joint, position: float) -> Pose:
-    if not joint.movable or position == 0.0:
-        return Pose()
+def child_pose(joint: Joint, position: float) -> Pose:
+    """Returns the child link seen from the parent, with the joint at `position` [rad, m]."""
+    motion = Pose()
     if joint.kind == "prismatic":
-        return Pose(scale(joint.axis, position))
-    x, y, z = scale(joint.axis, math.sin(position / 2.0))
-    return Pose(orientation=(x, y, z, math.cos(position / 2.0)))
+        motion = Pose(scale(joint.axis, position))
+    elif joint.movable and position != 0.0:
+        x, y, z = scale(joint.axis, math.sin(position / 2.0))
+        motion = Pose(orientation=(x, y, z, math.cos(position / 2.0)))
+    return joint.pose.compose(joint.anchor).compose(motion).compose(joint.anchor.inverse())
 
 
 def effective_inertias(model: ModelDescription, poses: Mapping[str, Pose]) -> dict[str, float]:

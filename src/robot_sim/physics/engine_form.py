@@ -115,7 +115,10 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
         for joint in model.joints.values()
         if joint.anchor != Pose()
     }
-    model = _shared(model)
+    if model.loops:  # helpers that close them have shares of links' inertias
+        inertias = model.inertias()
+        links = {name: replace(each, inertia=inertias[name]) for name, each in model.links.items()}
+        model = replace(model, links=links)
     root = model.links[model.root]
     if root.kinematic:
         heavy = replace(root, inertia=root.acting_inertia)
@@ -126,15 +129,6 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
     links = {name: _moved(link, offsets.get(name)) for name, link in model.links.items()}
     joints = {name: _joined(joint, offsets) for name, joint in model.joints.items()}
     return replace(model, links=links, joints=joints), offsets
-
-
-def _shared(model: ModelDescription) -> ModelDescription:
-    """Returns the model with the inertias of links shared with helpers that close loops."""
-    if not model.loops:
-        return model
-    inertias = model.inertias()
-    links = {name: replace(each, inertia=inertias[name]) for name, each in model.links.items()}
-    return replace(model, links=links)
 
 
 def one_friction_each(model: ModelDescription) -> ModelDescription:

@@ -16,7 +16,6 @@ from robot_sim.physics.description import (
     Joint,
     Link,
     ModelDescription,
-    Sensor,
     Shape,
 )
 from robot_sim.physics.dynamics import combine, is_positive_definite
@@ -44,8 +43,13 @@ def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
 def find_roots(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:
     """Returns the links without a parent joint, in document order; all others hang from one of them."""
     check_links(links, joints)
-    below = _children(joints)
-    children = {name for names in below.values() for name in names}
+    below: dict[str, list[str]] = defaultdict(list)
+    children: set[str] = set()
+    for joint in joints.values():
+        if joint.child in children:
+            raise DescriptionError(f"link '{joint.child}' has more than one parent joint")
+        children.add(joint.child)
+        below[joint.parent].append(joint.child)
     roots = [name for name in links if name not in children]
     if not roots:
         raise DescriptionError("the links form a loop: no link is without a parent joint")
@@ -74,17 +78,6 @@ def check_links(links: dict[str, Link], joints: dict[str, Joint]) -> None:
                 raise DescriptionError(f"joint '{joint.name}': {role} link '{name}' does not exist")
 
 
-def _children(joints: dict[str, Joint]) -> dict[str, list[str]]:
-    below: dict[str, list[str]] = defaultdict(list)
-    seen: set[str] = set()
-    for joint in joints.values():
-        if joint.child in seen:
-            raise DescriptionError(f"link '{joint.child}' has more than one parent joint")
-        seen.add(joint.child)
-        below[joint.parent].append(joint.child)
-    return below
-
-
 def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
     """Lumps fixed joints and drops massless links, in place; returns `model`.
 
@@ -105,8 +98,12 @@ def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
     model.joints = {name: model.joints[name] for name in left if name in model.joints}
     model.lumped = {name: at for name, at in model.lumped.items() if at[0] in model.links}
     model.sensors.sort(key=lambda sensor: order.index(sensor.link))
-    moved = [_lumped_sensor(model, sensor) for sensor in model.sensors]
-    model.sensors = [sensor for sensor in moved if sensor.link in model.links]
+    places = [model.lumped.get(each.link, (each.link, Pose())) for each in model.sensors]
+    model.sensors = [
+        replace(sensor, link=link, pose=pose.compose(sensor.pose))
+        for sensor, (link, pose) in zip(model.sensors, places, strict=True)
+        if link in model.links
+    ]
     mend_moments(model)
     for link in model.links.values():
         link.collisions = _named(link, link.collisions, "_collision")
@@ -176,11 +173,6 @@ def _lump(model: ModelDescription, name: str) -> None:
 
 def _lumped(shape: Shape, pose: Pose, link: str) -> Shape:
     return replace(shape, pose=pose.compose(shape.pose), name=shape.name or link)
-
-
-def _lumped_sensor(model: ModelDescription, sensor: Sensor) -> Sensor:
-    link, pose = model.lumped.get(sensor.link, (sensor.link, Pose()))
-    return replace(sensor, link=link, pose=pose.compose(sensor.pose))
 
 
 def _drop_free_joints(model: ModelDescription) -> None:

@@ -80,6 +80,15 @@ def normalized(q: Quaternion) -> Quaternion:
     return (q[0] / length, q[1] / length, q[2] / length, q[3] / length)
 
 
+def z_onto(direction: tuple[float, ...]) -> Quaternion:
+    """Returns the shortest rotation of z onto a direction of any length above 0."""
+    x, y, z = direction
+    length = (x * x + y * y + z * z) ** 0.5
+    if z < -0.999999 * length:
+        return (1.0, 0.0, 0.0, 0.0)
+    return normalized((0.0 - y, x, 0.0, length + z))
+
+
 def from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
     """Returns the quaternion of fixed-axis roll, pitch, yaw [rad], the convention of URDF."""
     cr, sr = math.cos(roll / 2), math.sin(roll / 2)

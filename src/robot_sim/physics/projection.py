@@ -28,7 +28,12 @@ def place_link(model: Model, link: str, pose: Pose, twist: Twist) -> None:
     for _ in range(ITERATIONS):
         if _approach(model, carriers, link, pose) < CLOSE:
             break
-    _match(model, carriers, link, twist)
+    # The carriers' speeds by which the link's velocity comes nearest to `twist`.
+    _speed_up(model, carriers, np.zeros(len(carriers)))
+    _, rest = model.link_state(link)
+    gap = np.array(twist[0] + twist[1]) - np.array(rest[0] + rest[1])
+    speeds = np.linalg.lstsq(_jacobian(model, carriers, link), gap, rcond=1e-9)[0]
+    _speed_up(model, carriers, speeds)
     model.put_followers()
     model.close_loops((), before)
 
@@ -46,16 +51,6 @@ def _approach(model: Model, carriers: list[str], link: str, pose: Pose) -> float
         model.body.reset_joint(model.joint_index(name), wanted, speed)
         moved = max(moved, abs(wanted - position))
     return moved
-
-
-def _match(model: Model, carriers: list[str], link: str, twist: Twist) -> None:
-    """Sets the carriers' speeds so that the link's velocity comes nearest to `twist`."""
-    _speed_up(model, carriers, np.zeros(len(carriers)))
-    _, rest = model.link_state(link)
-    gap = np.array(twist[0] + twist[1]) - np.array(rest[0] + rest[1])
-    _speed_up(
-        model, carriers, np.linalg.lstsq(_jacobian(model, carriers, link), gap, rcond=1e-9)[0]
-    )
 
 
 def _jacobian(model: Model, carriers: list[str], link: str) -> np.ndarray:

@@ -13,10 +13,11 @@ import numpy as np
 from PIL import Image
 
 from robot_sim.physics.files.world_file import empty_world
-from robot_sim.physics.pose import ZERO, Pose, Vector, add, subtract
+from robot_sim.physics.pose import ZERO, Vector, add, subtract
 from robot_sim.pictures.camera import ASPECT, Camera, overview
 from robot_sim.pictures.recording import RecordedModel, RecordingOptions
 from robot_sim.pictures.renderer import Renderer
+from robot_sim.pictures.visuals import pose_of
 from web_viewer.video import EncoderFailed, Mp4Writer
 
 NUMBERS = 7  # of a pose
@@ -49,13 +50,10 @@ class FrameDrawer:
 
     def frame(self, poses: Sequence[float]) -> np.ndarray:
         """Draws the models with their links at these poses, 7 numbers each."""
-        rows = iter(np.reshape(np.asarray(poses), (-1, NUMBERS)).tolist())
+        rows = iter(np.reshape(np.asarray(poses), (-1, NUMBERS)))
         places: dict[str, Vector] = {}
         for model, _ in self._models:
-            found = []
-            for _ in model.links:
-                x, y, z, *turn = next(rows)
-                found.append(Pose((x, y, z), (turn[0], turn[1], turn[2], turn[3])))
+            found = [pose_of(next(rows)) for _ in model.links]
             named = {link.name: pose for link, pose in zip(model.links, found, strict=True)}
             self._renderer.place(model.name, named)
             places[model.name] = found[model.root].position if found else ZERO

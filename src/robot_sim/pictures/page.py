@@ -1,6 +1,7 @@
 """Models, lights and contacts as nodes of viser's web page; knows no ROS."""
 
 from collections.abc import Callable, Iterable, Sequence
+from itertools import islice
 
 import numpy as np
 import viser
@@ -95,20 +96,17 @@ class Picture:
         for count, light in enumerate(lights):
             color = color_bytes(light.diffuse)
             x, y, z = light.direction
+            lamp: viser.SceneNodeHandle
             if light.kind == "directional":  # the page's shines from its position to the origin
-                self._lights.append(
-                    scene.add_light_directional(
-                        f"/lights/{count}", color=color, intensity=2.5, cast_shadow=True,
-                        position=(-10.0 * x, -10.0 * y, -10.0 * z),
-                    )
+                lamp = scene.add_light_directional(
+                    f"/lights/{count}", color=color, intensity=2.5, cast_shadow=True,
+                    position=(-10.0 * x, -10.0 * y, -10.0 * z),
                 )  # fmt: skip
             else:
-                self._lights.append(
-                    scene.add_light_point(
-                        f"/lights/{count}", color=color, intensity=20.0,
-                        position=light.pose.position,
-                    )
-                )  # fmt: skip
+                lamp = scene.add_light_point(
+                    f"/lights/{count}", color=color, intensity=20.0, position=light.pose.position
+                )
+            self._lights.append(lamp)
 
     def move(self, poses: np.ndarray) -> None:
         """Moves the links: position [m] and quaternion x y z w of each, in the models' order (n, 7)."""
@@ -139,12 +137,8 @@ class Picture:
 
     def joints(self, positions: Sequence[float]) -> dict[str, list[float]]:
         """Returns the positions [rad, m] of all joints by model."""
-        found, first = {}, 0
-        for model in self.models.values():
-            count = len(model.joints)
-            found[model.name] = list(positions[first : first + count])
-            first += count
-        return found
+        left = iter(positions)
+        return {m.name: list(islice(left, len(m.joints))) for m in self.models.values()}
 
     def touch(self, points: np.ndarray) -> None:
         """Shows contact points [m] (n, 3)."""

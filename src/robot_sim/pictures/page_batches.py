@@ -6,6 +6,7 @@ sends the poses of up to 128 shapes in one array.
 
 from collections import defaultdict
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -88,15 +89,13 @@ class Batches:
 
     def settle(self, first: dict[int, int]) -> None:
         """Sets the row of the poses at which each model begins."""
-        for batches in self._batches.values():
-            for batch in batches:
-                batch.settle(first)
+        for batch in chain.from_iterable(self._batches.values()):
+            batch.settle(first)
 
     def move(self, poses: np.ndarray, moved: np.ndarray) -> None:
         """Places the instances by the poses (n, 7) of all links; `moved` (n,) says which have changed."""
-        for batches in self._batches.values():
-            for batch in batches:
-                batch.move(poses, moved)
+        for batch in chain.from_iterable(self._batches.values()):
+            batch.move(poses, moved)
 
 
 class _Batch:

@@ -12,7 +12,7 @@ from trimesh import creation
 from robot_sim.physics.description import Color, DescriptionError, Joint, Shape
 from robot_sim.physics.files.elements import shown
 from robot_sim.physics.files.meshes import read_look
-from robot_sim.physics.pose import Pose, Vector, rotate
+from robot_sim.physics.pose import Pose, Vector, rotate, z_onto
 from robot_sim.pictures.camera import TILES
 from robot_sim.pictures.page_batches import (
     Appearance,
@@ -142,7 +142,7 @@ class ShapeMaker:
         """Adds a thin cylinder along `way`, between two distances [m] from `corner`."""
         low, high = ends
         x, y, z = np.array(corner) + (low + high) / 2.0 * np.array(way)
-        part = Instance(where, Pose((x, y, z), _turned(way)), (radius, radius, high - low), color)
+        part = Instance(where, Pose((x, y, z), z_onto(way)), (radius, radius, high - low), color)
         self._batches.add(Appearance(_cylinder(), shadow=False), part)
 
 
@@ -173,15 +173,6 @@ def _cylinder() -> Geometry:
 def _geometry(vertices: np.ndarray, faces: np.ndarray, **look: Any) -> Geometry:
     """Returns a geometry of the numbers' types that the page takes."""
     return Geometry(np.asarray(vertices, np.float32), np.asarray(faces, np.uint32), **look)
-
-
-def _turned(way: Vector) -> tuple[float, float, float, float]:
-    """Returns a quaternion that turns z to a direction of length 1."""
-    x, y, z = way
-    if z < -0.999999:
-        return (1.0, 0.0, 0.0, 0.0)
-    length = math.sqrt(2.0 * (1.0 + z))
-    return (-y / length, x / length, 0.0, length / 2.0)
 
 
 def _numbers(pose: Pose) -> np.ndarray:

@@ -89,7 +89,10 @@ class SimulationRecorder:
         self._queued, self._sent = 0, 0  # [bytes]; each is written by one thread
         self._dropped = 0
         self._ending = False
-        self._process = _start()
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", MAIN], stdin=subprocess.PIPE, start_new_session=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        )  # fmt: skip
         self._thread = threading.Thread(
             target=self._feed, args=(options,), name="recording", daemon=True
         )
@@ -150,11 +153,3 @@ def _recorded(model: Model) -> RecordedModel:
     made = model.description
     seen = visible_model(made, model.number, model.name, model.link_names, [], collisions=False)
     return RecordedModel(seen, visible_shapes(made))
-
-
-def _start() -> subprocess.Popen[bytes]:
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    return subprocess.Popen(
-        [sys.executable, "-P", "-c", MAIN], stdin=subprocess.PIPE, env=environment,
-        start_new_session=True,
-    )  # fmt: skip

@@ -42,9 +42,7 @@ class VisibleModel:
 
     def corners(self, links: np.ndarray) -> np.ndarray:
         """Returns box corners around its visuals (n, 3) [m], from the poses (m, 7) of its links."""
-        poses = {}
-        for link, (x, y, z, *turn) in zip(self.links, links.tolist(), strict=True):
-            poses[link.name] = Pose((x, y, z), (turn[0], turn[1], turn[2], turn[3]))
+        poses = {each.name: pose_of(row) for each, row in zip(self.links, links, strict=True)}
         shapes = [(each.name, shape) for each in self.links for shape in each.visuals]
         bounded = boxes_of((link, shape) for link, shape in shapes if shape.kind != "plane")
         found = [moved(box, poses[link].compose(pose)) for link, pose, box in bounded]
@@ -52,8 +50,13 @@ class VisibleModel:
 
     def pose(self, links: np.ndarray) -> Pose:
         """Returns where the model's frame is, from the poses (n, 7) of its links."""
-        x, y, z, qx, qy, qz, qw = links[self.root].tolist()
-        return Pose((x, y, z), (qx, qy, qz, qw)).compose(self.frame)
+        return pose_of(links[self.root]).compose(self.frame)
+
+
+def pose_of(row: np.ndarray) -> Pose:
+    """Returns a pose of seven numbers."""
+    x, y, z, qx, qy, qz, qw = row.tolist()
+    return Pose((x, y, z), (qx, qy, qz, qw))
 
 
 class Solid(NamedTuple):

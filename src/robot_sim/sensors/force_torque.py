@@ -131,7 +131,9 @@ class JointForces(Stateful):
                 f"joint '{name}' is part of a closed loop: its share of the force isn't known"
             )
         self.link = joint.child
-        self._forces = LinkForces(sim, model, _below(model.description, joint.child), name)
+        below = model.description.joints_below(joint.child)
+        links = [joint.child, *(each.child for each in below)]
+        self._forces = LinkForces(sim, model, links, name)
 
     def look(self, now: int, moves: int) -> None:
         """See `LinkForces`."""
@@ -186,14 +188,6 @@ def _joint(description: ModelDescription, name: str) -> Joint:
     raise DescriptionError(
         f"the model has no joint '{name}'; a fixed one of a URDF needs <disableFixedJointLumping>"
     )
-
-
-def _below(description: ModelDescription, link: str) -> list[str]:
-    """Returns a link and all that joints carry below it."""
-    below, links = description.joints_by_parent(), [link]
-    for parent in links:
-        links.extend(joint.child for joint in below[parent])  # the list grows while it is walked
-    return links
 
 
 def _moved(point: Vector, wrench: Wrench) -> Wrench:

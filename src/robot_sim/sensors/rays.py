@@ -59,7 +59,9 @@ class RayCaster:
         self._turns, self._places = state.turns, state.places
         if before is None or before.version != state.version:
             self._build(state.all_targets)
-        self._find_centres()
+        self._apart_centres = self._places[self._apart] + np.einsum(
+            "kij,kj->ki", self._turns[self._apart], self._centres[self._apart]
+        )
 
     @np.errstate(over="ignore", invalid="ignore")  # of what is light years away
     def cast(
@@ -183,8 +185,6 @@ class RayCaster:
             distances = ((self._places[target] - starts) @ normal) / (directions @ normal)
         return np.where(distances >= 0.0, distances, np.inf)
 
-    # --- what there is --------------------------------------------------------------------------
-
     def _build(self, targets: list[Target]) -> None:
         self.targets = targets
         count = len(targets)
@@ -214,25 +214,14 @@ class RayCaster:
                 triangles.append(corners @ self._turns[index].T + self._places[index])
                 continue
             apart.append(index)
-            self._surround(index, corners)
+            low, high = corners.min(axis=0), corners.max(axis=0)
+            self._centres[index] = (low + high) / 2.0  # of its bounding ball, in its frame
+            self._radii[index] = np.linalg.norm(high - low) / 2.0
             meshes[index] = _built([corners])
         self._still, self._apart = np.array([*still, NONE]), np.array(apart, int)
         self._apart_meshes, self._still_triangles = meshes, _built(triangles)
         self._are_cylinders = self._kinds == "cylinder"
         self._analytic = [kind for kind in DISTANCES if kind in self._kinds[apart]]
-
-    def _find_centres(self) -> None:
-        """Computes the bounding balls of moving shapes."""
-        turns, apart = self._turns[self._apart], self._apart
-        self._apart_centres = self._places[apart] + np.einsum(
-            "kij,kj->ki", turns, self._centres[apart]
-        )
-
-    def _surround(self, index: int, corners: np.ndarray) -> None:
-        """Sets the ball around a target, in the target's frame."""
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        self._centres[index] = (low + high) / 2.0
-        self._radii[index] = np.linalg.norm(high - low) / 2.0
 
 
 class RayScene(RayCaster):

@@ -127,13 +127,9 @@ class Mount(Shared):
         if not self.text(tag, "") and not required:
             scope = self.plugin.scope
             return next((name for name in names if name.startswith(f"{scope}::")), names[0])
-        found = self.among(tag, names)
+        given, found = self.required(tag), self.among(tag, names)
         if not found:
-            raise DescriptionError(
-                f"<{tag}>: the model has no link '{self.text(tag, '')}'"
-                if self.text(tag, "")
-                else f"<{tag}> is missing"
-            )
+            raise DescriptionError(f"<{tag}>: the model has no link '{given}'")
         return found
 
     def link_in_world(self, tag: str) -> tuple[Model, str]:

@@ -85,7 +85,7 @@ def test_a_robot_among_64_moves_as_it_does_alone_to_the_bit():
 
 def place_all(sim: Simulator) -> None:
     for robot in sim.robots:
-        sim.set_joint_positions(robot.model, {"cart_pole": 0.1})
+        sim.set_joint_states(robot.model, {"cart_pole": 0.1})
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def test_what_moves_a_robot_between_two_ticks_is_seen_by_the_next(one, whoever):
     with sim.lock:
         sim.advance(1)
         if whoever == "service":
-            sim.set_joint_positions(robot.model, {"stand_cart": 0.1})
+            sim.set_joint_states(robot.model, {"stand_cart": 0.1})
         else:  # which has the model, and tells nobody
             robot.model.set_joint_positions({"stand_cart": 0.1})
         seen = []

@@ -4,7 +4,7 @@ See docs/contract/ros_control.md 3.5.
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple, Self
+from typing import Self
 
 from robot_sim.constants import NANOSECONDS
 from robot_sim.control.controllers.base import Controller, Output
@@ -22,11 +22,11 @@ from robot_sim.control.trajectory import Axis, State
 from robot_sim.control.trajectory_goals import (
     CANCELED,
     INVALID_GOAL,
-    Constraints,
     Goal,
     GoalObserver,
     GoalOutcome,
     GoalRequest,
+    MonitoredJoint,
     Tolerance,
     Trajectory,
     TrajectoryRefused,
@@ -35,7 +35,6 @@ from robot_sim.control.trajectory_goals import (
     check_points,
     check_tolerances,
     dropped_points,
-    monitored_joints,
 )
 
 FOR_EVER = 1e12  # [s]; longer durations are cut
@@ -74,32 +73,8 @@ class JointGains(Parameters):
     )  # fmt: skip
 
 
-class Settings(NamedTuple):
-    """The parameters that aren't about one joint. Times in [ns]."""
-
-    state_period: int  # 0: no state is published
-    monitor_period: int
-    stop_duration: int
-    partial: bool
-    constraints: Constraints
-
-
-def read_settings(params: Mapping[str, object], given: TrajectoryParameters, name: str) -> Settings:
-    """Reads the settings of controller `name`."""
-    joints = [JointTolerances.read(params, name, joint) for joint in given.joints]
-    path = tuple(Tolerance(each.trajectory) for each in joints)
-    goal = tuple(Tolerance(each.goal, given.stopped_velocity_tolerance) for each in joints)
-    rate = given.state_publish_rate
-    return Settings(
-        round(NANOSECONDS / rate) if rate > SLOWEST else 0,
-        round(NANOSECONDS / given.action_monitor_rate),
-        _duration(given.stop_trajectory_duration),
-        given.allow_partial_joints_goal,
-        Constraints(path, goal, _duration(given.goal_time)),
-    )
-
-
 def _duration(seconds: float) -> int:
+    """Returns a duration in [ns]."""
     return round(min(max(0.0, seconds), FOR_EVER) * NANOSECONDS)
 
 
@@ -111,9 +86,16 @@ class JointTrajectoryController(Controller):
     """
 
     parameters = (TrajectoryParameters, JointTolerances, JointGains)
-    non_persistent = ("_goal", "_settings")  # a goal's client knows nothing of snapshots
+    # A goal's client knows nothing of snapshots.
+    non_persistent = ("_goal", "_settings", "_monitored", "_state_period")
 
-    def __init__(self, name: str, axes: list[Axis], settings: Settings) -> None:
+    def __init__(
+        self,
+        name: str,
+        axes: list[Axis],
+        settings: TrajectoryParameters,
+        tolerances: list[JointTolerances],
+    ) -> None:
         super().__init__(name)
         self.joint_names = tuple(axis.joint.name for axis in axes)
         self.claimed = tuple(sorted(self.joint_names))
@@ -124,6 +106,12 @@ class JointTrajectoryController(Controller):
         self.outputs = [self._state]
         self._axes = axes
         self._settings = settings
+        at_rest, rate = settings.stopped_velocity_tolerance, settings.state_publish_rate
+        self._monitored = [
+            MonitoredJoint(axis, Tolerance(each.trajectory), Tolerance(each.goal, at_rest))
+            for axis, each in zip(axes, tolerances, strict=True)
+        ]
+        self._state_period = round(NANOSECONDS / rate) if rate > SLOWEST else 0  # [ns]; 0: none
         self._goal: Goal | None = None
         self._now = self._uptime = self._period = 0
         self._next_state = self._next_report = 0
@@ -132,12 +120,12 @@ class JointTrajectoryController(Controller):
     def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
         given = TrajectoryParameters.read(params, name)
         joints = [hardware.joint(cls.interface, joint) for joint in given.joints]
-        settings = read_settings(params, given, name)
+        tolerances = [JointTolerances.read(params, name, joint) for joint in given.joints]
         if cls.interface == POSITION:
-            return cls(name, [Axis(joint) for joint in joints], settings)
+            return cls(name, [Axis(joint) for joint in joints], given, tolerances)
         gains = [JointGains.read(params, name, joint) for joint in given.joints]
         axes = [Axis(joint, each.pid, each.feed) for joint, each in zip(joints, gains, strict=True)]
-        return cls(name, axes, settings)
+        return cls(name, axes, given, tolerances)
 
     def starting(self, now: int) -> None:
         self._end_goal("the controller started over: it was restarted, or its joints were moved")
@@ -145,7 +133,7 @@ class JointTrajectoryController(Controller):
         self._uptime = 0
         self._next_state = 0
         for axis in self._axes:
-            axis.begin(self._settings.stop_duration)
+            axis.begin(_duration(self._settings.stop_trajectory_duration))
 
     def stopping(self) -> None:
         self._end_goal("the controller was stopped")
@@ -164,8 +152,8 @@ class JointTrajectoryController(Controller):
             axis.update(uptime, dt)
         if self._goal is not None:
             self._monitor(self._goal)
-        if self._settings.state_period and uptime >= self._next_state:
-            self._next_state = max(self._next_state + self._settings.state_period, uptime)
+        if self._state_period and uptime >= self._next_state:
+            self._next_state = max(self._next_state + self._state_period, uptime)
             if self._state.wanted:
                 self._state.send(self.sample())
 
@@ -189,7 +177,7 @@ class JointTrajectoryController(Controller):
         """
         self._check_running("take a trajectory")
         if trajectory.points:
-            check_joints(trajectory.names, self.joint_names, self._settings.partial)
+            self._check_joints(trajectory)
         _, warning = self._lead(trajectory)
         self._end_goal("a trajectory came by the command topic")
         return warning
@@ -197,13 +185,15 @@ class JointTrajectoryController(Controller):
     def pursue(self, key: str, request: GoalRequest, listener: GoalObserver) -> str:
         """Pursues a goal of follow_joint_trajectory; returns and raises like follow()."""
         self._check_running("take a goal")
-        check_joints(request.trajectory.names, self.joint_names, self._settings.partial)
+        self._check_joints(request.trajectory)
         check_tolerances(request)
         start, warning = self._lead(request.trajectory)
         self._end_goal("another goal came")
-        monitored, late = monitored_joints(request, self._axes, self._settings.constraints)
+        names, late = request.trajectory.names, _duration(self._settings.goal_time)
+        monitored = [e.changed(request) for e in self._monitored if e.axis.joint.name in names]
+        late = max(0, request.goal_time) if request.goal_time else late
         self._goal = Goal(key, listener, monitored, start, late)
-        self._next_report = self._uptime + self._settings.monitor_period
+        self._next_report = self._uptime + self._monitor_period
         return warning
 
     def cancel(self, key: str) -> None:
@@ -220,6 +210,13 @@ class JointTrajectoryController(Controller):
         self._check_running("sample its trajectory")
         uptime = self._uptime + time - self._now
         return [axis.spline.at(uptime) for axis in self._axes]
+
+    @property
+    def _monitor_period(self) -> int:
+        return round(NANOSECONDS / self._settings.action_monitor_rate)
+
+    def _check_joints(self, trajectory: Trajectory) -> None:
+        check_joints(trajectory.names, self.joint_names, self._settings.allow_partial_joints_goal)
 
     def _check_running(self, what: str) -> None:
         if self.state != "running":
@@ -247,7 +244,8 @@ class JointTrajectoryController(Controller):
 
     def _hold(self) -> None:
         for axis in self._axes:
-            axis.hold(self._uptime + self._period, self._settings.stop_duration)
+            start = self._uptime + self._period
+            axis.hold(start, _duration(self._settings.stop_trajectory_duration))
 
     def _monitor(self, goal: Goal) -> None:
         """Aborts a goal at once; reports progress and success at the monitor's rate."""
@@ -258,7 +256,7 @@ class JointTrajectoryController(Controller):
                 return
         if self._uptime < self._next_report:
             return
-        self._next_report = max(self._next_report + self._settings.monitor_period, self._uptime)
+        self._next_report = max(self._next_report + self._monitor_period, self._uptime)
         if goal.outcome is None:
             goal.listener.feedback(self.sample())
         else:

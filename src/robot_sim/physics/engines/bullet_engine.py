@@ -242,9 +242,11 @@ class BulletEngine(Engine):
     def renewed(self, bodies: Sequence[tuple[ModelDescription, Body]]) -> list[Body]:
         if self.waste <= max(self._most_waste, self.live):
             return super().renewed(bodies)
-        fresh = BulletEngine(self._settings)
+        fresh, moved = BulletEngine(self._settings), list[Body]()
         try:
-            moved = [_moved(description, body, fresh) for description, body in bodies]
+            for description, body in bodies:
+                moved.append(fresh.load(description, body.link_state(description.root)[0]))
+                moved[-1].move(body.motion())
         except DescriptionError:  # no space for their files: the old world continues
             fresh.close()
             self._most_waste = 2 * self.waste
@@ -275,14 +277,6 @@ def _decimal_points() -> Iterator[None]:
 def _size(folder: Path) -> int:
     """Returns the size of the files in `folder` [bytes]."""
     return sum(path.stat().st_size for path in folder.iterdir())
-
-
-def _moved(description: ModelDescription, body: Body, engine: BulletEngine) -> Body:
-    """Returns `body` reloaded into another world, in the same state."""
-    assert isinstance(body, BulletBody)
-    fresh = engine.load(description, body.link_state(description.root)[0])
-    fresh.move(body.motion())
-    return fresh
 
 
 def _contact(found: Sequence[Any], sides: Mapping[tuple[int, int], Side]) -> Contact:

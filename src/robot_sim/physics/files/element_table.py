@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from robot_sim.physics.files.elements import shown
+from robot_sim.physics.files.elements import given, shown
 
 TABLE = Path(__file__).with_name("elements.toml")
 READ, WARNED, BY_DESIGN, UNKNOWN = "read", "warned", "by_design", "unknown"
@@ -57,14 +57,14 @@ class Section:
 def element_table() -> dict[str, Section]:
     """Returns the table's sections by their names."""
     table = {}
-    for name, given in tomllib.loads(TABLE.read_text(encoding="utf-8")).items():
-        table[name] = section = Section(given["title"])
-        for text in given.get(READ, "").split():
+    for name, part in tomllib.loads(TABLE.read_text(encoding="utf-8")).items():
+        table[name] = section = Section(part["title"])
+        for text in part.get(READ, "").split():
             path, colon, other = text.partition(":")
             below = (other or path.rpartition("/")[2]) if colon else ""
             section.add(path, Row(READ, section=below))
         for answer in (WARNED, BY_DESIGN):
-            for texts, why in given.get(answer, {}).items():
+            for texts, why in part.get(answer, {}).items():
                 for text in texts.split():
                     path, _, default = text.partition("=")
                     section.add(path, Row(answer, why, default))
@@ -92,14 +92,13 @@ class WithoutEffect:
             for name, row in rows.items():
                 if row.default[:1] == "." and outer.find(name) is None:
                     other, _, value = row.default[1:].partition("/")
-                    given = outer.find(other)
-                    if given is not None and _value(given):
+                    if given(outer.find(other)):
                         what = f"<{other}> without <{name}>, which is {value},"
                         self._judge(what, row, value, outer, outside)
             for child in outer:
                 row = rows.get(child.tag, rows.get("*"))
                 if _is_foreign(child.tag) or self._judge(
-                    f"<{child.tag}>", row, _value(child), outer, outside
+                    f"<{child.tag}>", row, given(child), outer, outside
                 ):
                     continue
                 if row is not None and row.answer in ("", READ) and row.section != MODEL:
@@ -138,11 +137,6 @@ def without_effect(root: Element, section: str) -> list[str]:
     return report.warnings()
 
 
-def _value(element: Element) -> str:
-    """Returns an element's text, or what URDF's extensions may have instead."""
-    return (element.get("value", element.text) or "").strip()
-
-
 def _is_foreign(name: str) -> bool:
     """Returns whether a name is of a namespace, and so not Gazebo's."""
     return "}" in name or ":" in name
@@ -153,7 +147,7 @@ def _is_default(text: str, defaults: str, outer: Element) -> bool:
     for default in defaults.split("|") if defaults else ():
         name, _, value = default.partition("/")
         neighbour = outer.find(name[1:]) if name.startswith(".") else None
-        other = _value(neighbour) if neighbour is not None else value or default
+        other = given(neighbour) if neighbour is not None else value or default
         if not text or _words(text) == _words(other):
             return True
     return False

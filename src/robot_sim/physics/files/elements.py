@@ -5,7 +5,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from xml.etree.ElementTree import Element, SubElement
 
-from robot_sim.physics.description import DescriptionError, Plugin
+from file_access.content import FileError, TooLarge
+from robot_sim.physics.description import DescriptionError, LimitExceeded, Plugin
 from robot_sim.physics.pose import Pose, Vector, from_rpy, to_rpy
 
 FRAME_TAGS = ("bodyName", "frameName")  # of plugins, where they name a link
@@ -21,6 +22,17 @@ def place(where: str) -> Iterator[None]:
         yield
     except DescriptionError as error:
         raise type(error)(f"{where}: {error}") from error
+
+
+@contextmanager
+def reading_files() -> Iterator[None]:
+    """Turns errors over the content of files into those of descriptions."""
+    try:
+        yield
+    except TooLarge as error:
+        raise LimitExceeded(str(error)) from error
+    except FileError as error:
+        raise DescriptionError(str(error)) from error
 
 
 @contextmanager
@@ -71,6 +83,11 @@ def truth(text: str | None, default: bool = False) -> bool:
     """Returns the truth value of an element's text; `default` if it is empty."""
     word = (text or "").strip().lower()
     return word in ("true", "1") if word else default
+
+
+def given(element: Element | None) -> str:
+    """Returns the value of a URDF's extension: the attribute `value`, or else the text."""
+    return "" if element is None else (element.get("value", element.text) or "").strip()
 
 
 def named(element: Element, what: str) -> str:

@@ -5,7 +5,7 @@ warning, and what has it is left out.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from xml.etree.ElementTree import Element
 
@@ -41,11 +41,13 @@ def add_mechanisms(model: ModelDescription, robot: Element | None = None) -> Non
             _disable(model, plugin)
     if model.static:
         return
-    driven = set(mimics) | _with_transmission(robot)
-    for element in () if robot is None else robot.findall("joint"):
-        mimic = element.find("mimic")
-        if mimic is not None and element.get("name", "") not in driven:
-            _keep(model, mimics, partial(_of_urdf, model, element, mimic))
+    if robot is not None:
+        # What controllers move doesn't follow by `<mimic>`, too.
+        driven = {*mimics, *(each.get("name", "") for each in robot.findall("transmission/joint"))}
+        for element in robot.findall("joint"):
+            mimic = element.find("mimic")
+            if mimic is not None and element.get("name", "") not in driven:
+                _keep(model, mimics, partial(_of_urdf, model, element, mimic))
     model.mimics = dict(_drivers_first(model, mimics))
 
 
@@ -56,12 +58,6 @@ def _keep(model: ModelDescription, found: dict[str, Mimic], read: Callable[[], F
         model.warnings.append(str(error))
         return
     found.setdefault(name, mimic)
-
-
-def _with_transmission(robot: Element | None) -> set[str]:
-    """Returns joints that controllers move; they don't follow by `<mimic>`, too."""
-    joints = [] if robot is None else robot.findall("transmission/joint")
-    return {joint.get("name", "") for joint in joints}
 
 
 def _of_urdf(model: ModelDescription, element: Element, mimic: Element) -> Found:
@@ -117,15 +113,10 @@ def _drivers_first(model: ModelDescription, found: dict[str, Mimic]) -> Iterator
     while left:
         ready = [name for name, mimic in left.items() if mimic.driver not in left]
         if not ready:
-            model.warnings.append(
-                f"joints follow each other in a circle, and so none: {_listed(left)}"
-            )
+            names = ", ".join(shown(name) for name in list(left)[:10])
+            model.warnings.append(f"joints follow each other in a circle, and so none: {names}")
             return
         yield from ((name, left.pop(name)) for name in ready)
-
-
-def _listed(names: Iterable[str]) -> str:
-    return ", ".join(shown(name) for name in list(names)[:10])
 
 
 def _disable(model: ModelDescription, plugin: Plugin) -> None:

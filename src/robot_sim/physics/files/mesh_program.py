@@ -18,9 +18,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from file_access.content import FileError
 from robot_sim.physics.description import DescriptionError, Mesh
-from robot_sim.physics.files.elements import numbers, place, shown
+from robot_sim.physics.files.elements import numbers, place, reading_files, shown
 from robot_sim.physics.files.hull import convex_pieces, hull_points
 from robot_sim.physics.files.mesh_cache import read_arrays, written
 from robot_sim.physics.files.mesh_looks import meters_of, parse_collada, read_glb, read_parts
@@ -269,10 +268,8 @@ def _read_collada(data: bytes, only: str) -> list[Part]:
     """Returns all that the scene shows, or its nodes named `only`, as one part [m]."""
     from trimesh.exchange.dae import load_collada
 
-    try:
+    with reading_files():
         root = parse_collada(data)
-    except FileError as error:
-        raise DescriptionError(str(error)) from error
     if root.tag != "COLLADA":
         raise DescriptionError("it is not COLLADA")
     meters = meters_of(root)

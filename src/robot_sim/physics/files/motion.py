@@ -3,7 +3,7 @@
 from xml.etree.ElementTree import Element
 
 from robot_sim.physics.description import Joint, Link, ModelDescription
-from robot_sim.physics.files.elements import finite, shown, truth
+from robot_sim.physics.files.elements import finite, given, shown, truth
 from robot_sim.physics.files.sdf_parts import value
 
 SPRING = {"springStiffness": "spring_stiffness", "springReference": "spring_reference"}
@@ -26,7 +26,7 @@ def read_link_motion(link: Link, element: Element, warnings: list[str]) -> None:
     if decay is not None:
         shares = value(decay, "linear", where, 0.0), value(decay, "angular", where, 0.0)
     elif factor is not None:
-        shares = (finite(_given(factor), where),) * 2
+        shares = (finite(given(factor), where),) * 2
     else:
         return
     if not 0.0 <= min(shares) <= max(shares) <= 1.0:
@@ -55,9 +55,4 @@ def read_spring(joint: Joint, block: Element) -> None:
     for element in block:
         if element.tag in SPRING:
             place = f"<gazebo reference='{shown(joint.name)}'>, <{element.tag}>"
-            setattr(joint, SPRING[element.tag], finite(_given(element), place))
-
-
-def _given(element: Element) -> str:
-    """Returns the value of an extension: the attribute, or else the text."""
-    return (element.get("value", element.text) or "").strip()
+            setattr(joint, SPRING[element.tag], finite(given(element), place))

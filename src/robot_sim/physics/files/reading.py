@@ -9,10 +9,15 @@ from pathlib import Path
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
-from file_access.content import MAX_BYTES, FileError, TooLarge, read_file
+from file_access.content import MAX_BYTES, read_file
 from file_access.xml_text import MAX_ELEMENTS, parse
 from robot_sim.physics.description import DescriptionError, LimitExceeded, Mesh, ModelDescription
-from robot_sim.physics.files.elements import files_named_by_a_model, place, shown
+from robot_sim.physics.files.elements import (
+    files_named_by_a_model,
+    place,
+    reading_files,
+    shown,
+)
 from robot_sim.physics.files.meshes import SUFFIXES, Selection, check_mesh, in_pieces, read_mesh
 
 MeshFile = tuple[str, Mesh | None]
@@ -33,10 +38,6 @@ TELLING = 5.0  # [s] between two lines on the progress
 logger = logging.getLogger(f"rosout.{__name__}")
 
 
-def _no_packages(name: str) -> str:
-    raise LookupError(name)
-
-
 @dataclass(frozen=True)
 class Resources:
     """Resolves the URIs in model files: folders of models, of media, and ROS packages by name.
@@ -46,7 +47,7 @@ class Resources:
 
     models: tuple[Path, ...] = ()
     media: tuple[Path, ...] = ()
-    package: Callable[[str], str] = field(default=_no_packages)
+    package: Callable[[str], str] = dict[str, str]().__getitem__
 
     def find(self, uri: str, folder: Path | None = None) -> Path:
         """Returns the existing file or folder of `uri`, relative names being looked up in `folder`."""
@@ -130,12 +131,8 @@ class Reading:
         self._bytes += len(text)
         if self._bytes > MAX_BYTES:
             raise LimitExceeded(f"more than {MAX_BYTES} bytes of XML (MAX_BYTES)")
-        try:
+        with reading_files():
             root = parse(text)
-        except TooLarge as error:
-            raise LimitExceeded(str(error)) from error
-        except FileError as error:
-            raise DescriptionError(str(error)) from error
         self._count(root)
         return root
 
@@ -147,12 +144,8 @@ class Reading:
                 return self._files[path]
             if len(self._files) == MAX_FILES:
                 raise LimitExceeded(f"more than {MAX_FILES} files are included (MAX_FILES)")
-            try:
+            with reading_files():
                 data = read_file(path)
-            except TooLarge as error:
-                raise LimitExceeded(str(error)) from error
-            except FileError as error:
-                raise DescriptionError(str(error)) from error
             self._files[path] = self.parse(data)
             return self._files[path]
 

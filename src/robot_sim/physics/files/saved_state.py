@@ -16,12 +16,12 @@ from robot_sim.physics.description import (
     ModelDescription,
     SavedMotion,
 )
-from robot_sim.physics.dynamics import poses_at_zero
+from robot_sim.physics.dynamics import child_pose, link_poses, poses_at_zero
 from robot_sim.physics.engine import FASTEST, Twist
 from robot_sim.physics.engine_form import FURTHEST, rigid
 from robot_sim.physics.files.elements import numbers, shown
 from robot_sim.physics.files.sdf_parts import WORLD, read_pose
-from robot_sim.physics.pose import ZERO, Pose, add, cross, rotate, scale, subtract
+from robot_sim.physics.pose import ZERO, Pose, add, cross, rotate, rotation, subtract
 
 SLACK = 0.01  # [m, rad]; so far solvers let links come apart
 MOST_NAMES = 5  # that a warning lists
@@ -121,11 +121,12 @@ def _begin(model: ModelDescription, element: Element, where: str) -> Iterator[st
     joints = {name: _joint_state(joint, links) for name, joint in model.joints.items()}
     root, twist = links[model.root]
     for joint in held[:1]:  # where somebody has put it meanwhile
-        root = links[joint.child][0].compose(_motion(joint, joints[joint.name][0]).inverse())
+        root = links[joint.child][0].compose(child_pose(joint, joints[joint.name][0]).inverse())
     model.start = SavedMotion(root, STILL if model.fixed_base else twist, joints)
+    placed = link_poses(model, root, {name: position for name, (position, _) in joints.items()})
     apart = [
         f"'{shown(name)}'"
-        for name, pose in _placed(model, model.start).items()
+        for name, pose in placed.items()
         if whole[name] in given and _distance(pose, links[name][0]) > SLACK
     ]
     if apart:
@@ -167,27 +168,5 @@ def _dot(a: tuple[float, ...], b: tuple[float, ...]) -> float:
     return math.fsum(one * other for one, other in zip(a, b, strict=True))
 
 
-def _motion(joint: Joint, position: float) -> Pose:
-    """Returns the child seen from the parent with the joint at `position`."""
-    if joint.kind == "prismatic":
-        move = Pose(scale(joint.axis, position))
-    else:
-        x, y, z = scale(joint.axis, math.sin(position / 2.0))
-        move = Pose(orientation=(x, y, z, math.cos(position / 2.0)))
-    step = move if joint.movable else Pose()
-    return joint.pose.compose(joint.anchor).compose(step).compose(joint.anchor.inverse())
-
-
-def _placed(model: ModelDescription, start: SavedMotion) -> dict[str, Pose]:
-    """Returns where the joints put each link."""
-    poses = {model.root: start.pose}
-    for joint in model.joints_below(model.root):
-        motion = _motion(joint, start.joints[joint.name][0])
-        poses[joint.child] = poses[joint.parent].compose(motion)
-    return poses
-
-
 def _distance(one: Pose, other: Pose) -> float:
-    gap = other.relative_to(one)
-    x, y, z, w = gap.orientation
-    return max(math.hypot(*gap.position), 2.0 * math.atan2(math.hypot(x, y, z), abs(w)))
+    return max(math.dist(one.position, other.position), math.hypot(*rotation(one, other)))

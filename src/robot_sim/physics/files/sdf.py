@@ -19,7 +19,6 @@ from robot_sim.physics.description import (
     Plugin,
     Sensor,
 )
-from robot_sim.physics.files import elements
 from robot_sim.physics.files.element_table import MODEL, WithoutEffect
 from robot_sim.physics.files.elements import (
     files_named_by_a_model,
@@ -172,7 +171,7 @@ def parse_sdf(
     Raises:
         DescriptionError: If it can't be simulated: `source`, the place and the fault, in one line.
     """
-    with elements.place(source):
+    with place(source):
         reading = Reading()
         root = reading.parse(text)
         context = FileContext(resources or Resources(), reading, sdf_version(root))
@@ -208,7 +207,7 @@ def first_entity(root: Element) -> Element:
 def read_model(element: Element, context: FileContext) -> ModelDescription:
     """Returns the model of a `<model>` element."""
     name = named(element, "model")
-    with elements.place(f"model '{shown(name)}'"):
+    with place(f"model '{shown(name)}'"):
         static = truth(element.findtext("static"))
         context = replace(context, unread=WithoutEffect())
         parts = _read_parts(element, context, static, MAX_NESTING)
@@ -262,8 +261,8 @@ def _read_parts(model: Element, context: FileContext, static: bool, depth: int) 
     context.reading.model()
     parts, frames = _Parts(), Frames()
     if model.get("folder") not in own_models():
-        place = "" if depth == MAX_NESTING else f"model '{shown(model.get('name', ''))}'"
-        context.unread.look(model, MODEL, place)
+        where = "" if depth == MAX_NESTING else f"model '{shown(model.get('name', ''))}'"
+        context.unread.look(model, MODEL, where)
     elif not truth(model.get("exact")):
         parts.stand_ins.append(model.get("folder", ""))
     nested = list(_nested(model, context, static, depth))
@@ -305,7 +304,7 @@ def _nested(
                 continue
             origin = f" (<include> of '{shown((element.findtext('uri') or '').strip())}')"
         name = named(inner, "model")
-        with elements.place(f"model '{shown(name)}'{origin}"):
+        with place(f"model '{shown(name)}'{origin}"):
             yield name, inner, _read_parts(inner, inner_context, static, depth - 1)
 
 

@@ -1,13 +1,12 @@
 """Collisions and visuals of SDF models."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
 from robot_sim.physics.description import Color, DescriptionError, LimitExceeded, Shape
 from robot_sim.physics.files.elements import (
-    files_named_by_a_model,
+    direction,
     numbers,
     place,
     positive,
@@ -18,7 +17,7 @@ from robot_sim.physics.files.meshes import IMAGES, Submesh, make_mesh
 from robot_sim.physics.files.own_models import model_of_mesh
 from robot_sim.physics.files.reading import MeshFile, MeshFinder
 from robot_sim.physics.files.sdf_parts import Frames, material_color, read_color, read_pose, value
-from robot_sim.physics.pose import Pose, Quaternion, cross, normalized
+from robot_sim.physics.pose import Pose, Quaternion, z_onto
 
 GEOMETRIES = (
     "box", "cylinder", "sphere", "plane", "mesh", "heightmap", "polyline",
@@ -149,21 +148,15 @@ class ShapeReader:
 
     def _mesh(self, solid: Element, where: str, collides: bool) -> MeshFile | None:
         """Returns the file of a mesh or of a height map, and what collides of it."""
-        with files_named_by_a_model(where):
-            uri = solid.findtext("uri") or ""
-            if solid.tag == "heightmap":
-                samples = max(1, int(value(solid, "sampling", where, 2.0)))
-                return self.meshes.find(uri, where, collides, samples, IMAGES)
-            if model_of_mesh(uri) is not None and self.meshes.is_missing(uri):
-                return uri, None
-            return self.meshes.find(uri, where, collides, _submesh(solid))
-
-
-def _submesh(mesh: Element) -> Submesh | None:
-    name = (mesh.findtext("submesh/name") or "").strip()
-    if name in ("", NO_NAME):
-        return None
-    return Submesh(name, truth(mesh.findtext("submesh/center")))
+        uri = solid.findtext("uri") or ""
+        if solid.tag == "heightmap":
+            samples = max(1, int(value(solid, "sampling", where, 2.0)))
+            return self.meshes.find(uri, where, collides, samples, IMAGES)
+        if model_of_mesh(uri) is not None and self.meshes.is_missing(uri):
+            return uri, None
+        name = (solid.findtext("submesh/name") or "").strip()
+        part = Submesh(name, truth(solid.findtext("submesh/center")))
+        return self.meshes.find(uri, where, collides, None if name in ("", NO_NAME) else part)
 
 
 def _not_negative(collision: Element, path: str, where: str, name: str, default: float) -> float:
@@ -199,14 +192,9 @@ def _outline(geometry: Element, where: str) -> tuple[list[list[tuple[float, ...]
 
 def _onto_normal(plane: Element, where: str) -> Quaternion:
     """Returns the shortest rotation of z onto the plane's normal."""
-    x, y, z = numbers(plane.findtext("normal", "0 0 1"), f"{where}: <normal>", 3)
-    length = (x * x + y * y + z * z) ** 0.5
-    if not 0.0 < length < math.inf:
-        raise DescriptionError(f"{where}: the plane's normal has length {length:g}")
-    if z < -0.999999 * length:
-        return (1.0, 0.0, 0.0, 0.0)
-    axis = cross((0.0, 0.0, 1.0), (x, y, z))
-    return normalized((*axis, length + z))
+    normal = numbers(plane.findtext("normal", "0 0 1"), f"{where}: <normal>", 3)
+    direction(normal, f"{where}: the plane's normal")  # refuses one that has none
+    return z_onto(normal)
 
 
 def _color(element: Element, where: str, warnings: list[str]) -> Color | None:

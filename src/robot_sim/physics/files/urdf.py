@@ -26,7 +26,6 @@ from robot_sim.physics.files.element_table import without_effect
 from robot_sim.physics.files.elements import (
     TINY,
     direction,
-    files_named_by_a_model,
     finite,
     mended,
     named,
@@ -192,22 +191,11 @@ class LinkReader:
             self.meshes.reading.check()
             shape = self._or_none(_shape, element, place)
             if shape is not None and shape.kind == "mesh":
-                shape = self._with_mesh(shape, element, place)
+                uri = _solid(element, place).get("filename", "")
+                mesh = self.meshes.find(uri, place, needed=tag == "collision")
+                shape = mesh and replace(shape, mesh=mesh[0], solid=mesh[1])
             if shape is not None:
                 yield replace(shape, rgba=self._color(element, place))
-
-    def _with_mesh(self, shape: Shape, element: Element, place: str) -> Shape | None:
-        """Returns the shape with its mesh; None for a visual whose mesh is missing."""
-        uri, needed = _solid(element, place).get("filename", ""), element.tag == "collision"
-        try:
-            with files_named_by_a_model(place):
-                mesh = self.meshes.find(uri, place, needed)
-        except DescriptionError as error:
-            if needed:
-                raise
-            self.meshes.warnings.append(f"{error}; it is left out")
-            return None
-        return None if mesh is None else replace(shape, mesh=mesh[0], solid=mesh[1])
 
     def _color(self, element: Element, place: str) -> Color | None:
         material = element.find("material")

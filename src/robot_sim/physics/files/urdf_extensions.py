@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 from robot_sim.physics.description import DescriptionError, Joint, Link, ModelDescription
 from robot_sim.physics.dynamics import link_poses
-from robot_sim.physics.files.elements import finite, named, read_plugin, shown
+from robot_sim.physics.files.elements import finite, given, named, read_plugin, shown
 from robot_sim.physics.files.motion import read_link_motion, read_spring
 from robot_sim.physics.files.sdf_parts import (
     Frames,
@@ -77,7 +77,7 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
             on = NO if element.tag == "turnGravityOff" else ("", *YES)
             link.gravity, link.says_gravity = _value(element) in on, True
         elif element.tag == "material":
-            color = material_color(_text(element), model.warnings)
+            color = material_color(given(element), model.warnings)
             link.visuals = [replace(shape, rgba=color or shape.rgba) for shape in link.visuals]
         elif element.tag == "selfCollide":
             link.self_collide = _value(element) in YES
@@ -100,12 +100,7 @@ def _apply_to_joint(model: ModelDescription, joint: Joint, block: Element) -> No
 
 
 def _value(element: Element | None) -> str:
-    """Returns the value of an extension in lower case."""
-    return "" if element is None else _text(element).lower()
-
-
-def _text(element: Element) -> str:
-    return (element.get("value", element.text) or "").strip()
+    return given(element).lower()
 
 
 def add_extension_joints(model: ModelDescription, robot: Element) -> None:
@@ -117,8 +112,8 @@ def add_extension_joints(model: ModelDescription, robot: Element) -> None:
     poses = link_poses(model, model.root_pose, {})
     poses |= {name: poses[link].compose(pose) for name, (link, pose) in model.lumped.items()}
     joints, links = dict(model.joints), dict(model.links)
-    for given in _read(elements, poses, model.warnings):
-        joint = _on_whole_links(given, model)
+    for read in _read(elements, poses, model.warnings):
+        joint = _on_whole_links(read, model)
         if joint.name in joints:
             model.warnings.append(
                 f"joint '{joint.name}' is there twice; that in <gazebo> is left out"

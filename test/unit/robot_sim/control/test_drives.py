@@ -75,7 +75,7 @@ def test_a_position_joint_without_a_controller_stays_where_it_is_put(make):
     lift = make("Position")
     assert lift.advance(0.2) == pytest.approx(0.0, abs=1e-6)
     with lift.sim.lock:
-        lift.sim.set_joint_positions(lift.model, {"rail": 0.4})
+        lift.sim.set_joint_states(lift.model, {"rail": 0.4})
     assert lift.advance(0.2) == pytest.approx(0.4, abs=1e-6)
 
 

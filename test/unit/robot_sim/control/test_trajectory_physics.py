@@ -108,7 +108,7 @@ def test_after_a_reset_the_arm_hangs_where_it_was_put(sim, interface):
     with sim.lock:
         told = pursue(controller, [TrajectoryPoint(S, (1.0, -1.0))], 0.0)
         sim.advance(500)
-        sim.set_joint_positions(robot.model, {"shoulder": 0.0, "elbow": 0.0})
+        sim.set_joint_states(robot.model, {"shoulder": 0.0, "elbow": 0.0})
     assert [outcome.kind for outcome in told.outcomes] == ["canceled"]
     with sim.lock:
         sim.advance(500)

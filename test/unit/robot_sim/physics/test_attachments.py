@@ -87,7 +87,7 @@ def test_what_is_attached_goes_along_when_something_other_than_time_moves_it(wor
     simulator, before = Simulator(world), between(robot, box)
     other = world.spawn("other", parse_urdf(cube()), Pose((0.5, 0.0, 0.1)))
     world.attach((other, "cube_link"), (box, "cube_link"))
-    simulator.set_joint_positions(robot, {"lift": 0.3})
+    simulator.set_joint_states(robot, {"lift": 0.3})
     assert near(between(robot, box), before)
     run(world, 200)
     assert near(between(robot, box), before)
