@@ -25,12 +25,7 @@ from bullet_gazebo.common.node_process import (
     wait_for_master,
 )
 from bullet_gazebo.common.publishing import Thinner, advertise_states
-from bullet_gazebo.common.rospy_connections import (
-    Reception,
-    bound_calls,
-    bound_messages,
-    hang_up_on_nonsense,
-)
+from bullet_gazebo.common.rospy_connections import Reception, bound_messages, hang_up_on_nonsense
 from bullet_gazebo.common.rospy_internals import (
     answer_xmlrpc,
     free_polls_at_once,
@@ -179,7 +174,6 @@ class GazeboNode:
         answer_xmlrpc(WORK, self._watchdog.work)
         free_polls_at_once()
         bound_messages()
-        bound_calls()
         Reception.open()
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
