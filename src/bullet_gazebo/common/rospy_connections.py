@@ -1,6 +1,6 @@
 """Patches of rospy against clients that send nothing, too much or nonsense.
 
-- `Reception`: a client that sends nothing keeps all others out, and a lack of file descriptors ends the thread
+- `Reception`: a client that sends nothing keeps all others out, a lack of file descriptors ends the thread
   that accepts connections (gazebo_clients.test, test_rospy_connections.py)
 - `bound_messages`: rospy reads whatever size a client claims into memory (test_rospy_connections.py)
 - `hang_up_on_nonsense`: a client whose request can't be read waits forever (gazebo_clients.test)

@@ -329,7 +329,9 @@ def main(argv: list[str] | None = None, work: Work | None = None) -> int:
         rospy.logwarn(
             "--journal has no effect: only a world in lock-step (--lockstep) has a journal"
         )
-    seed_random_numbers(args.seed)
+    if args.seed is not None:
+        seed_random_numbers(args.seed)
+        rospy.loginfo("Random numbers start from seed %d", args.seed)
     try:
         engine = make_engine(args.physics if args.physics in ENGINES else BULLET[0])
     except EngineError as error:
