@@ -4,7 +4,6 @@ rospy's proxies have no time limit, keep a dead connection, and ask the process'
 know the address.
 """
 
-import contextlib
 import io
 import math
 import select
@@ -132,13 +131,6 @@ class ServiceClient:
         finally:
             if not kept:
                 self.close()
-
-    def call_idempotent(self, *request: Any) -> Any:
-        """Calls the service, again if a kept connection's node has ended; for what may be done twice."""
-        if self._connection is not None:
-            with contextlib.suppress(ServiceGone):
-                return self(*request)
-        return self(*request)
 
     def _failure(self, fault: Exception) -> ServiceFailed:
         if isinstance(fault, TimeoutError):
@@ -306,6 +298,13 @@ def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
         raise CallFailed(f"the request can't be sent: {fault}") from fault
 
 
+def bytes_of(message: genpy.Message) -> bytes:
+    """Returns a message as it goes over the wire, without its length."""
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
+
+
 def raised_in(fault: BaseException) -> str:
     """Returns the name of the module that has raised an exception."""
     frames = [frame for frame, _ in traceback.walk_tb(fault.__traceback__)]
@@ -318,13 +317,8 @@ def _finite(timeout: float) -> float:
 
 def _serialized(message: genpy.Message) -> bytes:
     """Returns the request's bytes, with their length in front."""
-    buffer = io.BytesIO()
-    buffer.seek(LENGTH.size)
     try:
-        message.serialize(buffer)
+        content = bytes_of(message)
     except (TypeError, genpy.SerializationError, struct.error) as fault:
         raise CallFailed(f"the request can't be sent: {fault}") from fault
-    size = buffer.tell() - LENGTH.size
-    buffer.seek(0)
-    buffer.write(LENGTH.pack(size))
-    return buffer.getvalue()
+    return LENGTH.pack(len(content)) + content

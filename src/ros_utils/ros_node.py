@@ -55,7 +55,8 @@ def ros_node_from_pkg(
     label = f"node {pkg_name}/{node_name}"
     with _master.using(master_uri):
         try:
-            command = [_executable(pkg_name, node_name), *_arguments(args), *_remappings(name, ns)]
+            own = shlex.split(args) if isinstance(args, str) else map(str, args or [])
+            command = [_executable(pkg_name, node_name), *own, *_remappings(name, ns)]
             if launch_master and not _roslaunch.start_master(launch_master_term, timeout):
                 return False
             _master.require()
@@ -153,11 +154,6 @@ def _executable(package: str, name: str) -> str:
             f"package '{package}' has no executable '{name}': is its workspace built and sourced?"
         )
     return str(paths[0])
-
-
-def _arguments(args: str | Sequence[str] | None) -> list[str]:
-    """Returns the node's own arguments as a list; raises ValueError if a quote isn't closed."""
-    return shlex.split(args) if isinstance(args, str) else [str(arg) for arg in args or []]
 
 
 def _global(ns: str | None) -> str:

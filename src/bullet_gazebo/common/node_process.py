@@ -157,13 +157,9 @@ def end_within(bound: float, code: int) -> None:
     threading.Thread(target=insist, name="insist on the end", daemon=True).start()
 
 
-def seed_random_numbers(seed: int | None, tell: bool = True) -> None:
+def seed_random_numbers(seed: int) -> None:
     """Seeds Python's and NumPy's random numbers, for plugins; the physics itself draws none."""
-    if seed is None:
-        return
     import numpy as np  # the clients start without it
 
     random.seed(seed)
     np.random.seed(seed % 2**32)
-    if tell:
-        rospy.loginfo("Random numbers start from seed %d", seed)

@@ -107,14 +107,14 @@ def publish_without_yielding() -> None:
 
     For a world that moves only at a request: the threads that send run between two requests.
     """
+
+    def sleep(seconds: float) -> None:
+        if seconds > 0:
+            time.sleep(seconds)
+
     module = types.ModuleType("time")
-    vars(module).update(vars(time), sleep=_sleep_unless_zero)
+    vars(module).update(vars(time), sleep=sleep)
     tcpros_pubsub.time = module
-
-
-def _sleep_unless_zero(seconds: float) -> None:
-    if seconds > 0:
-        time.sleep(seconds)
 
 
 def divert_connections(node: str, sink: Sink) -> None:

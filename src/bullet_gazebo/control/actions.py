@@ -37,9 +37,10 @@ class ControllerAction(ABC):
     """
 
     action: ClassVar[type]
+    name: ClassVar[str]  # in the controller's namespace
 
-    def __init__(self, sim: Simulator, controller: Any, namespace: str, name: str) -> None:
-        """`namespace` is the controller's, `name` the action's in it."""
+    def __init__(self, sim: Simulator, controller: Any, namespace: str) -> None:
+        """`namespace` is the controller's."""
         self._sim = sim
         self._controller = controller
         self._news = threading.Condition()
@@ -47,7 +48,7 @@ class ControllerAction(ABC):
         self._kept: list[tuple[ServerGoalHandle, Any, bool]] = []
         self._closing = self._closed = False
         self._status_due = 0.0  # [s]
-        self._name = rospy.names.ns_join(namespace, name)
+        self._name = rospy.names.ns_join(namespace, self.name)
         self._server = SteadyActionServer(
             self._name, self.action, self._pursue, self._cancel, self._clock
         )

@@ -10,11 +10,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from bullet_gazebo.common.messages import to_time
 from bullet_gazebo.control.actions import ControllerAction
-from robot_sim.control.controllers.gripper import (
-    GripperActionController,
-    GripperOutcome,
-    GripperSample,
-)
+from robot_sim.control.controllers.gripper import GripperOutcome, GripperSample
 from robot_sim.control.controllers.joint_trajectory import JointTrajectoryController
 from robot_sim.control.errors import ControlError
 from robot_sim.control.trajectory_goals import (
@@ -78,12 +74,7 @@ class TrajectoryTopics:
 class TrajectoryAction(ControllerAction):
     """The action `follow_joint_trajectory`."""
 
-    action = msg.FollowJointTrajectoryAction
-
-    def __init__(
-        self, sim: Simulator, controller: JointTrajectoryController, namespace: str
-    ) -> None:
-        super().__init__(sim, controller, namespace, "follow_joint_trajectory")
+    action, name = msg.FollowJointTrajectoryAction, "follow_joint_trajectory"
 
     def pursue(self, key: str, goal: msg.FollowJointTrajectoryGoal, listener: GoalObserver) -> str:
         request = GoalRequest(
@@ -105,10 +96,7 @@ class TrajectoryAction(ControllerAction):
 class GripperAction(ControllerAction):
     """The action `gripper_cmd`."""
 
-    action = msg.GripperCommandAction
-
-    def __init__(self, sim: Simulator, controller: GripperActionController, namespace: str) -> None:
-        super().__init__(sim, controller, namespace, "gripper_cmd")
+    action, name = msg.GripperCommandAction, "gripper_cmd"
 
     def pursue(self, key: str, goal: msg.GripperCommandGoal, listener: GoalObserver) -> str:
         self._controller.pursue(key, goal.command.position, goal.command.max_effort, listener)

@@ -3,7 +3,6 @@
 Plugins and controllers of users offer services, subscribe and read parameters with rospy alone (replay.test).
 """
 
-import io
 import zlib
 from collections.abc import Callable
 from typing import Any
@@ -16,6 +15,7 @@ from rospy.msproxy import MasterProxy
 from rospy.topics import _SubscriberImpl
 
 from bullet_gazebo.journal.journal import Entry, WorldJournal
+from ros_calls.service import bytes_of
 
 # How names of services begin, behind the last slash, that only look, one that each node has, and
 # advance_world, whose parts are recorded as commands and messages.
@@ -64,18 +64,12 @@ def recorded(
         entry.type, entry.md5sum, entry.answer = kind._type, kind._md5sum, FAILED
         try:
             response = convert_return_to_response(handler(request), service.response_class)
-            entry.answer = zlib.crc32(_bytes(response)) if journal.listeners else 0
+            entry.answer = zlib.crc32(bytes_of(response)) if journal.listeners else 0
             return response
         finally:
             journal.end(entry)
 
     return handle
-
-
-def _bytes(message: genpy.Message) -> bytes:
-    buffer = io.BytesIO()
-    message.serialize(buffer)
-    return buffer.getvalue()
 
 
 def record_messages(journal: WorldJournal) -> None:
@@ -90,7 +84,9 @@ def record_messages(journal: WorldJournal) -> None:
             receive(subscription, messages, connection)
             return
         for message in messages:
-            entry = Entry(JournalEntry.MESSAGE, subscription.resolved_name, _bytes(message), caller)
+            entry = Entry(
+                JournalEntry.MESSAGE, subscription.resolved_name, bytes_of(message), caller
+            )
             entry.type, entry.md5sum = kind._type, kind._md5sum
             entry.publishers = subscription.get_num_connections()
             is_first = journal.begin(entry)

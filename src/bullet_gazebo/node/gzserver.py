@@ -25,12 +25,7 @@ from bullet_gazebo.common.node_process import (
     wait_for_master,
 )
 from bullet_gazebo.common.publishing import Thinner, advertise_states
-from bullet_gazebo.common.rospy_connections import (
-    Reception,
-    bound_calls,
-    bound_messages,
-    hang_up_on_nonsense,
-)
+from bullet_gazebo.common.rospy_connections import Reception, bound_messages, hang_up_on_nonsense
 from bullet_gazebo.common.rospy_internals import (
     answer_xmlrpc,
     free_polls_at_once,
@@ -179,7 +174,6 @@ class GazeboNode:
         answer_xmlrpc(WORK, self._watchdog.work)
         free_polls_at_once()
         bound_messages()
-        bound_calls()
         Reception.open()
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
@@ -335,7 +329,9 @@ def main(argv: list[str] | None = None, work: Work | None = None) -> int:
         rospy.logwarn(
             "--journal has no effect: only a world in lock-step (--lockstep) has a journal"
         )
-    seed_random_numbers(args.seed)
+    if args.seed is not None:
+        seed_random_numbers(args.seed)
+        rospy.loginfo("Random numbers start from seed %d", args.seed)
     try:
         engine = make_engine(args.physics if args.physics in ENGINES else BULLET[0])
     except EngineError as error:

@@ -13,7 +13,6 @@ from trajectory_msgs.msg import JointTrajectory
 
 from bullet_gazebo.common.dynamic_server import DynamicServer, Parameter
 from bullet_gazebo.common.messages import bad_number, from_transform, to_transform, to_vector
-from bullet_gazebo.plugins.drive_topics import REPEAT
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import (
     ContextPlugin,
@@ -24,11 +23,9 @@ from bullet_gazebo.plugins.sensor_topics import (
 )
 from robot_sim.drives.odometry import Period
 from robot_sim.physics.description import DescriptionError
-from robot_sim.physics.files.elements import shown
 from robot_sim.physics.pose import ZERO, Pose, Vector, rotate, scale, subtract
 
 WORLDS = ("", "world", "map")
-MOST_FRAMES = 10_000  # of tf that are kept
 SLIPS = [
     Parameter(f"slip_compliance_unitless_{way}", "double", 0.0, 0.0, 20.0)
     for way in ("lateral", "longitudinal")
@@ -81,12 +78,6 @@ class HandOfGodPlugin(ContextPlugin):
                     parent, child = (
                         name.lstrip("/") for name in (each.header.frame_id, each.child_frame_id)
                     )
-                    if child not in self._frames and len(self._frames) == MOST_FRAMES:
-                        rospy.logerr_throttle(
-                            REPEAT, f"hand_of_god: tf has more than {MOST_FRAMES} frames: "
-                            f"'{shown(child)}' is ignored",
-                        )  # fmt: skip
-                        continue
                     self._frames[child] = parent, from_transform(each.transform)
 
     def _target(self) -> Pose | None:

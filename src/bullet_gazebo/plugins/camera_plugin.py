@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import partial
 from typing import ClassVar
 
-import rospy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Empty
 
@@ -22,6 +21,7 @@ from bullet_gazebo.plugins.sensor_topics import (
     ContextPlugin,
     SensorTopics,
     TopicSource,
+    subscribe,
     topic_in,
 )
 from robot_sim.physics.description import DescriptionError, Sensor
@@ -95,8 +95,7 @@ class TriggeredCameraPlugin(CameraPlugin):
         self._waiting = 0
         topic = topic_in(self._scope, context.text("triggerTopicName", "image_trigger"))
         self._clock = context.clock(0.0, self._update, lambda: self._waiting > 0, at_once=False)
-        trigger = rospy.Subscriber(topic, Empty, self._on_trigger, tcp_nodelay=True)
-        context.closing(trigger.unregister)
+        subscribe(context, topic, Empty, self._on_trigger, MOST_WAITING)
 
     def _on_clock(self, now: int) -> None:
         """Triggers take pictures, not the clock."""

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -76,7 +76,7 @@ class Mailboxes:
         # Replaced, never changed: ticks and other nodes' handlers iterate it when a node comes.
         self._boxes: dict[str, Mailbox] = {}
         self._heard: dict[str, tuple[Any, Any, bool]] = {}  # by topic: see `any_hears`
-        divert_messages(self._sink)
+        divert_messages(lambda node: self._boxes[node].put if node in self._boxes else None)
         publish_without_yielding()
         on_topics_changed(self._count_change)
 
@@ -134,10 +134,6 @@ class Mailboxes:
             for topics, publishes in ways
         )
         return heard, sent
-
-    def _sink(self, node: str) -> Callable[[str, bytes], None] | None:
-        box = self._boxes.get(node)
-        return box.put if box else None
 
     def _count_change(self) -> None:
         self.changes += 1
@@ -252,6 +248,6 @@ class AdvanceService:
 
 def reseed(sim: Simulator, seed: int) -> None:
     """Lets all random numbers start again."""
-    seed_random_numbers(seed, tell=False)
+    seed_random_numbers(seed)
     with sim.lock:
         sim.reseed(seed)

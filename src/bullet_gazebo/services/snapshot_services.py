@@ -102,7 +102,7 @@ class SnapshotServices:
                 self._sim.await_holds()
                 self._sim.restore_state(given)
                 if request.seed:
-                    seed_random_numbers(request.seed, tell=False)
+                    seed_random_numbers(request.seed)
                     self._sim.reseed(request.seed)
             except (SnapshotError, StateError) as error:
                 raise ServiceRefused(str(error)) from error

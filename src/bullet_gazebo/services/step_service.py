@@ -269,7 +269,7 @@ class StepService:
         sim = self._sim
         if request.reset != srv.StepWorldRequest.NONE:
             if request.seed:
-                seed_random_numbers(request.seed, tell=False)
+                seed_random_numbers(request.seed)
                 sim.reseed(request.seed)
             sim.reset(everything=request.reset == srv.StepWorldRequest.SIMULATION)
         for model, pose, twist in plan.placed_models:

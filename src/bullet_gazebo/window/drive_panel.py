@@ -7,7 +7,7 @@ from functools import partial
 import rosgraph
 import rospy
 import viser
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Twist, Vector3
 
 TWIST = Twist._type
 NONE = "no topic of velocities"
@@ -81,16 +81,11 @@ class DrivePanel:
             self._publisher = rospy.Publisher(name, Twist, queue_size=1)
         self._is_moving = bool(held)
         ahead, left, about = (sum(each) for each in zip(*held, strict=True)) if held else (0, 0, 0)
-        self._publisher.publish(_twist(ahead * self._speed.value, left * self._speed.value,
-                                       about * self._turn.value))  # fmt: skip
+        speed, turn = self._speed.value, self._turn.value
+        linear = Vector3(float(ahead * speed), float(left * speed), 0.0)
+        self._publisher.publish(Twist(linear, Vector3(0.0, 0.0, float(about * turn))))
 
     def _stop(self) -> None:
         if self._publisher is not None:
             self._publisher.publish(Twist())
             self._publisher.unregister()
-
-
-def _twist(ahead: float, left: float, about: float) -> Twist:
-    twist = Twist()
-    twist.linear.x, twist.linear.y, twist.angular.z = float(ahead), float(left), float(about)
-    return twist

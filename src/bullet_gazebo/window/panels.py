@@ -77,8 +77,10 @@ class TimePanel:
             for each in (self._pause, self._speed):  # neither does anything in lock-step
                 each.disabled = lockstep
                 each.hint = ONLY_STEPS if lockstep else None
-        if lockstep:
-            state = f"lock-step, {_pace(factor)}"
+        if lockstep and factor < STILL:
+            state = "lock-step, waits for a client's steps"
+        elif lockstep:
+            state = f"lock-step, {factor:.{2 if factor < 10 else 0}f} × real time"
         else:
             state = "paused" if paused else f"real-time factor {factor:.2f}"
         self._write(f"<b>{now:.3f} s</b> &nbsp; {state}")
@@ -100,13 +102,6 @@ class TimePanel:
         if text != self._shown:
             self._shown = text
             self._status.content = f'<div style="padding: 0.4em 0.8em">{text}</div>'
-
-
-def _pace(factor: float) -> str:
-    """Returns how fast a client's steps come."""
-    if factor < STILL:
-        return "waits for a client's steps"
-    return f"{factor:.{2 if factor < 10 else 0}f} × real time"
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,9 @@ class Window:
             try:
                 if poses is not None:
                     self._show(poses)
-                self._touch(contacts if self._contacts.value else NOTHING)
+                contacts = contacts if self._contacts.value else NOTHING
+                if contacts is not None:  # else the old ones stay
+                    self._picture.touch(np.array(contacts.points).reshape(-1, 3))
                 self._update(self._show_texts, OFTEN)
                 self._update(self._show_rest, SELDOM)
             except (ServiceFailed, rosgraph.MasterException, OSError) as fault:
@@ -154,11 +156,6 @@ class Window:
             if ways.min() < UNTOUCHED:
                 with contextlib.suppress(ValueError):  # the page's camera looks nowhere
                     client.camera.position, client.camera.look_at = camera.eye, camera.target
-
-    def _touch(self, message: SceneContacts | None) -> None:
-        """Shows contact points; None leaves the old ones."""
-        if message is not None:
-            self._picture.touch(np.array(message.points).reshape(-1, 3))
 
     def _update(self, show: Callable[[], None], period: float) -> None:
         now = time.monotonic()

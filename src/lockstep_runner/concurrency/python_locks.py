@@ -21,7 +21,8 @@ def install(runner: ScriptRunner) -> None:
         return _Lock(runner, make_lock()) if _is_asked_for_by_the_script() else make_lock()
 
     def rlock() -> Any:
-        return _RLock(runner, make_rlock()) if _is_asked_for_by_the_script() else make_rlock()
+        ours = _is_asked_for_by_the_script()
+        return _RLock(_Lock(runner, make_lock())) if ours else make_rlock()
 
     threading.Lock = lock  # type: ignore[assignment]
     threading.RLock = rlock  # type: ignore[assignment]
@@ -93,41 +94,9 @@ class _Lock:
         return bool(self._real.acquire(True, -1 if seconds == math.inf else seconds))
 
 
-class _RLock(_Lock):
-    """A lock that its holder may take again."""
+class _RLock(threading._RLock):  # type: ignore[misc]
+    """A lock that its holder may take again: Python's own one in Python, whose lock is replaced."""
 
-    def __init__(self, runner: ScriptRunner, real: Any) -> None:
-        super().__init__(runner, real)
-        self._depth = 0  # how often its holder has taken it
-
-    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-        """As Python's own."""
-        came = super().acquire(blocking, timeout)
-        self._depth += came
-        return came
-
-    __enter__ = acquire
-
-    def release(self) -> None:
-        """As Python's own."""
-        if self._depth == 1 or not self._is_owned():
-            super().release()  # raises if this thread doesn't hold it
-        else:
-            self._real.release()
-        self._depth -= 1
-
-    # Condition calls the methods below.
-
-    def _is_owned(self) -> bool:
-        return bool(self._real._is_owned())
-
-    def _release_save(self) -> Any:
-        depth, self._depth, self._holder = self._depth, 0, 0
-        return depth, self._real._release_save()
-
-    def _acquire_restore(self, saved: Any) -> None:
-        depth, real = saved
-        super().acquire()  # simulated time may pass here
-        self._real.release()
-        self._real._acquire_restore(real)
-        self._depth, self._holder = depth, threading.get_ident()
+    def __init__(self, lock: _Lock) -> None:
+        super().__init__()
+        self._block = lock

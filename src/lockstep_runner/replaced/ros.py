@@ -4,7 +4,6 @@ Messages to and from the simulator travel with its time; connections to services
 """
 
 import contextlib
-import io
 import math
 import re
 import select
@@ -29,7 +28,7 @@ from lockstep_runner.world import NODE, RunsByItself, is_running
 from lockstep_runner.world import SERVICE as ADVANCE
 from ros_calls import master
 from ros_calls.absence import spawns
-from ros_calls.service import ServiceClient
+from ros_calls.service import ServiceClient, bytes_of
 
 SILENCE = 10.0  # [s] of waiting for a topic before its silence is reported
 LOOK = 0.5  # [s] between two looks for a simulator
@@ -200,7 +199,7 @@ def replace_services(runner: ScriptRunner) -> None:
             return self.response_class()
         runner.before_call(self.resolved_name)
         answer = _call_kept(self, call, request)
-        runner.called(self.resolved_name, lambda: _bytes(request))
+        runner.called(self.resolved_name, lambda: bytes_of(request))
         return answer
 
     ServiceProxy.__init__ = beginning
@@ -259,12 +258,6 @@ def _drop(proxy: ServiceProxy) -> None:
     if proxy._lockstep_kept and proxy.transport is not None:
         proxy.transport.close()
         proxy.transport = None
-
-
-def _bytes(request: Any) -> bytes:
-    buffer = io.BytesIO()
-    request.serialize(buffer)
-    return buffer.getvalue()
 
 
 def replace_time(runner: ScriptRunner) -> None:

@@ -91,20 +91,6 @@ def test_a_hand_of_god_pulls_a_link_to_a_frame_of_tf(free):
     assert sent.transform.translation.x == pytest.approx(pose.position[0], abs=1e-3)
 
 
-def test_a_hand_of_god_keeps_a_bounded_number_of_frames(free, monkeypatch):
-    monkeypatch.setattr(acting_plugins, "MOST_FRAMES", 10)
-    free.spawn("hand_of_god", "<linkName>body</linkName>")
-    for number in range(9):
-        SilentSubscriber.send("/tf", to_transform(0, "world", f"other{number}", Pose()))
-    SilentSubscriber.send("/tf", to_transform(0, "world", "hog_desired", Pose((1.0, 0.0, 1.0))))
-    assert not free.logged
-    SilentSubscriber.send("/tf", to_transform(0, "world", "one_more", Pose()))
-    assert "more than 10 frames: 'one_more' is ignored" in free.logged[-1]
-    SilentSubscriber.send("/tf", to_transform(0, "world", "hog_desired", Pose((0.5, 0.0, 1.0))))
-    free.advance(3000)
-    assert free.model.link_state("body")[0].position[0] == pytest.approx(0.5, abs=1e-2)
-
-
 class Attaching(NamedTuple):
     """An attach request."""
 

@@ -26,7 +26,7 @@ def failing(monkeypatch):
 
 
 PARTS = ("SceneServer", "WorldControl", "answer_xmlrpc", "free_polls_at_once", "bound_messages",
-         "bound_calls", "Reception", "hang_up_on_nonsense", "Thinner", "advertise_states",
+         "Reception", "hang_up_on_nonsense", "Thinner", "advertise_states",
          "PluginRegistry", "load_plugins", "_clock_frequency")  # fmt: skip
 
 

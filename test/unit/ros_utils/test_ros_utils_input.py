@@ -2,7 +2,6 @@
 
 import math
 import re
-import shlex
 import socket
 import time
 
@@ -160,11 +159,6 @@ def test_bad_node_arguments(capsys):
     assert "No closing quotation" in capsys.readouterr().err
     assert not ros_node.ros_node_from_pkg(*executable, name="a/b")
     assert "'a/b'" in capsys.readouterr().err
-
-
-@given(st.lists(st.text()))
-def test_node_arguments_as_string_and_list_are_the_same(arguments):
-    assert ros_node._arguments(shlex.join(arguments)) == ros_node._arguments(arguments) == arguments
 
 
 @given(st.lists(st.sampled_from(["/", "a", "b_1"])).map("".join))
