@@ -125,15 +125,8 @@ def test_garbage_ends_its_own_connection_only(server, garbage) -> None:
     client.shutdown(socket.SHUT_WR)
     assert ends(client)
     assert server.greet() == b"/any"
-
-
-def test_who_only_looks_whether_anybody_listens_is_no_fault(server) -> None:
-    """rospy's handler would log a warning."""
-    with server.connect() as client:
-        client.shutdown(socket.SHUT_WR)
-        assert ends(client)
-    assert server.greet() == b"/any"
-    assert server.met == 1
+    # Who only looks whether anybody listens is no fault: rospy's handler would log a warning.
+    assert server.met == 1 + bool(garbage)
 
 
 def test_silent_clients_push_each_other_out_and_nobody_else(server, monkeypatch) -> None:
