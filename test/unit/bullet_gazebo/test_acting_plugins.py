@@ -5,7 +5,8 @@ from __future__ import annotations
 import gc
 import math
 import weakref
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import pytest
 import rospy
@@ -21,7 +22,6 @@ from robot_sim.physics.files.reading import Resources
 from robot_sim.physics.files.urdf import parse_urdf
 from robot_sim.physics.files.world_file import fill, parse_world
 from robot_sim.physics.pose import Pose, from_rpy, to_rpy
-from robot_sim.physics.world import World
 from robot_sim.simulator import Simulator
 
 MODEL = """<robot name="m">{links}<joint name="hinge" type="revolute"><parent link="body"/><child link="arm"/>
@@ -45,9 +45,6 @@ class Free:
         self.model = self.sim.world.spawn("m", parse_urdf(text), Pose((0.0, 0.0, 1.0)))
         self.plugins.load(self.model, "/")
         return self.model
-
-    def model_topic(self, name: str) -> SilentPublisher:
-        return SilentPublisher.open_ones[name]
 
     def advance(self, ticks: int) -> None:
         with self.sim.lock:
@@ -91,13 +88,7 @@ def test_a_hand_of_god_pulls_a_link_to_a_frame_of_tf(free):
     assert sent.transform.translation.x == pytest.approx(pose.position[0], abs=1e-3)
 
 
-class Attaching(NamedTuple):
-    """An attach request."""
-
-    model_name_1: str
-    link_name_1: str
-    model_name_2: str
-    link_name_2: str
+Attaching = namedtuple("Attaching", "model_name_1 link_name_1 model_name_2 link_name_2")
 
 
 def test_a_link_attacher_keeps_nothing_of_models_that_are_gone(make_world, monkeypatch):
@@ -121,8 +112,8 @@ def test_a_link_attacher_keeps_nothing_of_models_that_are_gone(make_world, monke
     assert [each() for each in gone] == [None] * 6
 
 
-def test_nothing_is_attached_to_an_actor(new_engine, monkeypatch):
-    world, sent = World(new_engine()), []
+def test_nothing_is_attached_to_an_actor(make_world, monkeypatch):
+    world, sent = make_world(), []
     monkeypatch.setattr(gripper_plugins.rospy, "Service", lambda *arguments: None)
     monkeypatch.setattr(gripper_plugins.rospy, "logerr", lambda text, *names: sent.append(names))
     attacher = gripper_plugins.LinkAttacher(Simulator(world, lockstep=True))
@@ -133,7 +124,6 @@ def test_nothing_is_attached_to_an_actor(new_engine, monkeypatch):
     assert list(fill(world, parse_world(text, Resources()).models)) == [("a", None)]
     assert not attacher._attach(Attaching("cube", "cube_link", "a", "a_pose")).ok
     assert len(sent) == 1
-    world.close()
 
 
 def test_a_second_vacuum_gripper_in_a_namespace_is_told_in_a_line(free):
@@ -149,7 +139,7 @@ def test_a_second_vacuum_gripper_in_a_namespace_is_told_in_a_line(free):
 
 def test_a_hand_of_god_that_only_hears_itself_sends_nothing(free):
     free.spawn("hand_of_god", "<linkName>body</linkName>")
-    sent, topic = SilentPublisher.messages["/tf"], free.model_topic("/tf")
+    sent, topic = SilentPublisher.messages["/tf"], SilentPublisher.open_ones["/tf"]
     topic.connections[0].endpoint_id = rospy.get_name()
     free.advance(3)
     assert not sent

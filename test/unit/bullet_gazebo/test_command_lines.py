@@ -1,9 +1,10 @@
-"""The command lines of gzserver, gzclient, gz and spawn_model, and the paths of models."""
+"""The command lines of gzserver, gzclient, gz and spawn_model, the paths of models, imports of 0.2."""
 
 import random
 
 import numpy as np
 import pytest
+from support.python import run_python
 
 from bullet_gazebo.clients import gz, gzclient, spawn_model, spawner
 from bullet_gazebo.clients.spawn_model import parse
@@ -78,20 +79,16 @@ def test_spawn_model_waits_for_the_service_that_unpauses(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "line",
-    ["-urdf -model m", "-param p -model m", "-urdf -sdf -param p -model m", "-urdf -param p",
-     "-gazebo -urdf -param p -model m", "-urdf -param p -model m -J hinge far"],
+    ("command", "line"),
+    [(parse, line) for line in
+     ("-urdf -model m", "-param p -model m", "-urdf -sdf -param p -model m", "-urdf -param p",
+      "-gazebo -urdf -param p -model m", "-urdf -param p -model m -J hinge far")]
+    + [(gz.main, line) for line in
+       ("gz", "gz world", "gz world -m 0", "gz world -p 2", "gz nix")],
 )  # fmt: skip
-def test_a_wrong_command_line_of_spawn_model(line):
+def test_a_wrong_command_line_of_spawn_model_or_gz(command, line):
     with pytest.raises(SystemExit) as end:
-        parse(line.split())
-    assert end.value.code == 2
-
-
-@pytest.mark.parametrize("line", ["gz", "gz world", "gz world -m 0", "gz world -p 2", "gz nix"])
-def test_a_wrong_command_line_of_gz(line):
-    with pytest.raises(SystemExit) as end:
-        gz.main(line.split())
+        command(line.split())
     assert end.value.code == 2
 
 
@@ -188,3 +185,27 @@ def test_a_spawner_waits_while_a_model_is_being_spawned(monkeypatch, spawns, wai
     monkeypatch.setattr(spawner.rospy, "get_param", lambda *_: False)  # time has begun
     monkeypatch.setattr(spawner, "spawns", lambda: spawns.pop(0))
     assert (spawner._find(LateManager(waits), 30.0) is None) == found
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("bullet_gazebo import Controller", "robot_sim.Controller"),
+        ("bullet_gazebo.physics.world import World", "robot_sim.physics.world"),
+        ("bullet_gazebo.control.pid import Pid", "robot_sim.control.pid"),
+        (
+            "bullet_gazebo.ros.plugins.plugin_loader import PluginContext",
+            "bullet_gazebo.plugins.plugin_loader",
+        ),
+    ],
+)
+def test_an_old_import_says_where_it_is(old, new):
+    name = old.split()[-1]
+    there = f"from {new.removesuffix(f'.{name}')} import {name} as there"
+    found = run_python(f"from {old} as it; {there}; assert it is there; print(there.__module__)")
+    assert f"is {new} now" in found.stderr and found.stdout.strip()
+
+
+def test_what_never_was_there_is_not_found():
+    found = run_python("import bullet_gazebo.physics.nothing", check=False)
+    assert "No module named 'bullet_gazebo.physics.nothing'" in found.stderr

@@ -33,11 +33,10 @@ def test_what_is_no_command_is_answered_with_the_usage(main, name, line, capsys)
     assert (ended.value.code, bool(output)) == ((0, True) if line in HELP else (2, False))
 
 
-EFFORT, VELOCITY = (
-    "hardware_interface::EffortJointInterface",
-    "hardware_interface::VelocityJointInterface",
+EFFORT, VELOCITY, STATE = (
+    f"hardware_interface::{kind}Interface"
+    for kind in ("EffortJoint", "VelocityJoint", "JointState")
 )
-STATE = "hardware_interface::JointStateInterface"
 
 
 def controller(name, kind, state, **claims):

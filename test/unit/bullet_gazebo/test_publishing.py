@@ -1,19 +1,19 @@
-"""Topics of a world faster than real time: fewer messages, the newest always."""
+"""Topics of a world faster than real time, and what an action keeps until somebody delivers it."""
 
 import threading
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import pytest
 
 from bullet_gazebo.common import publishing
 from bullet_gazebo.common.publishing import SubscriberCount, ThinnedTopic, Thinner
+from bullet_gazebo.control import actions
+from bullet_gazebo.control.trajectory_action import TrajectoryAction
+from robot_sim.control.trajectory_goals import SUCCEEDED, GoalOutcome, TrajectorySample
+from robot_sim.timing import FairLock
 
 BOUND = 60.0  # [s]
-
-
-class FakeSimulator:
-    """As fast as it says."""
-
-    outruns_the_clock = True
 
 
 class Reader:
@@ -35,7 +35,7 @@ class Reader:
 
 @pytest.fixture
 def sim():
-    return FakeSimulator()
+    return SimpleNamespace(outruns_the_clock=True)
 
 
 @pytest.fixture
@@ -91,9 +91,7 @@ def test_a_closed_topic_publishes_nothing(topic, reader):
     assert reader.got in ([1], [1, 2])
 
 
-def test_a_topic_whose_message_can_not_be_sent_silences_no_other(
-    thinner, topic, reader, monkeypatch
-):
+def test_a_message_that_can_not_be_sent_silences_no_other(thinner, topic, reader, monkeypatch):
     told = threading.Event()
     monkeypatch.setattr(publishing.rospy, "logerr_throttle", lambda period, text: told.set())
 
@@ -116,3 +114,43 @@ def test_a_subscriber_that_comes_while_the_last_one_goes_is_counted(monkeypatch)
     count.peer_subscribe("/a", None, None)
     count.peer_unsubscribe("/a", 0)
     assert count.size == 1
+
+
+def test_only_the_newest_feedback_of_a_goal_waits_for_its_delivery(monkeypatch) -> None:
+    monkeypatch.setattr(actions, "SteadyActionServer", MagicMock())
+    sim = SimpleNamespace(lock=FairLock(), outboxes=[], deliver_with_steps=True, sim_time=0.0)
+    action, goals = TrajectoryAction(sim, MagicMock(), "/arm"), (MagicMock(), MagicMock())
+    for goal in goals:
+        for second in range(100):
+            stamp = second * 10**9
+            action.note(goal, TrajectorySample(stamp, ("hinge",), ((), (), ()), ((), ()), ((), ())))
+        action.note(goal, GoalOutcome(SUCCEEDED), last=True)
+    action.deliver()
+    action.shutdown()
+    for goal in goals:
+        (told,) = goal.publish_feedback.call_args_list
+        assert told.args[0].header.stamp.secs == 99
+        goal.set_succeeded.assert_called_once()
+
+
+def test_an_action_is_closed_after_the_result_that_a_step_delivers(monkeypatch) -> None:
+    monkeypatch.setattr(actions, "SteadyActionServer", MagicMock())
+    sim = SimpleNamespace(lock=FairLock(), outboxes=[], deliver_with_steps=True, sim_time=0.0)
+    action, order = TrajectoryAction(sim, MagicMock(), "/arm"), []
+    action._server.stop.side_effect = lambda: order.append("closed")
+    closer = threading.Thread(target=action.shutdown)
+
+    def settle(*_) -> None:
+        closer.start()
+        closer.join(0.3)  # it waits for this
+        order.append("told")
+
+    goal = MagicMock()
+    goal.set_succeeded.side_effect = settle
+    action.note(goal, GoalOutcome(SUCCEEDED), last=True)
+    action.deliver()
+    closer.join()
+    assert order == ["told", "closed"]
+    sim.sim_time, before = 100.0, action._server.publish_status.call_count
+    action.deliver()  # by a step that began before
+    assert action._server.publish_status.call_count == before

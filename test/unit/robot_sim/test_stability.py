@@ -162,14 +162,10 @@ def test_joints_that_are_too_stiff_only_together_are_told(rig):
 
 @pytest.mark.parametrize("name", ["pendulum", "slides", "cartpole"])
 def test_sane_robots_are_told_nothing_of(rig, name):
-    text = cartpole_urdf() if name == "cartpole" else urdf_of(name)
-    robot = rig(text)
+    robot = rig(cartpole_urdf() if name == "cartpole" else urdf_of(name))
+    gains = {"p": 100.0, "d": 10.0} if name == "cartpole" else {"p": 5.0, "d": 0.1}
     for joint in robot.hardware.effort_joints:
-        robot.load(
-            POSITION,
-            joint.name,
-            {"p": 100.0, "d": 10.0} if name == "cartpole" else {"p": 5.0, "d": 0.1},
-        )
+        robot.load(POSITION, joint.name, gains)
     robot.run(0.5)
     assert robot.told == []
     assert robot.model.damping_added == {}

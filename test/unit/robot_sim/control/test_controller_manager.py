@@ -11,18 +11,13 @@ from robot_sim.control.hardware import RobotHardware
 from robot_sim.control.manager import STRICT, ControllerManager
 from robot_sim.control.transmissions import read_description
 
+POSITION = {"type": "effort_controllers/JointPositionController"}
 PARAMS = {
     "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 120},
-    "cart": {
-        "type": "effort_controllers/JointPositionController", "joint": "stand_cart", "pid": {"p": 1.0},
-    },
-    "cart2": {
-        "type": "effort_controllers/JointPositionController", "joint": "stand_cart", "pid": {"p": 2.0},
-    },
-    "pole": {
-        "type": "effort_controllers/JointPositionController", "joint": "cart_pole", "pid": {"p": 3.0},
-    },
-}  # fmt: skip
+    "cart": POSITION | {"joint": "stand_cart", "pid": {"p": 1.0}},
+    "cart2": POSITION | {"joint": "stand_cart", "pid": {"p": 2.0}},
+    "pole": POSITION | {"joint": "cart_pole", "pid": {"p": 3.0}},
+}
 
 
 @pytest.fixture

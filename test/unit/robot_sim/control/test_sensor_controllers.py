@@ -39,9 +39,8 @@ class Bot:
         self.sent = {}
 
     def start(self, **controllers):
-        start(
-            self.robot, {name: {"publish_rate": 100} | each for name, each in controllers.items()}
-        )
+        rate = {"publish_rate": 100}
+        start(self.robot, {name: rate | each for name, each in controllers.items()})
         for each in self.robot.manager.loaded:
             for output in each.outputs:
                 output.sink = self.sent.setdefault(output.topic, []).append
@@ -84,7 +83,7 @@ def test_nothing_is_stale_or_silent_after_resets(world, relatch):
     bot = Bot(world, relatch=relatch)
     bot.start(imu=IMU, forces=FORCES)
     for reset in (bot.sim.reset_simulation, bot.sim.reset_world, bot.sim.reset_time):
-        bot.advance(500)
+        bot.advance(150)
         bot.robot.model.place(Pose((0.0, 0.0, 5.0)), ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
         bot.sent["imu/data"].clear()
         reset()

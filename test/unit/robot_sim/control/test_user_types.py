@@ -48,15 +48,14 @@ def test_it_may_lie_in_a_module_of_the_package(module) -> None:
     assert find_type(f"{name}/Spring").__name__ == "Spring"
 
 
-@pytest.mark.parametrize("kind", ["this/X", "builtins/no_such_name"])
-def test_a_module_without_such_a_class_is_named(kind) -> None:
-    with pytest.raises(ControlError, match="does not exist: .* has no class"):
-        find_type(kind)
-
-
-@pytest.mark.parametrize("kind", ["builtins/eval", "sys/exit", "unittest/TestCase"])
-def test_what_is_no_controller_is_refused(kind) -> None:
-    with pytest.raises(ControlError, match="is not a subclass of .*Controller"):
+@pytest.mark.parametrize(
+    ("kind", "fault"),
+    [(kind, "does not exist: .* has no class") for kind in ("this/X", "builtins/no_such_name")]
+    + [(kind, "is not a subclass of .*Controller")
+       for kind in ("builtins/eval", "sys/exit", "unittest/TestCase")],
+)  # fmt: skip
+def test_what_is_no_controller_is_refused(kind, fault) -> None:
+    with pytest.raises(ControlError, match=fault):
         find_type(kind)
 
 

@@ -118,10 +118,9 @@ def measure(description: ModelDescription, sim: Simulator) -> None:
     """Makes the sensors of a model."""
     model = sim.world.spawn("m", description, Pose())
     sensing = Sensing(sim)
-    kinds = {kind: each for each in measurements() if each.fields for kind in each.kinds}
     for sensor in description.sensors:
         with suppress(DescriptionError, KeyError):
-            kinds[sensor.kind](Mount(sim, model, WITHOUT, sensing, sensor))
+            BY_KIND[sensor.kind](Mount(sim, model, WITHOUT, sensing, sensor))
 
 
 def looked_at(path: str) -> bool:
@@ -144,14 +143,10 @@ def is_seen(section: str, path: str, sim: Simulator) -> bool:
     return seen
 
 
-def is_left_to_others(section: str, path: str) -> bool:
-    return (section, path) in ELSEWHERE
-
-
 @pytest.mark.usefixtures("watched")
 @pytest.mark.parametrize(("section", "path"), every_path(READ))
 def test_what_is_read_is_looked_at(section, path, sim):
-    if is_left_to_others(section, path):
+    if (section, path) in ELSEWHERE:
         pytest.skip("someone else reads it")
     assert is_seen(section, path, sim)
 

@@ -26,10 +26,8 @@ def picture(server, complaints):
 
 def boxes(number, count, **look):
     """A model of `count` links, each a box of its own size."""
-    links = [
-        Link(f"l{i}", visuals=[Shape("box", (0.1, 0.1, number + i / 1000), **look)])
-        for i in range(count)
-    ]
+    shapes = (Shape("box", (0.1, 0.1, number + i / 1000), **look) for i in range(count))
+    links = [Link(f"l{i}", visuals=[shape]) for i, shape in enumerate(shapes)]
     return VisibleModel(number, f"m{number}", links)
 
 
@@ -110,12 +108,8 @@ def test_a_file_with_looks_is_sent_once_for_all_models(server, picture, tmp_path
     (tmp_path / "looks.mtl").write_text("newmtl red\nKd 1 0 0\n")
     path = tmp_path / "triangle.obj"
     path.write_text("mtllib looks.mtl\nv 0 0 0\nv 1 0 0\nv 0 0 1\nusemtl red\nf 1 2 3\n")
-    models = [
-        VisibleModel(
-            i, f"m{i}", [Link("l", visuals=[Shape("mesh", (1.0, 1.0, 2.0), mesh=str(path))])]
-        )
-        for i in range(5)
-    ]
+    link = Link("l", visuals=[Shape("mesh", (1.0, 1.0, 2.0), mesh=str(path))])
+    models = [VisibleModel(i, f"m{i}", [link]) for i in range(5)]
     picture.draw(models, [])
     picture.move(in_a_row(5))
     recording = Recording(server.get_scene_serializer().serialize())

@@ -157,9 +157,7 @@ def test_a_video_without_its_encoder_is_refused_with_the_command_that_installs_i
     tmp_path, monkeypatch
 ):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(
-        RecordingError, match=r"an MP4 needs imageio-ffmpeg, .*/ws extras' installs"
-    ):
+    with pytest.raises(RecordingError, match=r"needs imageio-ffmpeg, .*/ws extras' installs"):
         options(tmp_path).check()
     RecordingOptions(tmp_path / "a.html").check()
 

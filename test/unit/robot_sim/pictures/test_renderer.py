@@ -1,6 +1,7 @@
-"""What pictures show, and that taking them changes nothing."""
+"""Where the camera sees what, what pictures show, and that taking them changes nothing."""
 
 import math
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -8,14 +9,15 @@ import pytest
 from support.pages.pictures import pixel
 from support.robots.worlds import assert_near
 
+from robot_sim.physics.description import Shape
 from robot_sim.physics.dynamics import link_poses
 from robot_sim.physics.engines import make_engine
 from robot_sim.physics.files.urdf import parse_urdf
 from robot_sim.physics.pose import Pose, from_rpy
 from robot_sim.physics.world import World
-from robot_sim.pictures.camera import Camera
+from robot_sim.pictures.camera import SKY, Camera, background, overview
 from robot_sim.pictures.renderer import Renderer
-from robot_sim.pictures.visuals import visible_shapes
+from robot_sim.pictures.visuals import solid_of, visible_shapes
 
 WIDTH, HEIGHT = 160, 120
 CAMERA = Camera(target=(0.0, 0.0, 1.0), distance=3.0, yaw=0.0, pitch=-10.0)
@@ -184,3 +186,81 @@ def test_the_part_that_is_rendered_has_all_of_it(scene, place, monkeypatch):
     monkeypatch.setattr(Renderer, "_region", lambda self, camera, *size: (0, 0, *size))
     assert np.abs(part - shown(scene)).max() <= 60  # of edges, whose samples lie elsewhere
     assert (np.abs(part - shown(scene)).max(axis=-1) > 8).sum() < 20
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "volume", "extents"),
+    [
+        ("box", (0.2, 0.4, 0.3), 0.024, (0.2, 0.4, 0.3)),
+        ("box", (3.0, 0.02, 0.1), 0.006, (3.0, 0.02, 0.1)),
+        ("box", (0.1, 0.02, 2.0), 0.004, (0.1, 0.02, 2.0)),
+        ("cylinder", (0.2, 0.1), np.pi * 0.004, (0.4, 0.4, 0.1)),
+        ("cylinder", (0.01, 2.0), np.pi * 0.0002, (0.02, 0.02, 2.0)),
+        ("sphere", (0.7,), np.pi * 0.7**3 * 4 / 3, (1.4,) * 3),
+    ],
+)
+def test_it_is_closed_and_has_the_shapes_size(kind, size, volume, extents):
+    solid = solid_of(Shape(kind, size))
+    triangles = solid.corners.reshape(-1, 3, 3)
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    areas = np.cross(b - a, c - a) / 2.0
+    assert np.abs(areas.sum(axis=0)).max() < 1e-9  # nothing is open
+    assert np.einsum("ni,ni", a, areas) / 3.0 == pytest.approx(volume, rel=0.02)
+    assert np.ptp(solid.corners, axis=0) == pytest.approx(extents, rel=0.01)
+    outwards = np.einsum("ni,ni->n", solid.normals, np.repeat(areas, 3, axis=0))
+    assert (outwards > 0.0).all()
+    assert np.linalg.norm(solid.normals, axis=1) == pytest.approx(1.0)
+
+
+CORNERS = np.array([(x, y, z) for x in (-1.0, 2.0) for y in (0.0, 0.5) for z in (0.0, 3.0)])
+
+
+def test_x_goes_to_the_right_and_z_upwards():
+    camera = Camera(target=(0.0, 0.0, 1.0), distance=2.0, yaw=0.0, pitch=0.0)
+    assert pixel(camera, (0.0, 0.0, 1.0), 200, 100) == pytest.approx((100.0, 50.0))
+    assert pixel(camera, (0.1, 0.0, 1.0), 200, 100)[0] > 100.0
+    assert pixel(camera, (0.0, 0.0, 1.1), 200, 100)[1] < 50.0
+    edge = 2.0 * camera.slope
+    assert pixel(camera, (0.0, 0.0, 1.0 + edge), 200, 100) == pytest.approx((100.0, 0.0))
+
+
+@pytest.mark.parametrize("aspect", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("looking", [None, Camera(yaw=200.0, pitch=-80.0)])
+def test_an_overview_has_everything_in_it(aspect, looking):
+    camera = overview(CORNERS, aspect, looking)
+    width, height = 400 * aspect, 400
+    seen = np.array([pixel(camera, tuple(corner), width, height) for corner in CORNERS])
+    assert (seen > 0.0).all() and (seen < (width, height)).all()
+    assert np.abs(seen / (width, height) - 0.5).max() > 0.3  # and isn't far away
+
+
+def test_the_ground_ends_at_the_horizon():
+    behind = background(Camera(pitch=0.0, target=(0.0, 0.0, 1.0)), 40, 30)
+    assert (behind.colours[:15] == SKY).all() and (behind.depth[:15] == 1.0).all()
+    assert (behind.colours[-1] != SKY).any() and (np.diff(behind.depth[16:, 0]) < 0.0).all()
+
+
+def test_fields_are_changed_by_their_names():
+    fields = {"target": [0, 0.5, 1], "distance": 3, "yaw": 90.0, "follows": False}
+    changed = Camera(view=30.0).changed(fields)
+    assert changed == Camera((0.0, 0.5, 1.0), 3.0, 90.0, view=30.0, follows=False)
+    assert Camera().changed({}) == Camera()
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"zoom": 2.0}, "no 'zoom'; it has target, distance, yaw, pitch, view, follows"),
+        ({"distance": 0}, "distance is like 2.0, in [0.001, 1e+06]: 0"),
+        ({"distance": "far"}, "distance is like 2.0, in"),
+        ({"yaw": float("nan")}, "yaw is like 20.0, in [-360, 360]: nan"),
+        ({"view": 180.0}, "view is like 40.0, in [1, 170]"),
+        ({"target": [0.0, 1.0]}, "target is like (0.0, 0.0, 0.0), in"),
+        ({"target": 1.0}, "target is like (0.0, 0.0, 0.0), in"),
+        ({"follows": 2}, "follows is like True, in [0, 1]: 2"),
+        ({"follows": 1}, "follows is like True, in [0, 1]: 1"),
+    ],
+)
+def test_fields_that_no_camera_has_are_refused(fields, text):
+    with pytest.raises(ValueError, match=re.escape(text)):
+        Camera().changed(fields)

@@ -44,10 +44,9 @@ class Scene:
 
     def take(self, name):
         """Takes a picture, which comes into `sent` under a name."""
+        shots = [self.shot(colours=True)]
         with self.sim.lock:
-            self.stream.take(
-                [self.shot(colours=True)], lambda views: self.sent.append((name, views[0]))
-            )
+            self.stream.take(shots, lambda views: self.sent.append((name, views[0])))
 
     def await_sent(self, count):
         for _ in range(int(BOUND / 0.001)):
