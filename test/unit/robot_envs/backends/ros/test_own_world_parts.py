@@ -34,9 +34,8 @@ class Replayed:
 
     def act(self, commands: dict) -> WorldState:
         self.asked.append(commands)
-        return state(
-            len(self.asked) - 2 + self._drift, 0.0, 0.0, time=0.008 * (len(self.asked) - 2)
-        )
+        steps = len(self.asked) - 2
+        return state(steps + self._drift, 0.0, 0.0, time=0.008 * steps)
 
 
 def test_a_journal_brings_another_simulator_to_the_same_state_or_says_where_it_differs() -> None:
