@@ -86,15 +86,9 @@ def test_parameters_and_flags_over_them() -> None:
         (["--gui", "--headless"], "--headless: not with --gui"),
         (["--backend=bullet", "--rviz"], "not with --backend bullet"),
         (["--backend=bullet", "--realtime"], "not with --backend bullet"),
-        (
-            ["--num-envs=2", "--realtime"],
-            "--realtime is for a single simulator: num_envs must be 1",
-        ),
+        (["--num-envs=2", "--realtime"], "--realtime is for a single simulator: num_envs must be"),
         (["--num-envs=2", "--rviz"], "--rviz is for a single simulator: num_envs must be 1, not 2"),
-        (
-            ["--num-envs=2", "--algo=reinforce-document"],
-            "learns in one environment: num_envs must be 1",
-        ),
+        (["--num-envs=2", "--algo=reinforce-document"], "learns in one environment: num_envs"),
         (["--episods=5"], "unknown flag '--episods'; did you mean --episodes?"),
     ],
 )

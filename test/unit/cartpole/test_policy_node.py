@@ -53,17 +53,13 @@ def test_a_run_that_learned_over_ros_needs_no_simulator_here(run: Path) -> None:
 
 def test_policies_of_other_environments_are_refused(tmp_path: Path) -> None:
     other = workbench_runs.dqn(tmp_path / "run", total_timesteps=100)
-    with pytest.raises(
-        RobotEnvError, match="policy of CartPole-v1, which is not an environment of a robot"
-    ):
+    with pytest.raises(RobotEnvError, match="policy of CartPole-v1, which is not an environment"):
         policy_node.load(other, "best", {})
 
 
 def test_an_exported_policy_of_another_task_is_refused(exported: Path, monkeypatch) -> None:
     monkeypatch.setattr(torchscript, "open_exported", renamed("cartpole/SwingUp-v0"))
-    with pytest.raises(
-        WorkbenchError, match="another observation space than cartpole/SwingUp-v0 has"
-    ):
+    with pytest.raises(WorkbenchError, match="observation space than cartpole/SwingUp-v0 has"):
         policy_node.load(exported, "best", {})
 
 

@@ -111,9 +111,8 @@ def test_what_is_drawn_is_what_is_told_of_it():
 
 
 def test_the_robot_is_found_from_anywhere_without_ros(tmp_path, root: Path):
-    script = (
-        "import cartpole, gymnasium; gymnasium.make('cartpole/Balance-v0').reset(); print('made')"
-    )
+    make = "gymnasium.make('cartpole/Balance-v0')"
+    script = f"import cartpole, gymnasium; {make}.reset(); print('made')"
     environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(root / "src")}
     shown = subprocess.run(
         [sys.executable, "-c", script],

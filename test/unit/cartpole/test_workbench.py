@@ -15,9 +15,7 @@ from rl_workbench import errors
 from rl_workbench.starting import JOB
 
 
-def test_the_cart_pole_is_known_and_roslaunchs_arguments_are_left_out(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_cart_pole_is_known_and_roslaunchs_arguments_are_left_out(tmp_path, capsys) -> None:
     robot = {"env_id": "cartpole/Classic-v0", "total_timesteps": 100, "eval_frequency": 0}
     run = workbench_runs.dqn(tmp_path / "run", **robot)
     capsys.readouterr()
@@ -52,9 +50,7 @@ def test_each_of_several_trainings_has_a_master_of_its_own(monkeypatch) -> None:
     assert 30000 <= int(os.environ["ROS_MASTER_URI"].removeprefix("http://127.0.0.1:")) < 32768
 
 
-def test_recommended_commands_go_by_way_of_ws(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_recommended_commands_go_by_way_of_ws(root: Path, tmp_path: Path, monkeypatch) -> None:
     """With the folders that the user gave to --with; ws names one with a space by a link."""
     for name in ("mine", "other arm"):
         (tmp_path / name).mkdir()

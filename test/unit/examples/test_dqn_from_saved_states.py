@@ -27,9 +27,7 @@ def example(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 @pytest.mark.slow
-def test_it_trains_from_places_of_a_demonstration(
-    example: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_trains_from_places_of_a_demonstration(example: Any, tmp_path, monkeypatch) -> None:
     places = tmp_path / "places"
     example.demonstrate(places)
     assert len(list(places.glob("*.snapshot"))) == 12

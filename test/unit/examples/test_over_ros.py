@@ -34,9 +34,8 @@ def test_episodes_over_services_balance_in_lockstep() -> None:
 
 
 def test_random_changes_of_a_policy_learn() -> None:
-    text = printed(
-        f"{ROOT}/scripts/lockstep.py", "--seed=0", f"{ROOT}/examples/learn_over_services.py"
-    )
+    example = f"{ROOT}/examples/learn_over_services.py"
+    text = printed(f"{ROOT}/scripts/lockstep.py", "--seed=0", example)
     returns = dict.fromkeys(range(60), 0.0)
     for episode, reward in re.findall(r"Episode (\d+), .*Reward=(\S+)", text):
         returns[int(episode)] += float(reward)

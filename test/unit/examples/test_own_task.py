@@ -33,9 +33,8 @@ def test_it_makes_an_environment_like_any_other(own_task: Any) -> None:
 
 def test_the_reward_draws_towards_the_place(own_task: Any) -> None:
     env = own_task.make(place=-0.1)
-    places = [
-        cartpole_world(env.task.start._replace(cart_position=x)) for x in (-0.3, -0.1, 0.15, 0.4)
-    ]
+    states = [env.task.start._replace(cart_position=x) for x in (-0.3, -0.1, 0.15, 0.4)]
+    places = [*map(cartpole_world, states)]
     rewards = [env.task.reward(state, 0) for state in places]
     assert rewards == pytest.approx([0.6, 1.0, 0.5, 0.0])
     start, _ = env.reset(seed=0)
@@ -46,9 +45,7 @@ def test_the_reward_draws_towards_the_place(own_task: Any) -> None:
 
 
 @pytest.mark.slow
-def test_it_is_a_workbench_that_knows_the_task(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_it_is_a_workbench_that_knows_the_task(tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
 
     def run(*words: str) -> str:

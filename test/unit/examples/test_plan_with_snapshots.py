@@ -24,13 +24,7 @@ def example(monkeypatch: pytest.MonkeyPatch) -> Any:
 @pytest.mark.parametrize(
     ("name", "fewer"), [("cart-pole", {"rounds": 1}), ("rover", {"plans": 8})], ids=str
 )
-def test_it_gets_there(
-    example: Any,
-    name: str,
-    fewer: dict[str, int],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_it_gets_there(example: Any, name: str, fewer: dict[str, int], monkeypatch, capsys) -> None:
     """With less thought than it takes by itself."""
     monkeypatch.setitem(example.PROBLEMS, name, example.PROBLEMS[name]._replace(**fewer))
     monkeypatch.setattr(sys, "argv", ["plan_with_snapshots.py", name])
@@ -38,9 +32,7 @@ def test_it_gets_there(
     assert capsys.readouterr().out.startswith("done after ")
 
 
-def test_processes_find_the_same(
-    example: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_processes_find_the_same(example: Any, monkeypatch, capsys) -> None:
     quick = example.PROBLEMS["rover"]._replace(
         plans=5, horizon=3, is_done=lambda _, states: len(states) > 5
     )

@@ -119,9 +119,8 @@ try:
 except CannotExpand as fault:
     print(fault)
 """
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "of memory" in done.stdout
 
 

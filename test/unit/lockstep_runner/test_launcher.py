@@ -86,9 +86,8 @@ def test_what_is_imported_later_is_seen_to_once(tmp_path, monkeypatch):
     (tmp_path / "imported_later.py").write_text("value = 1\n")
     monkeypatch.syspath_prepend(tmp_path)
     seen = []
-    monkeypatch.setattr(
-        sys, "meta_path", [AfterImport("imported_later", seen.append), *sys.meta_path]
-    )
+    finder = AfterImport("imported_later", seen.append)
+    monkeypatch.setattr(sys, "meta_path", [finder, *sys.meta_path])
     import imported_later
 
     assert seen == [imported_later]

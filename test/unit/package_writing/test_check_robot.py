@@ -49,9 +49,8 @@ def test_a_sound_robot_is_fine_on_one_page(check):
     assert rows["mass"].startswith("1 kg")
     assert rows["plugins"] == "libgazebo_ros_control.so"
     assert rows["control"] == "1 EffortJointInterface"
-    assert (
-        rows["PyBullet"] == rows["MuJoCo"] == "held by its fixed base; commands move 1 of 1 joints"
-    )
+    told = "held by its fixed base; commands move 1 of 1 joints"
+    assert rows["PyBullet"] == rows["MuJoCo"] == told
     assert rows["verdict"] == "fine"
     assert len(page.splitlines()) < 20
 

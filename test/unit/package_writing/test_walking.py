@@ -40,9 +40,8 @@ def test_a_quadruped_trots_by_commands(new):
     assert not terminated and info["rewards"]["linear"] > 0.95
     assert info["rewards"]["height"] < 0.01
     env.close()
-    assert (
-        "num_envs: 8" in (folder / "config/ppo.yaml").read_text() and robot.control_period == 0.02
-    )
+    assert "num_envs: 8" in (folder / "config/ppo.yaml").read_text()
+    assert robot.control_period == 0.02
 
 
 def test_what_has_no_legs_is_refused(tmp_path, capsys):

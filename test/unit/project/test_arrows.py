@@ -42,9 +42,8 @@ def test_the_contracts_speak_of_all_libraries() -> None:
 
 
 def test_a_wait_in_our_libraries_stays_wall_time_under_the_lockstep_runner() -> None:
-    marked = {
-        path.parent.name for path in SRC.glob("*/__init__.py") if WALL_TIME in path.read_text()
-    }
+    files = [each for each in SRC.glob("*/__init__.py") if WALL_TIME in each.read_text()]
+    marked = {each.parent.name for each in files}
     assert set(LINTER["root_packages"]) <= marked | LIBRARIES
 
 
@@ -110,9 +109,7 @@ def test_no_folder_is_crowded() -> None:
     for path in (each for each in MODULES if each.name[:2] != "__"):
         for folder in path.relative_to(SRC).parents:  # a folder that git has left behind is none
             entries[folder].add(path.relative_to(SRC / folder).parts[0])
-    assert {
-        str(each): len(names) for each, names in entries.items() if len(names) > MOST_ENTRIES
-    } == {}
+    assert {str(each) for each, names in entries.items() if len(names) > MOST_ENTRIES} == set()
 
 
 def test_a_name_means_one_class() -> None:

@@ -44,9 +44,8 @@ def workspace(tmp_path_factory):
         (folder / "scripts").mkdir()
         messages = MESSAGES if name == "control_msgs" else ""
         (folder / "package.xml").write_text(PACKAGE.format(name=name))
-        (folder / "CMakeLists.txt").write_text(
-            CMAKE.format(name=name, messages=messages, script=script)
-        )
+        text = CMAKE.format(name=name, messages=messages, script=script)
+        (folder / "CMakeLists.txt").write_text(text)
         (folder / "msg/Theirs.msg").write_text("float64 x\n")
         (folder / "scripts" / script).write_text(SCRIPT)
         (folder / "scripts" / script).chmod(0o755)

@@ -77,9 +77,8 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """
     workspace = Workspace(tmp_path_factory.mktemp("home"))
     sources = workspace.home / "repository"
-    shutil.copytree(
-        ROOT, sources, ignore=shutil.ignore_patterns(".git", ".ws", "__pycache__", "runs")
-    )
+    ignored = shutil.ignore_patterns(".git", ".ws", "__pycache__", "runs")
+    shutil.copytree(ROOT, sources, ignore=ignored)
     shutil.copy(INSTALLED, sources / "requirements")
     made = workspace.bash(
         f"cd {sources}; git init -q; git add -A; git -c user.name=a -c user.email=a@example.com commit -qm a"
@@ -140,9 +139,8 @@ def test_built_workspace(workspace: Workspace, space: str) -> None:
         found = workspace.inside("rospack", "find", package, space=space).stdout.strip()
         expected = workspace.path / ("install/share" if space == "install" else "src")
         assert found.startswith(str(expected))
-    listed = workspace.inside(
-        "roslaunch", "--files", "gazebo_ros", "empty_world.launch", space=space
-    )
+    launch = ("roslaunch", "--files", "gazebo_ros", "empty_world.launch")
+    listed = workspace.inside(*launch, space=space)
     assert listed.returncode == 0, listed.stderr
 
 

@@ -312,6 +312,5 @@ def test_ws_takes_it(command: Command, tmp_path: Path) -> None:
         cwd=ROOT, env=dict(os.environ), capture_output=True, text=True, check=False,
     )  # fmt: skip
     none_of_the_part = pytest.ExitCode.NO_TESTS_COLLECTED
-    assert found.returncode == 0 or (is_whole and found.returncode == none_of_the_part), (
-        found.stdout
-    )
+    is_fine = found.returncode == 0 or (is_whole and found.returncode == none_of_the_part)
+    assert is_fine, found.stdout

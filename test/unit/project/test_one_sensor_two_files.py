@@ -80,9 +80,8 @@ def test_it_has_a_topic_that_listeners_and_windows_read(monkeypatch: pytest.Monk
     with sim.lock:
         sim.advance(25)
     message = SilentPublisher.messages["/temperature"][-1]
-    assert isinstance(message, Temperature) and message.temperature == pytest.approx(
-        WANTED + 1, abs=1
-    )
+    assert isinstance(message, Temperature)
+    assert message.temperature == pytest.approx(WANTED + 1, abs=1)
     [taken] = readers.read()
     said = to_reading(taken.now, taken.values).values[0]
     assert said.name == "temperature" and len(said.data) == 8

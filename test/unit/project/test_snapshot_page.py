@@ -9,9 +9,8 @@ PAGE = Path(__file__).resolve().parents[3] / "docs/snapshots.md"
 def test_its_programs_run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     known = {}
-    for program in re.findall(
-        r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.M | re.S
-    ):
+    text = PAGE.read_text(encoding="utf-8")
+    for program in re.findall(r"^```python\n(.*?)^```", text, re.M | re.S):
         exec(program, known)
     assert repr(known["first"]) == repr(known["again"]) and (tmp_path / "hard.snapshot").exists()
     assert "environment/steps: 0 and 1" in capsys.readouterr().out

@@ -180,12 +180,7 @@ class Reader:
 
 
 @pytest.fixture
-def reader(
-    tmp_path: Path,
-    environment: dict[str, str],
-    monkeypatch: pytest.MonkeyPatch,
-    request: pytest.FixtureRequest,
-) -> Iterator[Reader]:
+def reader(tmp_path: Path, environment: dict[str, str], monkeypatch, request) -> Iterator[Reader]:
     package = request.param
     checkout = tmp_path / "checkout"
     checkout.mkdir()

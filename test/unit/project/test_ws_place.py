@@ -14,9 +14,7 @@ import pytest
 
 NOBODY = 65534
 STRANGE = ["ü a b", "new\nline\n", "semi;co:lon", "$HOME", 'quo"te\t', "l" * 99]
-only_root = pytest.mark.skipif(
-    os.geteuid() != 0, reason="only root can become a user without rights"
-)
+only_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
 
 
 # --- who may write -----------------------------------------------------------------------------
@@ -88,10 +86,8 @@ def test_what_cannot_be_made_in_the_checkout_is_made_elsewhere(foreign, variable
     (made,) = (foreign / place).iterdir()
     assert (made / "venv/bin/python3").exists()
     assert not (foreign / "checkout/.ws").exists()
-    assert (
-        as_nobody(foreign / "checkout/ws", "clean", **{variable: str(foreign / "own")}).returncode
-        == 0
-    )
+    cleaned = as_nobody(foreign / "checkout/ws", "clean", **{variable: str(foreign / "own")})
+    assert cleaned.returncode == 0
     assert not made.exists()
 
 
@@ -164,10 +160,8 @@ def test_all_works_below_a_strange_path(ws, root, tmp_path, tmp_path_factory):
         found = there("python3", "-c", code)
         assert found.returncode == 0, found.stderr
         assert found.stdout.endswith("ros_utils/__init__.py\n")
-        for command in (
-            ("roslaunch", "--files", "gazebo_ros", "empty_world.launch"),
-            ("gz", "--help"),
-        ):
+        launch = ("roslaunch", "--files", "gazebo_ros", "empty_world.launch")
+        for command in (launch, ("gz", "--help")):
             result = there(*command)
             assert result.returncode == 0, result.stderr
     finally:

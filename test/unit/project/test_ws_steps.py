@@ -58,9 +58,7 @@ def test_a_lock_file_pins_all_that_the_lists_name(steps, root, version):
 
 def test_a_python_without_a_lock_file_is_named(steps):
     told = steps("pip_install || echo $?", "3.10").splitlines()
-    assert told[0].startswith(
-        "ERROR: requirements/ has no lock file for Python 3.10, only lock-3.11"
-    )
+    assert told[0].startswith("ERROR: requirements/ has no lock file for Python 3.10, only ")
     assert told[1:] == ["1"]
 
 

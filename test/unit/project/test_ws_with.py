@@ -195,10 +195,8 @@ def test_what_cannot_be_used_is_said_and_the_rest_works(ws, tmp_path):
     ):
         (line,) = [each for each in again.stderr.splitlines() if words in each]
         assert line.startswith("ws: ") and line in first.stderr
-    for words in (
-        "gazebo_ros is for Gazebo itself",
-        f"not built: {NEEDY}, needier (it needs needy)",
-    ):
+    unbuilt = f"not built: {NEEDY}, needier (it needs needy)"
+    for words in ("gazebo_ros is for Gazebo itself", unbuilt):
         assert first.stderr.count(words) == 1
         assert words not in again.stderr
     assert "building your package" not in again.stderr

@@ -113,9 +113,7 @@ def test_backends_that_differ_are_told_with_the_step():
         return RobotEnv(SOLO, Hold(reward=lambda *_: 0.0 if backend == "one" else 1.0))
 
     one, other = (Subject(make, steps=STEPS).over(name) for name in ("one", "other"))
-    with pytest.raises(
-        AssertionError, match=r"one and other .*: step 1: the reward is 0.0 and 1.0"
-    ):
+    with pytest.raises(AssertionError, match="one and other .*: step 1: the reward is 0.0 and"):
         repetition.backends(one, other)
 
 
@@ -166,9 +164,8 @@ def test_an_environments_own_error_is_told_once_and_is_the_cause():
     with pytest.raises(AssertionError) as error:
         check_robot_env(of(lambda: Hold(observe=fails)), steps=STEPS)
     assert isinstance(error.value.__cause__, ZeroDivisionError)
-    assert (
-        str(error.value).splitlines()[1] == "- observations (over bullet): ZeroDivisionError: here"
-    )
+    line = str(error.value).splitlines()[1]
+    assert line == "- observations (over bullet): ZeroDivisionError: here"
     assert str(error.value).count("ZeroDivisionError: here") == 1
 
 

@@ -83,9 +83,8 @@ def rollout(vector, mode):
 
 @pytest.mark.slow
 def test_two_simulators_give_the_bits_of_two_worlds_also_with_resets_apart(both):
-    pair = both(
-        "cartpole/Classic-v0", max_steps=25, render_mode="rgb_array", width=32, height=16, **RICH
-    )
+    pictures = {"render_mode": "rgb_array", "width": 32, "height": 16}
+    pair = both("cartpole/Classic-v0", max_steps=25, **pictures, **RICH)
     for mode in MODES:
         over_ros, here = (rollout(vector, mode) for vector in pair)
         ends = [row[2] | row[3] for row in here if len(row) == 5]

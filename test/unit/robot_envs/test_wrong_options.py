@@ -43,18 +43,10 @@ def test_an_option_or_action_that_cannot_be(case):
 @pytest.mark.parametrize(
     ("robot", "task", "text"),
     [
-        (
-            "support.scenes.solo_arm",
-            "Hold",
-            "'support.scenes.solo_arm' must be written as module:attribute",
-        ),
+        ("support.scenes.solo_arm", "Hold", "solo_arm' must be written as module:attribute"),
         ("support.scenes.solo_am:SOLO", "Hold", "no module 'support.scenes.solo_am'"),
         ("support.scenes.solo_arm:SOLE", "Hold", "has no 'SOLE'; did you mean 'SOLO'"),
-        (
-            "support.scenes.solo_arm:arm",
-            "Hold",
-            "is <function arm at .*not a robot_envs.Robot, a list",
-        ),
+        ("support.scenes.solo_arm:arm", "Hold", "is <function arm at .*not a robot_envs.Robot"),
         ("support.scenes.solo_arm:SOLO", "Hol", "has no 'Hol'; did you mean 'Hold'"),
         ("support.scenes.solo_arm:SOLO", "SOLO", "which is not a subclass of robot_envs.Task"),
     ],

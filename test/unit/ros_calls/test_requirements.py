@@ -53,9 +53,8 @@ def test_every_package_is_asked_for() -> None:
 
 
 def test_the_simulator_is_asked_for_what_it_loads() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", STARTED], capture_output=True, text=True, check=True
-    )
+    command = [sys.executable, "-c", STARTED]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     loaded = {name.partition(".")[0] for name in done.stdout.split()}
     assert loaded & set(ALL) <= set(SIMULATOR)
 
@@ -86,9 +85,8 @@ def test_debians_python_is_told_how_to_install(tmp_path: Path) -> None:
 def test_the_command_is_one_that_pip_takes() -> None:
     """In an environment that has them all, where there is nothing to fetch."""
     code = "import sys; from ros_calls.requirements import require; require(('no_such_module',))"
-    ended = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False
-    )
+    command = [sys.executable, "-c", code]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
     *command, _file = shlex.split(re.search(r"installs them: (.*) \(see", ended.stderr)[1])
     done = subprocess.run(
         [*command, INSTALLED, "--dry-run", "--no-index"], capture_output=True, text=True, check=False,

@@ -66,9 +66,8 @@ def slept(monkeypatch):
 def test_no_master(no_master, parameters, slept, capsys, call):
     assert call(parameters) is False
     assert sum(slept) < 1.0, "none is waited for"
-    assert re.search(
-        r"no ROS master at http://127.0.0.1:\d+ \(Connection refused\)", capsys.readouterr().err
-    )
+    told = capsys.readouterr().err
+    assert re.search(r"no ROS master at http://127.0.0.1:\d+ \(Connection refused\)", told)
 
 
 @pytest.mark.slow
@@ -132,10 +131,8 @@ def test_packages_and_files_that_do_not_exist(capsys):
     assert ros_launch.ros_launch_from_path("/nix.launch") is False
     assert ros_node.ros_node_from_pkg("nix_pkg", "nix") is False
     assert ros_node.ros_node_from_pkg("rospy", "nix") is False
-    assert ros_gazebo.gazebo_spawn_urdf_path("/nix.urdf") == (
-        False,
-        "/nix.urdf: can't be read or expanded",
-    )
+    answer = (False, "/nix.urdf: can't be read or expanded")
+    assert ros_gazebo.gazebo_spawn_urdf_path("/nix.urdf") == answer
     assert capsys.readouterr().err.count("[ERROR]") == 7
 
 

@@ -38,9 +38,7 @@ def ask(gate, path="/", **headers):
 
 
 def test_a_port_in_use_is_one_line(taken):
-    with pytest.raises(
-        PortInUse, match=rf"127\.0\.0\.1, port {taken}: Address already in use.*--port"
-    ):
+    with pytest.raises(PortInUse, match=rf"port {taken}: Address already in use.*--port"):
         find_address("127.0.0.1", taken)
 
 

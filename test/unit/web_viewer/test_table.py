@@ -34,9 +34,8 @@ def test_rows_come_once_and_whole(place):
 
 
 def test_any_way_of_cutting_the_file_gives_the_same(place):
-    content = (
-        HEADER + "".join(row(step, step / 3, f"tag{step % 3}") for step in range(200))
-    ).encode()
+    rows = [row(step, step / 3, f"tag{step % 3}") for step in range(200)]
+    content = (HEADER + "".join(rows)).encode()
     expected = [(float(step), f"tag{step % 3}", step / 3) for step in range(200)]
     draw = random.Random(7)
     for _ in range(20):

@@ -87,9 +87,7 @@ def test_what_joints_do_not_tell_is_refused(query: StateQuery, words: str) -> No
 
 def test_a_robot_that_is_not_fixed_to_the_world() -> None:
     text = (FILES / "two_link_arm.urdf").read_text().replace('"world"', '"cart"')
-    with pytest.raises(
-        RobotEnvError, match="isn't fixed to the world: its joints don't determine where"
-    ):
+    with pytest.raises(RobotEnvError, match="isn't fixed to the world: its joints don't determine"):
         LinkView(Robot(text), ALL)
 
 
@@ -99,7 +97,5 @@ def test_a_joint_that_nobody_tells() -> None:
     text = before + after.split("</transmission>", 1)[1]
     query = StateQuery(links=(LinkQuery("upper"),))
     LinkView(Robot(text), query)
-    with pytest.raises(
-        RobotEnvError, match="'tip' depends on the joint 'elbow', which has no trans"
-    ):
+    with pytest.raises(RobotEnvError, match="'tip' depends on the joint 'elbow', which has no"):
         LinkView(Robot(text), ALL)

@@ -95,9 +95,7 @@ def test_while_it_waits_again_no_effort_is_left_on(furuta: PolicyNode) -> None:
     assert commanded(furuta) == [0.0, 0.0, 0.0]
 
 
-def test_it_stops_when_nobody_listens_any_more(
-    furuta: PolicyNode, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_stops_when_nobody_listens_any_more(furuta: PolicyNode, monkeypatch) -> None:
     know_joints(furuta, FURUTA)
     assert furuta._trouble(0.0) == ""
     monkeypatch.setattr(SilentPublisher, "get_num_connections", lambda self: 0)
@@ -137,9 +135,7 @@ class Follow(Task):
         return 0.0
 
 
-def test_a_policy_gets_its_sensors_from_topics_and_stops_when_they_are_silent(
-    clock: SimpleNamespace,
-) -> None:
+def test_a_policy_gets_its_sensors_from_topics_and_stops_when_they_are_silent(clock) -> None:
     node = PolicyNode(SEEING, Follow(), lambda seen: seen, 0.02, late=1.0)
     know_joints(node, SEEING)
     assert node._missing() == "a message on /imu, and a message on /scan"

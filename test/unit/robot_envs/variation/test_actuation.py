@@ -88,10 +88,7 @@ def test_those_that_a_mapping_leaves_out_are_ideal():
         ({"delay": -1}, "action_delay must be a number of control steps from 0 to 1000, not -1"),
         ({"delay": float("nan")}, "action_delay"),
         ({"lag": -0.1}, "actuator_lag must be a number >= 0, not -0.1"),
-        (
-            {"lag": {"motr": 0.1}},
-            "actuator_lag: there is no controller 'motr'; did you mean 'motor'?",
-        ),
+        ({"lag": {"motr": 0.1}}, "there is no controller 'motr'; did you mean 'motor'?"),
         ({"limit": -1.0}, "actuator_limit must be a number >= 0"),
         ({"limit": [1.0, 2.0]}, "actuator_limit"),
     ],

@@ -157,10 +157,8 @@ def test_dry_friction_does_nothing_to_a_joint_that_is_set_in_position():
     """As docs/sim_to_real.md says: such a joint goes where it is told, as in Gazebo."""
     urdf = RIG.urdf.replace("EffortJointInterface", "PositionJointInterface")
     servo = {"type": "position_controllers/JointPositionController", "joint": "servo"}
-    motors = {
-        "type": "position_controllers/JointGroupPositionController",
-        "joints": ["rail", "drop"],
-    }
+    kind = "position_controllers/JointGroupPositionController"
+    motors = {"type": kind, "joints": ["rail", "drop"]}
     robot = replace(RIG, urdf=urdf, controllers={"servo_position": servo, "motors": motors})
     rows = []
     for friction in (0.0, 50.0):

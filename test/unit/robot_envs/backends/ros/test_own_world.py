@@ -39,10 +39,8 @@ def own(**options) -> RobotEnv:
 
 def lives(pid: int) -> bool:
     try:
-        return (
-            Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
-            not in "ZX"
-        )
+        state = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2]
+        return state.split()[0] not in "ZX"
     except OSError:
         return False
 
@@ -99,9 +97,8 @@ def test_a_coarser_physics_step_gives_the_same_bits_as_in_process() -> None:
 
 def test_snapshots_of_bodies_that_touch_survive_the_simulator() -> None:
     def told(dies: bool) -> list:
-        env = gymnasium.make(
-            "robot_envs.robots:robot_envs/PickCube-v0", backend="ros-own"
-        ).unwrapped
+        cube = "robot_envs.robots:robot_envs/PickCube-v0"
+        env = gymnasium.make(cube, backend="ros-own").unwrapped
         with env:
             env.reset(seed=1)
             snapshot = env.save_state()
@@ -150,9 +147,8 @@ def test_one_that_dies_or_hangs_is_replaced_and_no_bit_differs(env, truth, caplo
     episode.before(21, lambda: end(env, signal.SIGSTOP))
     assert differences(rollout(episode, 60, seed=8), truth) == ""
     assert env.backend.restarts == before + 2
-    died, hung = (
-        record.getMessage() for record in caplog.records if record.levelno == logging.WARNING
-    )
+    warnings = [each for each in caplog.records if each.levelno == logging.WARNING]
+    died, hung = (each.getMessage() for each in warnings)
     assert "it was ended by SIGKILL, as the kernel does where memory" in died
     assert "no answer within" in hung
     for told in (died, hung):
@@ -207,11 +203,8 @@ def test_one_that_dies_before_its_robot_is_there_is_replaced(truth, monkeypatch,
 
     monkeypatch.setattr(OwnSimulator, "wait", die)
     made = own(**RICH)
-    assert (
-        killed
-        and made.backend.restarts == 1
-        and "another one takes its place" in caplog.messages[-1]
-    )
+    assert killed and made.backend.restarts == 1
+    assert "another one takes its place" in caplog.messages[-1]
     assert differences(rollout(made, 60, seed=8), truth) == ""
     made.close()
 
@@ -246,9 +239,7 @@ def test_where_there_are_no_files_nothing_starts() -> None:
     os.close(held.pop())
     resource.setrlimit(resource.RLIMIT_NOFILE, (max(held) + 2, limits[1]))
     try:
-        with pytest.raises(
-            RobotEnvError, match="^the simulator can't be started: Too many open files$"
-        ):
+        with pytest.raises(RobotEnvError, match="simulator can't be started: Too many open files$"):
             OwnSimulator(Slot(), None, 0)
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, limits)

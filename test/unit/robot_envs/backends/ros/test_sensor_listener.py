@@ -52,9 +52,8 @@ def test_topics_are_those_that_the_plugins_name(heard: Heard) -> None:
     assert list(heard.topics) == wanted.split() == found.missing()
     found.close()
     assert not heard.topics
-    text = str(SEEING.urdf).replace(
-        "<topicName>scan", "<robotNamespace>own</robotNamespace><topicName>scan"
-    )
+    scan = "<topicName>scan"
+    text = str(SEEING.urdf).replace(scan, f"<robotNamespace>own</robotNamespace>{scan}")
     robot = replace(SEEING, urdf=text, namespace="left", sensor_topics={"imu": "/phone/imu"})
     listener(heard, "front_laser", "sonar", "seeing::imu", robot=robot)
     assert list(heard.topics) == ["/own/scan", "/left/sonar", "/phone/imu"]
