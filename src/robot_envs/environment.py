@@ -346,7 +346,7 @@ class RobotEnv(SavedEnv):
         """Has further sensors measure, as "camera" or "camera@640x480", from the next reset on.
 
         Returns a function that returns what each has measured last, by "sensor.field"; it changes nothing of
-        what the robot does. Raises SimulatorError for a sensor that there isn't.
+        what the robot does. Raises SimulatorError if there is no such sensor.
         """
         self._check_open()
         query = both(self.task.query, self.task.reward_query)

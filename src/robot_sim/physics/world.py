@@ -275,7 +275,7 @@ class World(Shared):
             model.reset(joints)
 
     def state_dict(self) -> dict[str, Any]:
-        """Returns all from which it steps on, but what services set once: properties and models.
+        """Returns the state that its steps depend on, without models and properties set by services.
 
         Engines can't save contacts. So those begin anew, now and after each load: the next step finds
         them again, but the solver of PyBullet starts without the forces of the last one.
@@ -315,7 +315,7 @@ class World(Shared):
     def check_state(self, state: Mapping[str, Any]) -> None:
         """Checks that it can take a state.
 
-        Raises SnapshotError if models, or their properties, are others now.
+        Raises SnapshotError if the models or their properties have changed.
         """
         now = self.gravity, self.time_step, vars(self.solver)
         if now != (state["gravity"], state["time_step"], state["solver"]):

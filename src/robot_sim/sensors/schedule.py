@@ -160,7 +160,7 @@ class Schedule(Shared, Stateful):
         self._take(fresh)
 
     def _take_part(self) -> None:
-        """Joins the ticks while a clock has listeners, and leaves them else."""
+        """Follows the ticks only while a clock has listeners."""
         heard = [clock.due for clock in self._clocks if clock.heard]
         self._due = min(heard, default=0)
         # A new list: the old one may be in use by a tick.
