@@ -83,7 +83,7 @@ def _section(section: Section) -> str:
             rows = list(group)
             names = ", ".join(_listed(rows))
             warning = " / ".join(dict.fromkeys(_warning(row) for _, row in rows))
-            lines.append(f"| {names} | {warning if answer == WARNED else 'no'} | {why} |")
+            lines.append(f"| {names} | {warning if answer == WARNED else ''} | {why} |")
         lines.append("")
     return "\n".join(lines)
 

@@ -129,7 +129,7 @@ class Clock:
                 self._running[ident] = thread
 
     def began_own(self, thread: threading.Thread, is_quiet: Callable[[], bool]) -> None:
-        """As `began`, for a thread that the script started: it may also wait for anything but time."""
+        """As `began`, for a thread of the script, which may also wait for things other than time."""
         self._own[thread] = is_quiet
         self.began(thread)
 
@@ -243,7 +243,7 @@ class Clock:
         return False
 
     def _end_sleeps(self, begins: dict[int, float]) -> None:
-        """Wakes the threads that a paused world doesn't keep, each once."""
+        """Wakes, each once, the threads that a paused world doesn't hold."""
         now = originals.monotonic()
         with self._guard:
             for sleeper in self._sleepers:

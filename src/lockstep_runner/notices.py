@@ -11,7 +11,7 @@ def tell(text: str) -> None:
 
 
 def tell_once(what: str, text: str) -> None:
-    """Prints a line on stderr, unless there was one about `what` before."""
+    """Prints a line on stderr, only the first time for each `what`."""
     if what not in _told:
         _told.add(what)
         tell(text)

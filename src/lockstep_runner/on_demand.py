@@ -36,7 +36,7 @@ def replace_threads(runner: ScriptRunner) -> None:
 
 
 def follow_processes(runner: ScriptRunner) -> None:
-    """Has time wait for the processes that the script starts, and nodes among them follow its clock."""
+    """Makes time wait for the script's processes, and nodes among them follow its clock."""
     folder = contextlib.ExitStack()
     address = str(folder.enter_context(scratch_folder()) / "clock")
     atexit.register(folder.close)

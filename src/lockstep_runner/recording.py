@@ -35,7 +35,7 @@ def recorded(path: str) -> Iterator[None]:
 
 
 def _files(bag: str) -> list[str]:
-    """Returns the files that there are of a bag, complete or not."""
+    """Returns a bag's existing files, complete or not."""
     return [each for each in (bag, bag + ACTIVE) if os.path.exists(each)]
 
 

@@ -208,7 +208,7 @@ class ScriptRunner:
 
     @_ends_with_the_world(None)
     def reads_time(self) -> None:
-        """Catches up after an interrupted call, and counts a reading of the time."""
+        """Catches up after an interrupted call, and counts a read of the clock."""
         if self.clock.behind and self.world.there and self._may_step():
             self.clock.exchange()
         self.polls("the time", POLLED_TIME)

@@ -185,7 +185,7 @@ class Topics:
         return messages
 
     def _give_up(self, names: Collection[str]) -> None:
-        """Waits for these topics no more: they never connect if their types differ."""
+        """Stops waiting for these topics: they never connect if their types differ."""
         self._given_up.update(names)
         for name in sorted(names):
             tell_once(

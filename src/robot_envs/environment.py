@@ -203,7 +203,7 @@ class RobotEnv(SavedEnv):
 
     @property
     def spec(self) -> EnvSpec | None:
-        """How Gymnasium made this; says if the robot never repeats itself."""
+        """How Gymnasium made this; marks robots that don't repeat as nondeterministic."""
         return self._spec
 
     @spec.setter
@@ -267,7 +267,7 @@ class RobotEnv(SavedEnv):
         return state._replace(commands={**state.commands, **self._first}) if self._first else state
 
     def _shown(self, state: WorldState) -> WorldState:
-        """Returns what `apply` and `observe` see of a state: as much as where the policy is deployed."""
+        """Returns what `apply` and `observe` see of a state: no more than a deployed policy."""
         return part_of(state, self.task.query) if self._hides else state
 
     def _observe(self, measured: WorldState) -> Any:
@@ -304,7 +304,7 @@ class RobotEnv(SavedEnv):
         return _Step(self._steps + 1, action, self._actuator(sent), sent)
 
     def _taken(self, action: Any) -> _Step:
-        """Returns the step that was begun with this action, or else a new one."""
+        """Returns the step begun with this action, or a new one."""
         begun = self._begun
         if begun is None:
             return self._prepared(action)
@@ -343,10 +343,10 @@ class RobotEnv(SavedEnv):
         return observation, reward, terminated, truncated, info
 
     def sensor_reader(self, names: Sequence[str]) -> Callable[[], dict[str, Any]]:
-        """Lets further sensors measure from the next reset on, such as "camera" or "camera@640x480".
+        """Adds sensors, as "camera" or "camera@640x480", from the next reset on.
 
-        Returns a function that returns their latest measurements, by "sensor.field". The robot's motion stays
-        the same. Raises SimulatorError if there is no such sensor.
+        Returns a function that returns what each has measured last, by "sensor.field"; it changes nothing of
+        what the robot does. Raises SimulatorError if there is no such sensor.
         """
         self._check_open()
         query = both(self.task.query, self.task.reward_query)

@@ -30,7 +30,7 @@ class SavedEnv(DrawnEnv):
     _begun: Any  # the step that is under way
 
     def save_state(self) -> EnvSnapshot:
-        """Returns all that decides the future: of world, episode, task and generators.
+        """Returns everything that decides the future of world, episode, task and generators.
 
         Raises:
             gymnasium.error.ResetNeeded: Before the first episode.
@@ -129,7 +129,7 @@ class SavedEnv(DrawnEnv):
             raise SimulatorError(f"no episode can begin at the snapshot: {error!s:.300}") from error
 
     def _parts(self) -> dict[str, Any]:
-        """Returns all but the world that has a state, by name."""
+        """Returns everything with a state, except the world, by name."""
         parts = {
             "generator": self.np_random, "sensor": self._sensor, "actuator": self._actuator,
             "task": self.task, "randomisation": self._randomisation,
@@ -138,7 +138,7 @@ class SavedEnv(DrawnEnv):
 
     @property
     def _fits(self) -> dict[str, Any]:
-        """What has to be the same where its snapshots are restored."""
+        """What another environment must share to restore its snapshots."""
         kind = type(self.task)
         parts = (self._sensor, self._actuator, self._randomisation)
         fits = {

@@ -17,7 +17,7 @@ from robot_sim.state_dict import Stateful
 
 @dataclass(frozen=True)
 class Object:
-    """An obstacle or a thing to handle, which a task needs besides its robots.
+    """An obstacle or an object to handle, in addition to a task's robots.
 
     Args:
         name: Name of the model in the world.
@@ -89,14 +89,14 @@ class Task(Stateful, ABC):
         """Returns the reward for reaching a state by an action."""
 
     def aim(self, goal: Any) -> None:
-        """Takes another goal, for a policy that is deployed; raises ValueError if it isn't one.
+        """Sets the goal of a deployed policy; raises ValueError if it isn't one.
 
         By default there are none; a `GoalTask`'s are those of its `goals`.
         """
         raise ValueError(f"{type(self).__name__} has no goal")
 
     def goal_mark(self) -> tuple[Vector, float] | None:
-        """Returns where pictures mark the episode's goal, and how near counts as there [m]; None: nowhere."""
+        """Returns place and radius [m] of the goal's mark in pictures; None: no mark."""
         return None
 
     def is_terminal(self, state: WorldState) -> bool:

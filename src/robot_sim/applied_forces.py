@@ -64,7 +64,7 @@ class AppliedForces:
         ]
 
     def forget(self, model: Model) -> None:
-        """Drops what acts on a model; as in Gazebo, also on equally named joints of other models."""
+        """Drops a model's efforts and wrenches; as in Gazebo, other models' joints of the same name too."""
         names = set(model.all_joints)
         self.wrenches = [each for each in self.wrenches if each.model is not model]
         self.efforts = [each for each in self.efforts if each.joint not in names]
@@ -77,7 +77,7 @@ class AppliedForces:
         }
 
     def load_state_dict(self, state: Mapping[str, Any], models: Mapping[str, Model]) -> None:
-        """Takes back what `state_dict` has returned, in a world with these models."""
+        """Loads what `state_dict` returned, in a world with these models."""
         self.efforts = [AppliedEffort(models[name], *each) for name, *each in state["efforts"]]
         self.wrenches = [AppliedWrench(models[name], *each) for name, *each in state["wrenches"]]
 

@@ -1,4 +1,4 @@
-"""Moves of bodies by something other than time, and their listeners."""
+"""Moves of bodies by services and resets, and their listeners."""
 
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
@@ -13,7 +13,7 @@ Moved = Collection[Model] | None
 
 
 class Moves:
-    """Tells of moves. The caller of each method holds the simulator's lock."""
+    """Notifies listeners of moves. The caller of each method holds the simulator's lock."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -22,7 +22,7 @@ class Moves:
         self._pending: Moved = ()
 
     def tell(self, moved: Moved) -> None:
-        """Tells of a move, or of all of a block's at its end."""
+        """Notifies of a move; within a block, of all its moves at its end."""
         pending = self._pending
         pending = None if moved is None or pending is None else {*pending, *moved}
         self._pending = pending if self._open else ()
@@ -36,7 +36,7 @@ class Moves:
 
     @contextmanager
     def as_one(self) -> Iterator[None]:
-        """Tells of all moves in the block at its end, as one."""
+        """Merges all moves in the block into one notification at its end."""
         self._open += 1
         try:
             yield
@@ -45,7 +45,7 @@ class Moves:
             self.tell(())
 
     def on_move_of(self, model: Model, call: Callable[[], None]) -> Callable[[Moved], None]:
-        """Calls a function when a model was moved, or all were; returns the listener, for `forget`."""
+        """Calls a function after each move of a model or of all; returns the listener, for `forget`."""
 
         def listener(moved: Moved) -> None:
             if moved is None or model in moved:
@@ -60,7 +60,7 @@ class Moves:
 
 
 def _carry(world: World, moved: Collection[Model]) -> None:
-    """Moves attached models along; detaches those that are fixed or were moved themselves."""
+    """Moves attached models along; detaches models that are fixed or were moved themselves."""
     stay, waiting = set(moved), list(moved)
     while waiting:
         model = waiting.pop()

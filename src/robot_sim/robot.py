@@ -80,9 +80,9 @@ class ControlledRobot:
         self._drives = [(drive, indices[drive.joint.name]) for drive in hardware.drives]
         self._efforts = [0.0] * len(indices)
         has_pids = any(drive.pid is not None for drive in hardware.drives)
-        self._exerts = has_pids or bool(self._effort_joints)  # efforts, besides motors
+        self._exerts = has_pids or bool(self._effort_joints)  # efforts, not only motor speeds
         moved = {drive.joint.name for drive, _ in self._drives if drive.pid is None}
-        # What a motor drives is as fast as its command.
+        # A motor drives its joint at exactly the commanded speed.
         self._watched = [index for name, index in indices.items() if name not in moved]
         self._others = [index for name, index in indices.items() if name not in hardware.joints]
         self.watch = StabilityWatch(model, hardware, manager, log)
@@ -93,7 +93,7 @@ class ControlledRobot:
         hardware.relatch()
 
     def review_gains(self) -> None:
-        """Looks for gains that the physics step can't follow, after gains or the step have changed."""
+        """Checks gains against the physics step, after either has changed."""
         self._fast = FAST / self.model.time_step
         self._slow = -self._fast
         self._read_ahead = False
@@ -108,7 +108,7 @@ class ControlledRobot:
             drive.share = shares.get(drive.joint.name, 1.0)
 
     def read(self) -> None:
-        """Copies positions and velocities from the engine, and contains what has blown up."""
+        """Copies positions and velocities from the engine, and slows joints that have blown up."""
         states, slow, fast = self.model.body.joint_states(), self._slow, self._fast
         calm = True
         for joint, index in self._joints:
@@ -146,7 +146,7 @@ class ControlledRobot:
                 self._soften()
 
     def _soften(self) -> None:
-        """Divides the efforts of gains that are too high for the step."""
+        """Reduces efforts where gains are too high for the step."""
         for joint, share in self._softened:
             joint.command *= share
 
@@ -191,7 +191,7 @@ class ControlledRobot:
             self.model.body.apply_efforts(efforts)
 
     def effort_on(self, joint: str) -> float:
-        """Returns the effort [N m, N] that it has applied to a movable joint in the last step."""
+        """Returns the effort [N m, N] applied to a movable joint in the last step."""
         return self._efforts[self.model.joint_index(joint)]
 
     def _halt(self) -> None:
@@ -221,7 +221,7 @@ class ControlledRobot:
             body.set_motor(index, speed, min(most, strongest, STRONGEST))
 
     def joints_moved(self, now: int, relatch: bool) -> None:
-        """Reads a state that something other than time has changed; `now` [ns].
+        """Reads the state after a service or reset has changed it; `now` [ns].
 
         With `relatch`, controllers start over, as an episode should.
         """
@@ -242,7 +242,7 @@ class ControlledRobot:
         }  # fmt: skip
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Takes back what `state_dict` has returned, with the same controllers running."""
+        """Loads what `state_dict` returned, with the same controllers running."""
         self._waited, self._read_ahead = state["waited"], False
         self._efforts[:] = state["efforts"]
         self.watch.load_state_dict(state["watch"])
@@ -259,7 +259,7 @@ class ControlledRobot:
         return [loop.pid.gains for loop in (*self.hardware.loops, *loops)]
 
     def emergency_stop(self, on: bool) -> None:
-        """Releases all joints but those with a position interface, which it holds.
+        """Releases all joints except those with a position interface, which it holds.
 
         When it ends, controllers start over.
         """

@@ -74,12 +74,12 @@ class Simulator(Shared):
         # Called with `now` before each physics step, under the lock: topics, plugins and sensors.
         self.listeners: list[Callable[[int], None]] = []
         self.moves = Moves(world)
-        self.parts: dict[str, Any] = {}  # whose state snapshots have, too, by name
+        self.parts: dict[str, Any] = {}  # by name; snapshots include their state
         self.restored: list[Callable[[], None]] = []  # called under the lock after a restore
         self.before_advance: list[Callable[[], None]] = []  # called under the lock
         self.resets = 0  # of the world or the simulation
         self.reseeded: list[Callable[[int], None]] = []  # called under the lock with a new seed
-        # What sends messages after the ticks, and whether those who step the world call them.
+        # Senders of messages after ticks, and whether callers that step the world run them.
         self.outboxes: list[Outbox] = []
         self.deliver_with_steps = False
         self._fits: dict[str, Any] = {}
@@ -152,7 +152,7 @@ class Simulator(Shared):
         self._stopping.set()
 
     def advance(self, ticks: int, until: Callable[[], bool] | None = None) -> int:
-        """Moves time by physics steps, at least one, or `until` that returns true after one of them.
+        """Advances by `ticks` physics steps; ends early, after one at least, once `until` returns true.
 
         The caller holds the lock. Returns the number of ticks that have passed. Raises NotInLockstep if time
         runs by itself, ValueError for less than one tick.
@@ -175,7 +175,7 @@ class Simulator(Shared):
         return passed
 
     def step(self, ticks: int) -> None:
-        """Pauses the world and moves it by `ticks` physics steps, as fast as they can be computed.
+        """Pauses the world and runs `ticks` physics steps, as fast as they can be computed.
 
         The lock is taken for each tick, so services are answered in between.
         """
@@ -193,7 +193,7 @@ class Simulator(Shared):
                 robot.read_ahead()
 
     def await_holds(self) -> None:
-        """Waits until no one holds time. The caller steps the world; its lock is released meanwhile."""
+        """Waits until nobody holds time, for a caller that steps the world; releases its lock meanwhile."""
         if self.holds:
             self.holds.await_end(self._stopping)
 
@@ -240,7 +240,7 @@ class Simulator(Shared):
         self.moves.tell([model])
 
     def place_link(self, model: Model, link: str, pose: Pose, twist: Twist) -> None:
-        """Moves one link as near as the joints that carry it allow; the caller holds the lock."""
+        """Moves one link as close as its joints allow; the caller holds the lock."""
         before = model.joint_states()
         place_link(model, link, pose, twist)
         if model.joint_states() != before:
@@ -248,7 +248,7 @@ class Simulator(Shared):
         self.moves.tell([model])
 
     def delete_model(self, model: Model) -> None:
-        """Takes a model out of the world, and what acts on it; the caller holds the lock."""
+        """Removes a model and whatever acts on it; the caller holds the lock."""
         self.applied.forget(model)
         self.world.delete(model.name)
 
@@ -265,7 +265,7 @@ class Simulator(Shared):
             self.reset(everything=False)
 
     def reset_simulation(self) -> None:
-        """As reset_world, and time and joint positions return to zero."""
+        """Resets the world, and returns time and joint positions to zero."""
         with self.lock:
             self.reset(everything=True)
 
@@ -278,7 +278,7 @@ class Simulator(Shared):
             self.moves.tell(None)
 
     def save_state(self) -> Snapshot:
-        """Returns all that decides the future; the caller holds the lock.
+        """Returns everything that decides the future; the caller holds the lock.
 
         Raises StateError if the state of a user's controller or plugin can't be saved.
         """
@@ -313,7 +313,7 @@ class Simulator(Shared):
             self.world.check_state(state["world"])
             with undoable():
                 self._load(state)
-        except Exception as error:  # whatever a forged state leads to
+        except Exception as error:  # whatever a forged state raises
             self._load(before)
             raise SnapshotError(f"the snapshot can't be restored: {error!s:.300}") from error
 
@@ -337,14 +337,14 @@ class Simulator(Shared):
 
     @property
     def fits(self) -> dict[str, Any]:
-        """What has to be the same where its snapshots are restored. The caller holds the lock."""
+        """What a world must share to restore its snapshots. The caller holds the lock."""
         version = self.version, [robot.manager.running for robot in self.robots]
         if self._fits_version != version:
             self._fits_version, self._fits = version, fingerprint(self.world, self.robots)
         return self._fits
 
     def reseed(self, seed: int) -> None:
-        """Lets what draws random numbers start from `seed`; the caller holds the lock."""
+        """Seeds everything that draws random numbers; the caller holds the lock."""
         for listener in self.reseeded:
             listener(seed)
 

@@ -18,7 +18,7 @@ def _nothing() -> None:
 
 
 class FairLock(Shared):
-    """A lock that serves its waiters in the order in which they came.
+    """A lock that serves its waiters in the order of their arrival.
 
     The simulation releases and re-acquires its lock in a loop. With threading.Lock that keeps all other
     threads out; here every waiter gets its turn after at most one tick. Raises RuntimeError if the thread
@@ -113,13 +113,13 @@ class FairLock(Shared):
 
 
 class Holds:
-    """Keeps time from passing while something is prepared that the next step needs.
+    """Stops time while something that the next step needs is prepared.
 
     A world that is held isn't paused: only clients pause it.
     """
 
     def __init__(self, lock: FairLock, changed: Callable[[], None]) -> None:
-        """`changed` is called with the simulator's lock held, whenever holders have come or gone."""
+        """`changed` is called, with the simulator's lock held, when holders come or go."""
         self._lock = lock
         self._changed = changed
         self._holders: set[object] = set()
@@ -131,7 +131,7 @@ class Holds:
 
     @contextmanager
     def hold(self, patience: float, late: Callable[[], None]) -> Iterator[None]:
-        """Lets no time pass within the block. The caller doesn't hold the lock.
+        """Stops time within the block. The caller doesn't hold the lock.
 
         Code in the block that waits for time to pass would wait forever. So time continues after `patience`
         [s of wall time], and `late` is called.
@@ -181,7 +181,7 @@ class Pacer:
         self._due = time.perf_counter()
 
     def restart(self) -> None:
-        """Counts from now on, after a pause."""
+        """Restarts the count, after a pause."""
         self._due = time.perf_counter()
 
     def wait(self, period: float, longest: float = math.inf) -> bool:

@@ -79,7 +79,7 @@ class DQNAgent:
         return self.act_greedily(observation)
 
     def take_back_action(self) -> None:
-        """Takes back the draws of the last `act`, whose action wasn't carried out."""
+        """Undoes the draws of the last `act`, whose action wasn't carried out."""
         self._explore.bit_generator.state = self._before_action
 
     def act_greedily(self, observation: np.ndarray) -> int:
@@ -203,7 +203,7 @@ class DQNAgent:
         }
 
     def load_policy_state(self, state: dict[str, Any]) -> None:
-        """Loads what `policy_state` returned; a file of the DQN tutorial's has no normaliser."""
+        """Loads what `policy_state` returned; a file of the DQN tutorial has no normaliser."""
         self.q_net.load_state_dict(state["q_net"])
         self.target_net.load_state_dict(state["target_net"])
         self._epsilon.value = float(state["epsilon"])

@@ -162,7 +162,7 @@ def _digest(env: Env, observation: Any) -> int:
 
 
 def save(folder: Path, episode: Demonstration) -> Path:
-    """Writes an episode behind those of a folder; returns its file."""
+    """Adds an episode to a folder; returns its file."""
     taken = [int(path.stem.rpartition("_")[2]) for path in paths(folder)]
     path = folder / f"episode_{max(taken, default=-1) + 1:05d}.npz"
     values = {each.name: getattr(episode, each.name) for each in fields(Demonstration)}
@@ -217,8 +217,8 @@ def load_all(folder: Path) -> dict[Path, Demonstration]:
 def replay(path: Path, episode: Demonstration, env: Env, exactly: bool = True) -> Iterator[Played]:
     """Plays an episode again, in an environment like its own, and compares it to the bit.
 
-    Without `exactly` the observations may differ, as those of an environment with other options do; rewards
-    may not. Raises WorkbenchError, with the file and the step, where it goes another way.
+    Without `exactly` only rewards and ends must match: the environment may have other options.
+    Raises WorkbenchError, naming file and step, at the first difference.
     """
 
     def compare(step: int, **pairs: tuple[Any, Any]) -> None:

@@ -100,7 +100,7 @@ class DQNTraining(Algorithm):
         self._mark = self._repeatable.mark(), mark_random_states()
 
     def settle(self) -> bool:
-        """Takes back the step that failed. A round of gradient steps can't be taken back."""
+        """Undoes the step that failed. A round of gradient steps can't be undone."""
         if self._is_learning:
             return False
         if self._mark is not None:
@@ -138,7 +138,7 @@ class DQNTraining(Algorithm):
             self.restore_environment(state, say)
 
     def restore_environment(self, state: dict[str, Any], say: Say) -> None:
-        """Repeats the episode under way; says so if it goes another way."""
+        """Repeats the episode under way; logs if it goes differently."""
         last = state["last"]
         self._last = None if last is None else Learned(*map(float, last))
         self._repeatable.generator = state["generator"]

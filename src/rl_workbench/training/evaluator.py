@@ -37,7 +37,7 @@ class Evaluation:
 
     @property
     def success_rate(self) -> float | None:
-        """Between 0 and 1; None if no episode says so."""
+        """Between 0 and 1; None if no episode reports success."""
         return float(np.mean(self.successes)) if self.successes else None
 
 
@@ -115,7 +115,7 @@ class Evaluator:
     def evaluate(
         self, best: float, say: Say, is_last: bool = False
     ) -> tuple[Evaluation, float] | None:
-        """Plays greedy episodes; also returns the mean by which policies compare; None if interrupted.
+        """Plays greedy episodes; also returns the mean that ranks policies; None if interrupted.
 
         A policy that is perfect in ten episodes may well fail in the next ninety. So one whose mean return is
         above `best` is confirmed over `confirm_episodes`. `say` is called if the current episode can't be

@@ -223,7 +223,7 @@ class Training:
     # --- called by algorithms ------------------------------------------------------------------
 
     def is_interrupted(self) -> bool:
-        """Returns whether the user interrupts."""
+        """Returns whether the user has interrupted."""
         return self._interrupt.requested()
 
     def is_over(self) -> bool:
@@ -363,7 +363,7 @@ class Training:
     def _tried(
         self, action: Callable[[], object], failure: WorkbenchError | None
     ) -> WorkbenchError | None:
-        """Returns the failure so far, or else that of an action of the end."""
+        """Returns the failure so far, or that of a final action."""
         try:
             action()
         except WorkbenchError as error:

@@ -194,7 +194,7 @@ class WalkByCommand(Task):
         return InitialState(joints, {self.robot.model: Motion(pose, twist)}, held, pushes)
 
     def aim(self, goal: Sequence[float]) -> None:
-        """Sets the command: ahead, to the left [m/s], turn [rad/s]; raises ValueError if it can't be one."""
+        """Sets the command: ahead, to the left [m/s], about [rad/s]; raises ValueError for any other."""
         if len(goal) != 3 or not all(map(math.isfinite, goal)):
             raise ValueError(f"a command is (ahead, left, about) [m/s, rad/s], not {tuple(goal)}")
         low = (self.ahead[0], -self.aside, -self.about)

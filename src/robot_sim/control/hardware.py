@@ -59,7 +59,7 @@ class Drive(Stateful, ABC):
             self.pid.clear()
 
     def joints_moved(self) -> None:
-        """Called when something other than time has moved the joint."""
+        """Called when a service or reset has moved the joint."""
 
     def begin_hold(self) -> None:
         """Called when an emergency stop begins."""
@@ -103,7 +103,7 @@ class PositionDrive(Drive):
         self.joints_moved()
 
     def joints_moved(self) -> None:
-        """Forgets where the joint was: something other than time has moved it."""
+        """Forgets where the joint was, after a service or reset has moved it."""
         self._aim, self._way = self.joint.position, math.inf
         self.blocked = self.pushed = False
 
@@ -166,7 +166,7 @@ class VelocityDrive(Drive):
 
 
 class SensorHandle(Stateful):
-    """A sensor as the controller sees that has it. This one measures nothing, as where no topics are."""
+    """A sensor as its controller sees it. This one measures nothing, for robots without topics."""
 
     def __init__(self, name: str, frame: str) -> None:
         self.name, self.frame = name, frame
@@ -178,7 +178,7 @@ class SensorHandle(Stateful):
         """
 
     def end(self) -> None:
-        """Measures no more."""
+        """Stops measuring."""
 
 
 class RobotHardware(Shared):
@@ -237,7 +237,7 @@ class RobotHardware(Shared):
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Takes back what `state_dict` has returned."""
+        """Loads what `state_dict` returned."""
         self.halted = state["halted"]
         for name, joint in self.joints.items():
             joint.load_state_dict(state["joints"][name])
@@ -245,7 +245,7 @@ class RobotHardware(Shared):
             drive.load_state_dict(state["drives"][drive.joint.name])
 
     def at_their_limits(self) -> list[JointHandle]:
-        """Returns the joints whose motors give all the effort they have."""
+        """Returns the joints whose motors are at their effort limits."""
         efforts = [(joint, joint.limits.effort) for joint in self.joints.values()]
         full = [joint for joint, most in efforts if most and abs(joint.effort) >= FULL * most]
         return full + [drive.joint for drive in self.drives if drive.blocked]

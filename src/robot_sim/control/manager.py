@@ -102,7 +102,7 @@ class ControllerManager:
         return controller
 
     def unload(self, name: str) -> None:
-        """Forgets a controller that isn't running."""
+        """Unloads a controller that isn't running."""
         controller = self.get(name)
         if controller.state == RUNNING:
             raise ControlError(f"Could not unload controller '{name}' because it is still running")
@@ -157,11 +157,11 @@ class ControllerManager:
         self.version += 1
 
     def loops_changed(self) -> None:
-        """Has gains checked that someone has changed."""
+        """Checks gains after a change."""
         self.on_change()
 
     def joints_moved(self, now: int, relatch: bool) -> None:
-        """Tells controllers that something other than time has moved joints.
+        """Tells controllers that a service or reset has moved joints.
 
         If `relatch`, they start over: set-points at the new positions, no PID history, no old effort.
         """
@@ -179,7 +179,7 @@ class ControllerManager:
         return {"now": self._now, "controllers": controllers}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Takes back what `state_dict` has returned, with the same controllers running."""
+        """Loads what `state_dict` returned, with the same controllers running."""
         self._now = state["now"]
         saved = state["controllers"]
         for name, each in self._controllers.items():
@@ -188,7 +188,7 @@ class ControllerManager:
         load((each, saved[name]) for name, each in self._controllers.items() if name in saved)
 
     def restored(self) -> None:
-        """Tells the running controllers that the world has returned to a snapshot."""
+        """Tells the running controllers that a snapshot was restored."""
         self._tell(lambda controller: controller.restored())
 
     def _tell(self, call: Callable[[Controller], None]) -> None:

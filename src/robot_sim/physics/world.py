@@ -78,7 +78,7 @@ class World(Shared):
         self.lights: dict[str, Light] = {}
         self.attachments: list[Attachment] = []
         self.clock: Callable[[], float] = lambda: 0.0  # of the simulator
-        self.version = 0  # counts what changes the look of the world: models and lights
+        self.version = 0  # counts changes of models and lights
         self._names = EntityNames()
         self._special: list[Model] = []  # with springs, decay or a kinematic link
         self._recalled: Sequence[Contact] | None = None  # until the next step
@@ -124,7 +124,7 @@ class World(Shared):
         return model
 
     def delete(self, name: str) -> None:
-        """Takes model `name` out of the world."""
+        """Removes model `name`."""
         model = self.models.pop(name)
         for each in self._of(model):
             self.detach(each)
@@ -133,12 +133,12 @@ class World(Shared):
         self._index(*self.models.values())
 
     def model(self, name: str) -> Model | None:
-        """Returns what the name look-up finds, if it is a model (docs/contract/gazebo.md 2.0)."""
+        """Returns the model that the name look-up finds, if any (docs/contract/gazebo.md 2.0)."""
         entity = self._names.entities.get(name)
         return entity.model if entity is not None and entity.kind == "model" else None
 
     def link(self, name: str) -> tuple[Model, str] | None:
-        """Returns model and plain name of what the name look-up finds, if it is a link."""
+        """Returns model and plain name of the link that the name look-up finds, if any."""
         entity = self._names.entities.get(name)
         return (entity.model, entity.name) if entity is not None and entity.kind == "link" else None
 
@@ -164,7 +164,7 @@ class World(Shared):
         return name in WORLD_FRAMES and name not in self._names.entities
 
     def attach(self, first: tuple[Model, str], second: tuple[Model, str]) -> Attachment:
-        """Fixes a link to another one where they are now, until `detach`, a reset, or one's deletion."""
+        """Fixes a link to another where they are now, until `detach`, a reset, or a deletion."""
         poses = [model.link_state(link)[0] for model, link in (first, second)]
         made = Attachment(first, second, poses[1].relative_to(poses[0]))
         self._fasten(made)
@@ -184,7 +184,7 @@ class World(Shared):
         return [each for each in self.attachments if each.joins(model)]
 
     def with_attached(self, models: Iterable[Model]) -> set[Model]:
-        """Returns models, and all that is attached to them, also by way of others."""
+        """Returns models and everything attached to them, directly or through others."""
         reached = set(models)
         waiting = list(reached)
         while waiting:
@@ -207,7 +207,7 @@ class World(Shared):
             model.apply_damping(time_step)
 
     def set_solver(self, solver: SolverSettings) -> None:
-        """Stores the solver's settings, and sets those that the engine has."""
+        """Stores the solver's settings, and applies those that the engine supports."""
         self.solver = solver
         self._configure()
 
@@ -217,7 +217,7 @@ class World(Shared):
         self.engine.configure(EngineSettings(self.gravity, self.time_step, iterations, separation))
 
     def set_inertia(self, model: Model, link: str, inertia: Inertia) -> None:
-        """Gives a link of `model` another inertia; poses and velocities stay.
+        """Changes the inertia of a link of `model`; poses and velocities stay.
 
         Raises DescriptionError if the engine can't take it; the model is as it was then.
         """
@@ -259,7 +259,7 @@ class World(Shared):
             passive_forces.set_kinematic_twist(model, twist)
 
     def contacts(self) -> Sequence[Contact]:
-        """Returns where bodies touched in the last step; after a restore, in that before the snapshot."""
+        """Returns the last step's contacts; after a restore, those of the step before the snapshot."""
         return self.engine.contacts() if self._recalled is None else self._recalled
 
     def reset(self, joints: bool) -> None:
@@ -275,7 +275,7 @@ class World(Shared):
             model.reset(joints)
 
     def state_dict(self) -> dict[str, Any]:
-        """Returns what decides its next steps, except models and properties that services set.
+        """Returns the state that its steps depend on, without models and properties set by services.
 
         Engines can't save contacts, so contacts restart now and after each load. The next step finds them
         again, but PyBullet's solver starts without the forces of the last one.
@@ -313,9 +313,9 @@ class World(Shared):
         self._recalled = contacts
 
     def check_state(self, state: Mapping[str, Any]) -> None:
-        """Checks that it can load a state.
+        """Checks that a state fits this world.
 
-        Raises SnapshotError if its models or their properties have changed.
+        Raises SnapshotError if the models or their properties have changed.
         """
         now = self.gravity, self.time_step, vars(self.solver)
         if now != (state["gravity"], state["time_step"], state["solver"]):
@@ -343,7 +343,7 @@ class World(Shared):
                 )
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Takes back what `state_dict` has returned, after `check_state`."""
+        """Loads what `state_dict` returned, after `check_state`."""
         models = self.models
         known = {(a.first, a.second, a.pose, a.number): a for a in self.attachments}
         self.engine.refasten(state["fastened"])
@@ -373,7 +373,7 @@ class World(Shared):
         fresh = [(m, body) for m, body in zip(models, bodies, strict=True) if body is not m.body]
         for model, body in fresh:
             model.go_on_in(body)
-        for each in self.attachments if fresh else ():  # all are in another world of the engine
+        for each in self.attachments if fresh else ():  # all are in a new world of the engine
             self._fasten(each)
 
     def _index(self, *models: Model) -> None:

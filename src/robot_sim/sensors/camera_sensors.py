@@ -30,7 +30,7 @@ def shot_of(
     mount: Mount, camera: PinholeCamera, now: int, own: str = "", *,
     image: bool = False, colours: bool = False, depths: bool = False,
 ) -> Shot:  # fmt: skip
-    """Returns what the picture of a time [ns] is made of; `own` names one of several cameras."""
+    """Returns the inputs of the picture at a time [ns]; `own` names one of several cameras."""
     random, part = None, f"/{own}"
     if image and camera.noise is not None:
         random = camera.noise.draw_bias(mount.biases(part)), mount.random(now, part)

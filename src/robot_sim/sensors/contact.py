@@ -35,12 +35,12 @@ class ContactSensor(Measurement):
         self._collisions = {(model.name, link, each) for each in found if each is not None}
 
     def is_stale(self, now: int) -> bool:
-        """Returns whether a service has moved the model since the last step, so that nothing is known."""
+        """Returns whether a service has moved the model since the last step: contacts are unknown."""
         step = round(self.mount.sim.world.time_step * NANOSECONDS)
         return now - self.mount.sensing.schedule.last_move(self.mount.model).at <= step
 
     def measure(self, now: int) -> list[ContactPair]:
-        """Returns what they touched in the last step."""
+        """Returns the collisions' contacts in the last step."""
         if self.is_stale(now) or not self._collisions:
             return []
         return contact_pairs(self.mount.sim.world, self._collisions)

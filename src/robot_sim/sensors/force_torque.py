@@ -51,7 +51,7 @@ class LinkForces(Stateful):
         self.effort = 0.0  # that clients apply to `joint`
 
     def look(self, now: int, moves: int) -> None:
-        """Takes down the state at a tick's time [ns].
+        """Records the state at a tick's time [ns].
 
         `moves` counts what has moved bodies besides time: no force is known across such a move.
         """
@@ -81,7 +81,7 @@ class LinkForces(Stateful):
         self.effort = last.effort
 
     def about_centre(self, link: str) -> Wrench | None:
-        """Returns all that acts, with the torque about a link's centre of mass; None if it isn't known."""
+        """Returns the total wrench, with the torque about a link's centre of mass; None if unknown."""
         if self.net is None or link not in (inertias := self._inertias()):
             return self.net
         return _moved(scale(inertias[link][1], -1.0), self.net)

@@ -68,7 +68,7 @@ class Imu(Stateful):
         self._last: tuple[int, int, Vector] | None = None  # time [ns], moves, velocity [m/s]
 
     def start(self) -> None:
-        """Begins at rest, if it hasn't begun: so the next measurement has something to compare with."""
+        """Begins at rest, unless it has begun, so that the next measurement can be compared."""
         self._last = self._last or (0, -1, (0.0, 0.0, 0.0))
 
     def measure(
@@ -126,7 +126,7 @@ class ModelImu(Measurement):
         return mount.rate()
 
     def start(self) -> None:
-        """Lets the next measurement be one, without acceleration, if it is the first."""
+        """Makes the first measurement one without acceleration."""
         self._imu.start()
 
     def measure(self, now: int) -> InertialSample | None:

@@ -54,7 +54,7 @@ class SensorClock(Stateful):
         self.plan(now)
 
     def look(self, somebody_came: bool = False) -> None:
-        """Says that listeners may have come or gone. It takes no lock, so rospy's callbacks may call it."""
+        """Notes that listeners may have come or gone; takes no lock, so rospy's callbacks may call it."""
         self.has_newcomer = self.has_newcomer or somebody_came
         self.schedule.look()
 
@@ -69,7 +69,7 @@ class SensorClock(Stateful):
 
 
 class Schedule(Shared, Stateful):
-    """The clocks of all sensors. Without listeners it costs a tick nothing."""
+    """The clocks of all sensors. Without listeners ticks cost nothing."""
 
     non_persistent = ("_clocks", "_due", "_is_looking", "prepare")
 
@@ -160,7 +160,7 @@ class Schedule(Shared, Stateful):
         self._take(fresh)
 
     def _take_part(self) -> None:
-        """Listens to ticks while a sensor has listeners."""
+        """Follows the ticks only while a clock has listeners."""
         heard = [clock.due for clock in self._clocks if clock.heard]
         self._due = min(heard, default=0)
         # A new list: the old one may be in use by a tick.
@@ -189,7 +189,7 @@ class Schedule(Shared, Stateful):
         self.moves_before_seed, self._begins_anew = self.moves, True
 
     def restored(self) -> None:
-        """Plans the clocks anew after a restored snapshot, for the present listeners."""
+        """Reschedules the clocks after a restore, for the present listeners."""
         now = self._sim.now
         for clock in self._clocks:
             # One that is newer than the snapshot, or wasn't heard then.
@@ -198,7 +198,7 @@ class Schedule(Shared, Stateful):
         self._take_part()
 
     def last_move(self, model: Model) -> Move:
-        """Returns the last move of a model by something other than time, resets included."""
+        """Returns the last move of a model by a service or reset."""
         return self._moves_of.get(model.name, self.last_reset)
 
     def _moved(self, moved: Moved) -> None:

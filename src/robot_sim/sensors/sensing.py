@@ -43,12 +43,12 @@ class Sensing(Shared, Stateful):
         sim.parts["sensing"] = self
 
     def _reseed(self, seed: int) -> None:
-        """Draws the same noise from now on as after any other time with this seed."""
+        """Restarts the noise, which depends only on this seed from now on."""
         self._seed = seed
         self.seeds += 1
 
     def noise(self, model: Model, name: str, now: int) -> np.random.Generator:
-        """Returns what draws the noise of the measurement at `now` [ns] by the sensor or plugin `name`.
+        """Returns the noise generator of the measurement at `now` [ns] by sensor or plugin `name`.
 
         It depends on the moves since the seed, and the time since the last of them: episodes that begin with
         the same seed have the same noise, whenever that is.
@@ -58,13 +58,13 @@ class Sensing(Shared, Stateful):
         return generator(self._seed, model.name, name, moves, now - max(schedule.moved_at, 0))
 
     def bias(self, model: Model, name: str) -> np.random.Generator:
-        """Returns what draws its biases, once."""
+        """Returns the generator of its biases."""
         return generator(self._seed, model.name, name, "bias")
 
 
 @dataclass(frozen=True)
 class Mount(Shared):
-    """A sensor's place in a model, and the plugin that says more about it."""
+    """A sensor's place in a model, and the plugin with its parameters."""
 
     sim: Simulator
     model: Model
@@ -74,7 +74,7 @@ class Mount(Shared):
 
     @property
     def key(self) -> str:
-        """What its random numbers are drawn by: the same for all plugins of a sensor."""
+        """The key of its random numbers: the same for all plugins of a sensor."""
         if self.sensor is not None:
             return f"{self.sensor.link}::{self.sensor.name}"
         return f"plugin {self.model.description.plugins.index(self.plugin)}"
@@ -84,7 +84,7 @@ class Mount(Shared):
         return (self.plugin.element.findtext(tag) or "").strip() or default
 
     def required(self, tag: str) -> str:
-        """Returns the same of an element that must be there, or else raises DescriptionError."""
+        """Returns the text of a required element; raises DescriptionError if it is missing."""
         found = self.text(tag, "")
         if not found:
             raise DescriptionError(f"<{tag}> is missing")
@@ -109,7 +109,7 @@ class Mount(Shared):
         return checked_deviation(self.number("gaussianNoise", 0.0), "<gaussianNoise>")
 
     def among(self, tag: str, names: Sequence[str]) -> str:
-        """Returns which of its model's `names` the element `tag` means; "" for none.
+        """Returns the one of its model's `names` that the element `tag` names; "" if none.
 
         In a nested model's plugin a plain name is one of that model's.
         """
@@ -144,11 +144,11 @@ class Mount(Shared):
         return found
 
     def random(self, now: int, part: str = "") -> np.random.Generator:
-        """Returns what draws the noise of the measurement at `now` [ns]."""
+        """Returns the noise generator of the measurement at `now` [ns]."""
         return self.sensing.noise(self.model, self.key + part, now)
 
     def biases(self, part: str = "") -> np.random.Generator:
-        """Returns what draws its biases, the same each time."""
+        """Returns the generator of its biases, the same at each call."""
         return self.sensing.bias(self.model, self.key + part)
 
 
@@ -177,7 +177,7 @@ class Measurement(Stateful):
         self.mount = mount
 
     def start(self) -> None:
-        """Lets the next measurement be one, if sensors of its kind compare each with the last."""
+        """Prepares the first measurement, for kinds that compare each with the last."""
 
     def measure(self, now: int) -> Any:
         """Returns a measurement at a time [ns], as its kind has it; None for nothing yet."""
@@ -208,5 +208,5 @@ def sensor_pose(model: Model, sensor: Sensor) -> Pose:
 
 
 def slower(*rates: float) -> float:
-    """Returns the slowest of some rates [Hz], of which 0 is every step."""
+    """Returns the slowest rate [Hz]; 0 means every step."""
     return min((each for each in rates if each > 0.0), default=0.0)

@@ -49,7 +49,7 @@ class Taken(NamedTuple):
 
 
 class SensorReaders(Stateful):
-    """Sensors that measure by their own clocks, whether or not their topics are heard.
+    """Sensors that measure by their own clocks, with or without subscribers.
 
     The caller holds the simulator's lock. Names are plain or model::sensor; of a model's IMU, the plugin's.
     Raises UnknownName if a name refers to none, or several, or to one that can't be read.
@@ -98,7 +98,7 @@ class SensorReaders(Stateful):
         return take
 
     def read(self) -> list[Taken]:
-        """Returns what each has measured last, in the order of the names."""
+        """Returns the last measurement of each, in the order of the names."""
         return [self._taken[name] for name in self.names]
 
     def end(self) -> None:
@@ -211,7 +211,7 @@ class MeasuringHandle(SensorHandle):
 def offer_sensors(
     hardware: RobotHardware, sim: Simulator, model: Model, sensing: Sensing | None
 ) -> None:
-    """Lets controllers have a model's IMUs and force-torque sensors.
+    """Gives controllers a model's IMUs and force-torque sensors.
 
     Without `sensing` they measure nothing.
     """

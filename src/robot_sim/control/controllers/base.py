@@ -116,10 +116,10 @@ class Controller(Stateful, ABC):
         """Takes new values of `tunables`, all of them."""
 
     def joints_moved(self, now: int) -> None:
-        """Called when something other than time has changed the joints' state."""
+        """Called when a service or reset has moved the joints."""
 
     def restored(self) -> None:
-        """Called when the world has returned to a snapshot, with the attributes that it had then."""
+        """Called when a snapshot was restored, with the attributes of that time."""
 
 
 def number_param(params: Mapping[str, object], key: str, place: str) -> float:
