@@ -10,15 +10,15 @@ import subprocess
 import sys
 import tempfile
 import unittest
-import xmlrpc.client
 from pathlib import Path
 
 import rosbag
-import rosgraph
 import rospkg
 import rostest
+from support.ros.calls import executable, process_of
 
 from bullet_gazebo.clients.gz import RemoteWorld
+from ros_calls import master
 from ros_calls.waiting import wait_until
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 from ros_utils.simulation import Simulation, reserved_port
@@ -47,6 +47,8 @@ BOUND = 300  # [s]
 
 
 def start(*command, **options):
+    if command[0] == "rosrun":
+        command = executable(*command[1:3]), *command[3:]
     return subprocess.Popen(
         list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         start_new_session=True, **options,
@@ -58,13 +60,6 @@ def replay(*arguments, **options):
     process = start("rosrun", "cartpole", "replay.py", *arguments, **options)
     out, err = process.communicate(timeout=BOUND)
     return process.returncode, out, err
-
-
-def ask(simulation, method):
-    """Returns what the simulator's node answers by XML-RPC."""
-    address = rosgraph.Master("/test", simulation.master_uri).lookupNode("/gazebo")
-    with xmlrpc.client.ServerProxy(address) as node:
-        return getattr(node, method)("/test")[2]
 
 
 def add_cartpole(name="cartpole", pos_y=0.0):
@@ -104,7 +99,7 @@ class ReplayTest(unittest.TestCase):
         self.addCleanup(self.end, recorder)
 
         def is_connected():
-            lines = ask(simulation, "getBusInfo")
+            lines = master.call_node(master.call("lookupNode", "/gazebo"), "getBusInfo")
             return any(line[1:5:3] == ["/recorder", "/gazebo/journal"] for line in lines)
 
         self.assertTrue(wait_until(is_connected, BOUND, "the recorder"))
@@ -125,9 +120,8 @@ class ReplayTest(unittest.TestCase):
     def check_difference(self, pattern, *arguments):
         code, out, err = replay(self.bag, *arguments)
         self.assertEqual(code, 1, out + err)
-        self.assertRegex(
-            err.strip().splitlines()[-1], pattern
-        )  # behind what the simulator complains of
+        # Behind what the simulator complains of
+        self.assertRegex(err.strip().splitlines()[-1], pattern)
 
     def test_a_stepped_world_with_all_that_comes_and_goes(self):
         """Robots come by services and a spawner and go again, another node commands, time is set back."""
@@ -186,6 +180,11 @@ class ReplayTest(unittest.TestCase):
             r"first difference: at [\d.]+ s joint \w+ of cartpole: -?[\d.e-]+ recorded, -?[\d.e-]+ now",
             f"--params=/cartpole/{CART}={gains}",
         )
+        robot = self.folder / "robot.urdf"
+        robot.write_text('<robot name="empty"/>')
+        self.check_difference(
+            "spawn_urdf_model answered otherwise than now: .*no <link>", f"--model=cartpole={robot}"
+        )
 
     def test_a_recorder_that_comes_late_gets_the_beginning(self):
         with self.simulation() as simulation:
@@ -198,44 +197,52 @@ class ReplayTest(unittest.TestCase):
         recorder.communicate(timeout=BOUND)
         self.assertRegex(self.check_equal(at_least=103), "no states were recorded with the first")
 
-    def test_gains_that_a_reconfigure_has_changed_and_a_script_loads_again(self):
-        with self.simulation() as simulation:
+    def test_snapshots_gains_and_a_noisy_sensor(self):
+        with self.simulation(extra_gazebo_args="--seed 7") as simulation:
             recorder = self.record(simulation)
             add_cartpole()
-            client = StepClient()
-            for gain in (3.0, 5.0):
-                ros_controllers.load_controller_srv(CART, ns="/cartpole")
-                subprocess.run(
-                    ["rosservice", "call", f"/cartpole/{CART}/pid/set_parameters",
-                     f"config: {{doubles: [{{name: p, value: {gain}}}]}}"],
-                    env=simulation.environment(), check=True, capture_output=True, timeout=BOUND,
-                )  # fmt: skip
-                client.step(8)
-                ros_controllers.unload_controller_srv(CART, ns="/cartpole")
-                assert ros_params.ros_load_yaml_from_pkg(
-                    "cartpole_controller", "joint_position_control.yaml", ns="/cartpole"
-                )
-            ros_controllers.spawn_controllers_srv([STATES, CART], ns="/cartpole")
-            client.step(100, {f"/cartpole/{CART}": 0.3})
+            self.go_back(simulation)
+            self.change_gains(simulation)
+            self.measure()
         recorder.communicate(timeout=BOUND)
-        self.check_equal(at_least=10)
+        # Time goes back by 1.2 s twice, and so is recorded three times.
+        self.assertIn(" 5.224 s", self.check_equal(at_least=48))
 
-    def test_a_snapshot_taken_and_restored(self):
-        """Time goes back, and so may be recorded twice."""
-        with self.simulation() as simulation:
-            recorder = self.record(simulation)
-            add_cartpole()
-            client = StepClient()
+    def call_service(self, simulation, *command):
+        subprocess.run(["rosservice", "call", *command], env=simulation.environment(), check=True,
+                       capture_output=True, timeout=BOUND)  # fmt: skip
+
+    def go_back(self, simulation):
+        client = StepClient()
+        client.step(8)
+        for request in ("save", "restore", "restore"):
+            self.call_service(simulation, f"/gazebo/{request}_state", "name: here")
+            client.step(1200)
+
+    def change_gains(self, simulation):
+        """By dynamic_reconfigure; a script loads the parameters again afterwards."""
+        client = StepClient()
+        for gain in (3.0, 5.0):
+            ros_controllers.load_controller_srv(CART, ns="/cartpole")
+            doubles = f"config: {{doubles: [{{name: p, value: {gain}}}]}}"
+            self.call_service(simulation, f"/cartpole/{CART}/pid/set_parameters", doubles)
             client.step(8)
-            environment = simulation.environment()
-            for request in ("save", "restore", "restore"):
-                subprocess.run(
-                    ["rosservice", "call", f"/gazebo/{request}_state", "name: here"],
-                    env=environment, check=True, capture_output=True, timeout=BOUND,
-                )  # fmt: skip
-                client.step(1200)
-        recorder.communicate(timeout=BOUND)
-        self.assertIn(" 3.608 s", self.check_equal(at_least=8))
+            ros_controllers.unload_controller_srv(CART, ns="/cartpole")
+            assert ros_params.ros_load_yaml_from_pkg(
+                "cartpole_controller", "joint_position_control.yaml", ns="/cartpole"
+            )
+        ros_controllers.spawn_controllers_srv([STATES, CART], ns="/cartpole")
+        client.step(100, {f"/cartpole/{CART}": 0.3})
+
+    def measure(self):
+        text = (DATA / "sensors" / "bot.sdf").read_text()
+        self.assertTrue(ros_gazebo.gazebo_spawn_sdf_string(text, "bot", pos_y=3.0))
+        steps, names = PreparedSteps(), StepNames(sensors=("scanner",))
+        seen = []
+        for _ in range(30):
+            steps.begin(names, 50, [])
+            seen.append(steps.end().sensors)
+        self.assertGreater(len({str(each) for each in seen}), 2)
 
     def test_a_simulator_that_goes_on_behind_the_end_of_its_bag(self):
         """As behind `lockstep.py --record`, if the script leaves its simulator running."""
@@ -249,20 +256,6 @@ class ReplayTest(unittest.TestCase):
         self.assertIn(" 0.016 s", self.check_equal(at_least=3))
         self.bag = first
         self.assertIn(" 0.008 s", self.check_equal(at_least=2))
-
-    def test_measurements_of_a_noisy_sensor(self):
-        with self.simulation(extra_gazebo_args="--seed 7") as simulation:
-            recorder = self.record(simulation)
-            text = (DATA / "sensors" / "bot.sdf").read_text()
-            self.assertTrue(ros_gazebo.gazebo_spawn_sdf_string(text, "bot"))
-            steps, names = PreparedSteps(), StepNames(sensors=("scanner",))
-            seen = []
-            for _ in range(30):
-                steps.begin(names, 50, [])
-                seen.append(steps.end().sensors)
-            self.assertGreater(len({str(each) for each in seen}), 2)
-        recorder.communicate(timeout=BOUND)
-        self.check_equal(at_least=30)
 
     @unittest.skipIf(importlib.util.find_spec("mujoco") is None, "mujoco is not installed")
     def test_mujoco(self):
@@ -296,33 +289,20 @@ class ReplayTest(unittest.TestCase):
         out, err = process.communicate(timeout=BOUND)
         return process.returncode, out, err
 
-    def test_a_script_that_fails_leaves_a_complete_bag(self):
+    def test_a_script_that_fails_leaves_a_complete_bag_and_its_page_opens_where_a_user_looks(self):
         script = self.folder / "fails.py"
         script.write_text(
             "import rospy\n"
             "from ros_utils import ros_gazebo\n"
             "ros_gazebo.launch_Gazebo(gui=False, output='log', launch_new_term=False)\n"
             "rospy.init_node('fails')\n"
-            "rospy.sleep(0.3)\n"
+            "for _ in range(20):\n"
+            "    rospy.sleep(0.1)\n"
             "raise SystemExit(7)\n"
         )
         code, _, err = self.run_script(script)
         self.assertEqual(code, 7, err)
         self.assertIn(f"recorded {self.bag}", err)
-        self.check_equal(at_least=2)
-
-    def test_the_page_opens_where_a_user_wants_to_look(self):
-        script = self.folder / "waits.py"
-        script.write_text(
-            "import rospy\n"
-            "from ros_utils import ros_gazebo\n"
-            "ros_gazebo.launch_Gazebo(gui=False, output='log', launch_new_term=False)\n"
-            "rospy.init_node('waits')\n"
-            "for _ in range(20):\n"
-            "    rospy.sleep(0.1)\n"
-        )
-        code, _, err = self.run_script(script)
-        self.assertEqual(code, 0, err)
         process = start("rosrun", "cartpole", "replay.py", self.bag, "--from", "1.5", "--gui")
         self.addCleanup(self.end, process)
         lines = [next(process.stdout) for _ in range(3)]
@@ -336,12 +316,8 @@ class ReplayTest(unittest.TestCase):
 
         def reindexed():
             shutil.copy(active, self.bag)
-            subprocess.run(
-                ["rosbag", "reindex", "--force", self.bag],
-                check=True,
-                capture_output=True,
-                timeout=BOUND,
-            )
+            command = ["rosbag", "reindex", "--force", self.bag]
+            subprocess.run(command, check=True, capture_output=True, timeout=BOUND)
             try:
                 messages = list(rosbag.Bag(str(self.bag)).read_messages("/gazebo/journal"))
             except rosbag.ROSBagUnindexedException:  # nothing is in it yet
@@ -355,24 +331,12 @@ class ReplayTest(unittest.TestCase):
             for _ in range(10):
                 client.step(8)
             self.assertTrue(wait_until(reindexed, BOUND, "the bag"))
-            os.kill(ask(simulation, "getPid"), signal.SIGKILL)
+            os.kill(process_of(master_uri=simulation.master_uri), signal.SIGKILL)
         code, _, err = replay(active)
         self.assertEqual(code, 2)
         self.assertIn(f"rosbag reindex {active}", err)
         self.assertTrue(reindexed())
         self.check_equal(at_least=11)
-
-    def test_a_request_that_is_refused_now_is_the_first_difference(self):
-        with self.simulation() as simulation:
-            recorder = self.record(simulation)
-            add_cartpole()
-            StepClient().step(1)
-        recorder.communicate(timeout=BOUND)
-        file = self.folder / "robot.urdf"
-        file.write_text('<robot name="empty"/>')
-        self.check_difference(
-            "spawn_urdf_model answered otherwise than now: .*no <link>", f"--model=cartpole={file}"
-        )
 
 
 if __name__ == "__main__":
