@@ -4,7 +4,6 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 
 from robot_sim.physics.model import Model
-from robot_sim.physics.pose import Pose
 from robot_sim.physics.world import World
 
 NEAR = 1e-3  # [m, rad / 2] by which attached links may be off
@@ -67,7 +66,9 @@ def _carry(world: World, moved: Collection[Model]) -> None:
         for each in [attachment for attachment in world.attachments if attachment.joins(model)]:
             (one, link), (other, its) = each.first, each.second
             pose, wanted = other.link_state(its)[0], one.link_state(link)[0].compose(each.pose)
-            if one is other or _near(pose, wanted):
+            gap = pose.relative_to(wanted)
+            off = max(map(abs, (*gap.position, *gap.orientation[:3])))
+            if one is other or off < NEAR:
                 continue
             if model is other:
                 wanted, pose = pose.compose(each.pose.inverse()), one.link_state(link)[0]
@@ -78,8 +79,3 @@ def _carry(world: World, moved: Collection[Model]) -> None:
             other.place(wanted.compose(other.state()[0].relative_to(pose)))
             stay.add(other)
             waiting.append(other)
-
-
-def _near(pose: Pose, other: Pose) -> bool:
-    gap = pose.relative_to(other)
-    return max(map(abs, (*gap.position, *gap.orientation[:3]))) < NEAR

@@ -266,5 +266,5 @@ class ControlledRobot:
         if on:
             self.hardware.halt()
         elif self.hardware.halted:
-            self.hardware.resume()
+            self.hardware.halted = False
             self.manager.restart()

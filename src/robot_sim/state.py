@@ -4,7 +4,7 @@
 refers to nothing, or to several entities, raises UnknownName.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import hypot
 from typing import NamedTuple
@@ -140,18 +140,11 @@ class ContactPair:
         return force, torque
 
 
-def find_collisions(world: World, names: Iterable[str]) -> set[Collision]:
-    """Returns all collisions that names of models, links and collisions refer to.
+def find_collisions(world: World, name: str) -> set[Collision]:
+    """Returns all collisions that the name of a model, link or collision refers to.
 
-    They are plain, or model::link and model::link::collision where several models have such a name.
+    It is plain, or model::link or model::link::collision where several models have such a name.
     """
-    found: set[Collision] = set()
-    for name in names:
-        found |= _collisions_of(world, name)
-    return found
-
-
-def _collisions_of(world: World, name: str) -> set[Collision]:
     found = set()
     for model in world.models.values():
         for link in model.link_names:
@@ -306,7 +299,8 @@ class StateReader:
         self._touch = query.all_contacts or bool(query.contacts_of)
         self._wanted: set[Collision] | None = None
         if not query.all_contacts:
-            self._wanted = find_collisions(world, query.contacts_of)
+            found = (find_collisions(world, name) for name in query.contacts_of)
+            self._wanted = set().union(*found)
 
     def _link(self, query: LinkQuery) -> Callable[[], State]:
         read = _reader(*find_link(self._world, query.link))

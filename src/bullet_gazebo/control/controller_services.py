@@ -16,7 +16,7 @@ from bullet_gazebo.control.controller_topics import ControllerTopics
 from robot_sim.control.controllers import find_type
 from robot_sim.control.controllers.base import Controller
 from robot_sim.control.errors import ControlError, faults
-from robot_sim.control.manager import ControllerInfo, ControllerManager
+from robot_sim.control.manager import ControllerManager
 from robot_sim.simulator import Simulator
 
 BASE_CLASS = "controller_interface::ControllerBase"
@@ -73,8 +73,7 @@ class ControllerServices:
 
     def _list(self, request: srv.ListControllersRequest) -> srv.ListControllersResponse:
         with self._sim.lock.glance():
-            listed = self._manager.listed()
-        return srv.ListControllersResponse([_state(entry) for entry in listed])
+            return srv.ListControllersResponse([_state(each) for each in self._manager.loaded])
 
     def _list_types(
         self, request: srv.ListControllerTypesRequest
@@ -128,7 +127,7 @@ class ControllerServices:
 
     def _reload(self, request: srv.ReloadControllerLibrariesRequest) -> bool:
         with self._sim.lock:
-            loaded = [entry.name for entry in self._manager.listed()]
+            loaded = [controller.name for controller in self._manager.loaded]
         if loaded and not request.force_kill:
             raise ControlError(f"Controllers {loaded} are loaded and force_kill is not set.")
         self._close_all()
@@ -149,8 +148,9 @@ def _report_fault(controller: Controller, error: BaseException) -> None:
     )  # fmt: skip
 
 
-def _state(entry: ControllerInfo) -> ControllerState:
+def _state(controller: Controller) -> ControllerState:
     claims = [
-        HardwareInterfaceResources(c.hardware_interface, list(c.resources)) for c in entry.claims
+        HardwareInterfaceResources(f"hardware_interface::{interface}", list(joints))
+        for interface, joints in controller.claims.items()
     ]
-    return ControllerState(entry.name, entry.state, entry.type_name, claims)
+    return ControllerState(controller.name, controller.state, controller.type_name, claims)

@@ -289,10 +289,6 @@ class RobotHardware(Shared):
                 drive.begin_hold()
         self.halted = True
 
-    def resume(self) -> None:
-        """Ends an emergency stop."""
-        self.halted = False
-
     def _of(self, interface: str) -> list[JointHandle]:
         joints = self.interfaces.get(interface, {})
         return [joints[name] for name in sorted(joints)]

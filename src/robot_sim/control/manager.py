@@ -1,7 +1,7 @@
 """The controller manager: loads, switches and updates controllers (docs/contract/ros_control.md 1)."""
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from robot_sim.control.controllers import built_in
 from robot_sim.control.controllers.base import Controller
@@ -12,22 +12,6 @@ from robot_sim.state_dict import load, state_of
 BEST_EFFORT = 1
 STRICT = 2
 RUNNING, STOPPED = "running", "stopped"
-
-
-class Claim(NamedTuple):
-    """The joints that a controller claims of a hardware interface."""
-
-    hardware_interface: str
-    resources: tuple[str, ...]
-
-
-class ControllerInfo(NamedTuple):
-    """An entry of list_controllers."""
-
-    name: str
-    state: str
-    type_name: str
-    claims: tuple[Claim, ...]
 
 
 class ControllerManager:
@@ -137,18 +121,6 @@ class ControllerManager:
         """Restarts all running controllers, at the end of an emergency stop."""
         names = [c.name for c in self._running]
         self.switch(names, names)
-
-    def listed(self) -> list[ControllerInfo]:
-        """Returns the loaded controllers in load order."""
-        return [
-            ControllerInfo(
-                c.name,
-                c.state,
-                c.type_name,
-                tuple(Claim(f"hardware_interface::{each}", c.claims[each]) for each in c.claims),
-            )
-            for c in self.loaded
-        ]
 
     def unload_all(self) -> None:
         """Stops and unloads all controllers."""

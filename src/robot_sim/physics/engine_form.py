@@ -127,7 +127,10 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
     if not offsets:
         return model, offsets
     links = {name: _moved(link, offsets.get(name)) for name, link in model.links.items()}
-    joints = {name: _joined(joint, offsets) for name, joint in model.joints.items()}
+    joints = {}
+    for name, joint in model.joints.items():
+        pose = offsets.get(joint.parent, Pose()).compose(joint.pose).compose(joint.anchor)
+        joints[name] = replace(joint, pose=pose, anchor=Pose())
     return replace(model, links=links, joints=joints), offsets
 
 
@@ -194,8 +197,3 @@ def _moved(link: Link, offset: Pose | None) -> Link:
         collisions=[replace(s, pose=offset.compose(s.pose)) for s in link.collisions],
         visuals=[replace(s, pose=offset.compose(s.pose)) for s in link.visuals],
     )
-
-
-def _joined(joint: Joint, offsets: dict[str, Pose]) -> Joint:
-    parent = offsets.get(joint.parent, Pose())
-    return replace(joint, pose=parent.compose(joint.pose).compose(joint.anchor), anchor=Pose())

@@ -135,7 +135,11 @@ class _Batch:
         else:
             handle.batched_positions, handle.batched_wxyzs = positions, wxyzs
             if self._changed:
-                self._update_looks(handle)
+                handle.batched_scales = self._scales
+                if isinstance(self._look.geometry, Geometry):
+                    handle.batched_colors = self._colors
+                    if self._look.clear:
+                        handle.batched_opacities = self._opacities
         self._changed = False
 
     def _make(self, positions: np.ndarray, wxyzs: np.ndarray) -> Any:
@@ -152,14 +156,6 @@ class _Batch:
             opacity=1.0 if look.clear else None, lod="off", flat_shading=geometry.flat,
             side=geometry.side, cast_shadow=look.shadow,
         )  # fmt: skip
-
-    def _update_looks(self, handle: Any) -> None:
-        handle.batched_scales = self._scales
-        if isinstance(self._look.geometry, GlbFile):
-            return
-        handle.batched_colors = self._colors
-        if self._look.clear:
-            handle.batched_opacities = self._opacities
 
     @property
     def _scales(self) -> np.ndarray:

@@ -1,7 +1,6 @@
 """The table of elements, elements.toml, and the warning of those of a file that have no effect here."""
 
 import tomllib
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -165,13 +164,10 @@ def _word(word: str) -> float | str:
 
 
 def _listed(found: dict[str, list[str]]) -> str:
-    names = [_named(what, places) for what, places in list(found.items())[:LISTED]]
+    names = []
+    for what, (first, *others) in list(found.items())[:LISTED]:
+        text = f"{what} of {first}" if first else what
+        names.append(f"{text} (and {len(others)} more)" if others else text)
     if len(found) > LISTED:
         names.append(f"and {len(found) - LISTED} other elements")
     return ", ".join(names)
-
-
-def _named(what: str, places: Iterable[str]) -> str:
-    first, *others = places
-    text = f"{what} of {first}" if first else what
-    return f"{text} (and {len(others)} more)" if others else text

@@ -124,19 +124,15 @@ def _checked(vertices: np.ndarray, faces: np.ndarray) -> Part:
     if faces.min() < 0 or faces.max() >= len(vertices):
         wrong = faces.min() if faces.min() < 0 else faces.max()
         raise DescriptionError(f"a face names vertex {wrong}: there are {len(vertices)}, from 0 on")
-    used, triangles = np.unique(_triangles(faces), return_inverse=True)
+    # Polygons of more corners are fans of triangles.
+    fans = [faces[:, [0, i, i + 1]] for i in range(1, faces.shape[1] - 1)]
+    used, triangles = np.unique(np.stack(fans, axis=1), return_inverse=True)
     vertices = np.ascontiguousarray(vertices[used], dtype=np.float64)
     outside = ~(np.abs(vertices) <= LARGEST).all(axis=1)
     if outside.any():
         first = " ".join(f"{x:g}" for x in vertices[outside][0])
         raise DescriptionError(f"a vertex lies at {first}: no coordinate may be beyond {LARGEST:g}")
     return vertices, np.ascontiguousarray(triangles.reshape(-1, 3), dtype=np.int32)
-
-
-def _triangles(faces: np.ndarray) -> np.ndarray:
-    """Returns polygons of more corners as fans of triangles."""
-    fans = [faces[:, [0, i, i + 1]] for i in range(1, faces.shape[1] - 1)]
-    return np.stack(fans, axis=1).reshape(-1, 3)
 
 
 def _joined(parts: list[Part]) -> Part:

@@ -112,8 +112,12 @@ def _begin(model: ModelDescription, element: Element, where: str) -> Iterator[st
     if unknown:
         yield f"{where}: it has no link or model {', '.join(unknown[:MOST_NAMES])}"
     if model.static:
-        _lay_out(model, links)
-        model.start = SavedMotion(links[model.root][0], STILL, {})
+        root = links[model.root][0]
+        for joint in model.joints.values():  # which moves nothing
+            joint.pose = links[joint.child][0].relative_to(links[joint.parent][0])
+            joint.anchor = Pose()
+        model.islands = {name: links[name][0].relative_to(root) for name in model.islands}
+        model.start = SavedMotion(root, STILL, {})
         return
     held = [each for each in model.joints.values() if each.parent == WORLD and each.child in given]
     if held:  # the model's frame has moved with its first link, the world hasn't
@@ -131,15 +135,6 @@ def _begin(model: ModelDescription, element: Element, where: str) -> Iterator[st
     ]
     if apart:
         yield f"{where}: its joints don't let link {', '.join(apart[:MOST_NAMES])} be there"
-
-
-def _lay_out(model: ModelDescription, links: dict[str, Saved]) -> None:
-    """Puts the links of a static model, which no joint moves, where they were."""
-    for joint in model.joints.values():
-        joint.pose = links[joint.child][0].relative_to(links[joint.parent][0])
-        joint.anchor = Pose()
-    root = links[model.root][0]
-    model.islands = {name: links[name][0].relative_to(root) for name in model.islands}
 
 
 def _joint_state(joint: Joint, links: dict[str, Saved]) -> tuple[float, float]:

@@ -29,7 +29,7 @@ def manager():
 
 
 def states(manager):
-    return {entry.name: entry.state for entry in manager.listed()}
+    return {entry.name: entry.state for entry in manager.loaded}
 
 
 @pytest.mark.parametrize(
@@ -43,10 +43,10 @@ def states(manager):
     ],
 )
 def test_what_cannot_be_loaded_is_refused_and_leaves_no_trace(manager, name, params, text):
-    before = manager.listed()
+    before = manager.loaded
     with pytest.raises(ControlError, match=text):
         manager.load(name, params)
-    assert manager.listed() == before
+    assert manager.loaded == before
 
 
 def test_moved_joints_relatch_running_controllers(manager):

@@ -230,10 +230,9 @@ def test_a_bicycle_of_no_length_is_refused(sim, key, value):
 
 def test_a_bicycle_follows_the_circle_of_its_fork(world):
     track = Track(world, bicycle(), ACKERMANN)
-    claims = track.robot.manager.listed()[0].claims
-    assert {claim.hardware_interface: claim.resources for claim in claims} == {
-        "hardware_interface::VelocityJointInterface": ("rear_joint",),
-        "hardware_interface::PositionJointInterface": ("front_steering",),
+    assert track.robot.manager.loaded[0].claims == {
+        "VelocityJointInterface": ("rear_joint",),
+        "PositionJointInterface": ("front_steering",),
     }
     track.advance(1000, 0.2, 0.0, 0.4)
     before = track.place[2]
