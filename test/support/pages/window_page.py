@@ -1,23 +1,16 @@
 """The window's page in a real browser: start it, click, look."""
 
+import atexit
+import functools
 import io
 import subprocess
 import threading
 import unittest
 
 import numpy as np
-import rospy
-from gazebo_msgs.srv import (
-    DeleteModel,
-    GetPhysicsProperties,
-    GetWorldProperties,
-    SetPhysicsProperties,
-    SpawnModel,
-    SpawnModelRequest,
-)
 from PIL import Image
-from std_srvs.srv import Empty
 from support.pages.browser import BOUND, Browser, find_browser, wait_for
+from support.ros.calls import delete_model, gazebo, model_names, spawn_model
 
 NOTICES = 160  # [pixels] from above that notices may take, and give back
 INERTIAL = """<inertial><mass value="1"/>
@@ -27,11 +20,6 @@ INERTIAL = """<inertial><mass value="1"/>
 RED = "red"
 BLUE = "blue"
 YELLOW = "yellow"
-
-
-def proxy(name, kind):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)
 
 
 def count(pixels, color):
@@ -79,55 +67,59 @@ class Output:
         return code
 
 
+class Shown:
+    """A window, and its page in a browser."""
+
+    def __init__(self):
+        self.window = Output("rosrun", "gazebo_ros", "gzclient", "--no-browser")
+        self.url = self.window.line("is the page").rpartition(" ")[2]
+        self.page = Browser(self.url).__enter__()
+        atexit.register(self.close)
+        self.page.wait_for_text("One step")
+
+    def close(self):
+        self.page.__exit__()
+        self.window.close()
+
+
+@functools.cache
+def shown():
+    """The one that all tests of this process share: drawn by software, a page takes long to come."""
+    return Shown()
+
+
 @unittest.skipUnless(find_browser(), "there is no Chromium here: apt-get install chromium")
 class WindowCase(unittest.TestCase):
-    """A window and its page for all tests of a class; each test has a world of its own making.
+    """A window and its page for all tests; each test has a world of its own making.
 
     What is waited for is always a state that must come, never a difference to what was seen before.
     """
 
-    keep = ("ground_plane",)  # models that all tests share
+    keep = ("ground_plane",)  # models that all tests of a class share
 
     @classmethod
     def setUpClass(cls):
-        cls.spawn_urdf = staticmethod(proxy("/gazebo/spawn_urdf_model", SpawnModel))
-        cls.delete = staticmethod(proxy("/gazebo/delete_model", DeleteModel))
-        cls.physics = staticmethod(proxy("/gazebo/get_physics_properties", GetPhysicsProperties))
-        cls.set_physics = staticmethod(
-            proxy("/gazebo/set_physics_properties", SetPhysicsProperties)
-        )
-        cls.world = staticmethod(proxy("/gazebo/get_world_properties", GetWorldProperties))
-        cls.reset = staticmethod(proxy("/gazebo/reset_simulation", Empty))
-        cls.pause = staticmethod(proxy("/gazebo/pause_physics", Empty))
-        cls.unpause = staticmethod(proxy("/gazebo/unpause_physics", Empty))
-        cls.window = Output("rosrun", "gazebo_ros", "gzclient", "--no-browser")
-        cls.addClassCleanup(cls.window.close)
-        url = cls.window.line("is the page").rpartition(" ")[2]
-        cls.page = cls.enterClassContext(Browser(url))
-        cls.page.wait_for_text("One step")
+        cls.window, cls.page = shown().window, shown().page
 
     def setUp(self):
-        self.pause()
-        for name in self.world().model_names:
+        gazebo("pause_physics")
+        for name in model_names():
             if name not in self.keep:
-                self.delete(name)
-        self.reset()
+                delete_model(name)
+        gazebo("reset_simulation")
 
-    def spawn(self, name, xml, **position):
+    def spawn(self, name, xml, **place):
         """Spawns a model, and has the page show it before the test goes on."""
-        request = SpawnModelRequest(model_name=name, model_xml=xml)
-        for axis, value in position.items():
-            setattr(request.initial_pose.position, axis, value)
-        answer = self.spawn_urdf(request)
+        answer = spawn_model(name, xml, "", **place)
         self.assertTrue(answer.success, answer.status_message)
         self.page.click("Models")
         self.page.wait_for_text(" ".join(name.split()))
 
     def set_speed(self, factor):
         """Sets the real-time factor that is aimed at; 0 is as fast as possible."""
-        now = self.physics()
-        rate = factor / now.time_step
-        self.assertTrue(self.set_physics(now.time_step, rate, now.gravity, now.ode_config).success)
+        now = gazebo("get_physics_properties")
+        fields = now.time_step, factor / now.time_step, now.gravity, now.ode_config
+        self.assertTrue(gazebo("set_physics_properties", *fields).success)
 
     def view(self):
         """Red, green and blue (3, n) of the picture's pixels, without the panel beside it and notices."""

@@ -12,9 +12,9 @@ import rosnode
 import rospy
 import rostest
 import zstandard
-from gazebo_msgs.srv import SpawnModel, SpawnModelRequest
 from support.pages.browser import BOUND, wait_for
-from support.pages.window_page import INERTIAL, Output, proxy
+from support.pages.window_page import INERTIAL, Output
+from support.ros.calls import spawn_model
 from websockets.sync.client import connect
 
 HEADER = 16  # [bytes] in front of what viser sends: its lengths
@@ -64,13 +64,9 @@ def simulator():
 
 
 def spawn(name):
-    service = proxy("/gazebo/spawn_urdf_model", SpawnModel)
-
     def spawned():
-        with contextlib.suppress(
-            rospy.ServiceException
-        ):  # the one that was killed may be listed yet
-            return service(SpawnModelRequest(model_name=name, model_xml=BALL)).success
+        with contextlib.suppress(rospy.ServiceException):  # the killed one may be listed yet
+            return spawn_model(name, BALL, "").success
 
     wait_for(spawned, f"model {name}")
 

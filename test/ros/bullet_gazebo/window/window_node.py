@@ -10,11 +10,14 @@ import numpy as np
 import rosgraph
 import rospy
 import rostest
+from drive_cases import DriveTest
 from gazebo_msgs.msg import ModelState
-from gazebo_msgs.srv import GetLinkState, GetModelState, SetModelConfiguration, SetModelState
+from joints_cases import JointsTest
 from PIL import Image
+from shown_robot_cases import ShownRobotTest
 from support.pages.browser import wait_for
-from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count, proxy
+from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count
+from support.ros.calls import delete_model, gazebo, position, process_of, sim_time
 
 from bullet_gazebo.common.messages import from_pose_msg
 from bullet_gazebo.window.window import CAMERA
@@ -22,8 +25,8 @@ from robot_sim.physics.files.urdf import parse_urdf
 from robot_sim.pictures.camera import ASPECT, THIRD, overview
 from robot_sim.pictures.renderer import Renderer
 from robot_sim.pictures.visuals import visible_shapes
-from ros_calls import master
 
+__all__ = ["DriveTest", "JointsTest", "ShownRobotTest", "WindowTest"]
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>
   <material name="r"><color rgba="1 0 0 1"/></material></visual></link></robot>"""
@@ -59,20 +62,24 @@ ODD = "<b>ö\t\"&'/x"
 # The lengths of all charts' data, as viser's page offers them to tests.
 CHARTS = """Object.values((window.__viserTestpoints || {}).uplots || {})
   .map(each => each.chart.data[0].length)"""
+LINKS = ("stand", "cart", "pole")
 FEW = 3  # [pixels]
 AWAY = (3.0, -4.0, 0.6)  # [m]; behind the camera
 
 
 class WindowTest(WindowCase):
-    def place(self, name, position):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.page.reload()  # its camera looks at what was there first
+        cls.page.wait_for_text("One step")
+
+    def place(self, name, where):
         state = ModelState(model_name=name)
         point = state.pose.position
-        point.x, point.y, point.z = position
+        point.x, point.y, point.z = where
         state.pose.orientation.w = 1.0
-        self.assertTrue(proxy("/gazebo/set_model_state", SetModelState)(state).success)
-
-    def height(self, name):
-        return proxy("/gazebo/get_model_state", GetModelState)(name, "").pose.position.z
+        self.assertTrue(gazebo("set_model_state", state).success)
 
     def test_models_come_and_go(self):
         self.wait_until_gone(RED)
@@ -84,7 +91,7 @@ class WindowTest(WindowCase):
                 self.spawn(name, BROKEN.format(mesh), z=0.6)
                 self.wait_until_seen(RED, 1000)
                 self.assertIn("broken.stl", self.window.line(f"'{told}', link 'ball', visual"))
-                self.assertTrue(self.delete(name).success)
+                self.assertTrue(delete_model(name).success)
                 wait_for(lambda told=told: told not in self.page.text, "deletion")
                 self.wait_until_gone(RED)
 
@@ -92,20 +99,20 @@ class WindowTest(WindowCase):
         self.spawn("ball", BALL, z=0.6)
         self.page.click("World")
         self.page.click("Resume")
-        wait_for(lambda: not self.physics().pause, "time that runs")
+        wait_for(lambda: not gazebo("get_physics_properties").pause, "time that runs")
         self.page.click("Pause")
-        wait_for(lambda: self.physics().pause, "pause")
+        wait_for(lambda: gazebo("get_physics_properties").pause, "pause")
         self.page.click("Reset simulation")
-        wait_for(lambda: self.world().sim_time == 0.0, "time zero")
+        wait_for(lambda: sim_time() == 0.0, "time zero")
         self.page.click("One step")
-        wait_for(lambda: round(self.world().sim_time, 6) == 0.001, "step")
+        wait_for(lambda: round(sim_time(), 6) == 0.001, "step")
         self.page.click("Do these steps")
-        wait_for(lambda: round(self.world().sim_time, 6) == 0.101, "hundred steps")
+        wait_for(lambda: round(sim_time(), 6) == 0.101, "hundred steps")
         self.page.wait_for_text("0.101 s")
-        self.assertLess(self.height("ball"), 0.56)
+        self.assertLess(position("ball").z, 0.56)
         self.page.click("Reset world")
-        wait_for(lambda: self.height("ball") == 0.6, "ball where it was")
-        self.assertEqual(round(self.world().sim_time, 6), 0.101)
+        wait_for(lambda: position("ball").z == 0.6, "ball where it was")
+        self.assertEqual(round(sim_time(), 6), 0.101)
 
     def test_speed_is_chosen_and_shown(self):
         self.set_speed(1.0)
@@ -120,7 +127,7 @@ class WindowTest(WindowCase):
             self.page.wait_for_value(shown)
 
     def factor(self):
-        now = self.physics()
+        now = gazebo("get_physics_properties")
         return round(now.max_update_rate * now.time_step, 6)
 
     def test_frames_and_shapes_on_demand(self):
@@ -141,7 +148,7 @@ class WindowTest(WindowCase):
         self.spawn("crate", CRATE, z=0.1)
         self.page.click("World")
         self.page.click("Do these steps")
-        wait_for(lambda: round(self.world().sim_time, 6) == 0.1, "hundred steps")
+        wait_for(lambda: round(sim_time(), 6) == 0.1, "hundred steps")
         self.wait_until_gone(RED)
         self.page.click("Contact points")
         self.wait_until_seen(RED, 20)
@@ -188,14 +195,13 @@ class WindowTest(WindowCase):
         self.page.click("/eye/image_raw")
         wait_for(lambda: self.page.run(PICTURES) == 1, "picture")
         self.wait_until_seen(BLUE, 40)  # the frustum
-        self.delete("seeing")
+        delete_model("seeing")
         wait_for(lambda: "/eye" not in self.page.text, "end of its sensors")
         self.wait_until_gone(BLUE)
 
     def open_files(self):
         """How many files the window's process has open."""
-        pid = master.call_node(master.call("lookupNode", "/gazebo_gui"), "getPid")
-        return len(os.listdir(f"/proc/{pid}/fd"))
+        return len(os.listdir(f"/proc/{process_of('/gazebo_gui')}/fd"))
 
     def watchers(self, topic):
         """The nodes that subscribe to a topic."""
@@ -247,13 +253,13 @@ class WindowTest(WindowCase):
     def test_the_page_shows_what_pictures_without_a_display_show(self):
         xml = rospy.get_param("/robot_description")
         self.spawn("cartpole", xml)
-        place = proxy("/gazebo/set_model_configuration", SetModelConfiguration)
         scene = Renderer()
         self.addCleanup(scene.close)
         scene.add("cartpole", visible_shapes(parse_urdf(xml)))
         self.place_links(scene)
         camera = overview(scene.corners("cartpole"), ASPECT, CAMERA, THIRD)  # of the first moment
-        self.assertTrue(place("cartpole", "", ["stand_cart", "cart_pole"], [0.2, 0.4]).success)
+        joints = ["stand_cart", "cart_pole"], [0.2, 0.4]
+        self.assertTrue(gazebo("set_model_configuration", "cartpole", "", *joints).success)
         self.place_links(scene)
         width, height = self.page.run(CANVAS)
         wanted = boxes(scene.picture(camera, width, height))
@@ -265,14 +271,9 @@ class WindowTest(WindowCase):
 
     def place_links(self, scene):
         """Places the robot in a renderer as the simulator has it."""
-        link = proxy("/gazebo/get_link_state", GetLinkState)
-        scene.place(
-            "cartpole",
-            {
-                name: from_pose_msg(link(f"cartpole::{name}", "world").link_state.pose)
-                for name in ("stand", "cart", "pole")
-            },
-        )
+        links = {name: gazebo("get_link_state", f"cartpole::{name}", "world") for name in LINKS}
+        poses = {name: from_pose_msg(each.link_state.pose) for name, each in links.items()}
+        scene.place("cartpole", poses)
 
 
 def boxes(picture):
@@ -294,4 +295,4 @@ CANVAS = """(() => { const canvas = document.querySelector("canvas");
 
 if __name__ == "__main__":
     rospy.init_node("window_test")
-    rostest.rosrun("cartpole", "window", WindowTest)
+    rostest.rosrun("cartpole", "window", "__main__")

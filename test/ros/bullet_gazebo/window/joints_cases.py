@@ -1,13 +1,11 @@
-#!/usr/bin/env python3
 """The sliders of the window's page place joints while paused, and command running controllers."""
 
 import rospy
-import rostest
-from controller_manager_msgs.srv import LoadController, SwitchController
-from gazebo_msgs.srv import GetJointProperties
 from std_msgs.msg import Float64
 from support.pages.browser import wait_for
-from support.pages.window_page import WindowCase, proxy
+from support.pages.window_page import WindowCase
+from support.ros.calls import gazebo, joint, sim_time
+from support.ros.manager import Manager
 from trajectory_msgs.msg import JointTrajectory
 
 HELD = ["position_hold", "effort_arm", "velocity_drive"]
@@ -23,12 +21,8 @@ class JointsTest(WindowCase):
         super().setUpClass()
         xml = rospy.get_param("/slides/robot_description")
         cls.spawn(cls("test_a_slider_places_a_joint_of_a_paused_world"), "slides", xml)
-        cls.joint = staticmethod(proxy("/gazebo/get_joint_properties", GetJointProperties))
-        cls.switch = staticmethod(
-            proxy("/slides/controller_manager/switch_controller", SwitchController)
-        )
-        load = proxy("/slides/controller_manager/load_controller", LoadController)
-        assert all(load(name).ok for name in HELD)
+        cls.manager = Manager("/slides")
+        assert all(map(cls.manager.load, HELD))
         cls.page.click("Models")
         cls.page.choose("(none)", "slides")
         cls.page.wait_for_text("position_a")
@@ -39,41 +33,39 @@ class JointsTest(WindowCase):
 
     def run_controllers(self):
         """Starts all, has time pass, and waits until the page knows what its sliders can't do."""
-        self.assertTrue(self.switch(HELD, [], 2, False, 0.0).ok)
-        self.addCleanup(self.switch, [], HELD, 2, False, 0.0)
-        self.unpause()
+        self.assertTrue(self.manager.switch(HELD))
+        self.addCleanup(self.manager.switch, [], HELD)
+        gazebo("unpause_physics")
         self.page.wait_for_text("velocity_a: /slides/velocity_drive/command takes velocities")
         self.page.wait_for_text("velocity_b: no running controller takes positions of it")
-        for joint in ("position_a", "effort_a"):  # their sliders work, once the page knows it
-            wait_for(
-                lambda what=f"{joint}: ": what not in self.page.text, f"end of {joint}'s fault"
-            )
+        for name in ("position_a", "effort_a"):  # their sliders work, once the page knows it
+            wait_for(lambda what=f"{name}: ": what not in self.page.text, f"end of {name}'s fault")
 
-    def push(self, joint, position):
+    def push(self, name, position):
         """Moves the slider of a joint to the right until the joint has come beyond a position [m]."""
 
         def is_there():
-            self.page.push_slider(joint, "ArrowRight", PRESSES)
-            return self.joint(joint).position[0] > position
+            self.page.push_slider(name, "ArrowRight", PRESSES)
+            return joint(name)[0] > position
 
-        wait_for(is_there, f"{joint} beyond {position}")
+        wait_for(is_there, f"{name} beyond {position}")
 
-    def push_and_hear(self, joint, topic, kind):
+    def push_and_hear(self, name, topic, kind):
         """Pushes a slider until its joint has moved; returns what is then said on a topic of commands."""
         said = []
         subscriber = rospy.Subscriber(topic, kind, said.append)
         self.addCleanup(subscriber.unregister)
-        self.push(joint, WAY)
+        self.push(name, WAY)
         # The page publishes from its first command on, and nobody else does.
         wait_for(subscriber.get_num_connections, "publisher of commands")
-        self.push(joint, 1.5 * WAY)
+        self.push(name, 1.5 * WAY)
         wait_for(lambda: said, "command")
         return said
 
     def test_a_slider_places_a_joint_of_a_paused_world(self):
         wait_for(lambda: not self.page.is_off("velocity_b"), "slider of a paused world")
         self.push("velocity_b", WAY)
-        self.assertEqual(self.world().sim_time, 0.0)
+        self.assertEqual(sim_time(), 0.0)
 
     def test_a_slider_commands_a_running_position_controller(self):
         self.run_controllers()
@@ -84,25 +76,20 @@ class JointsTest(WindowCase):
         self.run_controllers()
         said = self.push_and_hear("effort_a", "/slides/effort_arm/command", JointTrajectory)
         self.assertEqual(set(said[-1].joint_names), {"effort_a", "effort_b"})
-        self.assertLess(abs(self.joint("effort_b").position[0]), 0.05)
+        self.assertLess(abs(joint("effort_b")[0]), 0.05)
 
     def test_a_slider_that_would_move_nothing_is_switched_off(self):
         self.run_controllers()
-        for joint, off in (("velocity_a", True), ("velocity_b", True), ("position_a", False)):
-            wait_for(lambda j=joint, o=off: self.page.is_off(j) == o, f"{joint}: {off=}")
-        self.pause()
+        for name, off in (("velocity_a", True), ("velocity_b", True), ("position_a", False)):
+            wait_for(lambda n=name, o=off: self.page.is_off(n) == o, f"{name}: {off=}")
+        gazebo("pause_physics")
         wait_for(lambda: not self.page.is_off("velocity_b"), "slider of a paused world")
         wait_for(lambda: "takes velocities" not in self.page.text, "end of the list")
 
     def test_controllers_are_shown_with_their_state(self):
         self.page.click("Controllers")
         self.page.wait_for_text("/slides/controller_manager")
-        self.assertTrue(self.switch(["effort_arm"], [], 2, False, 0.0).ok)
+        self.assertTrue(self.manager.switch(["effort_arm"]))
         self.page.wait_for_text("effort_arm: running")
-        self.assertTrue(self.switch([], ["effort_arm"], 2, False, 0.0).ok)
+        self.assertTrue(self.manager.switch([], ["effort_arm"]))
         self.page.wait_for_text("effort_arm: stopped")
-
-
-if __name__ == "__main__":
-    rospy.init_node("joints_test")
-    rostest.rosrun("cartpole", "joints", JointsTest)

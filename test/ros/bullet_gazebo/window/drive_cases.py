@@ -1,13 +1,11 @@
-#!/usr/bin/env python3
 """The page's tab for driving, in a real browser: held keys, a gamepad, and a page that closes."""
 
 import threading
 
 import rospy
-import rostest
 from geometry_msgs.msg import Twist
 from support.pages.browser import Browser, wait_for
-from support.pages.window_page import WindowCase
+from support.pages.window_page import WindowCase, shown
 
 TOPIC = "/driven/cmd_vel"
 PAD = "navigator.getGamepads = () => [{{axes: [{}, {}, 0]}}]; 1"
@@ -51,16 +49,10 @@ class DriveTest(WindowCase):
         self.hears(0.0, 0.0, 0.0)
 
     def test_a_page_that_closes_stops_what_it_drove(self):
-        url = self.window.line("is the page").rpartition(" ")[2]
-        with Browser(url) as page:
+        with Browser(shown().url) as page:
             page.wait_for_text("One step")
             self.open_tab(page)
             self.key(page, "keyDown", "m")
             self.hears(-0.3, 0.0, 0.0)
         self.hears(0.0, 0.0, 0.0)
         self.assertEqual([each for each in self.heard if each[0] > 0.0], [])
-
-
-if __name__ == "__main__":
-    rospy.init_node("drive_test")
-    rostest.rosrun("cartpole", "drive", DriveTest)
