@@ -38,12 +38,12 @@ _EVERYWHERE = {"eval_episodes": 2, "confirm_episodes": 3, "seed": 3}
 SMALL: dict[str, dict[str, Any]] = {
     "dqn": _EVERYWHERE
     | {
-        "total_timesteps": 600,
+        "total_timesteps": 400,
         "learning_starts": 50,
         "train_frequency": 2,
         "hidden_sizes": "16,16",
         "batch_size": 16,
-        "buffer_size": 300,
+        "buffer_size": 200,
         "n_step": 3,
         "normalize_observations": "true",
         "lr_schedule": "linear",
@@ -86,13 +86,13 @@ SMALL: dict[str, dict[str, Any]] = {
     | {
         "env_id": "Pendulum-v1",
         "env_kwargs": {"max_episode_steps": 20},
-        "total_timesteps": 260,
-        "learning_starts": 50,
-        "buffer_size": 100,
+        "total_timesteps": 140,
+        "learning_starts": 20,
+        "buffer_size": 60,
         "batch_size": 8,
         "net_arch": "8",
-        "eval_frequency": 100,
-        "checkpoint_frequency": 50,
+        "eval_frequency": 60,
+        "checkpoint_frequency": 30,
         "log_frequency": 20,
     },
 }

@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = ROOT / "examples"
 FILES = ["dqn_single_file.py", "reinforce_single_file.py"]
 LONGEST = 250  # [lines]
-LEAST = 1000  # [steps] that a comparison needs
+LEAST = 500  # [steps] that a comparison needs
 
 
 @pytest.fixture(autouse=True)
@@ -75,23 +75,21 @@ def assert_same_weights(network: torch.nn.Module, state: dict[str, torch.Tensor]
 
 
 DQN = {
-    "as it comes": ["--total-timesteps", "1500", "--seed", "3"],
-    "plain": ["--total-timesteps", "1000", "--n-step", "1", "--no-double", "--no-dueling",
+    "as it comes": ["--total-timesteps", "1100", "--seed", "3"],
+    "plain": ["--total-timesteps", "600", "--n-step", "1", "--no-double", "--no-dueling",
               "--loss", "mse", "--reward-scale", "1", "--no-normalize-observations",
               "--learning-starts", "0", "--target-network-frequency", "10",
               "--exploration-fraction", "0"],
     "truncated, clipped, a buffer that overflows": [
-        "--env-id", "Acrobot-v1", "--total-timesteps", "1100", "--buffer-size", "600",
+        "--env-id", "Acrobot-v1", "--total-timesteps", "700", "--buffer-size", "300",
         "--max-grad-norm", "0.05", "--n-step", "5", "--batch-size", "16", "--hidden-sizes", "24",
-        "--gamma", "0.9", "--end-e", "0.3", "--seed", "1"],
+        "--gamma", "0.9", "--end-e", "0.3", "--seed", "1", "--learning-starts", "200"],
 }  # fmt: skip
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flags", DQN.values(), ids=DQN.keys())
-def test_dqn_comes_to_the_weights_of_the_library(
-    flags: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_dqn_comes_to_the_weights_of_the_library(flags: list[str], tmp_path, monkeypatch) -> None:
     example = module("dqn_single_file", monkeypatch)
     q_network, target_network, _, returns = trained(example, flags, tmp_path / "log")
     options = example.parse_args(flags)
@@ -106,14 +104,14 @@ def test_dqn_comes_to_the_weights_of_the_library(
 
 ROBOT = ["--env-id", "cartpole/Balance-v0"]
 REINFORCE = {
-    "as it comes": ["--episodes", "30", "--seed", "1"],
-    "the robot, normalised": ["--episodes", "40", "--normalize-observations"],
+    "as it comes": ["--episodes", "15", "--seed", "1"],
+    "the robot, normalised": ["--episodes", "15", "--normalize-observations"],
     "batches, entropy, a hidden layer": [
-        "--env-id", "CartPole-v1", "--episodes", "61", "--batch-episodes", "3",
+        "--env-id", "CartPole-v1", "--episodes", "31", "--batch-episodes", "3",
         "--policy-hidden", "8", "--value-hidden", "16", "--entropy-coefficient", "0.02",
         "--normalize-observations", "--gae-lambda", "0.9", "--gamma", "0.98"],
     "three actions, truncated": [
-        "--env-id", "Acrobot-v1", "--episodes", "5", "--batch-episodes", "2",
+        "--env-id", "Acrobot-v1", "--episodes", "3", "--batch-episodes", "2",
         "--value-epochs", "3"],
 }  # fmt: skip
 
@@ -143,9 +141,7 @@ def test_reinforce_comes_to_the_weights_of_the_library(
      ["reinforce_single_file.py", "--episodes", "20"]],
     ids=["dqn", "dqn on the robot", "reinforce"],
 )  # fmt: skip
-def test_it_runs_as_a_script(
-    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
-) -> None:
+def test_it_runs_as_a_script(words: list[str], tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", words)
     runpy.run_path(str(EXAMPLES / words[0]), run_name="__main__")

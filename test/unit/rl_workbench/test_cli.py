@@ -24,9 +24,7 @@ def test_ctrl_c_while_it_is_still_being_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("prog", ["rl-workbench", "workbench.py"])
-def test_errors_begin_with_the_commands_name(
-    tmp_path: Path, prog: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_errors_begin_with_the_commands_name(tmp_path: Path, prog: str, capsys) -> None:
     assert main(["eval", str(tmp_path)], prog) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"{prog}: {tmp_path} is not a run folder")
@@ -39,9 +37,7 @@ def test_errors_begin_with_the_commands_name(
 
 def test_it_can_be_started_without_a_script() -> None:
     for command in (["nonsense"], ["train", "--algo=dqm"]):
-        ended = subprocess.run(
-            [*PROGRAM, *command], capture_output=True, text=True, timeout=120, check=False
-        )
+        ended = subprocess.run([*PROGRAM, *command], capture_output=True, text=True, check=False)
         assert ended.returncode == 2 and "Traceback" not in ended.stderr
         assert f"{' '.join(['rl-workbench', *command[:-1]])}: error: unknown " in ended.stderr
 

@@ -1,4 +1,4 @@
-"""The agent: its targets against the DQN tutorial's formulas, and that it learns."""
+"""The agent: when it learns, how it explores, and that it goes on from its state."""
 
 import copy
 from typing import Any
@@ -6,11 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from torch import nn
 
 from rl_workbench.agents.dqn_agent import DQNAgent
 from rl_workbench.agents.settings import DQNSettings
-from rl_workbench.errors import WorkbenchError
 
 RNG = np.random.default_rng(0)
 
@@ -54,28 +52,6 @@ def test_exploration_is_epsilon() -> None:
     best = learner.act_greedily(observation)
     others = sum(learner.act(observation) != best for _ in range(4000))
     assert others / 4000 == pytest.approx(0.15, abs=0.02)
-
-
-def test_an_infinite_loss_leaves_the_weights() -> None:
-    learner = agent(loss="mse")
-    learner.observe((np.ones(4, np.float32), 0, np.inf), np.ones(4, np.float32), True, False)
-    before = learner.q_net.net[0].weight.clone()
-    with pytest.raises(WorkbenchError, match="the loss is inf"):
-        learner.learn()
-    assert torch.equal(learner.q_net.net[0].weight, before)
-
-
-def test_the_documents_own_way_of_loading(tmp_path) -> None:
-    """The DQN tutorial's class has these layers, and its code loads these keys."""
-    theirs = nn.Module()
-    theirs.net = nn.Sequential(nn.Linear(4, 128), nn.ReLU(), nn.Linear(128, 128), nn.ReLU(),
-                               nn.Linear(128, 2))  # fmt: skip
-    learner = agent(hidden_sizes=(128, 128))
-    torch.save(learner.state_dict(), tmp_path / "cartpole_dqn.pth")
-    saved = torch.load(tmp_path / "cartpole_dqn.pth", weights_only=True)
-    theirs.load_state_dict(saved["q_net"])
-    x = torch.randn(3, 4)
-    assert torch.equal(theirs.net(x), learner.q_net(x))
 
 
 @pytest.mark.parametrize(

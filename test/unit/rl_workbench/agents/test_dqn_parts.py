@@ -7,7 +7,7 @@ from torch import nn
 
 from rl_workbench.agents.dqn_agent import DuelingQNetwork, Epsilon, QNetwork, fast_values
 from rl_workbench.agents.normalisation import Normaliser
-from rl_workbench.agents.replay import NStepReturns, ReplayBuffer, Transition
+from rl_workbench.agents.replay import ReplayBuffer, Transition
 from rl_workbench.agents.settings import DQNSettings
 from rl_workbench.errors import WorkbenchError
 
@@ -81,22 +81,6 @@ def test_replay_from_its_state(count: int) -> None:
 def test_replay_refuses_what_does_not_fit() -> None:
     with pytest.raises(WorkbenchError, match="can't hold"):
         ReplayBuffer(2, 2).load_state_dict(filled(5, 5).state_dict())
-    with pytest.raises(ValueError, match=r"from shape \(5,2\) into shape \(5,3\)"):
-        ReplayBuffer(5, 3).load_state_dict(filled(5, 5).state_dict())
-
-
-def test_n_step_returns_from_their_state() -> None:
-    one, other = NStepReturns(3, 0.9), NStepReturns(3, 0.9)
-    for index in range(2):
-        assert (
-            one.add((np.array([index], np.float32), index, 1.0), np.array([index + 1]), False, True)
-            == []
-        )
-    other.load_state_dict(one.state_dict())
-    added = [each.add((np.array([2]), 2, 1.0), np.array([3]), False, True) for each in (one, other)]
-    assert added[0] == added[1] and len(added[0]) == 1
-    one.clear()
-    assert one.state_dict()["actions"] == []
 
 
 def test_linear_epsilon() -> None:

@@ -53,9 +53,7 @@ class Reference:
 
     def learn(self, batch: list[tuple], steps: int) -> None:
         options = self.options
-        s, a, r, s_, discount = (
-            torch.tensor(np.array(column)) for column in zip(*batch, strict=True)
-        )
+        s, a, r, s_, discount = (torch.tensor(np.array(each)) for each in zip(*batch, strict=True))
         with torch.no_grad():
             rated = self.target(s_)
             best = (self.net(s_) if options["double"] else rated).argmax(1)

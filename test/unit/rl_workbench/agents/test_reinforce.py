@@ -55,9 +55,8 @@ def test_advantages_are_the_sums_of_the_paper(pairs, last, gae_lambda):
 @pytest.mark.parametrize("normalize", [False, True])
 @pytest.mark.parametrize(("size", "actions"), [(4, 2), (6, 3), (1, 5)])
 def test_any_observations_and_actions(hidden, normalize, size, actions):
-    settings = ReinforceSettings(
-        policy_hidden=hidden, normalize_observations=normalize, value_epochs=2
-    )
+    shape = {"policy_hidden": hidden, "normalize_observations": normalize}
+    settings = ReinforceSettings(**shape, value_epochs=2)
     agent = ReinforceAgent(1, (0.5,) * size, settings, actions)
     assert chances(agent, np.ones(size, np.float32)) == pytest.approx([1 / actions] * actions)
     for seed in range(3):
@@ -67,9 +66,8 @@ def test_any_observations_and_actions(hidden, normalize, size, actions):
     found = chances(agent, observation)
     assert found == pytest.approx(expected, abs=1e-6)
     assert agent.act_greedily(observation) == int(np.argmax(found))
-    drawn = np.bincount(
-        [agent.draw(observation, agent.generator) for _ in range(4000)], minlength=actions
-    )
+    draws = [agent.draw(observation, agent.generator) for _ in range(4000)]
+    drawn = np.bincount(draws, minlength=actions)
     assert drawn / 4000 == pytest.approx(found, abs=0.04)
 
 
@@ -87,9 +85,7 @@ def test_it_goes_on_from_its_state_to_the_same_bits(episodes):
     assert [agents[0].draw(observation, agents[0].generator) for _ in range(50)] == [
         agents[1].draw(observation, agents[1].generator) for _ in range(50)
     ]
-    for ours, theirs in zip(
-        agents[0].value.parameters(), agents[1].value.parameters(), strict=True
-    ):
+    for ours, theirs in zip(*(each.value.parameters() for each in agents), strict=True):
         assert torch.equal(ours, theirs)
 
 

@@ -35,6 +35,7 @@ from rl_workbench.tools.runs import open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.train import PROGRAM
 
+SB3 = pytest.mark.extras("stable_baselines3")
 SUITE = """
 two:
   about: Two ways.
@@ -58,7 +59,7 @@ def examined(one: Job) -> RunResult:
     return examine(open_run(one.folder), "quick", 2, lambda text: None, also_last=True)
 
 
-@pytest.mark.extras("stable_baselines3")
+@SB3
 def test_every_suite_of_the_package_has_options_that_exist() -> None:
     import yaml
 
@@ -99,12 +100,9 @@ def test_a_suite_gives_tables_with_every_seed_and_every_failure(
         assert (out / name).read_bytes().startswith(b"\x89PNG")
 
 
-def test_its_length_is_a_flag_as_of_train(suites: Path, capsys) -> None:
+def test_its_length_is_a_flag_as_of_train() -> None:
     words = ["benchmark", "--total-timesteps=5000", "--params", "total_timesteps=1"]
-    suite = _suite(cli.parse(words))
-    assert suite.variants[0].options["total_timesteps"] == "5000"
-    assert cli.main(["benchmark", "two", f"--suites={suites}", "--total-timesteps=1"]) == 1
-    assert "a suite defines its trainings and takes no --algo" in capsys.readouterr().err
+    assert _suite(cli.parse(words)).variants[0].options["total_timesteps"] == "5000"
 
 
 @pytest.mark.slow
@@ -131,9 +129,7 @@ def test_an_interrupted_benchmark_goes_on_where_it_was(tmp_path: Path) -> None:
     assert not same.is_done() and command(same, PROGRAM)[-1] == f"--resume={run}"
 
 
-def test_a_folder_of_other_options_is_refused(
-    suites: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_of_other_options_is_refused(suites: Path, tmp_path: Path, capsys) -> None:
     out = tmp_path / "out"
     out.mkdir()
     (out / "suite.json").write_text("[]")
@@ -148,14 +144,14 @@ def test_a_folder_of_other_options_is_refused(
         (["--params", "gama=0.9"], "did you mean gamma"),
         (["cartpole", "--env-id", "CartPole-v1"], "a suite defines its trainings"),
         (["cartpole", "--algo", "dqn"], "a suite defines its trainings"),
+        (["cartpole", "--total-timesteps=1"], "a suite defines its trainings and takes no --algo"),
         (["--suites", "mine.yaml"], "which suite of mine.yaml"),
         (["--algo", "reinforce", "--params", "gama=0.9"], "did you mean gamma"),
         (["--params", "seed=3"], "the benchmark sets seed itself"),
+        pytest.param(["--algo=ppo", "--params", "n_stepz=64"], "did you mean n_steps", marks=SB3),
     ],
 )
-def test_wrong_input_is_a_line(
-    arguments: list[str], line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_input_is_a_line(arguments: list[str], line: str, tmp_path: Path, capsys) -> None:
     assert cli.main(["benchmark", *arguments, f"--out={tmp_path / 'out'}"]) == 1
     assert line in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
@@ -187,17 +183,6 @@ def test_a_suite_that_makes_no_sense_is_refused(content: str, words: str, tmp_pa
             check_options(variant)
 
 
-@pytest.mark.extras("stable_baselines3")
-def test_options_that_stable_baselines3_does_not_know_are_refused_before_anything_is_trained(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    command = ["benchmark", "--algo=ppo", f"--out={tmp_path / 'out'}", "--params", "n_stepz=64"]
-    assert cli.main(command) == 1
-    assert "did you mean n_steps" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-    check_options(make_variant("t", "a", {"algo": "ppo", "target_kl": None, "n_steps": 64}))
-
-
 def test_a_failed_training_stays_in_the_table(tmp_path: Path) -> None:
     one = job(tmp_path)
     workbench_runs.record(one.folder, [20.0] * 30)
@@ -220,10 +205,8 @@ def test_figures_that_cannot_be_read_are_faults(tmp_path: Path) -> None:
 def test_the_step_to_solve_is_a_confirmed_one_if_there_is_any(tmp_path: Path) -> None:
     one = job(tmp_path)
     workbench_runs.record(one.folder, [20.0] * 30)
-    for row, solved in (
-        ("300,eval/mean_reward,475.0,0", 300),
-        ("400,eval/confirmed_reward,480.0,0", 400),
-    ):
+    rows = {300: "300,eval/mean_reward,475.0,0", 400: "400,eval/confirmed_reward,480.0,0"}
+    for solved, row in rows.items():
         with (one.folder / "scalars.csv").open("a") as file:
             file.write(f"{row}\n")
         assert examined(one).solved_step == solved
@@ -252,9 +235,7 @@ def test_ctrl_c_while_policies_are_played(tmp_path: Path, monkeypatch) -> None:
     assert not (tmp_path / "results.md").exists()
 
 
-def test_two_benchmarks_do_not_share_a_folder(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_two_benchmarks_do_not_share_a_folder(tmp_path: Path, capsys) -> None:
     command = complete(tmp_path)
     with run_folder.held(tmp_path):
         assert cli.main(command) == 1

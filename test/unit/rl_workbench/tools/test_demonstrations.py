@@ -41,10 +41,8 @@ def cube(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A rover with a camera, a laser and an IMU, whose driver has stopped before the episode ended."""
-    folder, origin = (
-        tmp_path_factory.mktemp("demos") / "driven",
-        Origin("robot_envs/Navigate-v0", DRIVEN),
-    )
+    folder = tmp_path_factory.mktemp("demos") / "driven"
+    origin = Origin("robot_envs/Navigate-v0", DRIVEN)
     folder.mkdir()
     env = origin.make()
     recorder = Recorder(env, origin)
@@ -114,19 +112,16 @@ def test_sensors_and_pictures_are_rendered_later(driven: Path, tmp_path: Path) -
     assert shapes["laser.ranges"] == (6, 360) and shapes["imu.orientation"] == (6, 4)
     metadata = json.loads((out / "metadata.json").read_text())
     assert metadata["replay"]["equal_to_the_bit"] == ["rewards", "ends", "observations"]
-    assert metadata["episodes"] == [
-        {"file": "episode_00000.npz", "seed": 3, "success": True, "steps": 5}
-    ]
+    (episode,) = metadata["episodes"]
+    assert episode == {"file": "episode_00000.npz", "seed": 3, "success": True, "steps": 5}
 
 
 @pytest.mark.extras("minari")
 def test_a_dataset_of_minaris_is_loaded_there(driven: Path, tmp_path: Path, monkeypatch) -> None:
     import minari
 
-    assert (
-        dataset(driven, tmp_path / "rover-v0", "--format=minari", "--sensors=laser,render@48x40")
-        == 0
-    )
+    sensors = "--sensors=laser,render@48x40"
+    assert dataset(driven, tmp_path / "rover-v0", "--format=minari", sensors) == 0
     assert dataset(driven, tmp_path / "plain", "--sensors=laser,render@48x40") == 0
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     found = minari.load_dataset("rover-v0")

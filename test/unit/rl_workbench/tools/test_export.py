@@ -100,9 +100,8 @@ def seen_by(space: spaces.Space) -> list:
     draw = np.random.default_rng(1).normal
     if isinstance(space, spaces.Dict):
         parts = {name: draw(size=(200, *each.shape)) for name, each in space.items()}
-        return [
-            {name: part[n].astype(np.float32) for name, part in parts.items()} for n in range(200)
-        ]
+        single = [{name: part[n] for name, part in parts.items()} for n in range(200)]
+        return [{name: part.astype(np.float32) for name, part in each.items()} for each in single]
     return list(draw(size=(200, *space.shape)).astype(np.float32))
 
 
@@ -120,10 +119,8 @@ def test_the_file_acts_as_the_policy(tmp_path: Path, name: str, capsys) -> None:
     capsys.readouterr()
     assert work("export", run, "--out", out) == 0
     told = capsys.readouterr().out
-    assert (
-        told.startswith(f"{out}: the policy of {run.resolve()}/")
-        and "over 1000 observations" in told
-    )
+    assert told.startswith(f"{out}: the policy of {run.resolve()}/")
+    assert "over 1000 observations" in told
     policy, file = load_learned(open_run(run)), open_exported(out)
     observations = seen_by(policy.env.observation_space)
     wanted = np.array([policy.act(each) for each in observations])
@@ -226,9 +223,8 @@ def test_observations_in_parts(algorithm: str, actions: spaces.Space) -> None:
     content, agreement = torchscript.export(run, policy, seed=3)
     assert agreement.observations == 1000 and agreement.equal > 10
     module, metadata = torchscript.read(content)
-    seen = {
-        name: part[0] for name, part in torchscript.batch([env.observation_space.sample()]).items()
-    }
+    batch = torchscript.batch([env.observation_space.sample()])
+    seen = {name: part[0] for name, part in batch.items()}
     action = module({name: part[None] for name, part in seen.items()})[0].numpy()
     assert actions.contains(action.astype(actions.dtype))
     assert sorted(metadata["observation_space"]["spaces"]) == sorted(env.observation_space)

@@ -79,9 +79,8 @@ def test_plot_and_compare(trained: Path, tmp_path: Path, capsys, over: str) -> N
     head, _, row, *_ = capsys.readouterr().out.splitlines()[1:]
     assert "| success |" in head and "%" in row
     one, two = Image.open(picture), Image.open(tmp_path / "seeds.png")
-    assert one.width > 2 * one.height and two.width > 2 * two.height, (
-        "returns and successes, side by side"
-    )
+    for each in (one, two):
+        assert each.width > 2 * each.height, "returns and successes, side by side"
 
 
 def test_benchmark_trains_in_processes_of_their_own(tmp_path: Path, monkeypatch, capsys) -> None:
@@ -143,14 +142,9 @@ def test_a_run_whose_module_is_gone_is_plotted_all_the_same(
     for name in ("own_arm", "own_arm.tasks"):
         monkeypatch.delitem(sys.modules, name)
     assert cli.main(["plot", str(trained), "--out", str(tmp_path / "curve.png")]) == 0
-    for needs_it in (
-        ["eval"],
-        ["eval", "--checkpoint=random"],
-        ["view", "--no-browser"],
-        ["enjoy", "--gui"],
-    ):
+    for needs_it in ("eval", "eval --checkpoint=random", "view --no-browser", "enjoy --gui"):
         capsys.readouterr()
-        assert cli.main([*needs_it, str(trained)]) == 1
+        assert cli.main([*needs_it.split(), str(trained)]) == 1
         told = capsys.readouterr()
         assert told.out == "" and told.err.count("\n") == 1
         assert "there is no module 'own_arm'" in told.err

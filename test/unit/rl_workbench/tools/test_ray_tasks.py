@@ -1,6 +1,7 @@
 """`--ray` with a real cluster of two nodes on this machine; workers, nodes and the driver are killed."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -75,14 +76,10 @@ def cluster() -> Iterator[RayCluster]:
 def trainings(out: Path) -> list[int]:
     """The processes that train into a folder."""
     every = [int(each.name) for each in Path("/proc").iterdir() if each.name.isdigit()]
-    return [
-        pid for pid in every if f"--run-dir={out}" in title(pid) or f"--resume={out}" in title(pid)
-    ]
+    return [each for each in every if re.search(f"--(run-dir|resume)={out}", title(each))]
 
 
-def test_what_is_killed_changes_no_byte_of_the_table(
-    cluster: RayCluster, table: bytes, tmp_path: Path
-) -> None:
+def test_what_is_killed_changes_no_byte_of_the_table(cluster, table: bytes, tmp_path: Path) -> None:
     """A worker, then a whole node."""
     driver = benchmark(tmp_path, f"--ray={cluster.address}")
     try:
@@ -127,9 +124,7 @@ def test_a_benchmark_whose_own_process_is_killed_or_stopped_goes_on(
     assert [state(tmp_path, seed).state for seed in range(2)] == ["done", "done"]
 
 
-def test_a_node_that_does_not_see_the_folder_is_one_line(
-    cluster: RayCluster, tmp_path: Path, monkeypatch
-) -> None:
+def test_a_node_that_does_not_see_the_folder_is_one_line(cluster, tmp_path, monkeypatch) -> None:
     (tmp_path / "a").mkdir()
     program = (
         "from rl_workbench.tools import ray_tasks\n"
@@ -154,9 +149,7 @@ def test_a_node_that_does_not_see_the_folder_is_one_line(
         ("127.0.0.1:70000", "no Ray cluster answers"),
     ],
 )
-def test_where_no_cluster_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], address: str, words: str
-) -> None:
+def test_where_no_cluster_is(tmp_path: Path, capsys, address: str, words: str) -> None:
     assert cli.main(["benchmark", f"--out={tmp_path}", "--seeds=1", f"--ray={address}"]) == 1
     assert words in capsys.readouterr().err
 

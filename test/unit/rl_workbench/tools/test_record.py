@@ -198,9 +198,7 @@ def test_an_environment_without_a_size_has_its_pictures_scaled(tmp_path: Path):
 # In 3-D. That a browser plays the file: test_record_played.py.
 
 
-def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(
-    robot_run: Path, tmp_path: Path, capsys
-):
+def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(robot_run: Path, tmp_path, capsys):
     out = tmp_path / "a.html"
     assert record(robot_run, out) == 0
     steps = int(capsys.readouterr().out.split(" steps")[0].split()[-1])

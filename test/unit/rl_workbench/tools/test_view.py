@@ -91,9 +91,8 @@ def returns(folder: Path, which: str, seed: int) -> list[float]:
     """Of an episode as `record --seed` plays it, after each step."""
     learned = load_learned(open_run(folder), which)
     try:
-        rewards = [
-            each.reward for each in episode_steps(learned.env, learned.act, TEST_SEED + seed)
-        ]
+        steps = episode_steps(learned.env, learned.act, TEST_SEED + seed)
+        rewards = [each.reward for each in steps]
     finally:
         learned.env.close()
     return np.cumsum(rewards).tolist()

@@ -56,9 +56,8 @@ class Command:
         return wait_for(self._url, f"address in {self.lines}")
 
     def _url(self) -> str:
-        return next(
-            (found[0] for line in self.lines if (found := re.search("http://[0-9.:]+/", line))), ""
-        )
+        found = re.search("http://[0-9.:]+/", "\n".join(self.lines))
+        return found[0] if found else ""
 
     def children(self) -> list[int]:
         pid = self._process.pid

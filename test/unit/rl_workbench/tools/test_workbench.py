@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -41,9 +42,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     """The one line that a command says when it fails."""
     assert work(*arguments) == 1
     lines = capsys.readouterr().err.strip().splitlines()
-    assert "Traceback" not in lines[-1] and lines[-1].startswith(
-        ("rl-workbench: ", "rl-workbench train: ")
-    )
+    assert re.match("rl-workbench( train)?: ", lines[-1]) and "Traceback" not in lines[-1]
     return lines[-1]
 
 
@@ -52,9 +51,7 @@ ALL = ["dqn_0", "robot", "reinforce", "reinforce-document"]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
-def test_eval_tells_every_episode_and_writes_json(
-    runs: Path, tmp_path: Path, name: str, capsys
-) -> None:
+def test_eval_tells_every_episode_and_writes_json(runs: Path, tmp_path, name: str, capsys) -> None:
     out = tmp_path / "eval.json"
     assert work("eval", runs / name, "--episodes", 3, "--json", out) == 0
     found = json.loads(out.read_text())
@@ -81,7 +78,7 @@ def test_eval_of_random_actions_is_a_baseline(runs: Path, capsys) -> None:
     assert "or random actions" in " ".join(capsys.readouterr().out.split())
 
 
-@pytest.mark.parametrize("name", ["dqn_0", "robot", "reinforce"])
+@pytest.mark.parametrize("name", ["dqn_0", "robot"])
 def test_record_writes_a_gif_without_a_display(runs: Path, tmp_path: Path, name: str) -> None:
     out = tmp_path / "video.gif"
     assert work("record", runs / name, "--out", out, "--max-steps", 40, "--size", "160x80") == 0
@@ -283,6 +280,6 @@ def test_a_reader_that_goes_away_costs_no_file(runs: Path, tmp_path: Path) -> No
     out, (reading, writing) = tmp_path / "x.json", os.pipe()
     os.close(reading)
     command = [sys.executable, "-m", "rl_workbench", "eval", runs / "dqn_0", "--json", out]
-    subprocess.run(command, stdout=writing, check=True)
+    subprocess.run([*command, "--episodes=9"], stdout=writing, check=True)
     os.close(writing)
-    assert json.loads(out.read_text())["episodes"] == 100
+    assert json.loads(out.read_text())["episodes"] == 9

@@ -1,5 +1,6 @@
 """Checkpoint files: whole or absent, told from damaged and foreign ones, and which of them counts."""
 
+import os
 import random
 import resource
 from pathlib import Path
@@ -8,7 +9,7 @@ import pytest
 import torch
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.storage import save_tensors
+from rl_workbench.storage import save_tensors, write_atomically
 from rl_workbench.training import checkpoints
 from rl_workbench.training.checkpoints import Checkpoints, candidates, read
 
@@ -51,9 +52,7 @@ def test_foreign_files_are_told_from_checkpoints(tmp_path: Path, content: bytes)
 
 
 @pytest.mark.parametrize("content", [{"q_net": {}}, {"format": "rl_workbench 1"}, [1, 2]])
-def test_somebody_elses_torch_file_is_told_from_a_checkpoint(
-    tmp_path: Path, content: object
-) -> None:
+def test_somebody_elses_torch_file_is_told_from_a_checkpoint(tmp_path, content: object) -> None:
     torch.save(content, tmp_path / "last.pt")
     with pytest.raises(WorkbenchError, match="is not a checkpoint of a training"):
         read(tmp_path / "last.pt")
@@ -99,6 +98,15 @@ def test_a_disk_that_is_full_in_the_midst_of_a_checkpoint(tmp_path: Path) -> Non
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert [each.name for each in tmp_path.iterdir()] == ["last.pt"]
     assert torch.load(path, weights_only=True) == {"old": 1}
+
+
+def test_a_written_file_follows_the_umask(tmp_path: Path) -> None:
+    old = os.umask(0o027)
+    try:
+        write_atomically(tmp_path / "file", lambda stream: stream.write(b""))
+    finally:
+        os.umask(old)
+    assert (tmp_path / "file").stat().st_mode & 0o777 == 0o640
 
 
 def test_which_checkpoint_a_folder_stands_for(tmp_path: Path) -> None:

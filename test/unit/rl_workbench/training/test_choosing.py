@@ -155,14 +155,12 @@ def test_wrong_flags_exit_with_2(kind: AlgorithmKind, flags: list[str], words: s
 
 
 def test_wrong_names_elsewhere_name_the_nearest(empty: str) -> None:
-    assert "--params: unknown option 'gama'; did you mean gamma" in refusal(
-        DQN, empty, "--params", "gama=1"
-    )
+    line = refusal(DQN, empty, "--params", "gama=1")
+    assert "--params: unknown option 'gama'; did you mean gamma" in line
     assert "parameters: unknown parameter 'gama'; did you mean gamma" in refusal(DQN, empty, gama=1)
     assert "--params: 'gamma' isn't KEY=VALUE" in refusal(DQN, empty, "--params", "gamma")
-    assert "parameters: double must be true or false, not 'maybe'" in refusal(
-        DQN, empty, double="maybe"
-    )
+    line = refusal(DQN, empty, double="maybe")
+    assert "parameters: double must be true or false, not 'maybe'" in line
 
 
 def test_a_training_has_an_end(empty: str) -> None:

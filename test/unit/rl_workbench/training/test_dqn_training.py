@@ -1,6 +1,5 @@
 """What is DQN's own in a training: its checkpoint, its line, and the episode under way."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +10,12 @@ from support.training.training_runs import (
     checkpoint,
     points,
     resume,
+    rows,
     small,
     summary,
     train,
 )
+from torch import nn
 
 from rl_workbench.agents.dqn_agent import DQNAgent, Epsilon
 
@@ -23,7 +24,10 @@ from rl_workbench.agents.dqn_agent import DQNAgent, Epsilon
 def test_a_checkpoint_has_the_documents_keys_and_no_more_than_its_weights(whole) -> None:
     content = checkpoint(whole("dqn"))
     assert {"q_net", "target_net", "epsilon", "optimizer", "replay"} <= set(content)
-    assert "net.0.weight" in content["q_net"], "the DQN tutorial's QNetwork loads it"
+    theirs = nn.Module()  # the layers of the DQN tutorial's class
+    layers = [nn.Linear(4, 16), nn.ReLU(), nn.Linear(16, 16), nn.ReLU(), nn.Linear(16, 2)]
+    theirs.net = nn.Sequential(*layers)
+    theirs.load_state_dict(content["q_net"])
     assert content["q_net"]["net.0.weight"].untyped_storage().nbytes() == 16 * 4 * 4
     assert content["config"]["hyperparameters"]["hidden_sizes"] == (16, 16)
 
@@ -41,15 +45,12 @@ def test_epsilon_is_logged_at_each_episodes_end(whole) -> None:
         epsilon = Epsilon(settings)
         epsilon.step_done(step)
         wanted.append(epsilon.value)
-    with (whole("dqn") / "scalars.csv").open(newline="") as file:
-        found = [float(row["value"]) for row in csv.DictReader(file)
-                 if row["tag"] == "charts/epsilon"]  # fmt: skip
-    assert found == wanted
+    assert [float(each) for _, tag, each in rows(whole("dqn")) if tag == "charts/epsilon"] == wanted
 
 
 def test_losses_are_logged_every_so_many_steps_from_the_first_one_on(whole) -> None:
     steps = [step for step, _ in points(whole("dqn"))["losses/td_loss"]]
-    assert steps == list(range(60, 601, 20))
+    assert steps == list(range(60, 401, 20))
     assert steps == [step for step, _ in points(whole("dqn"))["losses/q_values"]]
 
 
@@ -63,9 +64,3 @@ def test_an_environment_that_goes_another_way_costs_its_episode(tmp_path: Path, 
     resume(run)
     assert "the current episode is abandoned" in capsys.readouterr().err
     assert summary(run)["complete"]
-
-
-def test_an_episode_under_way_counts_whole(whole, tmp_path: Path) -> None:
-    run = train(tmp_path / "run", "dqn", InterruptAfter(90))
-    reward = checkpoint(run)["environment"]["reward"]
-    assert 0 < reward < summary(whole("dqn"))["returns"][summary(run)["episodes"]]

@@ -127,9 +127,6 @@ def test_a_folder_that_is_moved_away_is_one_line(
     assert_same_run(whole(name), resume(tmp_path / "moved"))
 
 
-# No memory.
-
-
 # Numbers that are none.
 
 
@@ -218,6 +215,14 @@ def fails_at(monkeypatch: pytest.MonkeyPatch, place: type, method: str, call: in
     monkeypatch.setattr(place, method, failing)
 
 
+FREELY = ON_A_ROBOT | {"checkpoint_frequency": 0, "total_timesteps": 300}
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return train(tmp_path_factory.mktemp("undisturbed"), "dqn", **FREELY)
+
+
 @pytest.mark.parametrize("shares_robot", [False, True])
 @pytest.mark.parametrize(
     ("place", "method", "call"),
@@ -225,23 +230,19 @@ def fails_at(monkeypatch: pytest.MonkeyPatch, place: type, method: str, call: in
      (ScalarLogger, "on_episode", 4), (Evaluator, "_episodes", 1)],
 )  # fmt: skip
 def test_dqn_saves_its_last_whole_step_wherever_it_fails(
-    tmp_path: Path, monkeypatch, place: type, method: str, call: int, shares_robot: bool
+    undisturbed, tmp_path: Path, monkeypatch, place, method: str, call: int, shares_robot: bool
 ) -> None:
     monkeypatch.setattr(Pole, "shares_robot", shares_robot, raising=False)
-    options = ON_A_ROBOT | {"checkpoint_frequency": 0, "total_timesteps": 300}
-    whole = train(tmp_path / "whole", "dqn", **options)
     with monkeypatch.context() as patched:
         fails_at(patched, place, method, call)
-        line = failure(lambda: train(tmp_path / "run", "dqn", **options))
-    steps = summary(tmp_path / "run")["steps"]
-    assert checkpoint(tmp_path / "run")["steps"] == steps > 0
+        line = failure(lambda: train(tmp_path, "dqn", **FREELY))
+    steps = summary(tmp_path)["steps"]
+    assert checkpoint(tmp_path)["steps"] == steps > 0
     assert f"stopped after {steps} steps" in line and "progress is saved in" in line
-    assert_same_run(whole, resume(tmp_path / "run"))
+    assert_same_run(undisturbed, resume(tmp_path))
 
 
-def test_a_round_of_learning_that_fails_costs_the_steps_since_the_last_checkpoint(
-    tmp_path: Path,
-) -> None:
+def test_a_round_of_learning_that_fails_costs_the_steps_since_the_last_checkpoint(tmp_path) -> None:
     """Its first gradient steps can't be taken back."""
     huge = {"env_id": SPOILT, "env_kwargs": {"reward": 3e38}, "eval_frequency": 0}
     line = failure(lambda: train(tmp_path, "dqn", loss="mse", checkpoint_frequency=20, **huge))
@@ -295,9 +296,7 @@ def test_one_that_is_dead_from_the_start(tmp_path: Path, monkeypatch, name: str)
     assert before == {each: (run / each).read_bytes() for each in before}
 
 
-def test_a_simulator_that_dies_of_the_same_ctrl_c_is_no_failure(
-    tmp_path: Path, monkeypatch
-) -> None:
+def test_a_simulator_that_dies_of_the_same_ctrl_c_is_no_failure(tmp_path, monkeypatch) -> None:
     def step(env: Pole, action: int) -> tuple:
         interrupt.signal = 2
         raise Died("the simulator has ended")

@@ -33,19 +33,6 @@ def test_a_folder_may_be_named_and_may_be_there_if_it_is_empty(tmp_path: Path) -
         (folder / "mine").write_text("")
 
 
-def test_one_that_holds_something_is_refused_and_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "old").write_text("")
-    with pytest.raises(WorkbenchError, match="isn't empty"), opened(str(tmp_path), *PLACE):
-        pass
-    assert (tmp_path / "old").exists()
-
-
-def test_a_training_that_cannot_begin_leaves_none_behind(tmp_path: Path) -> None:
-    with pytest.raises(WorkbenchError, match="no such"), opened(str(tmp_path / "run"), *PLACE):
-        raise WorkbenchError("no such environment")
-    assert not (tmp_path / "run").exists()
-
-
 def test_one_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     inside = opened(str(tmp_path / "file" / "run"), *PLACE)

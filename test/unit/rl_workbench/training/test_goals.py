@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 
 MOVES = {"moves": 4}
 OFF = {"learning_starts": 30, "batch_size": 16, "buffer_size": 200, "net_arch": "16",
-       "total_timesteps": 200}  # fmt: skip
+       "total_timesteps": 120}  # fmt: skip
 HER = {**OFF, "her": True}
 SB3 = pytest.mark.extras("stable_baselines3")
 CASES = {
@@ -46,9 +46,7 @@ def made(folder: Path, case: str, **changed: Any) -> Path:
 
 
 @pytest.mark.parametrize("case", EVERY)
-def test_every_algorithm_learns_from_goals_and_counts_its_successes(
-    tmp_path: Path, case: str
-) -> None:
+def test_every_algorithm_learns_from_goals_and_counts_its_successes(tmp_path, case: str) -> None:
     folder = made(tmp_path, case)
     told = summary(folder)
     assert told["complete"] and len(told["successes"]) == len(told["returns"]) > 5
@@ -67,31 +65,27 @@ def test_every_algorithm_learns_from_goals_and_counts_its_successes(
 def test_successes_are_those_of_the_last_steps(tmp_path: Path) -> None:
     """Greedy ones, too: an episode that ends at its goal has more than the least return."""
     often = {"joints": 1, "moves": 2}  # by chance alone it is near in a third of the episodes
-    told = summary(
-        made(tmp_path, "dqn", env_kwargs=often, total_timesteps=1500, end_e=0.3, eval_frequency=500)
-    )
-    evaluation = told["evaluation"]
+    changed = {"total_timesteps": 800, "end_e": 0.3, "eval_frequency": 400}
+    told = summary(made(tmp_path, "dqn", env_kwargs=often, **changed))
     assert 0 < told["success_rate_last_100"] < 1
-    for success, total in zip(told["successes"], told["returns"], strict=True):
-        assert total > -20 or not success
-    for success, total in zip(evaluation["successes"], evaluation["returns"], strict=True):
-        assert total > -20 or not success
+    for found in (told, told["evaluation"]):
+        for success, total in zip(found["successes"], found["returns"], strict=True):
+            assert total > -20 or not success
 
 
 @SB3
 @pytest.mark.parametrize("strategy", ("future", "episode"))
 def test_a_resumed_hindsight_has_its_episodes(tmp_path: Path, monkeypatch, strategy: str) -> None:
     """Interrupted in the midst of an episode that doesn't come back, of a buffer that is full."""
-    folder = made(
-        tmp_path, "sac-her", goal_selection_strategy=strategy, total_timesteps=250, buffer_size=90
-    )
+    small = {"total_timesteps": 130, "buffer_size": 90}
+    folder = made(tmp_path, "sac-her", goal_selection_strategy=strategy, **small)
     buffer = checkpoint(folder)["buffer"]
-    assert buffer["full"] and buffer["episodes"].tolist() == [240 % 90]
+    assert buffer["full"] and buffer["episodes"].tolist() == [120 % 90]
     lengths = buffer["arrays"]["ep_length"].ravel()
     assert set(lengths.tolist()) == {0, 20}
     monkeypatch.setattr(gymnasium.registry[REACH], "nondeterministic", True)
-    again = summary(resume(folder, total_timesteps=300))
-    assert again["complete"] and again["steps"] == 300
+    again = summary(resume(folder, total_timesteps=160))
+    assert again["complete"] and again["steps"] == 160
     after = checkpoint(folder)["buffer"]["arrays"]["ep_length"].ravel().tolist()
     assert 10 in after, "the episode that was broken off ends where it was"
 
@@ -122,9 +116,7 @@ def test_hindsight_learns(tmp_path: Path) -> None:
      ("Scalar-v0", r"compute_reward\(\) of Scalar-v0 isn't vectorised: for \d+ goals at once"),
      ("Broken-v0", r"Broken-v0 failed in compute_reward\(\): ZeroDivisionError: .*test_goals.py:")],
 )  # fmt: skip
-def test_where_hindsight_has_nothing_to_see(
-    tmp_path: Path, monkeypatch, env_id: str, words: str
-) -> None:
+def test_where_hindsight_has_nothing_to_see(tmp_path, monkeypatch, env_id: str, words: str) -> None:
     class Unrewarded(Reach):
         compute_reward = property()
 

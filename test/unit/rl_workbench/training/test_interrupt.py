@@ -48,9 +48,7 @@ def test_one_that_was_deferred_is_not_forgotten(interrupt: Interrupt) -> None:
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGXCPU, 152)]
 )
-def test_other_signals_have_codes_of_their_own(
-    interrupt: Interrupt, number: int, code: int
-) -> None:
+def test_other_signals_have_codes_of_their_own(interrupt, number: int, code: int) -> None:
     interrupt.defer()
     signal.raise_signal(number)
     assert interrupt.requested() and interrupt.exit_code == code

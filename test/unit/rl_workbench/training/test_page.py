@@ -33,9 +33,8 @@ def begun(folder: Path, text: str) -> Page:
     os.mkfifo(folder / "up")
     shown = Page((sys.executable, "-c", text))
     shown.on_training_start(SimpleNamespace(folder=folder))
-    assert (folder / "up").read_text() == (
-        f"view {folder} --beside-training --checkpoint last best random"
-    )
+    command = f"view {folder} --beside-training --checkpoint last best random"
+    assert (folder / "up").read_text() == command
     return shown
 
 

@@ -70,13 +70,6 @@ def test_tags_by_episode_and_by_step(whole, name: str, updates: int) -> None:
     assert {tag for _, tag, _ in rows(whole(name))} >= set(BY_EPISODE)
 
 
-def test_a_checkpoint_has_it_all(whole) -> None:
-    agent = checkpoint(whole("reinforce"))["agent"]
-    parts = {"policy", "value", "policy_optimizer", "value_optimizer", "generator", "batch"}
-    assert parts < set(agent)
-    assert len(agent["batch"]) == 1, "13 episodes are four batches and one more"
-
-
 def test_the_scale_of_observations_counts(whole, tmp_path: Path) -> None:
     scaled = train(tmp_path / "scaled", "reinforce", observation_scale="1,1,0.1,2")
     assert summary(scaled)["returns"] != summary(whole("reinforce"))["returns"]

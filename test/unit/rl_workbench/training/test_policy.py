@@ -26,9 +26,7 @@ def test_a_checkpoint_of_another_environment(whole: Callable[[str], Path], name:
 
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("wrong", [torch.zeros(3, 3), [], {}, None, ""])
-def test_a_foreign_checkpoint_of_other_things(
-    whole: Callable[[str], Path], name: str, wrong: object
-) -> None:
+def test_a_foreign_checkpoint_of_other_things(whole, name: str, wrong: object) -> None:
     content = read(whole(name) / "last.pt")
     options = recorded_options(content["config"], "last.pt")
     env = make_environment(options.run.env_id)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from support.training.training_runs import ALL, EXACT, flags, resume, small, summary, train
+from support.training.training_runs import ALL, EXACT, flags, small, train
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs import open_run
@@ -69,9 +69,3 @@ def test_what_may_not(done: Path, name: str, flag: str, given: list[str]) -> Non
         choose(algorithm(name), [f"--resume={done}", *given])
     others = "--total-timesteps, --episodes, --stop-at-length, --stop-at-return, --device"
     assert f"--resume allows no {flag}, only {others}" in str(raised.value)
-
-
-def test_a_resumed_training_remembers_its_new_length(tmp_path: Path) -> None:
-    run = train(tmp_path, "reinforce", episodes=3)
-    assert summary(resume(run, episodes=5))["episodes"] == 5
-    assert summary(resume(run))["episodes"] == 5

@@ -39,7 +39,7 @@ class Killed(Exception):
 # Ctrl-C.
 
 
-@pytest.mark.parametrize("share", [0.0, 0.004, 0.06, 0.22, 0.41, 0.6, 0.79, 0.97])
+@pytest.mark.parametrize("share", [0.0, 0.004, 0.22, 0.6, 0.97])
 @pytest.mark.parametrize("name", EXACT)
 def test_ctrl_c_anywhere_and_resumed_is_the_same_training(
     whole, times, tmp_path: Path, name: str, share: float

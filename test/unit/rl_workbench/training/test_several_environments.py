@@ -37,6 +37,11 @@ NOISY = {"env_id": POLE, "env_kwargs": {"noise": 0.05}}
 MANY = {**NOISY, "num_envs": 3, "batch_episodes": 2, "episodes": 14}
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return train(tmp_path_factory.mktemp("whole"), "reinforce", **MANY)
+
+
 class Copied(OnlyOne):
     """One robot, of which there is a copy for who asks for it."""
 
@@ -54,9 +59,8 @@ def test_each_plays_what_it_would_play_alone() -> None:
     source.seed()
     rounds = [source.collect(lambda: False) for _ in range(2)]
     for index, env in enumerate(environments()):
-        agent.generator = (
-            np.random.default_rng((7, index)) if index else ReinforceAgent(7).generator
-        )
+        first = ReinforceAgent(7).generator
+        agent.generator = np.random.default_rng((7, index)) if index else first
         env.reset(seed=7 + index)
         for episodes in rounds:
             alone = run_episode(env, agent)
@@ -82,8 +86,7 @@ def test_rounds_are_whole_and_batches_are_of_all(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("asked", [40, 333, 700])
-def test_broken_off_in_a_round_it_comes_to_the_same_bits(tmp_path: Path, asked: int) -> None:
-    whole = train(tmp_path / "whole", "reinforce", **MANY)
+def test_broken_off_in_a_round_it_comes_to_the_same_bits(whole: Path, tmp_path, asked: int) -> None:
     broken = train(tmp_path / "broken", "reinforce", InterruptAfter(asked), **MANY)
     assert not summary(broken)["complete"] and len(rows(broken)) < len(rows(whole))
     assert_same_run(whole, resume(broken))
@@ -91,8 +94,7 @@ def test_broken_off_in_a_round_it_comes_to_the_same_bits(tmp_path: Path, asked: 
 
 
 @pytest.mark.slow
-def test_steps_are_begun_in_all_before_one_is_taken(tmp_path: Path, monkeypatch) -> None:
-    plain = train(tmp_path / "plain", "reinforce", **MANY)
+def test_steps_are_begun_in_all_before_one_is_taken(whole, tmp_path: Path, monkeypatch) -> None:
     env_id = register_with(monkeypatch, Elsewhere)
     options = MANY | {"env_id": env_id, "env_kwargs": {"noise": 0.05}}
     Elsewhere.calls.clear()
@@ -102,7 +104,7 @@ def test_steps_are_begun_in_all_before_one_is_taken(tmp_path: Path, monkeypatch)
     assert [name for name, _ in calls[3:9]] == ["step", "begin"] * 3
     assert [which for _, which in calls[:3]] == [which for _, which in calls[3:9:2]]
     resume(begun)
-    assert_same(checkpoint(plain)["agent"], checkpoint(begun)["agent"])
+    assert_same(checkpoint(whole)["agent"], checkpoint(begun)["agent"])
 
 
 @pytest.mark.slow
@@ -120,10 +122,9 @@ def test_the_one_that_fails_is_named(tmp_path: Path, monkeypatch) -> None:
 
 @pytest.mark.slow
 def test_a_round_that_nothing_can_be_learned_from_is_given_up_whole(
-    tmp_path: Path, monkeypatch
+    whole: Path, tmp_path: Path, monkeypatch
 ) -> None:
-    whole = train(tmp_path / "whole", "reinforce", **MANY)
-    broken, updated = tmp_path / "broken", ReinforceAgent._update
+    updated = ReinforceAgent._update
 
     def failing(agent: ReinforceAgent, batch: list) -> None:
         monkeypatch.setattr(ReinforceAgent, "_update", updated)
@@ -131,8 +132,8 @@ def test_a_round_that_nothing_can_be_learned_from_is_given_up_whole(
 
     monkeypatch.setattr(ReinforceAgent, "_update", failing)
     with pytest.raises(WorkbenchError, match="the policy loss is nan; .* 3 episodes, progress"):
-        train(broken, "reinforce", **MANY)
-    assert_same_run(whole, resume(broken))
+        train(tmp_path, "reinforce", **MANY)
+    assert_same_run(whole, resume(tmp_path))
 
 
 def test_one_that_can_not_be_made_is_named(tmp_path: Path, monkeypatch) -> None:

@@ -98,9 +98,8 @@ def test_parameters_of_a_node(tmp_path: Path) -> None:
 def test_a_node_may_have_defaults() -> None:
     options = choose_training([], {}, default="reinforce", env_id="Acrobot-v1")
     assert (options.kind.name, options.run.env_id) == ("reinforce", "Acrobot-v1")
-    options = choose_training(
-        ["--algo=dqn", "--env-id=A-v0"], {}, default="reinforce", env_id="B-v0"
-    )
+    flags = ["--algo=dqn", "--env-id=A-v0"]
+    options = choose_training(flags, {}, default="reinforce", env_id="B-v0")
     assert (options.kind.name, options.run.env_id) == ("dqn", "A-v0")
 
 
@@ -171,9 +170,7 @@ def test_an_environment_that_does_not_do_leaves_no_folder(
 
 
 def test_a_device_that_is_not_there(capsys) -> None:
-    assert "torch can't use the device 'cda': Expected one of" in failed(
-        capsys, *DQN, "--device=cda"
-    )
+    assert "torch can't use the device 'cda': Expected" in failed(capsys, *DQN, "--device=cda")
 
 
 def test_a_run_folder_in_use(capsys, tmp_path: Path) -> None:

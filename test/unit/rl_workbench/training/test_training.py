@@ -60,9 +60,8 @@ def test_the_summary_tells_it_all(whole, name: str) -> None:
     assert result["mean_length_last_20"] == pytest.approx(
         sum(result["lengths"][-20:]) / len(result["lengths"][-20:])
     )
-    assert result["mean_return_last_100"] == pytest.approx(
-        sum(result["returns"]) / result["episodes"]
-    )
+    mean = sum(result["returns"]) / result["episodes"]
+    assert result["mean_return_last_100"] == pytest.approx(mean)
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -115,13 +114,17 @@ def test_the_same_seed_gives_the_same_bits_and_another_one_others(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_evaluations_and_checkpoints_change_nothing_that_is_learned(
-    tmp_path: Path, name: str
+    whole, tmp_path: Path, name: str
 ) -> None:
-    none = {"eval_frequency": 0, "checkpoint_frequency": 0}
-    plain = train(tmp_path / "plain", name, **none)
-    evaluated = train(tmp_path / "evaluated", name, eval_frequency=40, checkpoint_frequency=7)
-    assert len(summary(evaluated)["evaluations"]) >= 4
-    assert summary(plain)["returns"] == summary(evaluated)["returns"]
+    """Without a frequency it is evaluated at the end alone."""
+    none = {"eval_frequency": 0, "checkpoint_frequency": 0, "eval_episodes": 5}
+    plain, evaluated = train(tmp_path, name, **none), whole(name)
+    result = summary(plain)
+    assert len(summary(evaluated)["evaluations"]) >= 2
+    assert result["returns"] == summary(evaluated)["returns"]
+    assert [step for step, _ in result["evaluations"]] == [result["steps"]]
+    assert checkpoint(plain, "best.pt")["steps"] == result["steps"]
+    assert len(set(result["evaluation"]["returns"])) > 1, "every episode starts somewhere else"
     mine, other = checkpoint(plain), checkpoint(evaluated)
     for content in (mine, other):
         del content["config"], content["history"]
@@ -152,9 +155,9 @@ def test_a_mean_return_ends_it_once_it_is_confirmed(tmp_path: Path, name: str) -
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EXACT)
 def test_the_mean_length_of_20_episodes_ends_it(tmp_path: Path, name: str) -> None:
-    free = {"total_timesteps": None, "episodes": 45, "eval_frequency": 0}
+    free = {"total_timesteps": None, "episodes": 35, "eval_frequency": 0}
     lengths = summary(train(tmp_path / "whole", name, **free))["lengths"]
-    means = [sum(lengths[end - 20 : end]) / 20 for end in range(20, 46)]
+    means = [sum(lengths[end - 20 : end]) / 20 for end in range(20, 36)]
     result = summary(train(tmp_path / "stopped", name, **free, stop_at_length=max(means)))
     assert result["complete"]
     assert 20 < result["episodes"] == 20 + means.index(max(means)), "not the first ones that came"
@@ -163,11 +166,10 @@ def test_the_mean_length_of_20_episodes_ends_it(tmp_path: Path, name: str) -> No
     assert summary(few)["episodes"] == 20, "no fewer"
 
 
-@pytest.mark.parametrize("name", ["ppo"])
 @pytest.mark.extras("stable_baselines3")
-def test_stable_baselines_needs_a_number_of_steps(tmp_path: Path, name: str) -> None:
+def test_stable_baselines_needs_a_number_of_steps(tmp_path: Path) -> None:
     with pytest.raises(WorkbenchError, match="ppo needs total_timesteps"):
-        train(tmp_path, name, total_timesteps=0, episodes=4)
-    stopped = summary(train(tmp_path / "run", name, episodes=4))
+        train(tmp_path, "ppo", total_timesteps=0, episodes=4)
+    stopped = summary(train(tmp_path / "run", "ppo", episodes=4))
     assert stopped["episodes"] >= 4 and stopped["steps"] % 64 == 0, "it ends with a rollout"
     assert stopped["complete"] and stopped["steps"] < 256

@@ -1,8 +1,5 @@
 """Policies of Stable-Baselines3 away from where they learned; options that no record could hold."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -15,9 +12,7 @@ pytestmark = pytest.mark.extras("stable_baselines3")
 
 
 @pytest.mark.parametrize("name", ["ppo", "sac"])
-def test_a_policy_needs_no_environment_of_its_training(
-    whole: Callable[[str], Path], name: str
-) -> None:
+def test_a_policy_needs_no_environment_of_its_training(whole, name: str) -> None:
     """It may have been a robot over ROS: nobody wants a simulator for a picture of the policy."""
     content = read(whole(name) / "last.pt")
     content["config"]["run"]["train_env_kwargs"] = {"nobody": "knows this one"}

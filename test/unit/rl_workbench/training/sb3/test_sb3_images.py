@@ -108,9 +108,8 @@ def test_images_are_learned_by_a_cnn_that_resumes_and_is_evaluated(
     assert type(learned.env.observation_space) is spaces.Box
     assert cli.main(["eval", str(whole), "--episodes=2"]) == 0
     assert cli.main(["export", str(whole), f"--out={out}"]) == 1
-    assert (
-        "can't be exported: only Stable-Baselines3 computes it (images" in capsys.readouterr().err
-    )
+    told = capsys.readouterr().err
+    assert "can't be exported: only Stable-Baselines3 computes it (images" in told
 
 
 def test_the_policy_is_chosen_by_the_observations(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -133,9 +132,8 @@ def test_arguments_of_the_policy_may_be_classes(monkeypatch: pytest.MonkeyPatch)
         policy_of(monkeypatch, Dot, policy_kwargs={"activation_fn": "os:getcwd"})
     with pytest.raises(WorkbenchError, match="ppo can't be made: Policy CnnPolice unknown"):
         policy_of(monkeypatch, Dot, policy="CnnPolice")
-    own = policy_of(
-        monkeypatch, Dot, policy="stable_baselines3.common.policies:ActorCriticCnnPolicy"
-    )
+    theirs = "stable_baselines3.common.policies:ActorCriticCnnPolicy"
+    own = policy_of(monkeypatch, Dot, policy=theirs)
     assert type(own).__name__ == "ActorCriticCnnPolicy"
 
 
@@ -149,16 +147,12 @@ def test_our_own_refuse_images_and_say_what_learns_from_them(
         run(options_of(algorithm, {"env_id": env_id, "episodes": 1}), tmp_path / "run")
 
 
-def test_images_of_another_form_are_refused_unless_a_wrapper_mends_them(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_images_of_another_form_are_refused_unless_a_wrapper_mends_them(monkeypatch) -> None:
     env_id = register_with(monkeypatch, Floats)
     with pytest.raises(WorkbenchError, match=r"float32 of .*: a CNN takes uint8 from 0 to 255"):
         make_environment(env_id, keep_dict=True)
     env = make_environment(env_id, keep_dict=True, wrapper=WRAPPER)
     assert env.reset(seed=0)[0].max() == 255
-    with pytest.raises(WorkbenchError, match="--wrapper builtins:str: it is no gymnasium.Wrapper"):
-        make_environment(env_id, wrapper="builtins:str")
     with pytest.raises(WorkbenchError, match="^--wrapper no_module:f: No module named"):
         make_environment(env_id, wrapper="no_module:f")
 
@@ -173,9 +167,7 @@ def test_the_wrapper_belongs_to_the_run(tmp_path: Path, monkeypatch: pytest.Monk
 
 @pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["dqn", "reinforce", "ppo"])
-def test_numbers_in_info_become_curves(
-    algorithm: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_numbers_in_info_become_curves(algorithm: str, tmp_path: Path, monkeypatch) -> None:
     class Telling(Dot):
         def __init__(self) -> None:
             self.observation_space = spaces.Box(0, 1, (2,))

@@ -98,9 +98,8 @@ def test_options_and_defaults_are_the_librarys(algorithm: str) -> None:
         "stats_window_size", "policy_kwargs", "replay_buffer_class", "replay_buffer_kwargs",
         "rollout_buffer_class", "rollout_buffer_kwargs",
     }  # fmt: skip
-    parameters = inspect.signature(
-        getattr(stable_baselines3, settings.library_class).__init__
-    ).parameters
+    made = getattr(stable_baselines3, settings.library_class)
+    parameters = inspect.signature(made.__init__).parameters
     wanted = {name: each.default for name, each in parameters.items() if name not in ours}
     own = settings().own
     assert own.pop("net_arch") is own.pop("log_std_init") is None

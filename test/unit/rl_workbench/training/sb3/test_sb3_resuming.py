@@ -99,9 +99,7 @@ def test_prolonged_it_is_the_one_that_was_longer_from_the_start(tmp_path: Path, 
 
 
 @pytest.mark.parametrize("name", ["ppo-3", "sac-3"])
-def test_what_does_not_repeat_itself_is_cut_off(
-    tmp_path: Path, monkeypatch, capsys, name: str
-) -> None:
+def test_what_does_not_repeat_itself_is_cut_off(tmp_path, monkeypatch, capsys, name: str) -> None:
     run = train(tmp_path, name, total_timesteps=48)
     before = checkpoint(run)
     for env_id in ("CartPole-v1", "Pendulum-v1"):
