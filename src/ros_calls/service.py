@@ -4,6 +4,7 @@ rospy's proxies have no time limit, keep a dead connection, and ask the process'
 know the address.
 """
 
+import contextlib
 import io
 import math
 import select
@@ -131,6 +132,13 @@ class ServiceClient:
         finally:
             if not kept:
                 self.close()
+
+    def call_idempotent(self, *request: Any) -> Any:
+        """Calls the service, again if a kept connection's node has ended; for what may be done twice."""
+        if self._connection is not None:
+            with contextlib.suppress(ServiceGone):
+                return self(*request)
+        return self(*request)
 
     def _failure(self, fault: Exception) -> ServiceFailed:
         if isinstance(fault, TimeoutError):

@@ -120,6 +120,18 @@ def test_a_connection_that_broke_is_renewed_by_the_next_call(offer, client):
     assert call(True).success
 
 
+def test_what_may_be_done_twice_is_called_again_at_once(offer, client):
+    service = offer()
+    call = client(persistent=True)
+    call(True)
+    service.close()
+    second = offer()
+    assert call.call_idempotent(True).success
+    second.close()
+    with pytest.raises(ServiceGone):
+        call.call_idempotent(True)
+
+
 @pytest.mark.parametrize("header", [None, "silence"], ids=["call", "greeting"])
 def test_a_service_that_hangs(offer, client, header):
     service = offer(lambda request: service.over.wait() and None, header)
