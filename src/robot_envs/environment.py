@@ -332,7 +332,7 @@ class RobotEnv(SavedEnv):
         self._state, self._steps = state, number
         ended = checks.checked(task, "is_terminal", evaluator.is_terminal(state), checks.FLAGS)
         terminated = bool(ended)
-        truncated = not terminated and number == self.max_steps
+        truncated = not terminated and number >= self.max_steps
         if terminated or truncated:
             self._steps = None
         measured = state if self._sensor is None else self._sensor.measure(state, self.np_random)

@@ -117,8 +117,10 @@ def _extension(value: Any) -> msgpack.ExtType:
         return msgpack.ExtType(TUPLE, _pack(list(value)))
     if kind is np.ndarray:
         _dtype(value.dtype.str)
-        content = [value.dtype.str, list(value.shape), value.flags.writeable, value.tobytes()]
-        return msgpack.ExtType(ARRAY, _pack(content))
+        order = "F" if value.flags.f_contiguous and not value.flags.c_contiguous else "C"
+        numbers = value.tobytes(order)
+        content = [value.dtype.str, list(value.shape), value.flags.writeable, numbers]
+        return msgpack.ExtType(ARRAY, _pack(content + ["F"] * (order == "F")))
     if isinstance(value, np.generic):
         _dtype(value.dtype.str)
         return msgpack.ExtType(SCALAR, _pack([value.dtype.str, value.tobytes()]))
@@ -169,9 +171,10 @@ def _unpack(data: bytes, depth: int, count: Counter[str]) -> Any:
         if code == TUPLE:
             return tuple(given)
         if code == ARRAY:
-            dtype, shape, is_writeable, numbers = given
+            dtype, shape, is_writeable, numbers, *order = given
             memory: Any = bytearray(memoryview(numbers)) if is_writeable else numbers
-            return np.frombuffer(memory, _dtype(dtype)).reshape(shape)
+            flat = np.frombuffer(memory, _dtype(dtype))
+            return flat.reshape(shape, order="F" if order == ["F"] else "C")
         if code == SCALAR:
             dtype, number = given
             return np.frombuffer(number, _dtype(dtype), 1)[0]

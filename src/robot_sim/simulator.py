@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Mapping
+from functools import partial
 from types import MappingProxyType
 from typing import Any, Protocol
 
@@ -321,19 +322,23 @@ class Simulator(Shared):
         self.world.load_state_dict(state["world"])
         self.now, self.resets = state["now"], state["resets"]
         self.applied.load_state_dict(state["applied"], self.world.models)
-        robots, parts = zip(self.robots, state["robots"], strict=True), state["parts"]
-        there = ((part, parts[name]) for name, part in self.parts.items() if name in parts)
-        fault = None
-        try:
-            load([*robots, *there])
-        except StateError as error:  # the clocks go on, too
-            fault = error
+        parts, faults = state["parts"], []
+        there = [(part, parts[name]) for name, part in self.parts.items() if name in parts]
+        robots = zip(self.robots, state["robots"], strict=True)
+        for loads in (
+            *(partial(robot.load_state_dict, own) for robot, own in robots),
+            partial(load, there),
+        ):
+            try:
+                loads()
+            except StateError as error:  # of a user's class; all else is restored
+                faults.append(str(error))
         for robot in self.robots:
             robot.manager.restored()
         for listener in self.restored:
             listener()
-        if fault is not None:
-            raise fault
+        if faults:
+            raise StateError("; ".join(faults))
 
     @property
     def fits(self) -> dict[str, Any]:

@@ -100,8 +100,11 @@ def load(parts: Iterable[tuple[Any, Any]]) -> None:
     faults = []
     for part, state in parts:
         try:
-            if hasattr(type(part), "load_state_dict"):
-                part.load_state_dict(state)
+            takes = getattr(type(part), "load_state_dict", None)
+            if takes is Stateful.load_state_dict:
+                put_attributes(part, state)
+            elif takes is not None:
+                part.load_state_dict(_saved(state))  # a copy: it may keep what it gets
             elif isinstance(part, GENERATORS):
                 _put_generator(part, state)
             elif not isinstance(part, Shared):
@@ -233,7 +236,9 @@ def _saved(value: Any) -> Any:
         dict.update(entries, {plain_key(key): _saved(each) for key, each in value.items()})
         return entries
     if kind is np.ndarray and not value.dtype.hasobject:
-        return value.copy() if value.flags.writeable else value
+        copied = value.copy(order="K")
+        copied.setflags(write=value.flags.writeable)
+        return copied
     if isinstance(value, np.generic) and not value.dtype.hasobject:
         return value
     if isinstance(value, Shared):
@@ -335,7 +340,7 @@ def _loaded(current: Any, saved: Any) -> Any:
             return defaultdict(current.default_factory, entries)
         return entries
     if kind is np.ndarray:
-        return saved.copy() if saved.flags.writeable else saved
+        return _saved(saved)
     if kind is deque:
         there = [*current] if isinstance(current, deque) else ()
         return deque(_loaded(there, [*saved]), saved.maxlen)

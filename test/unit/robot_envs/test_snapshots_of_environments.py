@@ -369,3 +369,46 @@ def test_a_robot_that_was_varied_for_a_snapshots_episode_is_nominal_again(made):
     env.reset(options={"snapshot": snapshot})
     env.restore_state(there)
     assert returns(env) == first
+
+
+class Listing(BalanceTask):
+    """Its state is a list."""
+
+    count = 0
+
+    def state_dict(self):
+        return [self.count]
+
+    def load_state_dict(self, state):
+        (self.count,) = state
+
+
+def test_a_tasks_state_may_be_any_plain_data(made):
+    env = made(Listing)
+    env.reset(seed=1)
+    env.task.count = 3
+    snapshot = env.save_state()
+    env.task.count = 4
+    env.restore_state(snapshot)
+    assert env.task.count == 3
+
+
+def test_where_a_controller_cannot_load_its_state_all_else_is_restored(made, monkeypatch):
+    env = made(Remembering)
+    env.reset(seed=1)
+    returns(env, 7)
+    snapshot, state = env.save_state(), env.state
+    returns(env, 5)
+    (controller,) = env.backend._sim.robots[0].manager.running
+    monkeypatch.setattr(type(controller), "load_state_dict", lambda self, state: 1 / 0)
+    with pytest.raises(SimulatorError, match="ZeroDivisionError"):
+        env.restore_state(snapshot)
+    assert len(env.task.seen) == 7 and env.state == state
+
+
+def test_an_episode_beyond_its_last_step_is_truncated(made):
+    longer, shorter = made(Remembering), made(Remembering, max_steps=5)
+    longer.reset(seed=1)
+    returns(longer, 8)
+    shorter.restore_state(longer.save_state())
+    assert shorter.step(0)[3]

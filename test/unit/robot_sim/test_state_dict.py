@@ -5,6 +5,7 @@ import random
 import threading
 from collections import defaultdict, deque
 from dataclasses import InitVar, dataclass, field
+from types import SimpleNamespace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -12,7 +13,17 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from robot_sim.state_dict import Held, Shared, StateError, Stateful, load, state_of, undoable
+from robot_sim.plain_data import pack, unpack
+from robot_sim.state_dict import (
+    Held,
+    Shared,
+    StateError,
+    Stateful,
+    attributes_of,
+    load,
+    state_of,
+    undoable,
+)
 
 
 class Part(Stateful):
@@ -330,3 +341,38 @@ def test_what_fails_as_a_whole_leaves_objects_where_they_were():
     with pytest.raises(StateError, match="load_state_dict is a method"), undoable(), undoable():
         load([(outer, {"parts": [], "load_state_dict": 1}), (slotted, {"size": 5})])
     assert outer.inner is inner and outer.parts == [(inner, slotted)] and slotted.size == 3
+
+
+class Keeping:
+    """Keeps the very list that it gets."""
+
+    def __init__(self):
+        self.history = []
+
+    def state_dict(self):
+        return {"history": self.history}
+
+    def load_state_dict(self, state):
+        self.history = state["history"]
+
+
+def test_what_a_part_does_with_its_state_leaves_the_snapshot_as_it_is():
+    part = Keeping()
+    state = state_of(part)
+    for _ in range(3):
+        load([(part, state)])
+        assert part.history == []
+        part.history.append(1)
+
+
+def test_arrays_keep_their_layout_and_what_a_view_showed():
+    whole = np.arange(6.0).reshape(2, 3)
+    view = whole[0]
+    view.setflags(write=False)
+    state = attributes_of(SimpleNamespace(view=view, turned=np.array(whole.T, order="F")))
+    whole += 1.0
+    assert state["view"].tolist() == [0.0, 1.0, 2.0] and not state["view"].flags.writeable
+    back = unpack(pack(state))
+    for each in (state, back):
+        assert each["turned"].flags.f_contiguous
+        assert each["turned"].tolist() == [[0.0, 3.0], [1.0, 4.0], [2.0, 5.0]]

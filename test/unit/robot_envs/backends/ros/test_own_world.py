@@ -20,7 +20,7 @@ from support.scenes.rover import ROVER, Roll
 from support.scenes.two_arms import LEFT, RIGHT, Volley
 
 import cartpole  # noqa: F401  # registers the environments
-from robot_envs import RobotEnv
+from robot_envs import EnvSnapshot, RobotEnv
 from robot_envs.backends.backend import Slot, side_by_side
 from robot_envs.backends.ros.own_simulator import OwnSimulator
 from robot_envs.errors import RobotEnvError, SimulatorError
@@ -93,6 +93,17 @@ def test_a_coarser_physics_step_gives_the_same_bits_as_in_process() -> None:
     rover = replace(ROVER, physics_step=0.004)
     with RobotEnv(rover, Roll()) as wanted, RobotEnv(rover, Roll(), "ros-own") as found:
         assert differences(rollout(found, 40, seed=8), rollout(wanted, 40, seed=8)) == ""
+
+
+def test_an_episode_goes_on_over_ros_where_it_was_saved_in_this_process() -> None:
+    """There a joint_state_controller runs, too, which claims nothing and here doesn't exist."""
+    here, there = gymnasium.make(BALANCE).unwrapped, own()
+    with here, there:
+        here.reset(seed=1)
+        here.step(0)
+        there.restore_state(EnvSnapshot.from_bytes(here.save_state().to_bytes()))
+        for _ in range(10):
+            assert repr(there.step(1)) == repr(here.step(1))
 
 
 def test_snapshots_of_bodies_that_touch_survive_the_simulator() -> None:
