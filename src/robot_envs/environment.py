@@ -332,7 +332,8 @@ class RobotEnv(SavedEnv):
         self._state, self._steps = state, number
         ended = checks.checked(task, "is_terminal", evaluator.is_terminal(state), checks.FLAGS)
         terminated = bool(ended)
-        truncated = not terminated and number >= self.max_steps
+        is_over = self.max_steps is not None and number >= self.max_steps
+        truncated = is_over and not terminated
         if terminated or truncated:
             self._steps = None
         measured = state if self._sensor is None else self._sensor.measure(state, self.np_random)
