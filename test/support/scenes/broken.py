@@ -29,8 +29,11 @@ class Numbers(RobotEnv):
 
 class NoCut(RobotEnv):
     def step(self, action):
-        self._steps = 1
-        return super().step(action)
+        most, self.max_steps = self.max_steps, None
+        try:
+            return super().step(action)
+        finally:
+            self.max_steps = most
 
 
 class BothEnds(RobotEnv):
