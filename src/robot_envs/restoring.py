@@ -96,7 +96,7 @@ class SavedEnv(DrawnEnv):
         self._steps = self._begun = None
         if is_varied:
             self._vary(state["variation"])
-        faults: list[SimulatorError] = []
+        fault: Exception | None = None  # of a controller, plugin or task; all else is restored
         try:
             self.backend.restore_state(snapshot.world)
         except SimulatorError as error:
@@ -104,19 +104,19 @@ class SavedEnv(DrawnEnv):
                 self._steps = steps
             if not isinstance(error.__cause__, StateError):
                 raise
-            faults.append(error)  # of a controller or plugin; all else is restored
+            fault = error
         self._state, self._first, self._initial = state["state"], state["first"], state["initial"]
         self._steps, parts = state["steps"], state["parts"]
         try:
             load((part, parts[name]) for name, part in self._parts().items())
-        except StateError as error:  # all else is restored
-            raise SimulatorError(str(error)) from error
+        except StateError as error:
+            fault = error
         for name in state["lent"]:
             if name in parts["task"]:
                 setattr(self.task, name, self.np_random)
         self._show()
-        if faults:
-            raise faults[0]
+        if fault is not None:
+            raise SimulatorError(str(fault)) from fault
 
     def _begin_at(self, snapshot: EnvSnapshot, seed: int) -> WorldState:
         """Begins an episode in the snapshot's world; task, noise and random numbers are this one's own."""

@@ -50,9 +50,11 @@ def pack(value: Any) -> bytes:
     Raises:
         StateError: If something isn't plain data.
     """
-    for _ in _entries(value):
-        pass  # raises if it is nested too deeply
-    return _pack(value)
+    _check_depth(value)
+    try:
+        return _pack(value)
+    except (ValueError, OverflowError) as error:  # half a character of a text
+        raise StateError(f"it can't be written: {error}") from error
 
 
 def unpack(data: bytes) -> Any:
@@ -62,8 +64,7 @@ def unpack(data: bytes) -> Any:
         StateError: If they are damaged, or refer to a class that isn't imported.
     """
     value = _unpack(data, 0, Counter())
-    for _ in _entries(value):
-        pass  # raises if it is nested too deeply
+    _check_depth(value)
     return value
 
 
@@ -93,6 +94,11 @@ def _entries(value: Any) -> Iterator[Any]:
         if not level:
             return
     raise StateError("it is nested too deeply")
+
+
+def _check_depth(value: Any) -> None:
+    for _ in _entries(value):  # raises
+        pass
 
 
 def _within(value: Any) -> Iterable[Any]:

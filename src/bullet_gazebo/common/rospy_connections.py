@@ -31,9 +31,7 @@ LARGEST_HEADER = 2**18  # [bytes]; the text of a message's definition is the lon
 LARGEST_MESSAGE = 2**27
 SILENCE = 30.0  # [s] that a client may be silent in the middle of a header
 IDLE = 300.0  # [s] the same in an XML-RPC call and between two: clients keep connections, and renew them
-BACKLOG = (
-    64  # connections that wait to be accepted; rospy lets five wait, the others retry after seconds
-)
+BACKLOG = 64  # connections that wait; rospy lets five do so, and others retry after seconds
 EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 RECOVERY = 0.1  # [s] until the next try
 REPEAT = 1.0  # [s] between two logs of the same complaint

@@ -116,6 +116,7 @@ class Driver:
             button = gui.add_button(word, hint=hint)
             button.on_click(partial(self._click, word))
         self._about = gui.add_html("")
+        self._shown: tuple[int, int] | None = None  # seed and step of what the page shows
 
     def _click(self, word: str, _event: object) -> None:
         self._clicks.put(word)
@@ -146,15 +147,16 @@ class Driver:
         return None
 
     def _show(self, seed: int) -> None:
-        self._view.show(self._view.take())
         recorder = self._recorder
+        if self._shown == (seed, recorder.length):
+            return
+        self._shown = seed, recorder.length
+        self._view.show(self._view.take())
         lines = [f"seed {seed}, step {recorder.length}, return {recorder.total_reward:.1f}"]
         if recorder.has_ended:
             verdict = {None: "", True: ": success", False: ": no success"}[recorder.success]
             lines.append(f"the episode has ended{verdict}")
-        text = f'<div style="padding: 0.4em 0.8em">{"<br>".join(lines)}</div>'
-        if text != self._about.content:
-            self._about.content = text
+        self._about.content = f'<div style="padding: 0.4em 0.8em">{"<br>".join(lines)}</div>'
 
 
 def driven(

@@ -122,10 +122,8 @@ class TrainingOptions(NamedTuple):
 
     def doubt(self) -> str:
         """Returns a line if the training ends before learning starts; else ""."""
-        steps, starts = (
-            self.run.total_timesteps,
-            getattr(self.hyperparameters, "learning_starts", 0),
-        )
+        steps = self.run.total_timesteps
+        starts = getattr(self.hyperparameters, "learning_starts", 0)
         if steps and starts >= steps:
             return (
                 f"learning starts after {starts} steps (learning_starts), but the training ends after "
