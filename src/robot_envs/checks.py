@@ -12,7 +12,7 @@ import numpy as np
 from file_access.text import did_you_mean
 from robot_envs.errors import TaskError
 from robot_envs.robot import Robot
-from robot_envs.snapshot import EnvSnapshot
+from robot_envs.snapshot import checked_snapshot
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
@@ -44,8 +44,8 @@ def reset_options(task: Task, options: dict[str, Any]) -> dict[str, Any]:
         raise ValueError(f"{type(task).__name__} has no goal; only a GoalTask does")
     if isinstance(options.get("snapshot"), Iterator):  # a vector's: one for each
         options = {**options, "snapshot": next(options["snapshot"])}
-    if "snapshot" in options and not isinstance(options["snapshot"], EnvSnapshot):
-        raise ValueError(f"snapshot is what save_state() returns, not {options['snapshot']!r:.100}")
+    if "snapshot" in options:
+        checked_snapshot(options["snapshot"])
     if not isinstance(options.get("initial_state", InitialState()), InitialState):
         raise ValueError(f"initial_state is an InitialState, not {options['initial_state']!r}")
     return options

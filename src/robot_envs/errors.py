@@ -15,6 +15,10 @@ class SimulatorError(RobotEnvError):
     """The simulator refuses a request, doesn't answer, or answers something that can't be used."""
 
 
+class RestoreRefused(SimulatorError):
+    """A world can't be as in a snapshot; nothing has changed."""
+
+
 class SimulatorFault(SimulatorError):
     """The simulator has died or answers nonsense; another one may do better."""
 

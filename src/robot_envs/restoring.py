@@ -5,7 +5,7 @@ from typing import Any
 
 import gymnasium
 
-from robot_envs.errors import SimulatorError
+from robot_envs.errors import RestoreRefused, SimulatorError
 from robot_envs.pictures.drawn import DrawnEnv
 from robot_envs.snapshot import EnvSnapshot
 from robot_envs.variation import Randomisation, Variation
@@ -81,6 +81,8 @@ class SavedEnv(DrawnEnv):
                 raise SimulatorError(f"the snapshot can't be restored: {fault}")
             with undoable():
                 self._load(EnvSnapshot(snapshot.fits, state, snapshot.world))
+        except RestoreRefused:
+            raise
         except Exception as error:  # whatever a forged state leads to
             if before is not None:
                 with contextlib.suppress(SimulatorError):  # a reset comes next
@@ -96,27 +98,23 @@ class SavedEnv(DrawnEnv):
         self._steps = self._begun = None
         if is_varied:
             self._vary(state["variation"])
-        fault: Exception | None = None  # of a controller, plugin or task; all else is restored
         try:
-            self.backend.restore_state(snapshot.world)
-        except SimulatorError as error:
-            if isinstance(error.__cause__, SnapshotError):  # nothing has changed
-                self._steps = steps
-            if not isinstance(error.__cause__, StateError):
-                raise
-            fault = error
+            fault = self.backend.restore_state(snapshot.world)  # of a class; all else is restored
+        except RestoreRefused:
+            self._steps = steps
+            raise
         self._state, self._first, self._initial = state["state"], state["first"], state["initial"]
         self._steps, parts = state["steps"], state["parts"]
         try:
             load((part, parts[name]) for name, part in self._parts().items())
         except StateError as error:
-            fault = error
+            fault = str(error)
         for name in state["lent"]:
             if name in parts["task"]:
                 setattr(self.task, name, self.np_random)
         self._show()
-        if fault is not None:
-            raise SimulatorError(str(fault)) from fault
+        if fault:
+            raise SimulatorError(fault)
 
     def _begin_at(self, snapshot: EnvSnapshot, seed: int) -> WorldState:
         """Begins an episode in the snapshot's world; task, noise and random numbers are this one's own."""

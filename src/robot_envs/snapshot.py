@@ -77,6 +77,13 @@ class EnvSnapshot:
         return cls(fits, state, whole, is_foreign=True)
 
 
+def checked_snapshot(value: Any) -> EnvSnapshot:
+    """Returns a snapshot of an environment; raises ValueError for anything else."""
+    if not isinstance(value, EnvSnapshot):
+        raise ValueError(f"a snapshot is what save_state() returns, not {value!r:.100}")
+    return value
+
+
 class InitialStates(Shared):
     """Snapshots, of which a task's `initial_state` may return one.
 
@@ -84,7 +91,7 @@ class InitialStates(Shared):
         source: Snapshots, or a folder with files of them, `*.snapshot`, taken in the order of their names.
 
     Raises:
-        ValueError: If there is none.
+        ValueError: If there is none, or something else.
         SnapshotError: If a file can't be read, or is no snapshot.
     """
 
@@ -93,7 +100,7 @@ class InitialStates(Shared):
             files = sorted(Path(source).glob("*.snapshot"))
             self.snapshots = [EnvSnapshot.load(path) for path in files]
         else:
-            self.snapshots = list(source)
+            self.snapshots = [checked_snapshot(each) for each in source]
         if not self.snapshots:
             raise ValueError(f"there is no snapshot in {source!s:.200}")
 

@@ -1,7 +1,7 @@
 """Vector environments: what `gymnasium.make_vec` makes of every environment of this library."""
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -13,7 +13,8 @@ from robot_envs.backends import LOCKSTEP, OWN, REALTIME
 from robot_envs.backends.backend import side_by_side
 from robot_envs.checks import action_reader
 from robot_envs.environment import RobotEnv
-from robot_envs.snapshot import EnvSnapshot
+from robot_envs.errors import SimulatorError
+from robot_envs.snapshot import EnvSnapshot, checked_snapshot
 
 Results = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
 
@@ -91,15 +92,20 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
         """
         options = dict(options or {})
         of_all = "reset_mask" not in options
-        if isinstance(snapshots := options.get("snapshot"), Sequence):
+        if isinstance(given := options.get("snapshot"), Iterable):
+            snapshots = [checked_snapshot(each) for each in given]
             count = self.num_envs if of_all else int(np.sum(options["reset_mask"]))
             if len(snapshots) != count:
                 raise ValueError(f"{len(snapshots)} snapshots for {count} environments")
             options["snapshot"] = iter(snapshots)
-        given = super().reset(seed=seed, options=options or None)
+        try:
+            begun = super().reset(seed=seed, options=options or None)
+        except SimulatorError:  # some have begun, and others not
+            self._interrupted = True
+            raise
         if of_all:
             self._interrupted = False
-        return given
+        return begun
 
     def step(self, actions: Any) -> Results:
         """Carries out one action in each; nothing moves for a wrong one, which is a ValueError."""

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import msgpack
 import numpy as np
 
-from robot_sim.state_dict import ATOMS, Held, StateError, fields_of, plain_key
+from robot_sim.state_dict import ATOMS, NUMBERS_AND_TEXTS, Held, StateError, fields_of, plain_key
 
 DEEPEST = 100
 MOST = 2**22  # entries of lists and dictionaries, those of records and arrays included
@@ -203,7 +203,7 @@ def _unpack(data: bytes, depth: int, count: Counter[str]) -> Any:
 
 
 def _dtype(name: Any) -> np.dtype[Any]:
-    if not (isinstance(name, str) and re.fullmatch(r"[<>|][biufcSU]\d{1,4}", name)):
+    if not (isinstance(name, str) and re.fullmatch(rf"[<>|][{NUMBERS_AND_TEXTS}]\d{{1,4}}", name)):
         raise StateError(f"it has an array of type {name!r:.50}")
     return np.dtype(name)
 

@@ -26,6 +26,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 GENERATOR = "__generator__"  # the key of a generator's kind in its state
+NUMBERS_AND_TEXTS = "biufcSU"  # kinds of arrays
 GENERATORS = (np.random.Generator, random.Random)
 ATOMS = frozenset((type(None), bool, int, float, str, bytes))
 LARGEST_POOL = 1024  # of a seed sequence; NumPy's has 4
@@ -235,11 +236,11 @@ def _saved(value: Any) -> Any:
         entries: dict[Any, Any] = dict.__new__(kind)
         dict.update(entries, {plain_key(key): _saved(each) for key, each in value.items()})
         return entries
-    if kind is np.ndarray and not value.dtype.hasobject:
+    if kind is np.ndarray and value.dtype.kind in NUMBERS_AND_TEXTS:
         copied = value.copy(order="K")
         copied.setflags(write=value.flags.writeable)
         return copied
-    if isinstance(value, np.generic) and not value.dtype.hasobject:
+    if isinstance(value, np.generic) and value.dtype.kind in NUMBERS_AND_TEXTS:
         return value
     if isinstance(value, Shared):
         return Held(kind.__qualname__, None)

@@ -9,6 +9,7 @@ import numpy as np
 from bullet_gazebo_msgs.srv import (
     RestoreState,
     RestoreStateRequest,
+    RestoreStateResponse,
     SaveState,
     SaveStateRequest,
     SaveStateResponse,
@@ -91,7 +92,7 @@ class SnapshotServices:
             )
         return self._kept[name]
 
-    def _restore(self, request: RestoreStateRequest) -> str:
+    def _restore(self, request: RestoreStateRequest) -> RestoreStateResponse:
         with self._one_at_a_time, self._sim.lock:
             if request.data and request.name:
                 self._check_room(request.name)
@@ -101,11 +102,13 @@ class SnapshotServices:
                 )
                 self._sim.await_holds()
                 self._sim.restore_state(given)
-                if request.seed:
-                    seed_random_numbers(request.seed)
-                    self._sim.reseed(request.seed)
-            except (SnapshotError, StateError) as error:
+                if request.data and request.name:  # without what the data had beyond a state
+                    self._kept[request.name] = self._sim.save_state()
+            except SnapshotError as error:
                 raise ServiceRefused(str(error)) from error
-            if request.data and request.name:
-                self._kept[request.name] = given
-        return "RestoreState: state restored"
+            except StateError as error:
+                return RestoreStateResponse(False, f"RestoreState: {error}", True)
+            if request.seed:
+                seed_random_numbers(request.seed)
+                self._sim.reseed(request.seed)
+        return RestoreStateResponse(True, "RestoreState: state restored", True)

@@ -53,8 +53,12 @@ class RobotBackend(Protocol):
     def save_state(self) -> WorldSnapshot:
         """Returns all that decides the world's future."""
 
-    def restore_state(self, state: WorldSnapshot) -> None:
-        """Returns to what `save_state` of a backend has returned; the same commands lead to the same bits."""
+    def restore_state(self, state: WorldSnapshot) -> str:
+        """Returns to what `save_state` of a backend has returned; the same commands lead to the same bits.
+
+        Returns which classes couldn't take their state, though all else is restored; "" for none. Raises
+        RestoreRefused if nothing has changed.
+        """
 
     def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
         """Begins an episode where a snapshot is; returns the state reached. `seed` as in `reset`."""

@@ -9,7 +9,7 @@ from typing import Any
 from robot_envs.backends.backend import PHYSICS_STEP, RobotBackend, ticks_per_action
 from robot_envs.backends.world_files import fill, loose_joints, spawn
 from robot_envs.controllers import Loaded, load
-from robot_envs.errors import RobotEnvError, SimulatorError
+from robot_envs.errors import RestoreRefused, RobotEnvError, SimulatorError
 from robot_envs.files import resources
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
@@ -254,16 +254,22 @@ class InProcessWorld(RobotBackend):
         snapshot.state["parts"]["steps"] = {"knows_contacts": self._knows_contacts}
         return snapshot
 
-    def restore_state(self, state: WorldSnapshot) -> None:
-        snapshot = state.whole()
+    def restore_state(self, state: WorldSnapshot) -> str:
+        snapshot, fault = state.whole(), ""
         begun, held = episode_of(snapshot)
-        with _refusals():
+        try:
             self._sim.restore_state(snapshot)
+        except SnapshotError as error:
+            raise RestoreRefused(str(error)) from error
+        except StateError as error:
+            fault = str(error)
         self._begin, self._held = begun, held
         self._knows_contacts = snapshot.state["parts"]["steps"]["knows_contacts"]
+        return fault
 
     def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
-        self.restore_state(state)
+        if fault := self.restore_state(state):
+            raise SimulatorError(fault)
         if seed:
             self._sim.reseed(seed)
         self._begin = self._sim.now

@@ -324,6 +324,8 @@ def test_a_tasks_episodes_begin_at_saved_states(made, tmp_path):
         env.save_state().save(tmp_path / f"{number}.snapshot")
     with pytest.raises(ValueError, match="no snapshot"):
         InitialStates(tmp_path / "nowhere")
+    with pytest.raises(ValueError, match="a snapshot is what save_state"):
+        InitialStates(["somewhere"])
     env.task.places = InitialStates(tmp_path)
     begun = []
     for seed in range(20):
@@ -404,6 +406,8 @@ def test_where_a_controller_cannot_load_its_state_all_else_is_restored(made, mon
     with pytest.raises(SimulatorError, match="ZeroDivisionError"):
         env.restore_state(snapshot)
     assert len(env.task.seen) == 7 and env.state == state
+    env.step(0)
+    assert env.state.time == pytest.approx(state.time + env.control_period)
 
 
 def test_an_episode_beyond_its_last_step_is_truncated(made):

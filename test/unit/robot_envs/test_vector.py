@@ -168,3 +168,8 @@ def test_all_go_on_from_a_snapshot_with_the_ends_of_their_episodes(many):
     assert [env.state.joints for env in other.envs] == [*there, there[1]]
     with pytest.raises(ValueError, match=f"2 snapshots for {COUNT + 1} environments"):
         other.reset(options={"snapshot": snapshot.states[:2]})
+    with pytest.raises(ValueError, match="a snapshot is what save_state"):
+        other.reset(options={"snapshot": [*snapshot.states, "there"]})
+    assert [env.state.joints for env in other.envs] == [*there, there[1]]  # none has begun
+    other.reset(options={"snapshot": iter([snapshot.states[0]] * (COUNT + 1))})
+    assert [env.state.joints for env in other.envs] == [there[0]] * (COUNT + 1)

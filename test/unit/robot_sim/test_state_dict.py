@@ -313,6 +313,8 @@ def test_attributes_that_are_not_persistent_stay_also_those_of_a_base():
         ({1}, "builtins.set"),
         (random.SystemRandom(), "SystemRandom"),
         (np.array([object()]), "numpy.ndarray"),
+        (np.zeros(1, "datetime64[s]"), "numpy.ndarray"),
+        (np.zeros(1, [("x", "f8")]), "numpy.ndarray"),
         ({frozenset(): 1}, "frozenset as key"),
         ([{"a": (object(),)}], "builtins.object"),
     ],

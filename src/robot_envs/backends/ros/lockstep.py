@@ -34,7 +34,7 @@ from robot_envs.backends.ros.running import (
     check_success,
 )
 from robot_envs.backends.world_files import loose_joints
-from robot_envs.errors import SimulatorError
+from robot_envs.errors import RestoreRefused, SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.snapshot import WorldSnapshot, episode_of
 from robot_envs.variation import Variation
@@ -273,12 +273,12 @@ class LockstepWorld(RobotBackend):
         whole.state["episode"] = {"begun": kept.begun, "held": kept.held}
         return whole
 
-    def restore_state(self, state: WorldSnapshot, seed: int = 0) -> None:
+    def restore_state(self, state: WorldSnapshot, seed: int = 0) -> str:
         """See `RobotBackend.restore_state`; another simulator's goes there as bytes."""
         self._drop()
         if isinstance(state, KeptSnapshot) and state.of is self:
             self._world.check_holder(self)
-            self._succeed(self._restore, RestoreStateRequest(name=state.name, seed=seed))
+            fault = self._restored(RestoreStateRequest(name=state.name, seed=seed))
             begun, held = state.begun, state.held
         else:
             whole = state.whole()
@@ -286,14 +286,21 @@ class LockstepWorld(RobotBackend):
             with self._simulator:
                 self._world.claim(self)
             self._look(self._names)  # sensors that states have are read from now on
-            request = RestoreStateRequest(data=whole.to_bytes(), seed=seed)
-            self._succeed(self._restore, request)
+            fault = self._restored(RestoreStateRequest(data=whole.to_bytes(), seed=seed))
             wrenches = whole.state["applied"]["wrenches"]
             self._variation.pushed.update(f"{model}::{link}" for model, link, *_ in wrenches)
         self._begun, self._held = begun, held
+        return fault
+
+    def _restored(self, request: RestoreStateRequest) -> str:
+        answer = self._call(self._restore, request)
+        if not answer.restored:
+            raise RestoreRefused(f"{self._restore.name}: {answer.status_message}")
+        return "" if answer.success else answer.status_message
 
     def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
-        self.restore_state(state, seed)
+        if fault := self.restore_state(state, seed):
+            raise SimulatorError(fault)
         begun = self._look(self._names)
         self._begun = begun.now
         return self._state(begun)

@@ -158,7 +158,13 @@ class OwnWorld(RobotBackend):
         return self._advance(lambda world: checked(world.reset(initial, seed), 0))
 
     def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
-        whole = state.whole()
+        try:
+            whole = state.whole()
+        except SimulatorError:
+            if not isinstance(state, JournalledSnapshot) or state.of is not self:
+                raise
+            self.restore_state(state)  # in the place of the simulator that kept it
+            whole = self.save_state().whole()
         self._forget_episode()
         return self._advance(lambda world: checked(world.begin_at(whole, seed), 0))
 
@@ -187,32 +193,36 @@ class OwnWorld(RobotBackend):
         self._journal.append(LockstepWorld.save_state)
         return JournalledSnapshot(self, kept, tuple(self._journal), self._passed, self._last)
 
-    def restore_state(self, state: WorldSnapshot) -> None:
+    def restore_state(self, state: WorldSnapshot) -> str:
         if not isinstance(state, JournalledSnapshot) or state.of is not self:
             whole = state.whole()
             begin = partial(LockstepWorld.restore_state, state=whole)
-            self._perform(begin)
+            fault = self._perform(begin)
             passed = whole.state["now"] - episode_of(whole)[0]
             self._journal, self._passed, self._last = [begin], passed, None
-            return
+            return fault
 
-        def restore(world: LockstepWorld) -> None:
+        def restore(world: LockstepWorld) -> str:
             if world is state.kept.of:
-                world.restore_state(state.kept)
-            else:  # that one was replaced
-                replay(state.journal, world, state.last)
+                return world.restore_state(state.kept)
+            replay(state.journal, world, state.last)  # that one was replaced
+            return ""
 
-        self._perform(restore)
+        fault = self._perform(restore)
         self._journal, self._passed, self._last = [*state.journal], state.passed, state.last
+        return fault
 
     def read(self, kept: KeptSnapshot) -> Snapshot:
         """Returns a snapshot that the simulator keeps; raises SimulatorError if it was replaced since."""
-        if self._world is not kept.of:
-            raise SimulatorError(
-                f"{self.simulator} has taken the place of the one that kept the snapshot"
-            )
-        with master.using(self.simulator.uri):
+
+        def whole(world: LockstepWorld) -> Snapshot:
+            if world is not kept.of:
+                raise SimulatorError(
+                    f"{self.simulator} has taken the place of the one that kept the snapshot"
+                )
             return kept.whole()
+
+        return self._perform(whole)
 
     def _forget_episode(self) -> None:
         self._journal, self._passed, self._last = [], 0, None

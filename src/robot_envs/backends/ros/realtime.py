@@ -27,7 +27,7 @@ from robot_envs.backends.ros.running import (
 )
 from robot_envs.backends.ros.sensor_listener import SensorListener
 from robot_envs.controllers import CommandPort
-from robot_envs.errors import RobotEnvError, SimulatorError
+from robot_envs.errors import RestoreRefused, RobotEnvError, SimulatorError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.snapshot import WorldSnapshot
@@ -277,8 +277,8 @@ class RealtimeWorld(RobotBackend):
     def save_state(self) -> WorldSnapshot:
         raise SimulatorError("a world in real time can't be saved; in lock-step it can")
 
-    def restore_state(self, state: WorldSnapshot) -> None:
-        raise SimulatorError("a world in real time can't be restored; in lock-step it can")
+    def restore_state(self, state: WorldSnapshot) -> str:
+        raise RestoreRefused("a world in real time can't be restored; in lock-step it can")
 
     def begin_at(self, state: WorldSnapshot, seed: int = 0) -> WorldState:
         raise SimulatorError("a world in real time can't begin at a snapshot; in lock-step it can")

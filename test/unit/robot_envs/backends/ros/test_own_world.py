@@ -15,11 +15,14 @@ from pathlib import Path
 import gymnasium
 import pytest
 import rospy
+import yaml
 from support.robots.cartpole import RICH
 from support.scenes.rover import ROVER, Roll
 from support.scenes.two_arms import LEFT, RIGHT, Volley
 
 import cartpole  # noqa: F401  # registers the environments
+from cartpole.robot import ROBOT
+from cartpole.tasks import BalanceTask
 from robot_envs import EnvSnapshot, RobotEnv
 from robot_envs.backends.backend import Slot, side_by_side
 from robot_envs.backends.ros.own_simulator import OwnSimulator
@@ -126,6 +129,62 @@ def test_snapshots_of_bodies_that_touch_survive_the_simulator() -> None:
     wanted = told(dies=False)
     assert repr(wanted[0]) == repr(wanted[1])
     assert repr(told(dies=True)) == repr(wanted)
+
+
+FORGETFUL = """
+from robot_sim.control.controllers.forward import Forward
+from robot_sim.control.hardware import EFFORT
+
+class Forgetful(Forward):
+    interface, type_name = EFFORT, "forgetful/Forgetful"
+
+    @classmethod
+    def create(cls, name, params, hardware):
+        return cls(name, [hardware.joints["cart_pole"]])
+
+    def state_dict(self):
+        return {}
+
+    def load_state_dict(self, state):
+        raise RuntimeError("it has forgotten")
+"""
+
+
+def test_what_cannot_be_restored_is_said_and_the_episode_goes_on(tmp_path, monkeypatch) -> None:
+    (tmp_path / "forgetful.py").write_text(FORGETFUL, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    known = yaml.safe_load(ROBOT.controllers().read_text(encoding="utf-8"))
+    extra = {"type": "forgetful/Forgetful"}
+    robot = replace(ROBOT, controllers={**known, "extra": extra}, run=(*ROBOT.run, "extra"))
+    with RobotEnv(robot, BalanceTask(), backend="ros-own") as env, own() as other:
+        for each in (env, other):
+            each.reset(seed=1)
+            each.step(0)
+        with pytest.raises(SimulatorError, match="controllers"):
+            env.restore_state(other.save_state())
+        env.step(0)  # nothing has changed
+        snapshot, before = env.save_state(), env.state
+        env.step(1)
+        with pytest.raises(SimulatorError, match="it has forgotten"):
+            env.restore_state(snapshot)
+        assert env.state == before  # all else is restored
+        env.step(1)
+        assert env.state.time == pytest.approx(before.time + env.control_period)
+
+
+def test_an_episode_begins_at_a_snapshot_whose_simulator_has_died() -> None:
+    with own() as env:
+        env.reset(seed=1)
+        env.step(0)
+        snapshot = env.save_state()
+        begun = [env.reset(seed=2, options={"snapshot": snapshot}), *map(env.step, [0, 1, 1])]
+        end(env, signal.SIGKILL)
+        again = [env.reset(seed=2, options={"snapshot": snapshot}), *map(env.step, [0, 1, 1])]
+        assert repr(again) == repr(begun)
+        assert env.backend.restarts == 1
+    with pytest.raises(SimulatorError, match="was closed"):
+        snapshot.to_bytes()
 
 
 def test_side_by_side_each_has_the_bits_that_it_has_alone(truth, monkeypatch) -> None:
