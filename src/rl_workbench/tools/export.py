@@ -17,7 +17,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Exports the policy, and checks the file against it."""
+    """Exports the policy."""
     from rl_workbench.storage import check_writable, write_file
     from rl_workbench.tools.policies import load_learned
     from rl_workbench.tools.runs import open_run
@@ -27,14 +27,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     check_writable(arguments.out)
     policy = load_learned(run, arguments.checkpoint, env_options(arguments))
     with closing(policy.env):
-        content, agreement = export(run, policy, arguments.seed)
+        content = export(run, policy)
     write_file(arguments.out, lambda stream: stream.write(content))
     open_exported(arguments.out)  # checks that the file on disk is readable
-    others, share = agreement.observations - agreement.equal, agreement.largest_difference
-    same = f"are the same, but for {others} where scores tie" if others else "are the same"
-    if share:
-        same = f"differ by at most {share:.1g} of their range"
-    tell(
-        f"{arguments.out}: the policy of {policy.checkpoint}, {policy.steps} steps; over "
-        f"{agreement.observations} observations its actions {same}"
-    )
+    tell(f"{arguments.out}: the policy of {policy.checkpoint}, {policy.steps} steps")

@@ -15,19 +15,15 @@ from gymnasium import spaces
 from torch import nn
 
 from file_access.content import open_file
-from rl_workbench.agents.greedy import Choice, SeveralChoices, Switches
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.storage import check_archive, reading
-from rl_workbench.tools.policies import TEST_SEED, Player
+from rl_workbench.tools.policies import Player
 from rl_workbench.tools.runs import Run
-from rl_workbench.training.environments import as_float32
 from rl_workbench.training.folder import library_versions
 
 FORMAT = "rl_workbench policy 1"  # changes when older files can't be read any more
 READ = {"env_id": str, "env_kwargs": dict, "observation_space": dict, "action_space": dict}
 METADATA = "metadata.json"  # its name within the file
-SAMPLES = 1000  # observations for the comparison
-ROUNDING = 1e-4  # largest difference from summing the same float32 numbers in another order
 Observation = Any  # of one step: a float32 array, or a dict of those
 
 
@@ -36,14 +32,6 @@ class ExportedPolicy(NamedTuple):
 
     act: Callable[[Observation], Any]  # greedily, for one observation
     metadata: dict[str, Any]  # see `export`
-
-
-class Agreement(NamedTuple):
-    """How a file's actions compare with the policy's."""
-
-    observations: int
-    equal: int  # observations with bit-identical actions
-    largest_difference: float  # of continuous actions, as a share of the distance of their bounds
 
 
 def open_exported(path: Path) -> ExportedPolicy:
@@ -148,12 +136,8 @@ class OfDicts(nn.Module):
         return self.network(torch.cat(parts, dim=1))
 
 
-def export(run: Run, policy: Player, seed: int) -> tuple[bytes, Agreement]:
-    """Returns the file's content, and how it compares with the policy.
-
-    Raises WorkbenchError if the environment fails, its observations can't be exported, or the file would act
-    differently.
-    """
+def export(run: Run, policy: Player) -> bytes:
+    """Returns the content; raises WorkbenchError for a policy or observations that can't be exported."""
     if policy.network is None or policy.checkpoint is None:
         raise WorkbenchError(
             f"a policy of {run.folder} can't be exported: only Stable-Baselines3 computes it "
@@ -161,8 +145,6 @@ def export(run: Run, policy: Player, seed: int) -> tuple[bytes, Agreement]:
         )
     space, original = policy.env.observation_space, policy.env.unwrapped.observation_space
     module = _module(policy.network, space, run.env_id)
-    # Read back, because the file's content is what must agree.
-    agreement = _compare(read(written(module, {}))[0], policy, _observations(policy, seed))
     metadata = {
         "format": FORMAT,
         "env_id": run.env_id,
@@ -176,10 +158,9 @@ def export(run: Run, policy: Player, seed: int) -> tuple[bytes, Agreement]:
         "observation_space": described(space),
         "flattened_from": None if original == space else described(original),
         "action_space": described(policy.env.action_space),
-        "agreement": agreement._asdict(),
         "versions": library_versions(),
     }
-    return written(module, metadata), agreement
+    return written(module, metadata)
 
 
 def _module(network: nn.Module, space: spaces.Space[Any], env_id: str) -> OfVectors | OfDicts:
@@ -195,77 +176,3 @@ def _module(network: nn.Module, space: spaces.Space[Any], env_id: str) -> OfVect
                 f"a policy of {env_id} can't be exported: part {name} of its observations is {part}"
             )
     return OfDicts(own, list(space))
-
-
-def _observations(policy: Player, seed: int) -> list[Observation]:
-    """Returns observations from episodes of alternating greedy and random actions."""
-    env = policy.env
-    env.action_space.seed(seed)
-    met: list[Observation] = []
-    observation, _ = env.reset(seed=TEST_SEED + seed)
-    while len(met) < SAMPLES:
-        met.append(as_float32(observation))
-        action = policy.act(met[-1]) if len(met) % 2 else env.action_space.sample()
-        observation, _, terminated, truncated, _ = env.step(action)
-        if terminated or truncated:
-            observation, _ = env.reset()
-    return met
-
-
-def _compare(
-    file: torch.jit.ScriptModule, policy: Player, observations: list[Observation]
-) -> Agreement:
-    """Compares the file's actions with the policy's; raises WorkbenchError if more than rounding differs."""
-    wanted = np.stack([np.asarray(policy.act(each)) for each in observations])
-    with torch.no_grad():
-        actions = file(batch(observations)).numpy()
-    space = policy.env.action_space
-    equal, distances = _differences(actions, wanted, space)
-    is_continuous = isinstance(space, spaces.Box)
-    wrong = distances > ROUNDING if is_continuous else ~equal
-    if wrong.any() and not is_continuous:
-        wrong &= ~_tied(policy, observations)
-    if wrong.any():
-        raise WorkbenchError(
-            f"not written: in {wrong.sum()} of {len(wanted)} observations the file's actions differ from "
-            "the run's policy"
-        )
-    return Agreement(len(wanted), int(equal.sum()), float(distances.max()))
-
-
-def _tied(policy: Player, observations: list[Observation]) -> np.ndarray:
-    """Returns whether rounding may change the choice, (N,)."""
-    network = policy.network
-    if not isinstance(network, Choice):
-        return np.zeros(len(observations), bool)
-    module = _module(network.scores, policy.env.observation_space, "")
-    with torch.no_grad():
-        scores = module(batch(observations))
-    return (margins(network, scores) <= ROUNDING * scores.abs().amax(1).clamp_min(1.0)).numpy()
-
-
-def margins(network: Choice, scores: torch.Tensor) -> torch.Tensor:
-    """Returns how far scores (N, A) are from another choice, (N,)."""
-    if isinstance(network, Switches):
-        return scores.abs().amin(1)
-    sizes = network.sizes if isinstance(network, SeveralChoices) else [scores.shape[1]]
-    best = [each.topk(min(2, each.shape[1])).values for each in scores.split(sizes, dim=1)]
-    return torch.stack([each[:, 0] - each[:, -1] for each in best]).amin(0)
-
-
-def _differences(
-    found: np.ndarray, wanted: np.ndarray, space: spaces.Space[Any]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns which actions are equal, (N,), and the distances of continuous ones, (N,), see `Agreement`."""
-    if found.shape != wanted.shape:
-        raise WorkbenchError(
-            f"not written: the shape of its actions is {found.shape[1:]}, that of the run's "
-            f"{wanted.shape[1:]}"
-        )
-    same = (found == wanted).reshape(len(wanted), -1).all(axis=1)
-    if not isinstance(space, spaces.Box):
-        return same, np.zeros(len(wanted))
-    extent = space.high.astype(float) - space.low
-    extent = np.where(np.isfinite(extent) & (extent > 0.0), extent, 1.0)
-    distances = np.abs(found.astype(float) - wanted) / extent
-    return same, distances.reshape(len(wanted), -1).max(axis=1)
