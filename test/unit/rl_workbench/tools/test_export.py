@@ -12,9 +12,9 @@ import pytest
 import torch
 from gymnasium import spaces
 from support.training import workbench_runs
+from support.training.workbench_runs import work
 from torch import nn
 
-from rl_workbench import cli
 from rl_workbench.agents.greedy import SeveralChoices, SingleChoice, Switches
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools import torchscript
@@ -23,6 +23,7 @@ from rl_workbench.tools.runs import Run, open_run
 from rl_workbench.tools.torchscript import open_exported
 from rl_workbench.training.algorithms import ALGORITHMS
 
+REACH = "robot_envs.robots:robot_envs/TwoLinkReachGoal-v0"
 KINDS = {
     "plain": ("dqn", {"normalize_observations": "false"}),
     "dueling": ("dqn", {"dueling": "true"}),
@@ -34,8 +35,7 @@ KINDS = {
                             "env_kwargs": {"max_episode_steps": 30}}),
     "gaussian": ("reinforce", {"env_id": "Pendulum-v1", "episodes": 6, "eval_frequency": 0,
                                "env_kwargs": {"max_episode_steps": 30}}),
-    "goals": ("reinforce", {"env_id": "robot_envs.robots:robot_envs/TwoLinkReachGoal-v0",
-                            "episodes": 2, "batch_episodes": 1, "eval_frequency": 0,
+    "goals": ("reinforce", {"env_id": REACH, "episodes": 2, "batch_episodes": 1, "eval_frequency": 0,
                             "env_kwargs": {"max_steps": 20}, "normalize_observations": "true"}),
     "document": ("reinforce-document", {}),
 }  # fmt: skip
@@ -51,20 +51,9 @@ SB3 = {
     "sac-sde": ("sac", CONTINUOUS | OFF_POLICY | {"use_sde": True}),
     "td3": ("td3", CONTINUOUS | OFF_POLICY),
     "ddpg": ("ddpg", CONTINUOUS | OFF_POLICY),
-    "sac-her": (
-        "sac",
-        OFF_POLICY
-        | {
-            "env_id": "robot_envs.robots:robot_envs/TwoLinkReachGoal-v0",
-            "env_kwargs": {"max_steps": 20},
-            "her": True,
-        },
-    ),
-    "dqn-sb3": (
-        "dqn-sb3",
-        OFF_POLICY | {"learning_rate": 0.01, "target_update_interval": 20, "seed": 2},
-    ),
-}
+    "sac-her": ("sac", OFF_POLICY | {"env_id": REACH, "env_kwargs": {"max_steps": 20}, "her": True}),
+    "dqn-sb3": ("dqn-sb3", OFF_POLICY | {"learning_rate": 0.01, "target_update_interval": 20, "seed": 2}),
+}  # fmt: skip
 ALONE = """
 import json, sys
 import torch
@@ -74,16 +63,6 @@ observations = torch.tensor(json.loads(sys.argv[2]), dtype=torch.float64)
 strange = [name for name in sys.modules if name.split(".")[0] in ("rl_workbench", "gymnasium", "cartpole")]
 print(json.dumps([policy(observations).tolist(), json.loads(extra["metadata.json"]), strange]))
 """
-
-
-def work(*arguments: object) -> int:
-    return cli.main([str(each) for each in arguments])
-
-
-def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    assert work(*arguments) == 1
-    (line,) = capsys.readouterr().err.strip().splitlines()
-    return line
 
 
 def train(folder: Path, name: str) -> Path:
@@ -240,9 +219,7 @@ def test_parts_that_are_no_vectors_of_numbers() -> None:
         torchscript.export(run, policy, seed=0)
 
 
-def test_a_file_that_acts_otherwise_is_not_written(
-    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
-) -> None:
+def test_a_file_that_acts_otherwise_is_not_written(run, tmp_path, monkeypatch, refused) -> None:
     real = torchscript.written
 
     def spoilt(module: torch.nn.Module, metadata: dict) -> bytes:
@@ -252,7 +229,7 @@ def test_a_file_that_acts_otherwise_is_not_written(
         return real(module, metadata)
 
     monkeypatch.setattr(torchscript, "written", spoilt)
-    line = refused(capsys, "export", run, "--out", tmp_path / "policy.pt")
+    line = refused("export", run, "--out", tmp_path / "policy.pt")
     assert "of 1000 observations the file's actions differ" in line
     assert not list(tmp_path.iterdir())
 

@@ -121,9 +121,7 @@ def test_a_section_of_options_is_found_by_either_name(tmp_path: Path, capsys, se
         ("own_arm.leaving:own_arm/Reach-v0", "can't make own_arm.leaving:own_arm/Reach-v0: SystemExit"),
     ],
 )  # fmt: skip
-def test_a_name_that_leads_nowhere_is_one_line(
-    module: Path, tmp_path: Path, capsys, env_id: str, words: str
-) -> None:
+def test_a_name_that_leads_nowhere_is_one_line(module, tmp_path, capsys, env_id, words) -> None:
     (module / "own_arm/broken.py").write_text("1 / 0\n")
     (module / "own_arm/needy.py").write_text("import nowhere\n")
     (module / "own_arm/leaving.py").write_text("raise SystemExit\n")
