@@ -180,9 +180,7 @@ def test_a_training_has_an_end(empty: str) -> None:
         ),
     ],
 )  # fmt: skip
-def test_options_that_leave_nothing_to_learn_are_doubted(
-    empty: str, kind: AlgorithmKind, flags: str, words: str
-) -> None:
+def test_options_that_leave_nothing_to_learn_are_doubted(empty, kind, flags, words) -> None:
     doubt = choose(kind, [empty, *f"--total-timesteps={flags}".split()]).doubt()
     assert bool(doubt) == bool(words) and re.search(words, doubt)
 

@@ -26,9 +26,7 @@ def made(seed: int = 3, env_id: str = POLE, **options: Any) -> RepeatableEnviron
 )
 @pytest.mark.parametrize("is_first", [False, True])
 @pytest.mark.parametrize("steps", [0, 1, 7])
-def test_another_environment_comes_to_the_same_place(
-    env_id: str, options: dict[str, Any], is_first: bool, steps: int
-) -> None:
+def test_another_environment_comes_to_the_same_place(env_id, options, is_first, steps) -> None:
     one, other = made(3, env_id, **options), made(4, env_id, **options)
     for _ in range(0 if is_first else 3):
         observation, _ = one.reset()

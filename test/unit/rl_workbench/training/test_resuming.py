@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.training.goal_environments import Reach
 from support.training.learning_fakes import Dicing, OnlyOne, register_with
 from support.training.training_runs import (
     EXACT,
@@ -67,15 +68,21 @@ def test_ctrl_c_in_an_evaluation(whole, tmp_path: Path, name: str) -> None:
     assert_same_run(whole(name), resume(run))
 
 
-@pytest.mark.parametrize("kind", [Dicing, OnlyOne])
-@pytest.mark.parametrize("name", EXACT[1:])
+@pytest.mark.parametrize(
+    ("name", "kind", "given", "moments"),
+    [
+        *((name, kind, None, (37, 60)) for name in EXACT[1:] for kind in (Dicing, OnlyOne)),
+        ("reinforce", Reach, {"dense": True}, (50, 190)),  # with continuous actions
+    ],
+)
 def test_whatever_generator_an_environment_draws_from_comes_back(
-    tmp_path: Path, monkeypatch, name: str, kind: type
+    tmp_path: Path, monkeypatch, name: str, kind: type, given: dict | None, moments: tuple
 ) -> None:
-    options = {"env_id": register_with(monkeypatch, kind), "env_kwargs": None}
+    options = {"env_id": register_with(monkeypatch, kind), "env_kwargs": given}
     whole = train(tmp_path / "whole", name, **options)
-    for asked in (37, 60):
+    for asked in moments:
         run = train(tmp_path / str(asked), name, InterruptAfter(asked), **options)
+        assert rows(run) != rows(whole), "interrupted"
         assert_same_run(whole, resume(run))
 
 
@@ -172,9 +179,7 @@ def test_there_is_something_to_resume_from_the_first_moment_on(
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_killed_between_the_names_of_a_best_checkpoint(
-    whole, tmp_path: Path, monkeypatch, name: str
-) -> None:
+def test_killed_between_the_names_of_a_best_checkpoint(whole, tmp_path, monkeypatch, name) -> None:
     """Resumed, the training comes to the same best checkpoint."""
     give_name, save, bests = run_checkpoints.give_name, Checkpoints.save, [False]
 
@@ -196,9 +201,7 @@ def test_killed_between_the_names_of_a_best_checkpoint(
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_killed_before_its_first_checkpoint_it_begins_anew(
-    whole, tmp_path: Path, capsys, name: str
-) -> None:
+def test_killed_before_its_first_checkpoint_it_begins_anew(whole, tmp_path, capsys, name) -> None:
     run = train(tmp_path / "run", name, InterruptAfter(2))
     (run / "last.pt").unlink()
     for path in (run / "checkpoints").iterdir():
