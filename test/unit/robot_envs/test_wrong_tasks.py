@@ -8,16 +8,8 @@ import pytest
 from support.scenes.solo_arm import SOLO, Hold, Reach, episode, is_a_line
 from support.scenes.two_arms import PLINTH
 
-from robot_envs import (
-    InitialState,
-    LinkQuery,
-    Object,
-    Pose,
-    Robot,
-    RobotEnv,
-    RobotEnvError,
-    StateQuery,
-)
+from robot_envs import InitialState, LinkQuery, Object, Pose, Robot, RobotEnv, StateQuery
+from robot_envs.errors import RobotEnvError
 from robot_envs.making import make_environment
 
 NAN = math.nan

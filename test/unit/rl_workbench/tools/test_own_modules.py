@@ -133,9 +133,7 @@ def test_a_name_that_leads_nowhere_is_one_line(module, tmp_path, capsys, env_id,
     assert not (tmp_path / "run").exists()
 
 
-def test_a_run_whose_module_is_gone_is_plotted_all_the_same(
-    module: Path, trained: Path, tmp_path: Path, capsys, monkeypatch
-) -> None:
+def test_a_run_without_module_is_plotted(module, trained, tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.setattr(sys, "path", [each for each in sys.path if each != str(module)])
     for name in ("own_arm", "own_arm.tasks"):
         monkeypatch.delitem(sys.modules, name)

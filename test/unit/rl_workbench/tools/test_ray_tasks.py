@@ -96,9 +96,7 @@ def test_what_is_killed_changes_no_byte_of_the_table(cluster, table: bytes, tmp_
     assert max(state(tmp_path, seed).attempts for seed in range(2)) > 1
 
 
-def test_a_benchmark_whose_own_process_is_killed_or_stopped_goes_on(
-    cluster: RayCluster, table: bytes, tmp_path: Path
-) -> None:
+def test_a_benchmark_killed_or_stopped_goes_on(cluster, table: bytes, tmp_path: Path) -> None:
     flag = f"--ray={cluster.address}"
     driver = benchmark(tmp_path, flag)
     try:

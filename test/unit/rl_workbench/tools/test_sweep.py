@@ -257,9 +257,7 @@ def command(tmp_path: Path) -> Callable[..., list[object]]:
 
 
 @pytest.mark.parametrize("algorithm", ["dqn", "reinforce", "ppo"])
-def test_the_command_trains_and_its_best_options_can_be_used(
-    tmp_path: Path, algorithm: str, command, capsys
-) -> None:
+def test_the_command_trains_and_writes_best_options(tmp_path, algorithm, command, capsys) -> None:
     assert work(*command(algorithm)) == 0
     assert states(tmp_path / "study") == ["complete"]
     assert "its options are in" in capsys.readouterr().out

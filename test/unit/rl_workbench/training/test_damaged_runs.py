@@ -17,9 +17,7 @@ SHORT = {"total_timesteps": 120, "eval_frequency": 0}  # as those of `short` and
 
 
 @pytest.mark.parametrize("name", runs.ALL)
-def test_a_damaged_checkpoint_is_told_and_the_one_before_is_used(
-    whole, times, tmp_path: Path, capsys, name: str
-) -> None:
+def test_a_damaged_checkpoint_gives_way(whole, times, tmp_path, capsys, name: str) -> None:
     run = runs.train(tmp_path / "run", name, InterruptAfter(round(0.9 * times(name))))
     newest = run / "last.pt"
     content = bytearray(newest.read_bytes())

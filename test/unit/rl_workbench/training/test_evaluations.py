@@ -64,9 +64,7 @@ def test_the_best_is_that_of_the_best_evaluation(tmp_path: Path, name: str) -> N
 
 
 @pytest.mark.parametrize("name", ["dqn", "reinforce", *OTHERS[:1]])
-def test_prolonged_a_worse_one_does_not_take_the_place_of_the_best(
-    tmp_path: Path, monkeypatch, name: str
-) -> None:
+def test_prolonged_no_worse_one_becomes_the_best(tmp_path: Path, monkeypatch, name: str) -> None:
     """Also if that was found at the end, of which the last checkpoint doesn't know otherwise."""
     verdicts = [5.0, 9.0, *[7.0] * 9]
     monkeypatch.setattr(evaluator, "run_greedily", lambda *_: Evaluation([1], [verdicts.pop(0)]))
@@ -82,9 +80,7 @@ def test_prolonged_a_worse_one_does_not_take_the_place_of_the_best(
 
 
 @pytest.mark.parametrize("name", ["dqn", *OTHERS[:1]])
-def test_a_policy_is_the_best_one_only_if_more_episodes_confirm_it(
-    tmp_path: Path, monkeypatch, name: str
-) -> None:
+def test_more_episodes_confirm_the_best_policy(tmp_path: Path, monkeypatch, name: str) -> None:
     def evaluated(env, act, seed: int, episodes: int, stop) -> Evaluation:
         asked.append((seed, episodes))
         return Evaluation([1], [verdicts.pop(0)])
@@ -114,9 +110,7 @@ def test_training_and_evaluation_may_have_options_of_their_own(robot, tmp_path, 
 
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("kind", [Dicing, OnlyOne])
-def test_an_evaluation_leaves_the_generators_alone_that_it_shares(
-    tmp_path: Path, monkeypatch, kind: type, name: str
-) -> None:
+def test_an_evaluation_draws_from_no_shared_generator(tmp_path, monkeypatch, kind, name) -> None:
     env_id = register_with(monkeypatch, kind)
     options = {"env_id": env_id, "env_kwargs": None, "confirm_episodes": 0, "total_timesteps": 200}
     plain = train(tmp_path / "plain", name, **options, eval_frequency=0)
@@ -127,9 +121,7 @@ def test_an_evaluation_leaves_the_generators_alone_that_it_shares(
 
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("shared", [False, True])
-def test_where_there_is_one_robot_the_evaluation_moves_it(
-    robot: type[Pole], tmp_path: Path, monkeypatch, name: str, shared: bool
-) -> None:
+def test_an_evaluation_moves_the_one_robot(robot, tmp_path, monkeypatch, name, shared) -> None:
     monkeypatch.setattr(robot, "shares_robot", shared)
     short = {"env_id": "Robot-v0", "total_timesteps": 60}
     train(tmp_path / "run", name, env_kwargs=None, **short)

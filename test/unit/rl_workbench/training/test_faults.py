@@ -47,9 +47,7 @@ def test_a_disk_that_is_full_from_the_beginning_fails_before_tensorboard(tmp_pat
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", runs.ALL)
-def test_a_disk_that_fills_up_keeps_the_checkpoint_before(
-    whole, tmp_path: Path, monkeypatch, name: str
-) -> None:
+def test_a_disk_that_fills_up_keeps_a_checkpoint(whole, tmp_path, monkeypatch, name: str) -> None:
     run = tmp_path / "run"
 
     def is_full() -> bool:
@@ -94,9 +92,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 @pytest.mark.slow
 @pytest.mark.parametrize("is_replaced", [True, False])
 @pytest.mark.parametrize("name", EXACT)
-def test_a_folder_that_is_moved_away_is_one_line(
-    whole, times, tmp_path: Path, capsys, name: str, is_replaced: bool
-) -> None:
+def test_a_folder_moved_away_is_one_line(whole, times, tmp_path, capsys, name, is_replaced) -> None:
     """Another run that comes into its place is left alone."""
     (run := tmp_path / "run").mkdir()
     other, moved_at = whole(name) if is_replaced else None, round(0.5 * times(name))
@@ -230,9 +226,7 @@ def test_a_round_of_learning_that_fails_costs_the_steps_since_the_last_checkpoin
     assert f"progress up to step {steps} is saved in {tmp_path}; --resume" in line
 
 
-def test_a_round_that_was_learned_from_and_not_recorded_is_played_again(
-    tmp_path: Path, monkeypatch
-) -> None:
+def test_a_round_that_was_not_recorded_is_played_again(tmp_path: Path, monkeypatch) -> None:
     options = ON_A_ROBOT | {"checkpoint_frequency": 20}
     whole = train(tmp_path / "whole", "reinforce", **options)
     with monkeypatch.context() as patched:

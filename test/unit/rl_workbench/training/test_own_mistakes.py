@@ -58,9 +58,7 @@ PLACE = next(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LEARNERS)
 @pytest.mark.parametrize(("where", "error"), [("step", "KeyError"), ("reset", "TypeError")])
-def test_a_mistake_in_an_environment_is_one_line_with_its_place(
-    tmp_path: Path, monkeypatch, name: str, where: str, error: str
-) -> None:
+def test_a_mistake_is_one_line_with_its_place(tmp_path, monkeypatch, name, where, error) -> None:
     monkeypatch.setattr(Mistaken, "steps", 0)
     env_id = register_with(monkeypatch, Mistaken)
     options = {"env_id": env_id, "env_kwargs": {"where": where, "error": error}}

@@ -5,16 +5,9 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
+from support.training import learning_fakes
 from support.training import training_runs as runs
-from support.training.learning_fakes import (
-    POLE,
-    Elsewhere,
-    Fragile,
-    OnlyOne,
-    Pole,
-    register_with,
-    run_episode,
-)
+from support.training.learning_fakes import POLE, Elsewhere, Fragile, OnlyOne, Pole, register_with
 from support.training.training_runs import assert_same, checkpoint, resume, summary, train
 
 from rl_workbench.agents.reinforce import ReinforceAgent
@@ -52,7 +45,7 @@ def test_each_plays_what_it_would_play_alone() -> None:
         agent.generator = np.random.default_rng((7, index)) if index else first
         env.reset(seed=7 + index)
         for episodes in rounds:
-            alone = run_episode(env, agent)
+            alone = learning_fakes.run_episode(env, agent)
             assert_same(alone.state_dict(), episodes[index].state_dict())
     lengths = [[episode.length for episode in episodes] for episodes in rounds]
     assert len({length for each in lengths for length in each}) > 3, "they differ"
@@ -110,9 +103,7 @@ def test_the_one_that_fails_is_named(tmp_path: Path, monkeypatch) -> None:
 
 
 @pytest.mark.slow
-def test_a_round_that_nothing_can_be_learned_from_is_given_up_whole(
-    whole: Path, tmp_path: Path, monkeypatch
-) -> None:
+def test_a_round_without_anything_to_learn_is_given_up(whole, tmp_path, monkeypatch) -> None:
     updated = ReinforceAgent._update
 
     def failing(agent: ReinforceAgent, batch: list) -> None:

@@ -87,9 +87,7 @@ def policy_of(monkeypatch: pytest.MonkeyPatch, kind: type[Dot], **changed: objec
 
 
 @pytest.mark.slow
-def test_images_are_learned_by_a_cnn_that_resumes_and_is_evaluated(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_cnn_learns_from_images_and_resumes(tmp_path: Path, monkeypatch, capsys) -> None:
     env_id = register_with(monkeypatch, Dot)
     whole = run(options_of("ppo", SMALL | {"env_id": env_id}), tmp_path / "whole")
     interrupt = InterruptAfter(40)
@@ -130,9 +128,7 @@ def test_arguments_of_the_policy_may_be_classes(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize("algorithm", ["dqn", "reinforce"])
-def test_our_own_refuse_images_and_say_what_learns_from_them(
-    algorithm: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_our_own_refuse_images_and_say_what_takes_them(algorithm, tmp_path, monkeypatch) -> None:
     env_id = register_with(monkeypatch, Dot)
     words = rf"{env_id} observes images, uint8 of \(36, 36, 3\): .* --algo ppo, a2c or dqn-sb3"
     with pytest.raises(WorkbenchError, match=words):

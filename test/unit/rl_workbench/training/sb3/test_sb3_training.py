@@ -33,9 +33,7 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
      ("ppo", {"total_timesteps": 200, "n_steps": 50, "batch_size": 100, "num_envs": 2,
               "eval_frequency": 100})],
 )  # fmt: skip
-def test_every_algorithm_trains_and_its_policy_is_the_librarys(
-    tmp_path: Path, algorithm: str, options: dict
-) -> None:
+def test_each_trains_and_its_policy_is_the_librarys(tmp_path, algorithm: str, options) -> None:
     import stable_baselines3
 
     folder = runs.run(options_of(algorithm, options), tmp_path)
