@@ -82,13 +82,8 @@ class OnlyOne(gymnasium.Env):
         return self._observation(), {}
 
     def step(self, action):
-        return (
-            self._observation(),
-            self.np_random.random(),
-            self.np_random.random() < 0.1,
-            False,
-            {},
-        )
+        seen, reward = self._observation(), self.np_random.random()
+        return seen, reward, self.np_random.random() < 0.1, False, {}
 
     def _observation(self):
         return self.np_random.random(4, np.float32)
