@@ -91,11 +91,9 @@ class SharedReach(Reach):
     shares_robot = True
     robot: "SharedReach | None" = None  # who has moved it last
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    def reset(self, **kwargs: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         SharedReach.robot = self
-        return super().reset(seed=seed, options=options)
+        return super().reset(**kwargs)
 
     def step(self, action: Any) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         assert SharedReach.robot is self, "somebody else has moved the robot"

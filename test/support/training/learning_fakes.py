@@ -37,6 +37,24 @@ def register_with(monkeypatch: pytest.MonkeyPatch, kind: type[gymnasium.Env]) ->
     return name
 
 
+class Still(gymnasium.Env):
+    """Nothing happens in it, and nothing ends its episodes."""
+
+    observation_space = gymnasium.spaces.Box(-9, 9, (2,), np.float32)
+    action_space = gymnasium.spaces.Discrete(2)
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+
+    def __init__(self, render_mode: str | None = None) -> None:
+        self.render_mode = render_mode
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return np.zeros(2, np.float32), {}
+
+    def step(self, action):
+        return np.zeros(2, np.float32), 1.0, False, False, {}
+
+
 class Dicing(gymnasium.Env):
     """Draws from the generators that all of a process share."""
 
@@ -64,13 +82,8 @@ class OnlyOne(gymnasium.Env):
         return self._observation(), {}
 
     def step(self, action):
-        return (
-            self._observation(),
-            self.np_random.random(),
-            self.np_random.random() < 0.1,
-            False,
-            {},
-        )
+        seen, reward = self._observation(), self.np_random.random()
+        return seen, reward, self.np_random.random() < 0.1, False, {}
 
     def _observation(self):
         return self.np_random.random(4, np.float32)

@@ -14,11 +14,8 @@ from pathlib import Path
 
 STORE = 80 * 2**20  # [bytes], hardly more than Ray's least
 PATIENCE = 600.0  # [s], on a busy machine
-QUIET = {
-    "RAY_USAGE_STATS_ENABLED": "0",
-    "RAY_AUTH_MODE": "disabled",
-    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
-}
+QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_AUTH_MODE": "disabled",
+         "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}  # fmt: skip
 
 
 def free_port() -> int:
@@ -64,13 +61,9 @@ class RayNode:
                    f"--temp-dir={self.folder}", f"--object-store-memory={STORE}"]  # fmt: skip
         self.log = (self.folder / "node.log").open("wb")
         self.process = subprocess.Popen(
-            command,
-            env={**environment, **QUIET, "TMPDIR": str(self.folder)},
-            stdin=subprocess.DEVNULL,
-            stdout=self.log,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
+            command, env={**environment, **QUIET, "TMPDIR": str(self.folder)},
+            stdin=subprocess.DEVNULL, stdout=self.log, stderr=subprocess.STDOUT, start_new_session=True,
+        )  # fmt: skip
 
     def workers(self) -> list[int]:
         """Its processes that do a job, and the trainings that these have begun."""

@@ -6,6 +6,7 @@ from pathlib import Path
 from support.training import training_runs
 from support.training.training_runs import train
 
+from rl_workbench import cli
 from rl_workbench.tools.benchmark import make_variant, training_flags
 from rl_workbench.tools.job import Job
 
@@ -13,6 +14,11 @@ PPO = {"env_id": "CartPole-v1", "n_steps": 64, "batch_size": 64, "total_timestep
        "eval_frequency": 128, "eval_episodes": 2}  # fmt: skip
 QUICK = {"total_timesteps": 300, "learning_starts": 50, "batch_size": 8, "hidden_sizes": [8],
          "eval_frequency": 150, "eval_episodes": 1, "confirm_episodes": 1}  # fmt: skip
+
+
+def work(*words: object) -> int:
+    """Runs a command of rl-workbench; returns its exit code."""
+    return cli.main([str(each) for each in words])
 
 
 def dqn(folder: Path, **changed: object) -> Path:

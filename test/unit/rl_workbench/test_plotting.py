@@ -7,17 +7,8 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from rl_workbench.plotting import (
-    Panel,
-    SeedCurve,
-    as_png,
-    evaluation_curves,
-    learning_curve,
-    mean_over_seeds,
-    moving_average,
-    seed_curves,
-    training_curves,
-)
+from rl_workbench import plotting
+from rl_workbench.plotting import Panel, SeedCurve, evaluation_curves, seed_curves, training_curves
 
 
 def seed(positions: list[float], values: list[float], complete: bool = True) -> SeedCurve:
@@ -44,15 +35,13 @@ def at(line: Line2D, position: float) -> float:
 @pytest.mark.parametrize("count", [1, 300])
 def test_one_training_has_two_axes_and_can_be_written_as_png(tmp_path: Path, count: int) -> None:
     lengths = np.random.default_rng(0).integers(1, 3000, count).tolist()
-    figure = learning_curve(lengths, [length / 2 for length in lengths], "title")
+    figure = plotting.learning_curve(lengths, [length / 2 for length in lengths], "title")
     upper, lower = figure.axes
-    assert [line.get_ydata().tolist() for line in upper.lines] == [
-        lengths,
-        moving_average(lengths).tolist(),
-    ]
+    drawn = [line.get_ydata().tolist() for line in upper.lines]
+    assert drawn == [lengths, plotting.moving_average(lengths).tolist()]
     assert lower.lines[0].get_ydata().tolist() == [length / 2 for length in lengths]
     with (tmp_path / "curve.png").open("wb") as file:
-        as_png(figure)(file)
+        plotting.as_png(figure)(file)
     assert (tmp_path / "curve.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
@@ -61,14 +50,14 @@ def test_one_training_has_two_axes_and_can_be_written_as_png(tmp_path: Path, cou
 
 def test_a_seed_that_has_ended_keeps_its_last_value_in_the_mean() -> None:
     solved, slow = seed([100, 200], [100, 500]), seed([100, 1000], [100, 100])
-    positions, mean, _, _ = mean_over_seeds([solved, slow])
+    positions, mean, _, _ = plotting.mean_over_seeds([solved, slow])
     assert (positions[0], positions[-1]) == (100, 1000)
     assert np.interp([200, 600, 1000], positions, mean) == pytest.approx([300, 300, 300])
 
 
 def test_the_band_lies_around_the_mean_and_one_seed_has_none() -> None:
     curves = [seed([1, 2], [value, 2 * value]) for value in (1.0, 2.0, 6.0)]
-    _, mean, low, high = mean_over_seeds(curves)
+    _, mean, low, high = plotting.mean_over_seeds(curves)
     assert (low < mean).all() and (mean < high).all()
     (axes,) = seed_curves([panel({"dqn": curves[:1]})]).axes
     assert not axes.collections and not lines(axes, "seed"), "the thick line is the seed itself"
@@ -116,17 +105,12 @@ def test_a_threshold_above_all_curves_is_not_drawn() -> None:
 
 def test_a_variant_is_held_against_the_first_of_its_own_environment() -> None:
     low, high = seed([1, 2], [0, 1]), seed([1, 2], [0, 2])
-    panels = [
-        panel({"tuned": [low]}, "A-v0"),
-        panel({"mse": [high]}, "A-v0"),
-        panel({"other": [high]}, "B-v0"),
-    ]
+    drawn = (("tuned", low, "A-v0"), ("mse", high, "A-v0"), ("other", high, "B-v0"))
+    panels = [panel({name: [curve]}, env_id) for name, curve, env_id in drawn]
     figure = evaluation_curves(panels)
     first, second, third = (axes for axes in figure.axes if axes.axison)
     assert not lines(first, "reference") and not lines(third, "reference")
     (reference,) = lines(second, "reference")
     assert at(reference, 2) == 1 and at(the_mean(second), 2) == 2
-    assert [axes.get_title() for axes in (first, third)] == [
-        "tuned (1 seed), A-v0",
-        "other (1 seed), B-v0",
-    ]
+    titles = [axes.get_title() for axes in (first, third)]
+    assert titles == ["tuned (1 seed), A-v0", "other (1 seed), B-v0"]

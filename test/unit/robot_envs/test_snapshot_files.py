@@ -55,13 +55,7 @@ def places(value, place=()):
     """All places of a state that can be replaced."""
     if place:
         yield place
-    entries = (
-        value.items()
-        if isinstance(value, dict)
-        else enumerate(value)
-        if isinstance(value, list)
-        else ()
-    )
+    entries = enumerate(value) if isinstance(value, list) else getattr(value, "items", list)()
     for key, each in entries:
         yield from places(each, (*place, key))
 
@@ -69,6 +63,13 @@ def places(value, place=()):
 def signed(content):
     """A file of a snapshot, with the digest of what it holds."""
     return MAGIC + hashlib.sha256(content).digest() + content
+
+
+def altered(env, change):
+    """Its snapshot with a change of its state; its digest is right."""
+    fits, state = unpack(env.save_state().to_bytes()[BEGIN:])
+    change(state)
+    return EnvSnapshot.from_bytes(signed(pack([fits, state])))
 
 
 def forged(data, rng):
@@ -109,10 +110,7 @@ def test_forged_files_run_no_code_and_are_one_error():
 
 
 def test_a_refused_one_changes_nothing():
-    env, same = (
-        begun("robot_envs/SixJointReach-v0", "bullet"),
-        begun("robot_envs/SixJointReach-v0", "bullet"),
-    )
+    env, same = (begun("robot_envs/SixJointReach-v0", "bullet") for _ in range(2))
     state = unpack(env.save_state().to_bytes()[BEGIN:])
     same.save_state()
     for change in (
@@ -130,53 +128,40 @@ def test_a_refused_one_changes_nothing():
     ):
         fits, content = unpack(pack(state))
         change(fits, content)
-        data = signed(pack([fits, content]))
         with pytest.raises(SimulatorError):
-            env.restore_state(EnvSnapshot.from_bytes(data))
+            env.restore_state(EnvSnapshot.from_bytes(signed(pack([fits, content]))))
     assert play(env) == play(same)
     env.close()
     same.close()
 
 
-@pytest.mark.parametrize(
-    ("name", "change"),
-    [
-        ("gripper_controller", lambda own: own["pids"].update({"left_finger/pid": None})),
-        ("gripper_controller", lambda own: own["_loops"].__setitem__(0, None)),
-        ("joint_state_controller", lambda own: own.pop("_joints")),
-        ("joint_state_controller", lambda own: own["_joints"].pop()),
-        ("joint_state_controller", lambda own: own.update(_joints=None)),
-    ],
-)
-def test_no_controller_loses_what_it_refers_to(name, change):
-    env = begun("robot_envs/PickCube-v0", "bullet")
-    good = env.save_state().to_bytes()
-    fits, state = unpack(good[BEGIN:])
-    change(state["robots"][0]["manager"]["controllers"][name])
-    data = signed(pack([fits, state]))
-    with pytest.raises(
-        SimulatorError, match="can't be restored: .*(pid|_joints|_loops|controller)"
-    ):
-        env.restore_state(EnvSnapshot.from_bytes(data))
-    env.restore_state(EnvSnapshot.from_bytes(good))
-    env.close()
+def own(robot, name):
+    return robot["manager"]["controllers"][f"{name}_controller"]
+
+
+LOST = "can't be restored: .*(pid|_joints|_loops|controller)"
+NUMBERS = "numbers of gripper_arm's joints are missing"
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("words", "change"),
     [
-        lambda robot: robot["efforts"].__setitem__(0, None),
-        lambda robot: robot["hardware"]["joints"]["wrist"].update(command=None),
-        lambda robot: robot["hardware"]["drives"]["wrist"].update(_most=None),
+        (LOST, lambda robot: own(robot, "gripper")["pids"].update({"left_finger/pid": None})),
+        (LOST, lambda robot: own(robot, "gripper")["_loops"].__setitem__(0, None)),
+        (LOST, lambda robot: own(robot, "joint_state").pop("_joints")),
+        (LOST, lambda robot: own(robot, "joint_state")["_joints"].pop()),
+        (LOST, lambda robot: own(robot, "joint_state").update(_joints=None)),
+        (NUMBERS, lambda robot: robot["efforts"].__setitem__(0, None)),
+        (NUMBERS, lambda robot: robot["hardware"]["joints"]["wrist"].update(command=None)),
+        (NUMBERS, lambda robot: robot["hardware"]["drives"]["wrist"].update(_most=None)),
     ],
 )
-def test_joints_and_drives_lose_no_numbers(change):
+def test_a_robot_loses_nothing_that_it_refers_to(words, change):
     env = begun("robot_envs/PickCube-v0", "bullet")
-    fits, state = unpack(env.save_state().to_bytes()[BEGIN:])
-    change(state["robots"][0])
-    data = signed(pack([fits, state]))
-    with pytest.raises(SimulatorError, match="numbers of gripper_arm's joints are missing"):
-        env.restore_state(EnvSnapshot.from_bytes(data))
+    good = env.save_state()
+    with pytest.raises(SimulatorError, match=words):
+        env.restore_state(altered(env, lambda state: change(state["robots"][0])))
+    env.restore_state(good)
     env.close()
 
 
@@ -189,11 +174,9 @@ def test_joints_and_drives_lose_no_numbers(change):
 )  # fmt: skip
 def test_no_episode_begins_at_a_forged_one(change):
     env = begun("cartpole/Balance-v0", "bullet")
-    fits, state = unpack(env.save_state().to_bytes()[BEGIN:])
-    change(state["environment"])
-    data = signed(pack([fits, state]))
+    forged = altered(env, lambda state: change(state["environment"]))
     with pytest.raises(SimulatorError, match="^no episode can begin at the snapshot: "):
-        env.reset(options={"snapshot": EnvSnapshot.from_bytes(data)})
+        env.reset(options={"snapshot": forged})
     env.close()
 
 

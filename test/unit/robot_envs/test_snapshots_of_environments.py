@@ -78,10 +78,21 @@ def made():
         env.close()
 
 
-def test_what_a_task_remembers_comes_back(made):
-    env = made(Remembering)
-    env.reset(seed=1)
-    returns(env, 7)
+@pytest.fixture
+def begun(made):
+    """Make an environment, begin an episode with the seed 1, and take some steps of it."""
+
+    def begin(task=BalanceTask, steps=0, **options):
+        env = made(task, **options)
+        env.reset(seed=1)
+        returns(env, steps)
+        return env
+
+    return begin
+
+
+def test_what_a_task_remembers_comes_back(begun):
+    env = begun(Remembering, steps=7)
     snapshot = env.save_state()
     first = returns(env)
     env.restore_state(snapshot)
@@ -99,9 +110,8 @@ def test_a_task_may_know_its_environment_and_keep_snapshots(made):
     assert returns(env) == first
 
 
-def test_a_randomisation_goes_on_from_where_it_was(made):
-    env = made(randomisation=Curriculum())
-    env.reset(seed=1)
+def test_a_randomisation_goes_on_from_where_it_was(begun):
+    env = begun(randomisation=Curriculum())
     snapshot = env.save_state()
     levels = []
     for _ in range(2):
@@ -110,9 +120,8 @@ def test_a_randomisation_goes_on_from_where_it_was(made):
     assert levels == [{"level": 2}, {"level": 2}]
 
 
-def test_actions_that_a_space_samples_do_not_come_again(made):
-    env = made()
-    env.reset(seed=1)
+def test_actions_that_a_space_samples_do_not_come_again(begun):
+    env = begun()
     snapshot = env.save_state()
     drawn = []
     for _ in range(5):
@@ -121,25 +130,17 @@ def test_actions_that_a_space_samples_do_not_come_again(made):
     assert len({str(each) for each in drawn}) == 5
 
 
-def test_the_episode_counts_on_and_ends_as_before(made):
-    env = made(max_steps=10)
-    env.reset(seed=1)
-    returns(env, 8)
+def test_the_episode_counts_on_and_ends_as_before(begun):
+    env = begun(steps=8, max_steps=10)
     snapshot = env.save_state()
     for _ in range(2):
         env.restore_state(snapshot)
         assert [truncated for _, _, truncated in returns(env, 2)] == [False, True]
         with pytest.raises(gymnasium.error.ResetNeeded):
             returns(env, 1)
-
-
-def test_an_ended_episode_is_ended_again(made):
-    env = made(max_steps=3)
-    env.reset(seed=1)
-    returns(env, 3)
-    snapshot = env.save_state()
+    ended = env.save_state()
     env.reset(seed=2)
-    env.restore_state(snapshot)
+    env.restore_state(ended)
     with pytest.raises(gymnasium.error.ResetNeeded):
         returns(env, 1)
 
@@ -201,6 +202,10 @@ def test_refusals_name_the_reason(made):
     unreadable.reset(seed=1)
     with pytest.raises(SimulatorError, match="Reading.lines.*generator"):
         unreadable.save_state()
+    env.task.env = env
+    env.reset(seed=1)
+    with pytest.raises(SimulatorError, match=r"^BalanceTask.env: a snapshot can't save a .*Env;"):
+        env.save_state()
 
 
 @pytest.mark.parametrize(
@@ -210,19 +215,15 @@ def test_refusals_name_the_reason(made):
         ("action_delay", 3, 1), ("actuator_limit", 1.0, 2.0), ("actuator_lag", 0.1, 0.2),
     ],
 )  # fmt: skip
-def test_imperfections_of_another_size_are_refused(made, option, one, other):
-    first, same, second = made(**{option: one}), made(**{option: one}), made(**{option: other})
-    for env in (first, same, second):
-        env.reset(seed=1)
+def test_imperfections_of_another_size_are_refused(begun, option, one, other):
+    first, same, second = (begun(**{option: value}) for value in (one, one, other))
     same.restore_state(EnvSnapshot.from_bytes(first.save_state().to_bytes()))
     with pytest.raises(ValueError, match=f"another environment: its {option} is"):
         second.restore_state(first.save_state())
 
 
-def test_a_refused_one_leaves_the_episode_as_it_is(made):
-    env, other = made(), made(backend="mujoco")
-    env.reset(seed=1)
-    other.reset(seed=1)
+def test_a_refused_one_leaves_the_episode_as_it_is(begun):
+    env, other = begun(), begun(backend="mujoco")
     with pytest.raises(SimulatorError, match="the engine .Mujoco., and here"):
         env.restore_state(other.save_state())
     env.step(1)
@@ -243,9 +244,8 @@ class Borrowing(BalanceTask):
         return self.rng.random()
 
 
-def test_a_task_shares_the_environments_generator_again(made):
-    env, other = made(Borrowing, sensor_noise=0.01), made(Borrowing, sensor_noise=0.01)
-    env.reset(seed=1)
+def test_a_task_shares_the_environments_generator_again(made, begun):
+    env, other = (make(Borrowing, sensor_noise=0.01) for make in (begun, made))
     returns(env, 3)
     snapshot = EnvSnapshot.from_bytes(env.save_state().to_bytes())
     other.restore_state(snapshot)  # before any reset
@@ -256,9 +256,8 @@ def test_a_task_shares_the_environments_generator_again(made):
     assert returns(other) == returns(env)
 
 
-def test_another_environment_goes_on_from_a_file(made, tmp_path):
-    env, other = made(sensor_noise=0.01, sensor_delay=2), made(sensor_noise=0.01, sensor_delay=2)
-    env.reset(seed=1)
+def test_another_environment_goes_on_from_a_file(made, begun, tmp_path):
+    env, other = (make(sensor_noise=0.01, sensor_delay=2) for make in (begun, made))
     returns(env, 7)
     env.save_state().save(tmp_path / "hard.snapshot")
     first = returns(env)
@@ -271,10 +270,8 @@ def test_another_environment_goes_on_from_a_file(made, tmp_path):
         EnvSnapshot.load(tmp_path / "none.snapshot")
 
 
-def test_an_episode_begins_at_a_snapshot(made):
-    env = made(max_steps=5)
-    env.reset(seed=1)
-    returns(env, 3)
+def test_an_episode_begins_at_a_snapshot(begun):
+    env = begun(steps=3, max_steps=5)
     snapshot, there = env.save_state(), env.state
     observation, info = env.reset(seed=7, options={"snapshot": snapshot})
     assert env.state.time == 0.0 and env.state.joints == there.joints
@@ -327,17 +324,16 @@ def test_a_tasks_episodes_begin_at_saved_states(made, tmp_path):
     with pytest.raises(ValueError, match="a snapshot is what save_state"):
         InitialStates(["somewhere"])
     env.task.places = InitialStates(tmp_path)
-    begun = []
+    found = []
     for seed in range(20):
         env.reset(seed=seed)
-        begun.append(env.state.joints)
+        found.append(env.state.joints)
         assert env.reset(seed=seed)[0].tolist() == env.task.observe(env.state).tolist()
-    assert all(each in begun for each in seen) and all(each in seen for each in begun)
+    assert all(each in found for each in seen) and all(each in seen for each in found)
 
 
-def test_differences_are_named_with_their_values(made):
-    env = made()
-    env.reset(seed=1)
+def test_differences_are_named_with_their_values(begun):
+    env = begun()
     one = env.save_state()
     assert diff(one, EnvSnapshot.from_bytes(one.to_bytes())) == []
     env.step(1)
@@ -345,15 +341,6 @@ def test_differences_are_named_with_their_values(made):
     assert found["now"].second - found["now"].first == 8_000_000
     assert str(found["environment/steps"]) == "environment/steps: 0 and 1"
     assert any(place.startswith("world/models/cartpole/motion/joints") for place in found)
-
-
-def test_a_task_with_an_environment_among_what_is_saved_is_refused():
-    env = gymnasium.make("cartpole/Balance-v0", backend="bullet").unwrapped
-    env.reset(seed=1)
-    env.task.env = env
-    with pytest.raises(SimulatorError, match=r"^BalanceTask.env: a snapshot can't save a .*Env;"):
-        env.save_state()
-    env.close()
 
 
 def test_a_robot_that_was_varied_for_a_snapshots_episode_is_nominal_again(made):
@@ -385,9 +372,8 @@ class Listing(BalanceTask):
         (self.count,) = state
 
 
-def test_a_tasks_state_may_be_any_plain_data(made):
-    env = made(Listing)
-    env.reset(seed=1)
+def test_a_tasks_state_may_be_any_plain_data(begun):
+    env = begun(Listing)
     env.task.count = 3
     snapshot = env.save_state()
     env.task.count = 4
@@ -395,10 +381,8 @@ def test_a_tasks_state_may_be_any_plain_data(made):
     assert env.task.count == 3
 
 
-def test_where_a_controller_cannot_load_its_state_all_else_is_restored(made, monkeypatch):
-    env = made(Remembering)
-    env.reset(seed=1)
-    returns(env, 7)
+def test_where_a_controller_cannot_load_its_state_all_else_is_restored(begun, monkeypatch):
+    env = begun(Remembering, steps=7)
     snapshot, state = env.save_state(), env.state
     returns(env, 5)
     (controller,) = env.backend._sim.robots[0].manager.running
@@ -410,9 +394,7 @@ def test_where_a_controller_cannot_load_its_state_all_else_is_restored(made, mon
     assert env.state.time == pytest.approx(state.time + env.control_period)
 
 
-def test_an_episode_beyond_its_last_step_is_truncated(made):
-    longer, shorter = made(Remembering), made(Remembering, max_steps=5)
-    longer.reset(seed=1)
-    returns(longer, 8)
+def test_an_episode_beyond_its_last_step_is_truncated(made, begun):
+    longer, shorter = begun(Remembering, steps=8), made(Remembering, max_steps=5)
     shorter.restore_state(longer.save_state())
     assert shorter.step(0)[3]

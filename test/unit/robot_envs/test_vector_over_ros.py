@@ -24,10 +24,8 @@ def both():
     made = []
 
     def make(identifier, **options):
-        made.extend(
-            gymnasium.make_vec(identifier, 2, backend=backend, **options)
-            for backend in ("ros", "bullet")
-        )
+        for backend in ("ros", "bullet"):
+            made.append(gymnasium.make_vec(identifier, 2, backend=backend, **options))
         return made
 
     yield make

@@ -1,16 +1,23 @@
-"""What a backend tells of the world beside the robot's state; over ROS it is the same (second_robot.test)."""
+"""A pendulum with an effort controller: how it moves, and what a backend tells of its world.
+
+Over ROS it is the same: second_robot.test.
+"""
 
 import math
 
+import numpy as np
 import pytest
-from support.robots.pendulum import MOTOR, PENDULUM, hanging
+from support.robots.pendulum import MOTOR, PENDULUM, hanging, make_pendulum
 
 from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
+from robot_envs.testing import rollout
 from robot_envs.world_state import InitialState, LinkQuery, Motion, StateQuery
 from robot_sim.physics.pose import Pose
 
+MASS, LENGTH, DAMPING, GRAVITY = 0.5, 0.4, 0.01, 9.8  # kg, m, N m s/rad, m/s²
+INERTIA = MASS * LENGTH**2 / 3.0  # [kg m²] of the rod about its hinge
 HINGE, PERIOD = 1.0, 0.01  # [m] above the model, [s]
 ROD = StateQuery(links=(LinkQuery("rod"),), models=("pendulum",), all_contacts=True)
 
@@ -88,3 +95,31 @@ def test_wrong_names_are_refused_at_once_and_the_old_question_stays(backend):
     with pytest.raises(ValueError, match="no joint 'hing' to place; did you mean 'hinge'"):
         backend.reset(InitialState({"hing": 0.1}))
     assert list(backend.reset(InitialState()).links) == ["rod"]
+
+
+def test_it_moves_as_the_equations_say(backend):
+    """From upright by its motor, and let go hanging on its side; to the first order of a period."""
+
+    def after(angle, rate, torque):
+        backend.reset(hanging(angle, rate))
+        return backend.act({MOTOR: torque}).joints["hinge"]
+
+    pushed = after(0.0, 0.0, 0.3)
+    assert pushed.velocity == pytest.approx(0.3 / INERTIA * PERIOD, rel=0.02)
+    falling = after(np.pi / 2, 0.0, 0.0)
+    weight = MASS * GRAVITY * LENGTH / 2
+    assert falling.velocity == pytest.approx(weight / INERTIA * PERIOD, rel=0.02)
+    turning = after(0.0, 10.0, 0.0)
+    lost = DAMPING * 10.0 / INERTIA * PERIOD
+    gained = weight * np.sin(turning.position / 2) / INERTIA * PERIOD
+    assert turning.velocity == pytest.approx(10.0 - lost + gained, abs=0.1 * lost)
+
+
+@pytest.mark.extras("mujoco")
+def test_on_mujoco_it_moves_nearly_the_same():
+    runs = []
+    for engine in ("bullet", "mujoco"):
+        env = make_pendulum(engine)
+        runs.append(np.array([row[0] for row in rollout(env, 10, seed=2)[1:]]))
+        env.close()
+    assert 0.0 < np.abs(runs[0] - runs[1]).max() < 1e-3

@@ -74,12 +74,7 @@ ROBOTS = {
     "a command to what doesn't run": ({"commanded": ("pear",)},
         "'pear' is commanded, but not among the controllers that run; did you mean 'pair'"),
     "gains that are none": (
-        {
-            "controllers": {
-                **LEFT_CONTROLLERS,
-                "gazebo_ros_control": {"pid_gains": {"elbow": {"p": "x"}}},
-            }
-        },
+        {"controllers": {**LEFT_CONTROLLERS, "gazebo_ros_control": {"pid_gains": {"elbow": {"p": "x"}}}}},
         "gazebo_ros_control/pid_gains/elbow/p is 'x'",
     ),
     "a place that is none": ({"pose": (0, 0, 1)}, r"its pose is a Pose\(\(x, y, z\)\), not \(0, 0, 1\)"),
@@ -117,11 +112,8 @@ def test_all_faults_of_a_robot_are_told_at_once():
     robot = replace(SOLO, pose=Pose((math.nan, 0.0, 0.0)), run=("pear", "pair"))
     with pytest.raises(RobotEnvError) as error:
         robot.check()
-    assert [line[:20] for line in str(error.value).splitlines()] == [
-        "the robot 'arm': ",
-        "- its pose isn't fin",
-        "- there is no contro",
-    ]
+    begun = ["the robot 'arm': ", "- its pose isn't fin", "- there is no contro"]
+    assert [line[:20] for line in str(error.value).splitlines()] == begun
 
 
 def test_gains_and_limits_of_joints_that_are_not_there_are_told_and_no_fault(caplog):

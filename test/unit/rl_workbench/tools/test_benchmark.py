@@ -1,6 +1,5 @@
 """`rl-workbench benchmark`: suites, trainings as processes, tables that leave no failure out."""
 
-import argparse
 import json
 import os
 import re
@@ -17,18 +16,9 @@ from support.training.workbench_runs import QUICK, job
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools import benchmark, results
 from rl_workbench.tools import job as job_module
-from rl_workbench.tools import results
-from rl_workbench.tools.benchmark import (
-    CONFIG,
-    _suite,
-    add_flags,
-    check_options,
-    default_file,
-    make_variant,
-    read_suite,
-    training_flags,
-)
+from rl_workbench.tools.benchmark import check_options, make_variant, read_suite, training_flags
 from rl_workbench.tools.job import Job, command
 from rl_workbench.tools.results import SUMMARY, RunResult, examine, grouped, summary_table
 from rl_workbench.tools.runs import open_run
@@ -63,7 +53,7 @@ def examined(one: Job) -> RunResult:
 def test_every_suite_of_the_package_has_options_that_exist() -> None:
     import yaml
 
-    for name in yaml.safe_load(default_file(CONFIG).read_text()):
+    for name in yaml.safe_load(benchmark.default_file(benchmark.CONFIG).read_text()):
         suite = read_suite(name)
         assert suite.variants and suite.about
         for variant in suite.variants:
@@ -71,9 +61,7 @@ def test_every_suite_of_the_package_has_options_that_exist() -> None:
 
 
 @pytest.mark.slow
-def test_a_suite_gives_tables_with_every_seed_and_every_failure(
-    suites: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_suite_gives_tables_with_every_seed_and_every_failure(suites, tmp_path, capsys) -> None:
     out = tmp_path / "out"
     command = ["benchmark", "two", f"--suites={suites}", f"--out={out}", "--episodes=2", "--jobs=2"]
     assert cli.main(command) == 1  # a training has failed
@@ -100,9 +88,12 @@ def test_a_suite_gives_tables_with_every_seed_and_every_failure(
         assert (out / name).read_bytes().startswith(b"\x89PNG")
 
 
-def test_its_length_is_a_flag_as_of_train() -> None:
-    words = ["benchmark", "--total-timesteps=5000", "--params", "total_timesteps=1"]
-    assert _suite(cli.parse(words)).variants[0].options["total_timesteps"] == "5000"
+def test_length_and_file_of_options_are_flags_as_of_train(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    flags = ["--total-timesteps=5000", f"--config={file}", "--params", "total_timesteps=1"]
+    (variant,) = benchmark._suite(cli.parse(["benchmark", *flags])).variants
+    assert variant.options["total_timesteps"] == "5000"
+    assert f"--config={file.resolve()}" in training_flags(variant, 0)
 
 
 @pytest.mark.slow
@@ -129,12 +120,12 @@ def test_an_interrupted_benchmark_goes_on_where_it_was(tmp_path: Path) -> None:
     assert not same.is_done() and command(same, PROGRAM)[-1] == f"--resume={run}"
 
 
-def test_a_folder_of_other_options_is_refused(suites: Path, tmp_path: Path, capsys) -> None:
+def test_a_folder_of_other_options_is_refused(suites: Path, tmp_path: Path, refused) -> None:
     out = tmp_path / "out"
     out.mkdir()
     (out / "suite.json").write_text("[]")
-    assert cli.main(["benchmark", "two", f"--suites={suites}", f"--out={out}"]) == 1
-    assert "runs with other options" in capsys.readouterr().err
+    line = refused("benchmark", "two", f"--suites={suites}", f"--out={out}")
+    assert "runs with other options" in line
 
 
 @pytest.mark.parametrize(
@@ -151,9 +142,8 @@ def test_a_folder_of_other_options_is_refused(suites: Path, tmp_path: Path, caps
         pytest.param(["--algo=ppo", "--params", "n_stepz=64"], "did you mean n_steps", marks=SB3),
     ],
 )
-def test_wrong_input_is_a_line(arguments: list[str], line: str, tmp_path: Path, capsys) -> None:
-    assert cli.main(["benchmark", *arguments, f"--out={tmp_path / 'out'}"]) == 1
-    assert line in capsys.readouterr().err
+def test_wrong_input_is_a_line(arguments: list[str], line: str, tmp_path: Path, refused) -> None:
+    assert line in refused("benchmark", *arguments, f"--out={tmp_path / 'out'}")
     assert not (tmp_path / "out").exists()
 
 
@@ -235,11 +225,10 @@ def test_ctrl_c_while_policies_are_played(tmp_path: Path, monkeypatch) -> None:
     assert not (tmp_path / "results.md").exists()
 
 
-def test_two_benchmarks_do_not_share_a_folder(tmp_path: Path, capsys) -> None:
+def test_two_benchmarks_do_not_share_a_folder(tmp_path: Path, refused) -> None:
     command = complete(tmp_path)
     with run_folder.held(tmp_path):
-        assert cli.main(command) == 1
-    assert f"another benchmark is running in {tmp_path}" in capsys.readouterr().err
+        assert f"another benchmark is running in {tmp_path}" in refused(*command)
 
 
 def test_a_damaged_record_costs_no_other_run_its_row(tmp_path: Path) -> None:
@@ -282,11 +271,3 @@ def test_a_statistic_tells_how_many_seeds_it_lacks() -> None:
 def test_a_variant_without_any_run_has_a_line_of_its_own() -> None:
     line = summarised([RunResult("a", 0, "run", fault="no run folder")])
     assert line == "| a | 0 of 1, 1 failed | never | never |"
-
-
-def test_options_come_from_a_file_as_in_train(tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
-    parser = argparse.ArgumentParser()
-    add_flags(parser)
-    suite = _suite(parser.parse_args(["--config", str(file)]))
-    assert f"--config={file.resolve()}" in training_flags(suite.variants[0], 0)

@@ -8,18 +8,10 @@ import pytest
 from support.pages.browser import Browser, find_browser, wait_for
 
 import robot_envs.robots  # noqa: F401 - registers the environments
-from rl_workbench import cli
 from rl_workbench.starting import Interrupt
 from rl_workbench.tools.by_hand import driven
-from rl_workbench.training.demonstrations import (
-    Demonstration,
-    Origin,
-    Recorder,
-    load,
-    paths,
-    replay,
-    save,
-)
+from rl_workbench.training import demonstrations
+from rl_workbench.training.demonstrations import Demonstration, Origin, Recorder, load, paths
 
 needs_browser = pytest.mark.skipif(
     not find_browser(), reason="no Chromium: apt-get install chromium"
@@ -90,8 +82,8 @@ def test_held_keys_are_a_robots_action_and_undone_ones_were_never(tmp_path: Path
     env = hand.origin.make()
     ways = [tuple(action) for action in (episode.actions / env.action_space.high).tolist()]
     assert ways[0] == (1, 0, 0, 0) and set(ways) <= {ways[0], (-1, 0, 0, 0), (0, 0, 0, 0)}
-    path = save(tmp_path, episode)
-    assert len(list(replay(path, load(path), env))) == 41
+    path = demonstrations.save(tmp_path, episode)
+    assert len(list(demonstrations.replay(path, load(path), env))) == 41
 
 
 @needs_browser
@@ -114,8 +106,8 @@ def test_a_choice_stays_until_the_next_and_an_end_waits_for_its_driver() -> None
         ("", "--env-id names the environment to drive"),
     ],
 )
-def test_what_cannot_be_driven_by_hand_is_one_line(tmp_path, capsys, env_id, text) -> None:
+def test_what_cannot_be_driven_by_hand_is_one_line(tmp_path, refused, env_id, text) -> None:
     given = [f"--env-id={env_id}"] if env_id else []
     out = tmp_path / "demos"
-    assert cli.main(["demonstrate", *given, f"--out={out}", "--no-browser", "--port=0"]) == 1
-    assert text in capsys.readouterr().err and not paths(out)
+    assert text in refused("demonstrate", *given, f"--out={out}", "--no-browser", "--port=0")
+    assert not paths(out)

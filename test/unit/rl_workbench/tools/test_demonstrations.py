@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from support.training import workbench_runs
 from support.training.learning_fakes import POLE
+from support.training.workbench_runs import work
 
 import robot_envs.robots  # noqa: F401 - registers the environments
-from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training import demonstrations
 from rl_workbench.training.demonstrations import Origin, Recorder, load, load_all, paths, replay
@@ -21,20 +21,20 @@ SHORT = {"max_steps": 6}
 DRIVEN = {"max_steps": 8}
 
 
-def demonstrate(folder: Path, *more: str, env_id: str = CUBE, steps: int = 6) -> int:
-    return cli.main(["demonstrate", f"--env-id={env_id}", f"--policy={PICK}", f"--out={folder}",
-                     "--env-kwargs", f"max_steps={steps}", *more])  # fmt: skip
+def demonstrating(folder: Path, *more: str, env_id: str = CUBE, steps: int = 6) -> list[str]:
+    return ["demonstrate", f"--env-id={env_id}", f"--policy={PICK}", f"--out={folder}",
+            "--env-kwargs", f"max_steps={steps}", *more]  # fmt: skip
 
 
 def dataset(demos: Path, out: Path, *more: str) -> int:
-    return cli.main(["dataset", str(demos), f"--out={out}", *more])
+    return work("dataset", demos, f"--out={out}", *more)
 
 
 @pytest.fixture(scope="module")
 def cube(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two short episodes; not to be changed."""
     folder = tmp_path_factory.mktemp("demos") / "cube"
-    assert demonstrate(folder, "--episodes=2") == 0
+    assert work(*demonstrating(folder, "--episodes=2")) == 0
     return folder
 
 
@@ -54,13 +54,6 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def fault(capsys: pytest.CaptureFixture[str]) -> str:
-    """The one line of a command that has failed."""
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1, lines
-    return lines[0]
-
-
 def test_an_episode_is_a_small_file_that_says_how_it_was_made(cube: Path) -> None:
     first, second = (load(path) for path in paths(cube))
     assert (first.env_id, first.env_kwargs, first.seed, second.seed) == (CUBE, SHORT, 0, 1)
@@ -71,7 +64,7 @@ def test_an_episode_is_a_small_file_that_says_how_it_was_made(cube: Path) -> Non
 
 def test_more_episodes_come_behind_with_further_seeds(cube: Path, tmp_path: Path) -> None:
     whole = Path(shutil.copytree(cube, tmp_path / "demos"))
-    assert demonstrate(whole, "--episodes=1") == 0
+    assert work(*demonstrating(whole, "--episodes=1")) == 0
     assert [load(path).seed for path in paths(whole)] == [0, 1, 2]
 
 
@@ -93,9 +86,9 @@ def test_undone_steps_leave_no_trace() -> None:
 
 def test_the_policy_of_a_run_demonstrates_in_its_own_environment(tmp_path: Path) -> None:
     run = workbench_runs.dqn(tmp_path / "run", env_id=POLE, total_timesteps=100)
-    command = ["demonstrate", f"--policy={run}", "--episodes=2", f"--out={tmp_path / 'demos'}"]
-    assert cli.main(command) == 0
-    assert dataset(tmp_path / "demos", tmp_path / "data") == 0
+    out = tmp_path / "demos"
+    assert work("demonstrate", f"--policy={run}", "--episodes=2", f"--out={out}") == 0
+    assert dataset(out, tmp_path / "data") == 0
     (path, _) = sorted((tmp_path / "data").glob("*.npz"))
     with np.load(path) as data:
         assert data["observations"].shape == (len(data["actions"]) + 1, 4)
@@ -135,15 +128,14 @@ def test_a_dataset_of_minaris_is_loaded_there(driven: Path, tmp_path: Path, monk
     found.recover_environment().close()
 
 
-def test_options_that_keep_the_trajectory_may_differ(cube: Path, tmp_path: Path, capsys) -> None:
+def test_options_that_keep_the_trajectory_may_differ(cube: Path, tmp_path: Path, refused) -> None:
     noisy, late = tmp_path / "noisy", tmp_path / "late"
     assert dataset(cube, noisy, "--env-kwargs", "sensor_noise=0.01") == 0
     assert json.loads((noisy / "metadata.json").read_text())["replay"]["equal_to_the_bit"] == [
         "rewards", "ends",
     ]  # fmt: skip
-    capsys.readouterr()
-    assert dataset(cube, late, "--env-kwargs", "action_delay=1") == 1
-    assert "episode_00000.npz goes another way in step 1: other rewards" in fault(capsys)
+    line = refused("dataset", cube, f"--out={late}", "--env-kwargs", "action_delay=1")
+    assert "episode_00000.npz goes another way in step 1: other rewards" in line
     assert [path.name for path in tmp_path.iterdir()] == ["noisy"]
 
 
@@ -175,41 +167,37 @@ def cut(path: Path) -> None:
         (lambda path: changed(path, seen=np.zeros(7, np.uint64)), "in step 0: other observations"),
     ],
 )  # fmt: skip
-def test_damaged_and_foreign_episodes_are_one_line(
-    cube: Path, tmp_path: Path, capsys, damage, text
-) -> None:
+def test_damaged_and_foreign_episodes_are_one_line(cube, tmp_path, refused, damage, text) -> None:
     demos = Path(shutil.copytree(cube, tmp_path / "demos"))
     damage(paths(demos)[1])
-    assert dataset(demos, tmp_path / "data") == 1
-    line = fault(capsys)
+    line = refused("dataset", demos, f"--out={tmp_path / 'data'}")
     assert text in line and "episode_00001.npz" in line
     assert not (tmp_path / "data").exists()
 
 
 @pytest.mark.parametrize(
-    ("more", "text"),
+    ("sensors", "text"),
     [
-        (["--sensors=front"], "there is no sensor 'front'"),
-        (["--sensors=camera@9"], "WIDTHxHEIGHT, not '9'"),
-        (["--sensors=laser@9x9"], "'laser' is none"),
-        (["--sensors=laser,laser"], "names one twice"),
-        (["--sensors=render@9"], "WIDTHxHEIGHT, as in render@640x480"),
+        ("front", "there is no sensor 'front'"),
+        ("camera@9", "WIDTHxHEIGHT, not '9'"),
+        ("laser@9x9", "'laser' is none"),
+        ("laser,laser", "names one twice"),
+        ("render@9", "WIDTHxHEIGHT, as in render@640x480"),
     ],
 )
-def test_sensors_that_there_are_not(driven: Path, tmp_path: Path, capsys, more, text) -> None:
-    assert dataset(driven, tmp_path / "data", *more) == 1
-    assert text in fault(capsys)
+def test_sensors_that_there_are_not(driven: Path, tmp_path, refused, sensors, text) -> None:
+    assert text in refused("dataset", driven, f"--out={tmp_path / 'd'}", f"--sensors={sensors}")
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_of_another_environment_gets_none(cube: Path, capsys) -> None:
-    assert demonstrate(cube, "--episodes=1", env_id="robot_envs/PickCubeGoal-v0") == 1
-    assert "another --out keeps them apart" in fault(capsys)
-    assert demonstrate(cube, "--episodes=1", steps=7) == 1
+def test_a_folder_of_another_environment_gets_none(cube: Path, refused) -> None:
+    for other in ({"env_id": "robot_envs/PickCubeGoal-v0"}, {"steps": 7}):
+        line = refused(*demonstrating(cube, "--episodes=1", **other))
+        assert "another --out keeps them apart" in line
     assert len(load_all(cube)) == 2
 
 
-def test_a_full_disk_loses_nothing(cube: Path, tmp_path: Path, capsys, monkeypatch) -> None:
+def test_a_full_disk_loses_nothing(cube: Path, tmp_path: Path, refused, monkeypatch) -> None:
     demos, write, written = Path(shutil.copytree(cube, tmp_path / "demos")), os.fsync, []
 
     def full(number: int) -> None:
@@ -219,8 +207,8 @@ def test_a_full_disk_loses_nothing(cube: Path, tmp_path: Path, capsys, monkeypat
         write(number)
 
     monkeypatch.setattr(os, "fsync", full)
-    assert demonstrate(demos, "--episodes=3") == 1
-    assert "episode_00003.npz: No space left on device" in capsys.readouterr().err
+    line = refused(*demonstrating(demos, "--episodes=3"))
+    assert "episode_00003.npz: No space left on device" in line
     assert len(load_all(demos)) == 3
 
 

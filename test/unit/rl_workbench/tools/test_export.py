@@ -11,8 +11,8 @@ import pytest
 import torch
 from gymnasium import spaces
 from support.training import workbench_runs
+from support.training.workbench_runs import work
 
-from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools import torchscript
 from rl_workbench.tools.policies import Player, load_learned
@@ -20,6 +20,7 @@ from rl_workbench.tools.runs import Run, open_run
 from rl_workbench.tools.torchscript import open_exported
 from rl_workbench.training.algorithms import ALGORITHMS
 
+REACH = "robot_envs.robots:robot_envs/TwoLinkReachGoal-v0"
 KINDS = {
     "plain": ("dqn", {"normalize_observations": "false"}),
     "dueling": ("dqn", {"dueling": "true"}),
@@ -31,8 +32,7 @@ KINDS = {
                             "env_kwargs": {"max_episode_steps": 30}}),
     "gaussian": ("reinforce", {"env_id": "Pendulum-v1", "episodes": 6, "eval_frequency": 0,
                                "env_kwargs": {"max_episode_steps": 30}}),
-    "goals": ("reinforce", {"env_id": "robot_envs.robots:robot_envs/TwoLinkReachGoal-v0",
-                            "episodes": 2, "batch_episodes": 1, "eval_frequency": 0,
+    "goals": ("reinforce", {"env_id": REACH, "episodes": 2, "batch_episodes": 1, "eval_frequency": 0,
                             "env_kwargs": {"max_steps": 20}, "normalize_observations": "true"}),
     "document": ("reinforce-document", {}),
 }  # fmt: skip
@@ -48,20 +48,9 @@ SB3 = {
     "sac-sde": ("sac", CONTINUOUS | OFF_POLICY | {"use_sde": True}),
     "td3": ("td3", CONTINUOUS | OFF_POLICY),
     "ddpg": ("ddpg", CONTINUOUS | OFF_POLICY),
-    "sac-her": (
-        "sac",
-        OFF_POLICY
-        | {
-            "env_id": "robot_envs.robots:robot_envs/TwoLinkReachGoal-v0",
-            "env_kwargs": {"max_steps": 20},
-            "her": True,
-        },
-    ),
-    "dqn-sb3": (
-        "dqn-sb3",
-        OFF_POLICY | {"learning_rate": 0.01, "target_update_interval": 20, "seed": 2},
-    ),
-}
+    "sac-her": ("sac", OFF_POLICY | {"env_id": REACH, "env_kwargs": {"max_steps": 20}, "her": True}),
+    "dqn-sb3": ("dqn-sb3", OFF_POLICY | {"learning_rate": 0.01, "target_update_interval": 20, "seed": 2}),
+}  # fmt: skip
 ALONE = """
 import json, sys
 import torch
@@ -71,16 +60,6 @@ observations = torch.tensor(json.loads(sys.argv[2]), dtype=torch.float64)
 strange = [name for name in sys.modules if name.split(".")[0] in ("rl_workbench", "gymnasium", "cartpole")]
 print(json.dumps([policy(observations).tolist(), json.loads(extra["metadata.json"]), strange]))
 """
-
-
-def work(*arguments: object) -> int:
-    return cli.main([str(each) for each in arguments])
-
-
-def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    assert work(*arguments) == 1
-    (line,) = capsys.readouterr().err.strip().splitlines()
-    return line
 
 
 def train(folder: Path, name: str) -> Path:

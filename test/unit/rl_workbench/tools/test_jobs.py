@@ -12,6 +12,7 @@ import threading
 import time
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.training import workbench_runs
@@ -32,25 +33,19 @@ LONGER = {"total_timesteps": 3000, "checkpoint_frequency": 100}
 HERE = Program(PROGRAM, search_path())
 
 
-def pool(
-    folder: Path, jobs: list[Job], at_once: int = 1, interrupt: Interrupt | None = None
-) -> JobPool:
+def pool(folder: Path, jobs: list[Job], at_once: int = 1, interrupt: Any = None) -> JobPool:
     folder.mkdir(exist_ok=True)
     run = partial(run_here, program=HERE, since=time.time())
     return JobPool(folder, run, at_once, interrupt or Interrupt(), jobs)
 
 
-def sleeping(
-    monkeypatch: pytest.MonkeyPatch, program: str = "import time; time.sleep(1000)"
-) -> None:
+def sleeping(monkeypatch: Any, program: str = "import time; time.sleep(1000)") -> None:
     """Trainings become another program."""
     words = [sys.executable, "-c", program]
     monkeypatch.setattr(job_module, "command", lambda *_: words)
 
 
-def test_a_training_that_outlived_its_benchmark_is_left_alone(
-    tmp_path: Path, monkeypatch, capsys
-) -> None:
+def test_a_training_that_outlived_its_command_is_left_alone(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setattr(job_module, "MAX_ATTEMPTS", 2)
     one = job(tmp_path)
     one.folder.mkdir()
@@ -150,6 +145,7 @@ while True:
 WORKER = f"""
 import sys, time
 from pathlib import Path
+from typing import Any
 from rl_workbench.tools import job
 
 job.command = lambda *_: [sys.executable, "-c", {TRAINING!r}]
@@ -203,10 +199,8 @@ def test_jobs_are_listed_from_files_alone(tmp_path: Path, capsys) -> None:
     made.run(every[2])
     made.run(every[1])
     lines = [line for line in capsys.readouterr().out.splitlines() if not line.startswith("[")]
-    assert (
-        lines[0].split()[:2] == ["done", "done"]
-        and "300 steps  in 1.5 s, best evaluation 9.0 at step 200" in lines[0]
-    )
+    assert lines[0].split()[:2] == ["done", "done"]
+    assert "300 steps  in 1.5 s, best evaluation 9.0 at step 200" in lines[0]
     assert lines[1].split()[0] == "running" and "30 of 500 steps" in lines[1]
     assert re.search("for 1:00:.. on 10.0.0.8  attempt 2.*Episode 20$", lines[1])
     assert lines[2].endswith("the loss is nan") and lines[3].split()[0] == "waiting"

@@ -121,9 +121,7 @@ def test_a_section_of_options_is_found_by_either_name(tmp_path: Path, capsys, se
         ("own_arm.leaving:own_arm/Reach-v0", "can't make own_arm.leaving:own_arm/Reach-v0: SystemExit"),
     ],
 )  # fmt: skip
-def test_a_name_that_leads_nowhere_is_one_line(
-    module: Path, tmp_path: Path, capsys, env_id: str, words: str
-) -> None:
+def test_a_name_that_leads_nowhere_is_one_line(module, tmp_path, capsys, env_id, words) -> None:
     (module / "own_arm/broken.py").write_text("1 / 0\n")
     (module / "own_arm/needy.py").write_text("import nowhere\n")
     (module / "own_arm/leaving.py").write_text("raise SystemExit\n")
@@ -135,9 +133,7 @@ def test_a_name_that_leads_nowhere_is_one_line(
     assert not (tmp_path / "run").exists()
 
 
-def test_a_run_whose_module_is_gone_is_plotted_all_the_same(
-    module: Path, trained: Path, tmp_path: Path, capsys, monkeypatch
-) -> None:
+def test_a_run_without_module_is_plotted(module, trained, tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.setattr(sys, "path", [each for each in sys.path if each != str(module)])
     for name in ("own_arm", "own_arm.tasks"):
         monkeypatch.delitem(sys.modules, name)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.training.ray_nodes import QUIET, RayCluster, title, wait_until
@@ -25,14 +26,12 @@ PARAMS = ["total_timesteps=5000", "learning_starts=50", "batch_size=8", "hidden_
 def benchmark(out: Path, *flags: str) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "rl_workbench", "benchmark", f"--out={out}", "--seeds=2",
                "--episodes=2", *flags, "--params", *PARAMS]  # fmt: skip
-    return subprocess.Popen(
-        command,
-        env={**os.environ, **QUIET},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        start_new_session=True,
-    )
+    return started(command, start_new_session=True)
+
+
+def started(command: list[str], **options: Any) -> subprocess.Popen[str]:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    return subprocess.Popen(command, env={**os.environ, **QUIET}, **pipes, **options)
 
 
 def finished(process: subprocess.Popen[str], code: int = 0) -> str:
@@ -97,9 +96,7 @@ def test_what_is_killed_changes_no_byte_of_the_table(cluster, table: bytes, tmp_
     assert max(state(tmp_path, seed).attempts for seed in range(2)) > 1
 
 
-def test_a_benchmark_whose_own_process_is_killed_or_stopped_goes_on(
-    cluster: RayCluster, table: bytes, tmp_path: Path
-) -> None:
+def test_a_benchmark_killed_or_stopped_goes_on(cluster, table: bytes, tmp_path: Path) -> None:
     flag = f"--ray={cluster.address}"
     driver = benchmark(tmp_path, flag)
     try:
@@ -134,10 +131,8 @@ def test_a_node_that_does_not_see_the_folder_is_one_line(cluster, tmp_path, monk
     )
     command = [sys.executable, "-c", program, "benchmark", f"--ray={cluster.address}", "--seeds=1",
                f"--out={tmp_path / 'a'}"]  # fmt: skip
-    driver = subprocess.Popen(
-        command, env={**os.environ, **QUIET}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )  # fmt: skip
-    assert f"doesn't see {tmp_path / 'a'}: --out must be a folder that all" in finished(driver, 1)
+    said = finished(started(command), 1)
+    assert f"doesn't see {tmp_path / 'a'}: --out must be a folder that all" in said
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import ctypes.util
 import os
+from argparse import Namespace
 from io import BytesIO
 from pathlib import Path
 
@@ -10,14 +11,22 @@ import numpy as np
 import pytest
 from PIL import Image
 from support.pages import viser_recording
+from support.pages.browser import Browser, find_browser, wait_for
+from support.pages.pictures import pixel
 from support.training.workbench_runs import record as bare_run
 
 import cartpole  # noqa: F401 - registers the environments
+from cartpole.environment import CAMERA
 from rl_workbench import cli
-from rl_workbench.tools.record import Film, SideBySide, write_video
+from rl_workbench.tools.policies import Player
+from rl_workbench.tools.record import Film, SideBySide, _write_scene, write_video
 from rl_workbench.tools.recording import PictureView, draw_without_display, record_episode
 
 RATE = 40.0  # [Hz]
+HEIGHT = 0.5  # [m] of the robot above the ground, in this task
+NEAR = 4.0  # [pixels]
+CART = 0.15  # [m] above the robot's foot
+SEEK = ".mantine-NumberInput-input"
 
 
 class Counter(gymnasium.Env):
@@ -125,7 +134,7 @@ def test_best_last_and_random_side_by_side(robot_run: Path, tmp_path: Path, caps
     assert [line.split(":")[0] for line in told] == ["best", "last", "random", str(out)]
 
 
-def test_the_camera_is_placed_by_its_fields(robot_run: Path, tmp_path: Path, capsys):
+def test_the_camera_is_placed_by_its_fields(robot_run: Path, tmp_path: Path):
     words = ("--max-steps", "1", "--size", "64x48", "--camera")
     seen = []
     for name, fields in (("a.gif", ("distance=2",)), ("b.gif", ("yaw=104", "target=[0,0,0.3]"))):
@@ -133,8 +142,6 @@ def test_the_camera_is_placed_by_its_fields(robot_run: Path, tmp_path: Path, cap
         with Image.open(tmp_path / name) as video:
             seen.append(np.asarray(video.convert("RGB"))[:48])
     assert (seen[0] != seen[1]).any()
-    assert record(robot_run, tmp_path / "a.gif", *words, "jaw=104") == 1
-    assert "a camera has no 'jaw'; it has target, distance, yaw" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -152,9 +159,16 @@ def test_flags_that_make_no_sense(robot_run: Path, tmp_path: Path, capsys, words
     assert text in capsys.readouterr().err
 
 
-def test_a_gif_that_browsers_would_slow_down_is_refused(robot_run: Path, tmp_path: Path, capsys):
-    assert record(robot_run, tmp_path / "a.gif", "--fps", "100") == 1
-    assert "at most 50 frames a second" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("name", "flags", "text"),
+    [
+        ("a.gif", ("--fps=100",), "at most 50 frames a second"),  # browsers would slow it down
+        ("a.gif", ("--camera", "jaw=1"), "a camera has no 'jaw'; it has target, distance, yaw"),
+        ("a.html", ("--size=64x48",), "as large as the browser's window"),
+    ],
+)
+def test_what_a_file_cannot_be_is_refused(robot_run: Path, tmp_path, refused, name, flags, text):
+    assert text in refused("record", robot_run, "--out", tmp_path / name, *flags)
 
 
 def test_a_page_holds_all_that_it_shows(tmp_path: Path):
@@ -179,12 +193,11 @@ class Narrow(Counter):
         super().__init__(3, render_mode)
 
 
-def test_a_size_that_an_environment_refuses_is_said(tmp_path: Path, capsys):
+def test_a_size_that_an_environment_refuses_is_said(tmp_path: Path, refused):
     gymnasium.register("Narrow-v0", Narrow)
     run = bare_run(tmp_path / "run", [1.0], env_id="Narrow-v0")
-    words = ("--checkpoint", "random", "--size", "600x60")
-    assert record(run, tmp_path / "a.gif", *words) == 1
-    assert "600 pixels are too wide for this one" in capsys.readouterr().err
+    words = ("--checkpoint=random", "--size=600x60", "--out", tmp_path / "a.gif")
+    assert "600 pixels are too wide for this one" in refused("record", run, *words)
 
 
 def test_an_environment_without_a_size_has_its_pictures_scaled(tmp_path: Path):
@@ -195,7 +208,7 @@ def test_an_environment_without_a_size_has_its_pictures_scaled(tmp_path: Path):
         assert video.size == (100, 30 + 8)
 
 
-# In 3-D. That a browser plays the file: test_record_played.py.
+# In 3-D.
 
 
 def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(robot_run: Path, tmp_path, capsys):
@@ -227,9 +240,44 @@ def test_several_are_seen_beside_each_other(robot_run: Path, tmp_path: Path, cap
     assert [each.split()[0] for each in captions] == ["best", "last", "random"]
 
 
-def test_a_size_is_refused_where_it_has_none(robot_run: Path, tmp_path: Path, capsys):
-    assert record(robot_run, tmp_path / "a.html", "--size", "64x48") == 1
-    assert "as large as the browser's window" in capsys.readouterr().err
+def cart(page: Browser, height: int) -> np.ndarray:
+    """Column and row [pixels] of the blue cart, above the player's bar; infinite where there is none."""
+    picture = Image.open(BytesIO(page.screenshot())).convert("RGB")
+    red, _, blue = np.asarray(picture)[:height].astype(int).transpose(2, 0, 1)
+    seen = blue > 1.5 * red + 30
+    seen[:, : picture.width // 8] = False  # the page's own axes
+    return np.argwhere(seen)[:, ::-1].mean(axis=0) if seen.any() else np.full(2, np.inf)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not find_browser(), reason="no Chromium: apt-get install chromium")
+def test_a_browser_plays_it_without_any_network(tmp_path: Path):
+    places: list[float] = []
+    camera = CAMERA.at((*CAMERA.target[:2], CAMERA.target[2] + HEIGHT))
+
+    def right(observation: np.ndarray) -> list[float]:
+        places.append(float(observation[0]))
+        return [1.0]
+
+    path = tmp_path / "episode.html"
+    env = gymnasium.make("cartpole/SwingUp-v0", noise=0.0)
+    arguments = Namespace(
+        out=path, size=None, checkpoint=["best"], seed=0, max_steps=31, no_captions=True
+    )
+    _write_scene(arguments, {"best": Player(right, env)}, 125.0)
+    env.close()
+    with Browser(path.as_uri(), offline=True, size=(640, 400)) as page:
+        wait_for(lambda: page.run(f"!!document.querySelector({SEEK!r})"), "player")
+        canvas = "document.querySelector('canvas')"
+        width, height = page.run(f"[{canvas}.clientWidth, {canvas}.clientHeight]")
+        for step in (15, 0, 30):
+            wanted = pixel(camera, (places[step], 0.0, HEIGHT + CART), width, height)
+            page.type(SEEK, f"{step * 0.008 + 0.001:.4f}")
+            wait_for(lambda at=wanted: np.abs(cart(page, height) - at).max() < NEAR, f"step {step}")
+        assert all(each.startswith(("file:", "data:", "blob:")) for each in page.requests)
+        assert page.requests
+    across = [pixel(camera, (place, 0.0, HEIGHT), width, height)[0] for place in places]
+    assert across[15] - across[0] > 2.0 * NEAR and across[30] - across[15] > 2.0 * NEAR
 
 
 @pytest.mark.parametrize(

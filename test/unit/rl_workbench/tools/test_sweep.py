@@ -4,27 +4,21 @@ import errno
 import json
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import yaml
+from support.training.workbench_runs import work
 
-from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
+from rl_workbench.tools import sweep as search_module
 from rl_workbench.tools.job import Ending, Job, StopWithin
 from rl_workbench.tools.jobs import JobPool
-from rl_workbench.tools.sweep import (
-    OptionRange,
-    Search,
-    Sweep,
-    open_study,
-    read_ranges,
-    write_results,
-)
+from rl_workbench.tools.sweep import OptionRange, Sweep, read_ranges
 from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.options import known_options
 
@@ -87,9 +81,11 @@ def search(
     folder.mkdir(exist_ok=True)
     sweep = QuickSweep(folder, "dqn", {}, RANGES, trials, seeds, 0, pruner, "Some-v0")
     trainer, interrupt = Trainer(curve), interrupt or Interrupt()
-    study = open_study(sweep)
-    Search(sweep, study, JobPool(folder, trainer, at_once, interrupt), interrupt).run()
-    write_results(sweep, study)
+    study = search_module.open_study(sweep)
+    search_module.Search(
+        sweep, study, JobPool(folder, trainer, at_once, interrupt), interrupt
+    ).run()
+    search_module.write_results(sweep, study)
     return trainer
 
 
@@ -244,7 +240,7 @@ def test_the_packages_own_ranges(algorithm: str) -> None:
 
 
 @pytest.fixture
-def command(tmp_path: Path) -> Iterator[Callable[..., int]]:
+def command(tmp_path: Path) -> Callable[..., list[object]]:
     ranges = tmp_path / "ranges.yaml"
     ranges.write_text(
         "dqn: {gamma: {choices: [0.98, 0.99]}, eval_frequency: {choices: [200]}, "
@@ -253,39 +249,34 @@ def command(tmp_path: Path) -> Iterator[Callable[..., int]]:
         "reinforce: {gamma: {choices: [0.98]}, batch_episodes: {choices: [1, 2]}}"
     )
 
-    def run(algorithm: str, *flags: str) -> int:
-        return cli.main(
-            ["sweep", "--algo", algorithm, "--out", str(tmp_path / "study"), "--trials", "2",
-             "--ranges", str(ranges), "--total-timesteps", "200", *flags]
-        )  # fmt: skip
+    def words(algorithm: str) -> list[object]:
+        return ["sweep", "--algo", algorithm, "--out", tmp_path / "study", "--trials=1",
+                "--ranges", ranges, "--total-timesteps=200"]  # fmt: skip
 
-    return run
+    return words
 
 
 @pytest.mark.parametrize("algorithm", ["dqn", "reinforce", "ppo"])
-def test_the_command_trains_and_its_best_options_can_be_used(
-    tmp_path: Path, algorithm: str, command: Callable[..., int], capsys
-) -> None:
-    assert command(algorithm, "--trials=1") == 0
+def test_the_command_trains_and_writes_best_options(tmp_path, algorithm, command, capsys) -> None:
+    assert work(*command(algorithm)) == 0
     assert states(tmp_path / "study") == ["complete"]
     assert "its options are in" in capsys.readouterr().out
     best = yaml.safe_load((tmp_path / "study" / "best.yaml").read_text())
     assert list(best) == ["ppo CartPole-v1" if algorithm == "ppo" else "CartPole-v1"]
 
 
-def test_a_folder_of_another_search_is_refused(tmp_path: Path, command, capsys) -> None:
+def test_a_folder_of_another_search_is_refused(tmp_path: Path, command, refused) -> None:
     (tmp_path / "study").mkdir()
     (tmp_path / "study" / "sweep.json").write_text("{}")
-    assert command("dqn") == 1
-    assert "other options, ranges or seeds" in capsys.readouterr().err
+    assert "other options, ranges or seeds" in refused(*command("dqn"))
 
 
-def test_a_disk_that_is_full_is_one_line(tmp_path: Path, command, monkeypatch, capsys) -> None:
+def test_a_disk_that_is_full_is_one_line(tmp_path: Path, command, monkeypatch, refused) -> None:
     from optuna.storages.journal import JournalFileBackend
 
     def refuse(self: Any, logs: Any) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(JournalFileBackend, "append_logs", refuse)
-    assert command("dqn") == 1
-    assert f"can't write to {tmp_path}/study: No space left on device" in capsys.readouterr().err
+    line = refused(*command("dqn"))
+    assert f"can't write to {tmp_path}/study: No space left on device" in line

@@ -12,10 +12,10 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 import pytest
-from support.training.workbench_runs import dqn, policy_gradient, record
+from support.training.learning_fakes import Still
+from support.training.workbench_runs import dqn, record
 
 import cartpole  # noqa: F401 - registers its environments
-from rl_workbench import cli
 from rl_workbench.tools import recording
 from rl_workbench.tools.policies import TEST_SEED, episode_steps, load_learned
 from rl_workbench.tools.recording import EpisodeFrame, EpisodeRecorder, RecordedEpisode
@@ -28,33 +28,9 @@ BOUND = 180.0  # [s]
 TICK = 0.1  # [s]
 
 
-class Blind(gymnasium.Env):
-    """An environment that draws nothing."""
-
-    observation_space = gymnasium.spaces.Box(-1.0, 1.0, (2,))
-    action_space = gymnasium.spaces.Discrete(2)
-    metadata = {"render_modes": []}
-
-    def __init__(self) -> None:
-        self.render_mode = None
-
-    def reset(self, *, seed=None, options=None):
-        super().reset(seed=seed)
-        return np.zeros(2, np.float32), {}
-
-    def step(self, action):
-        return np.zeros(2, np.float32), 1.0, False, False, {}
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> Path:
     return dqn(tmp_path_factory.mktemp("runs") / "run", env_id="CartPole-v1", env_kwargs=None)
-
-
-@pytest.fixture(scope="module")
-def robot(tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("runs") / "robot"
-    return policy_gradient(folder, env_id="cartpole/Balance-v0")
 
 
 @pytest.fixture
@@ -114,11 +90,11 @@ def test_an_episode_is_that_of_record_with_pictures(run, make_recorder) -> None:
     assert whole(recorder.play("best", 0)).frames[5].seen != episode.frames[5].seen
 
 
-def test_a_robot_is_recorded_by_where_its_links_are(robot, make_recorder, server) -> None:
-    recorder = make_recorder(robot)
+def test_a_robot_is_recorded_by_where_its_links_are(robot_run, make_recorder, server) -> None:
+    recorder = make_recorder(robot_run)
     episode = whole(recorder.play("last", 1))
     assert not episode.note
-    assert [each.total_reward for each in episode.frames] == returns(robot, "last", 1)
+    assert [each.total_reward for each in episode.frames] == returns(robot_run, "last", 1)
     places = np.array([each.seen.links for each in episode.frames])
     assert places.shape[0] == episode.length + 1 and places.shape[2] == 7
     assert np.ptp(places, axis=0).max() > 0.01
@@ -148,13 +124,17 @@ def endless(place: Path) -> Path:
     return folder if folder.exists() else record(folder, [1.0], env_id="Endless-v0")
 
 
-class Endless(Blind):
-    """One whose episodes don't end."""
+class Blind(Still):
+    """One that draws nothing."""
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
+    def __init__(self) -> None:
+        super().__init__()
 
-    def __init__(self, render_mode=None) -> None:
-        self.render_mode = render_mode
+
+class Endless(Still):
+    """One that is drawn."""
+
+    metadata: ClassVar = {"render_modes": ["rgb_array"], "render_fps": 10}
 
     def render(self):
         return np.zeros((16, 16, 3), np.uint8)
@@ -193,10 +173,8 @@ def test_an_environment_that_draws_nothing_is_said(tmp_path, make_recorder) -> N
     recorder = make_recorder(record(tmp_path / "blind", [1.0], env_id="Blind-v0"))
     assert "the environment draws no pictures" in whole(recorder.play("random", 0)).note
     recorder = make_recorder(record(tmp_path / "none", [1.0], env_id="NoSuch-v0"))
-    assert (
-        "can't make NoSuch-v0: Environment `NoSuch` doesn't exist."
-        in whole(recorder.play("random", 0)).note
-    )
+    words = "can't make NoSuch-v0: Environment `NoSuch` doesn't exist."
+    assert words in whole(recorder.play("random", 0)).note
 
 
 class Shared(Endless):
@@ -279,14 +257,12 @@ def test_one_that_fails_while_it_is_drawn_is_said_and_made_anew(
     assert whole(recorder.play("random", 0)).length == 5
 
 
-def test_record_says_it_in_one_line(tmp_path, monkeypatch, capsys) -> None:
+def test_record_says_it_in_one_line(tmp_path, monkeypatch, refused) -> None:
     """As with MuJoCo's environments where there is no OpenGL."""
     registered("Broken-v0", Broken)
     monkeypatch.setattr(Broken, "trouble", RuntimeError("no\nOpenGL here"))
     folder = record(tmp_path / "broken", [1.0], env_id="Broken-v0")
-    flags = ["--checkpoint", "random", "--out", str(tmp_path / "a.gif")]
-    assert cli.main(["record", str(folder), *flags], "workbench.py") == 1
-    (told,) = capsys.readouterr().err.strip().splitlines()
+    told = refused("record", folder, "--checkpoint=random", "--out", tmp_path / "a.gif")
     assert "can't be drawn: Broken-v0 failed in render(): RuntimeError: no OpenGL here" in told
 
 
@@ -365,21 +341,14 @@ def test_several_episodes_follow_each_other(server) -> None:
 # The command.
 
 
-def refused(capsys, *arguments: str) -> str:
-    assert cli.main(["view", *arguments], "workbench.py") == 1
-    told = capsys.readouterr().err.strip().splitlines()
-    assert len(told) == 1
-    return told[0]
-
-
-def test_what_is_no_run_is_one_line(tmp_path, run, capsys) -> None:
-    assert "there is no such folder" in refused(capsys, str(tmp_path / "none"))
-    assert "it has no config.json" in refused(capsys, str(tmp_path))
+def test_what_is_no_run_is_one_line(tmp_path, run, refused) -> None:
+    assert "there is no such folder" in refused("view", tmp_path / "none")
+    assert "it has no config.json" in refused("view", tmp_path)
     (tmp_path / "config.json").write_text("{]")
-    assert "isn't JSON" in refused(capsys, str(tmp_path))
+    assert "isn't JSON" in refused("view", tmp_path)
     with socket.socket() as held:
         held.bind(("127.0.0.1", 0))
         held.listen()
         port = held.getsockname()[1]
-        assert f"port {port}: Address already in use" in refused(capsys, str(run), f"--port={port}")
-    assert "choose others with --host, --port" in refused(capsys, str(run), "--host=192.0.2.1")
+        assert f"port {port}: Address already in use" in refused("view", run, f"--port={port}")
+    assert "choose others with --host, --port" in refused("view", run, "--host=192.0.2.1")

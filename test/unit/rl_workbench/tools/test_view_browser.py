@@ -173,13 +173,8 @@ def test_a_training_is_seen_while_it_learns(start, tmp_path) -> None:
 
 
 def test_the_page_ends_with_its_training_whatever_ends_it(start, tmp_path) -> None:
-    training = start(
-        "train",
-        "--algo=dqn",
-        f"--run-dir={tmp_path / 'run'}",
-        "--total-timesteps=100000000",
-        "--gui",
-    )
+    long = ("--total-timesteps=100000000", "--gui")
+    training = start("train", "--algo=dqn", f"--run-dir={tmp_path / 'run'}", *long)
     url = training.url()
     assert is_served(url)
     training.kill()

@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -12,9 +11,11 @@ import numpy as np
 import pytest
 from PIL import Image
 from support.training import workbench_runs
+from support.training.workbench_runs import work
 
 import cartpole  # noqa: F401 - registers the environments
-from rl_workbench import cli
+
+SB3 = pytest.mark.extras("stable_baselines3")
 
 
 @pytest.fixture(scope="module")
@@ -32,18 +33,6 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def own(runs: Path, tmp_path: Path) -> Path:
     """A copy of a run that a test may damage."""
     return Path(shutil.copytree(runs / "dqn_0", tmp_path / "own"))
-
-
-def work(*arguments: object) -> int:
-    return cli.main([str(each) for each in arguments])
-
-
-def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """The one line that a command says when it fails."""
-    assert work(*arguments) == 1
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert re.match("rl-workbench( train)?: ", lines[-1]) and "Traceback" not in lines[-1]
-    return lines[-1]
 
 
 ALL = ["dqn_0", "robot", "reinforce", "reinforce-document"]
@@ -105,10 +94,10 @@ def test_record_writes_an_mp4_that_can_be_read(runs: Path, tmp_path: Path, name:
     assert len(list(frames)) >= 3
 
 
-def test_enjoy_without_a_display_says_so(runs: Path, monkeypatch, capsys) -> None:
+def test_enjoy_without_a_display_says_so(runs: Path, monkeypatch, refused) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
         monkeypatch.delenv(name, raising=False)
-    line = refused(capsys, "enjoy", runs / "dqn_0")
+    line = refused("enjoy", runs / "dqn_0")
     assert "DISPLAY isn't set" in line and "record" in line
 
 
@@ -202,23 +191,43 @@ def test_compare_by_training_needs_no_checkpoint(tmp_path: Path, capsys) -> None
     assert "| 115.0 ± 190.2 | 25.0 | 25.0 [" in capsys.readouterr().out
 
 
+# With Stable-Baselines3.
+
+
+@SB3
+def test_runs_of_stable_baselines_are_taken_by_all(tmp_path: Path) -> None:
+    run = workbench_runs.sb3(tmp_path / "run", num_envs=2)
+    assert work("eval", run, "--episodes", 2, "--checkpoint", "last") == 0
+    assert work("record", run, "--out", tmp_path / "a.gif", "--max-steps", 10) == 0
+    assert work("plot", run, "--out", tmp_path / "a.png") == 0
+    assert work("compare", run, "--episodes", 1, "--out", tmp_path / "c.png") == 0
+
+
+@SB3
+def test_many_environments_of_training_are_one_when_playing(tmp_path: Path, recwarn) -> None:
+    run = workbench_runs.sb3(tmp_path / "run", num_envs=8, n_steps=1, batch_size=8)
+    recwarn.clear()
+    assert work("eval", run, "--episodes", 1) == 0
+    assert not [each for each in recwarn if "mini-batch" in str(each.message)]
+
+
 # Bad input: one line each, and an exit code.
 
 
-def test_no_run_folder(tmp_path: Path, capsys) -> None:
-    assert "there is no such folder" in refused(capsys, "eval", tmp_path / "nowhere")
-    assert "it has no config.json" in refused(capsys, "eval", tmp_path)
-    assert "no run folder at" in refused(capsys, "plot", tmp_path, "--out", tmp_path / "a.png")
+def test_no_run_folder(tmp_path: Path, refused) -> None:
+    assert "there is no such folder" in refused("eval", tmp_path / "nowhere")
+    assert "it has no config.json" in refused("eval", tmp_path)
+    assert "no run folder at" in refused("plot", tmp_path, "--out", tmp_path / "a.png")
 
 
 @pytest.mark.parametrize(
     ("name", "value"), [("env_id", 5), ("seed", "x"), ("env_kwargs", [1]), ("eval_env_kwargs", 3)]
 )
-def test_a_record_of_other_types_is_one_line(own: Path, capsys, name: str, value: object) -> None:
+def test_a_record_of_other_types_is_one_line(own: Path, refused, name: str, value: object) -> None:
     content = json.loads((own / "config.json").read_text())
     content["run"][name] = value
     (own / "config.json").write_text(json.dumps(content))
-    assert f"{own} is not a run folder: its record is damaged" in refused(capsys, "eval", own)
+    assert f"{own} is not a run folder: its record is damaged" in refused("eval", own)
 
 
 @pytest.mark.parametrize("content", ["[1]", '{"returns": ["x"]}'])
@@ -236,17 +245,17 @@ def test_a_damaged_checkpoint_gives_way_to_an_earlier_one(own: Path, capsys) -> 
     assert json.loads(out)["checkpoint"].endswith("last.pt")
 
 
-def test_a_checkpoint_of_another_run_is_refused(runs: Path, own: Path, capsys) -> None:
+def test_a_checkpoint_of_another_run_is_refused(runs: Path, own: Path, refused) -> None:
     for other in ("dqn_1", "robot", "reinforce"):  # another seed, environment, algorithm
         shutil.copy(runs / other / "best.pt", own / "best.pt")
-        assert "best.pt isn't a checkpoint of" in refused(capsys, "eval", own)
+        assert "best.pt isn't a checkpoint of" in refused("eval", own)
 
 
-def test_no_episodes_yet(tmp_path: Path, capsys) -> None:
+def test_no_episodes_yet(tmp_path: Path, refused) -> None:
     run = workbench_runs.record(tmp_path / "run", [])
-    assert "no episode has ended yet" in refused(capsys, "plot", run, "--out", tmp_path / "a.png")
+    assert "no episode has ended yet" in refused("plot", run, "--out", tmp_path / "a.png")
     out = tmp_path / "b.png"
-    assert "no episode has ended" in refused(capsys, "compare", run, "--out", out)
+    assert "no episode has ended" in refused("compare", run, "--out", out)
     assert not out.exists()
 
 
@@ -257,18 +266,18 @@ def test_a_line_that_is_only_half_written_is_left_out(tmp_path: Path) -> None:
     assert work("plot", run, "--out", tmp_path / "a.png") == 0
 
 
-def test_a_picture_or_a_video_of_another_format(runs: Path, tmp_path: Path, capsys) -> None:
+def test_a_picture_or_a_video_of_another_format(runs: Path, tmp_path: Path, refused) -> None:
     for name in ("video.avi", "video"):
-        line = refused(capsys, "record", runs / "dqn_0", "--out", tmp_path / name)
-        assert ".gif, .mp4, .html" in line
-    assert "PNG" in refused(capsys, "plot", runs / "dqn_0", "--out", tmp_path / "a.jpg")
+        said = refused("record", runs / "dqn_0", "--out", tmp_path / name)
+        assert ".gif, .mp4, .html" in said
+    assert "PNG" in refused("plot", runs / "dqn_0", "--out", tmp_path / "a.jpg")
 
 
-def test_an_extra_that_is_missing(runs: Path, tmp_path: Path, monkeypatch, capsys) -> None:
+def test_an_extra_that_is_missing(runs: Path, tmp_path, monkeypatch, refused, capsys) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     monkeypatch.setattr("shutil.which", lambda name: None)
-    assert "installs it" in refused(capsys, "sweep", "--out", tmp_path / "sweep")
-    line = refused(capsys, "record", runs / "dqn_0", "--out", tmp_path / "a.mp4")
+    assert "installs it" in refused("sweep", "--out", tmp_path / "sweep")
+    line = refused("record", runs / "dqn_0", "--out", tmp_path / "a.mp4")
     assert "an MP4 needs imageio-ffmpeg, an extra: " in line
     with pytest.raises(SystemExit):
         work("train", "--algo", "ppo")

@@ -11,27 +11,26 @@ SHORT = {"total_timesteps": 120, "eval_frequency": 0}
 
 
 @pytest.fixture(scope="session")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """By an algorithm's name: a small training that was never interrupted; not to be changed."""
+def counted(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[Path, int]]:
+    """A small training by its algorithm's name, and how often it asks whether it is interrupted."""
 
     @cache
-    def trained(name: str) -> Path:
-        return train(tmp_path_factory.mktemp("whole") / name, name)
+    def trained(name: str) -> tuple[Path, int]:
+        interrupt = InterruptAfter()
+        return train(tmp_path_factory.mktemp("whole") / name, name, interrupt), interrupt.times
 
     return trained
 
 
 @pytest.fixture(scope="session")
-def times(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], int]:
-    """How often a small training asks whether it is interrupted, by its algorithm."""
+def whole(counted: Callable[[str], tuple[Path, int]]) -> Callable[[str], Path]:
+    """By an algorithm's name: a small training that was never interrupted; not to be changed."""
+    return lambda name: counted(name)[0]
 
-    @cache
-    def counted(name: str) -> int:
-        interrupt = InterruptAfter()
-        train(tmp_path_factory.mktemp("times") / name, name, interrupt)
-        return interrupt.times
 
-    return counted
+@pytest.fixture(scope="session")
+def times(counted: Callable[[str], tuple[Path, int]]) -> Callable[[str], int]:
+    return lambda name: counted(name)[1]
 
 
 @pytest.fixture(scope="session")

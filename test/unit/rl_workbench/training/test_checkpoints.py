@@ -4,11 +4,13 @@ import os
 import random
 import resource
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import check_optimizer
 from rl_workbench.storage import save_tensors, write_atomically
 from rl_workbench.training import checkpoints
 from rl_workbench.training.checkpoints import Checkpoints, candidates, read
@@ -120,3 +122,22 @@ def test_which_checkpoint_a_folder_stands_for(tmp_path: Path) -> None:
     found = [str(path.relative_to(tmp_path)) for path in candidates(tmp_path)]
     assert found == ["last.pt", names[3], names[2], "best.pt"]
     assert candidates(tmp_path, best_first=True)[0].name == "best.pt"
+
+
+@pytest.mark.parametrize("optimizer", [torch.optim.Adam, torch.optim.RMSprop, torch.optim.SGD])
+def test_an_optimizers_moments_of_another_size_are_refused(optimizer: Any) -> None:
+    """torch would write beyond them, and the process might crash."""
+
+    def made(size: int) -> Any:
+        weights = torch.nn.Parameter(torch.ones(size))
+        result = optimizer([weights], lr=0.1)
+        weights.grad = torch.ones(size)
+        result.step()
+        return result
+
+    new = optimizer([torch.nn.Parameter(torch.ones(4))], lr=0.3)
+    check_optimizer(new, new.state_dict())
+    check_optimizer(new, made(4).state_dict())
+    if optimizer is not torch.optim.SGD:  # which has no moments
+        with pytest.raises(ValueError, match=r"of shape \(4,\), not \(3,\)"):
+            check_optimizer(new, made(3).state_dict())

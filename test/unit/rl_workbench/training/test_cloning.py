@@ -6,23 +6,17 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+from support.training import training_runs as runs
 from support.training.learning_fakes import POLE, register_with
-from support.training.training_runs import (
-    InterruptAfter,
-    assert_same_run,
-    failure,
-    options_of,
-    resume,
-    run,
-    summary,
-)
+from support.training.recorded import recorded
+from support.training.training_runs import InterruptAfter, failure, options_of, resume, run
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training import demonstrations
-from rl_workbench.training.demonstrations import Origin, Recorder
 
 BC = {"total_timesteps": 60, "hidden_sizes": "16", "batch_size": 32, "eval_episodes": 2,
       "eval_frequency": 30, "checkpoint_frequency": 25, "log_frequency": 10}  # fmt: skip
+EIGHT = (10,) * 8  # steps of each episode
 
 
 class Follow(gymnasium.Env):
@@ -52,23 +46,9 @@ class Follow(gymnasium.Env):
         return self._drawn(), -away, False, over, {"is_success": away < 0.5}
 
 
-def recorded(folder: Path, env_id: str, act, episodes: int = 8, success: bool = True) -> Path:
-    folder.mkdir()
-    origin = Origin(env_id, {})
-    env = origin.make()
-    recorder = Recorder(env, origin)
-    for seed in range(episodes):
-        observation = recorder.begin(seed)
-        for _ in range(10):
-            observation = recorder.step(act(observation, env))
-        demonstrations.save(folder, recorder.episode(success))
-    env.close()
-    return folder
-
-
 @pytest.fixture
 def balanced(tmp_path: Path) -> Path:
-    return recorded(tmp_path / "demos", POLE, lambda seen, env: int(seen[2] < 0.0))
+    return recorded(tmp_path / "demos", POLE, EIGHT, lambda seen, _: int(seen[2] < 0.0), True)
 
 
 def cloning(demos: Path, **changed: object):
@@ -79,13 +59,13 @@ def test_interrupted_and_resumed_is_the_same_training(balanced: Path, tmp_path: 
     whole = run(cloning(balanced), tmp_path / "whole")
     for asked in (1, 20, 47):
         stopped = run(cloning(balanced), tmp_path / str(asked), InterruptAfter(asked))
-        assert summary(stopped)["interrupted"]
-        assert_same_run(whole, resume(stopped))
+        assert runs.summary(stopped)["interrupted"]
+        runs.assert_same_run(whole, resume(stopped))
 
 
 def test_pictures_and_numbers_are_learned_from(tmp_path: Path, monkeypatch) -> None:
     env_id = register_with(monkeypatch, Follow)
-    demos = recorded(tmp_path / "demos", env_id, lambda _, env: env.unwrapped.place)
+    demos = recorded(tmp_path / "demos", env_id, EIGHT, lambda _, env: env.unwrapped.place, True)
     options = cloning(demos, env_id=env_id, total_timesteps=600, eval_frequency=0)
     folder = run(options, tmp_path / "run")
     best = torch.load(folder / "best.pt", weights_only=True)["best_at_the_end"]
@@ -96,7 +76,7 @@ def test_wrong_demonstrations_are_one_line(balanced: Path, tmp_path: Path) -> No
     assert "--demos FOLDER" in failure(lambda: run(options_of("bc", BC), tmp_path / "0"))
     text = failure(lambda: run(cloning(balanced, env_id="CartPole-v1"), tmp_path / "1"))
     assert f"is of {POLE}, not of CartPole-v1" in text
-    bad = recorded(tmp_path / "bad", POLE, lambda *_: 0, 1, success=False)
+    bad = recorded(tmp_path / "bad", POLE, (10,), lambda *_: 0, success=False)
     text = failure(lambda: run(cloning(bad), tmp_path / "2"))
     assert "none of the 1 demonstrations succeeded" in text
 

@@ -6,31 +6,19 @@ from pathlib import Path
 
 import pytest
 import torch
-from support.training.training_runs import (
-    ALL,
-    EXACT,
-    InterruptAfter,
-    assert_no_doubles,
-    assert_same,
-    assert_same_run,
-    checkpoint,
-    record,
-    resume,
-    rows,
-    summary,
-    train,
-)
+from support.training import training_runs as runs
+from support.training.training_runs import InterruptAfter, checkpoint, record, resume, rows, summary
 
 from rl_workbench.errors import WorkbenchError
 
 pytestmark = pytest.mark.slow
 
+SHORT = {"total_timesteps": 120, "eval_frequency": 0}  # as those of `short` and `stopped`
 
-@pytest.mark.parametrize("name", ALL)
-def test_a_damaged_checkpoint_is_told_and_the_one_before_is_used(
-    whole, times, tmp_path: Path, capsys, name: str
-) -> None:
-    run = train(tmp_path / "run", name, InterruptAfter(round(0.9 * times(name))))
+
+@pytest.mark.parametrize("name", runs.ALL)
+def test_a_damaged_checkpoint_gives_way(whole, times, tmp_path, capsys, name: str) -> None:
+    run = runs.train(tmp_path / "run", name, InterruptAfter(round(0.9 * times(name))))
     newest = run / "last.pt"
     content = bytearray(newest.read_bytes())
     for place in range(len(content) // 2, len(content) // 2 + 100):
@@ -40,8 +28,8 @@ def test_a_damaged_checkpoint_is_told_and_the_one_before_is_used(
     told = capsys.readouterr().out
     assert f"{newest} is damaged" in told and "looking for an earlier one" in told
     assert summary(run)["complete"]
-    if name in EXACT:
-        assert_same_run(whole(name), run)
+    if name in runs.EXACT:
+        runs.assert_same_run(whole(name), run)
 
 
 @pytest.mark.parametrize("damage", [lambda path: path.write_bytes(b""), Path.unlink])
@@ -75,9 +63,7 @@ def refusal(run: Path) -> str:
      ("hyperparameters", "hidden_sizes", [32], "hidden_sizes [32], the checkpoint [16, 16]"),
      ("run", "seed", 9, "seed 9, the checkpoint 3")],
 )  # fmt: skip
-def test_a_record_that_somebody_changed_is_refused(
-    stopped: Path, part: str, name: str, value: object, words: str
-) -> None:
+def test_a_record_that_somebody_changed_is_refused(stopped, part, name, value, words) -> None:
     change_record(stopped, part, name, value)
     assert f"config.json says {words}; a resumed training keeps" in refusal(stopped)
 
@@ -102,10 +88,8 @@ def test_a_damaged_record_is_one_line(stopped: Path, content: str) -> None:
 
 
 @pytest.mark.parametrize("left", [None, 0, 10, 300])
-def test_figures_that_were_lost_cost_nothing_else(
-    short: Path, tmp_path: Path, capsys, left: int | None
-) -> None:
-    run = train(tmp_path / "run", "dqn", InterruptAfter(80), total_timesteps=120, eval_frequency=0)
+def test_figures_that_were_lost_cost_nothing_else(short, tmp_path, capsys, left) -> None:
+    run = runs.train(tmp_path / "run", "dqn", InterruptAfter(80), **SHORT)
     path = run / "scalars.csv"
     if left is None:
         path.unlink()
@@ -113,9 +97,9 @@ def test_figures_that_were_lost_cost_nothing_else(
         path.write_bytes(path.read_bytes()[:left])
     resume(run)
     assert "lacks rows that it had" in capsys.readouterr().out
-    assert_same(checkpoint(run)["q_net"], checkpoint(short)["q_net"])
+    runs.assert_same(checkpoint(run)["q_net"], checkpoint(short)["q_net"])
     assert set(rows(run)) < set(rows(short)) and rows(run)
-    assert_no_doubles(run)
+    runs.assert_no_doubles(run)
 
 
 def test_a_moved_run_goes_on_where_it_lies(short: Path, stopped: Path, tmp_path: Path) -> None:

@@ -5,23 +5,10 @@ from typing import ClassVar
 
 import gymnasium
 import pytest
+from support.training import training_runs
 from support.training.goal_environments import REACH, SHARED_REACH
 from support.training.learning_fakes import POLE, Dicing, OnlyOne, Pole, register_with
-from support.training.training_runs import (
-    ALL,
-    EXACT,
-    OTHERS,
-    InterruptAfter,
-    assert_same,
-    assert_same_run,
-    checkpoint,
-    options_of,
-    resume,
-    rows,
-    run,
-    summary,
-    train,
-)
+from support.training.training_runs import EXACT, OTHERS, checkpoint, rows, run, summary, train
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training import evaluator
@@ -64,7 +51,7 @@ def test_an_evaluation_is_due_where_a_multiple_is_passed(tmp_path: Path, name: s
 # The best one.
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", training_runs.ALL)
 def test_the_best_is_that_of_the_best_evaluation(tmp_path: Path, name: str) -> None:
     changed = {"confirm_episodes": 0, "eval_frequency": 50}
     result = summary(train(tmp_path, name, **changed))
@@ -77,9 +64,7 @@ def test_the_best_is_that_of_the_best_evaluation(tmp_path: Path, name: str) -> N
 
 
 @pytest.mark.parametrize("name", ["dqn", "reinforce", *OTHERS[:1]])
-def test_prolonged_a_worse_one_does_not_take_the_place_of_the_best(
-    tmp_path: Path, monkeypatch, name: str
-) -> None:
+def test_prolonged_no_worse_one_becomes_the_best(tmp_path: Path, monkeypatch, name: str) -> None:
     """Also if that was found at the end, of which the last checkpoint doesn't know otherwise."""
     verdicts = [5.0, 9.0, *[7.0] * 9]
     monkeypatch.setattr(evaluator, "run_greedily", lambda *_: Evaluation([1], [verdicts.pop(0)]))
@@ -87,7 +72,7 @@ def test_prolonged_a_worse_one_does_not_take_the_place_of_the_best(
     first = summary(train(tmp_path, name, **numbers))
     assert [mean for _, mean in first["evaluations"]] == [5.0, 9.0]
     assert first["best"] == [first["steps"], 9.0]
-    longer = summary(resume(tmp_path, total_timesteps=384))
+    longer = summary(training_runs.resume(tmp_path, total_timesteps=384))
     assert len(longer["evaluations"]) >= 2
     assert longer["best"] == first["best"]
     best = checkpoint(tmp_path, "best.pt")
@@ -95,9 +80,7 @@ def test_prolonged_a_worse_one_does_not_take_the_place_of_the_best(
 
 
 @pytest.mark.parametrize("name", ["dqn", *OTHERS[:1]])
-def test_a_policy_is_the_best_one_only_if_more_episodes_confirm_it(
-    tmp_path: Path, monkeypatch, name: str
-) -> None:
+def test_more_episodes_confirm_the_best_policy(tmp_path: Path, monkeypatch, name: str) -> None:
     def evaluated(env, act, seed: int, episodes: int, stop) -> Evaluation:
         asked.append((seed, episodes))
         return Evaluation([1], [verdicts.pop(0)])
@@ -118,9 +101,7 @@ def test_a_policy_is_the_best_one_only_if_more_episodes_confirm_it(
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_training_and_evaluation_may_have_options_of_their_own(
-    robot: type[Pole], tmp_path: Path, name: str
-) -> None:
+def test_training_and_evaluation_may_have_options_of_their_own(robot, tmp_path, name) -> None:
     options = {"env_kwargs": {"a": 1, "b": 1}, "train_env_kwargs": {"a": 2},
                "eval_env_kwargs": {"b": 3}}  # fmt: skip
     train(tmp_path, name, env_id="Robot-v0", **options, total_timesteps=60)
@@ -129,9 +110,7 @@ def test_training_and_evaluation_may_have_options_of_their_own(
 
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("kind", [Dicing, OnlyOne])
-def test_an_evaluation_leaves_the_generators_alone_that_it_shares(
-    tmp_path: Path, monkeypatch, kind: type, name: str
-) -> None:
+def test_an_evaluation_draws_from_no_shared_generator(tmp_path, monkeypatch, kind, name) -> None:
     env_id = register_with(monkeypatch, kind)
     options = {"env_id": env_id, "env_kwargs": None, "confirm_episodes": 0, "total_timesteps": 200}
     plain = train(tmp_path / "plain", name, **options, eval_frequency=0)
@@ -142,9 +121,7 @@ def test_an_evaluation_leaves_the_generators_alone_that_it_shares(
 
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("shared", [False, True])
-def test_where_there_is_one_robot_the_evaluation_moves_it(
-    robot: type[Pole], tmp_path: Path, monkeypatch, name: str, shared: bool
-) -> None:
+def test_an_evaluation_moves_the_one_robot(robot, tmp_path, monkeypatch, name, shared) -> None:
     monkeypatch.setattr(robot, "shares_robot", shared)
     short = {"env_id": "Robot-v0", "total_timesteps": 60}
     train(tmp_path / "run", name, env_kwargs=None, **short)
@@ -155,15 +132,13 @@ def test_where_there_is_one_robot_the_evaluation_moves_it(
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_one_robot_learns_as_if_nobody_had_moved_it(
-    robot: type[Pole], tmp_path: Path, monkeypatch, name: str
-) -> None:
+def test_one_robot_learns_as_if_nobody_had_moved_it(robot, tmp_path, monkeypatch, name) -> None:
     options = {"env_id": "Robot-v0", "eval_frequency": 30, "total_timesteps": 300}
     whole = train(tmp_path / "whole", name, **options)
     monkeypatch.setattr(robot, "shares_robot", True)
-    run = train(tmp_path / "run", name, InterruptAfter(150), **options)
+    run = train(tmp_path / "run", name, training_runs.InterruptAfter(150), **options)
     assert rows(run) != rows(whole), "interrupted"
-    assert_same_run(whole, resume(run))
+    training_runs.assert_same_run(whole, training_runs.resume(run))
 
 
 @pytest.mark.parametrize("name", ["dqn", *OTHERS[:1]])
@@ -192,29 +167,25 @@ def test_where_a_robot_cannot_be_brought_back_the_episode_is_given_up(
         ("td3", {"her": True, "learning_starts": 10, "batch_size": 8, "action_noise": 0.2}),
     ],
 )
-def test_stable_baselines_moves_the_one_robot_and_learns_the_same(
-    tmp_path: Path, name: str, options: dict
-) -> None:
+def test_stable_baselines_moves_the_one_robot_and_learns_the_same(tmp_path, name, options) -> None:
     """Evaluated in the midst of episodes, of 20 steps each."""
     given = {"total_timesteps": 64, "n_steps": 32, "net_arch": "8", "eval_frequency": 25,
              "eval_episodes": 2, "checkpoint_frequency": 0, "seed": 3, **options}  # fmt: skip
     if name != "ppo":
         del given["n_steps"]
     alone, shared = (
-        run(options_of(name, {"env_id": env_id, **given}), tmp_path / env_id[6:])
+        run(training_runs.options_of(name, {"env_id": env_id, **given}), tmp_path / env_id[6:])
         for env_id in (REACH, SHARED_REACH)
     )
     evaluated = [32, 64] if name == "ppo" else [25, 50, 64]
     assert [step for step, _ in summary(shared)["evaluations"]] == evaluated
     assert rows(alone) == rows(shared)
     for part in ("policy", "buffer"):
-        assert_same(checkpoint(alone).get(part), checkpoint(shared).get(part), part)
+        training_runs.assert_same(checkpoint(alone).get(part), checkpoint(shared).get(part), part)
 
 
 @pytest.mark.parametrize("name", ["dqn", "reinforce"])
-def test_an_environment_of_which_there_can_be_only_one(
-    tmp_path: Path, monkeypatch, capsys, name: str
-) -> None:
+def test_an_environment_of_which_there_can_be_only_one(tmp_path, monkeypatch, capsys, name) -> None:
     """It says nothing of a robot that it shares: as somebody writes it around a connection."""
 
     class Alone(Pole):

@@ -6,17 +6,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from support.training import training_runs as runs
 from support.training.goal_environments import REACH, Reach
 from support.training.learning_fakes import register_with
-from support.training.training_runs import (
-    checkpoint,
-    options_of,
-    points,
-    resume,
-    rows,
-    run,
-    summary,
-)
+from support.training.training_runs import checkpoint, options_of, points, resume, rows, summary
 
 from rl_workbench.errors import WorkbenchError
 
@@ -42,7 +35,7 @@ EVERY = [pytest.param(name, marks=[] if name in ("dqn", "reinforce") else [SB3])
 def made(folder: Path, case: str, **changed: Any) -> Path:
     name, options = CASES[case]
     common = {"env_id": REACH, "eval_frequency": 100, "eval_episodes": 5, "confirm_episodes": 0}
-    return run(options_of(name, {**common, **options, **changed}), folder)
+    return runs.run(options_of(name, {**common, **options, **changed}), folder)
 
 
 @pytest.mark.parametrize("case", EVERY)
@@ -139,3 +132,14 @@ def test_where_hindsight_has_nothing_to_see(tmp_path, monkeypatch, env_id: str, 
 def _unrewarded(self: Reach, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
     self._taken += 1
     return self._observation(), -1.0, False, self._taken >= 20, {}
+
+
+def test_actions_that_are_whole_numbers_are_refused(tmp_path: Path, monkeypatch) -> None:
+    class Stepper(Reach):
+        def __init__(self) -> None:
+            super().__init__()
+            self.action_space = gymnasium.spaces.Box(0, 9, (2,), np.int64)
+
+    env_id = register_with(monkeypatch, Stepper)
+    with pytest.raises(WorkbenchError, match="REINFORCE needs discrete actions"):
+        made(tmp_path, "reinforce", env_id=env_id, env_kwargs={})

@@ -5,7 +5,7 @@ import math
 import gymnasium
 import numpy as np
 import pytest
-from support.training.learning_fakes import POLE, SPOILT, Died, register_with
+from support.training.learning_fakes import POLE, SPOILT, Died, Still, register_with
 
 from rl_workbench import errors
 from rl_workbench.errors import WorkbenchError
@@ -57,35 +57,23 @@ def test_a_wrapper_of_another_kind_is_not_called() -> None:
         make_environment(POLE, wrapper="subprocess:Popen")
 
 
-class Endless(gymnasium.Env):
-    """Nothing ends its episodes."""
-
-    observation_space = gymnasium.spaces.Box(-9, 9, (2,), np.float32)
-    action_space = gymnasium.spaces.Discrete(2)
-    render_mode = None
+class Endless(Still):
     max_steps = None
 
-    def reset(self, *, seed=None, options=None):
-        super().reset(seed=seed)
-        return np.zeros(2, np.float32), {}
 
-    def step(self, action):
-        return np.zeros(2, np.float32), 1.0, False, False, {}
-
-
-class OldGym(Endless):
+class OldGym(Still):
     """As one wrote them for gym before 0.26."""
 
     def reset(self, seed=None, options=None):
         return np.zeros(2, np.float32)
 
 
-class OldStep(Endless):
+class OldStep(Still):
     def step(self, action):
         return np.zeros(2, np.float32), 1.0, False, {}
 
 
-class Unseeded(Endless):
+class Unseeded(Still):
     def reset(self):
         return np.zeros(2, np.float32)
 

@@ -1,11 +1,9 @@
 """Policies of trainings, read back from their checkpoints."""
 
-from collections.abc import Callable
-from pathlib import Path
-
+import numpy as np
 import pytest
 import torch
-from support.training.training_runs import EXACT
+from support.training.training_runs import EXACT, OTHERS
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithm import load_policy
@@ -15,7 +13,7 @@ from rl_workbench.training.options import recorded_options
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_a_checkpoint_of_another_environment(whole: Callable[[str], Path], name: str) -> None:
+def test_a_checkpoint_of_another_environment(whole, name: str) -> None:
     content = read(whole(name) / "last.pt")
     content["config"]["run"]["env_id"] = "Acrobot-v1"
     options = recorded_options(content["config"], "last.pt")
@@ -33,3 +31,17 @@ def test_a_foreign_checkpoint_of_other_things(whole, name: str, wrong: object) -
     others = {each: wrong for each in content if each != "config"}
     with pytest.raises(WorkbenchError, match=r"^last.pt doesn't fit |the checkpoint holds another"):
         load_policy(options, others, env, "last.pt")
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_policy_needs_no_environment_of_its_training(whole, name: str) -> None:
+    """It may have been a robot over ROS: nobody wants a simulator for a picture of the policy."""
+    content = read(whole(name) / "last.pt")
+    content["config"]["run"]["train_env_kwargs"] = {"nobody": "knows this one"}
+    options = recorded_options(content["config"], "last.pt")
+    env = make_environment(options.run.env_id, options.run.env_kwargs)
+    policy = load_policy(options, content, env, "last.pt")
+    observation, _ = env.reset(seed=0)
+    assert env.action_space.contains(policy.act(np.asarray(observation, np.float32)))
+    env.step(policy.act(np.asarray(observation, np.float32)))  # it is still open
+    env.close()

@@ -6,21 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.training import training_runs as runs
+from support.training.goal_environments import Reach
 from support.training.learning_fakes import Dicing, OnlyOne, register_with
-from support.training.training_runs import (
-    EXACT,
-    InterruptAfter,
-    assert_no_doubles,
-    assert_same,
-    assert_same_run,
-    checkpoint,
-    record,
-    resume,
-    rows,
-    small,
-    summary,
-    train,
-)
+from support.training.training_runs import EXACT, assert_same_run, checkpoint, resume, rows, train
 
 from rl_workbench.training import checkpoints as run_checkpoints
 from rl_workbench.training import training
@@ -41,20 +30,18 @@ class Killed(Exception):
 
 @pytest.mark.parametrize("share", [0.0, 0.004, 0.22, 0.6, 0.97])
 @pytest.mark.parametrize("name", EXACT)
-def test_ctrl_c_anywhere_and_resumed_is_the_same_training(
-    whole, times, tmp_path: Path, name: str, share: float
-) -> None:
-    interrupt = InterruptAfter(1 + round(share * times(name)))
+def test_ctrl_c_anywhere_and_resumed_is_the_same(whole, times, tmp_path, name, share) -> None:
+    interrupt = runs.InterruptAfter(1 + round(share * times(name)))
     run = train(tmp_path / "run", name, interrupt)
     assert interrupt.exit_code == 130
-    assert summary(run)["interrupted"]
+    assert runs.summary(run)["interrupted"]
     assert_same_run(whole(name), resume(run))
-    assert_no_doubles(run)
+    runs.assert_no_doubles(run)
 
 
 @pytest.mark.parametrize("name", EXACT)
 def test_ctrl_c_in_an_evaluation(whole, tmp_path: Path, name: str) -> None:
-    class InEvaluation(InterruptAfter):
+    class InEvaluation(runs.InterruptAfter):
         def requested(self) -> bool:
             names, frame = set(), sys._getframe(1)
             while frame:
@@ -63,19 +50,25 @@ def test_ctrl_c_in_an_evaluation(whole, tmp_path: Path, name: str) -> None:
             return super().requested() if "run_greedily" in names else self.signal is not None
 
     run = train(tmp_path / "run", name, InEvaluation(25))
-    assert summary(run)["interrupted"]
+    assert runs.summary(run)["interrupted"]
     assert_same_run(whole(name), resume(run))
 
 
-@pytest.mark.parametrize("kind", [Dicing, OnlyOne])
-@pytest.mark.parametrize("name", EXACT[1:])
+@pytest.mark.parametrize(
+    ("name", "kind", "given", "moments"),
+    [
+        *((name, kind, None, (37, 60)) for name in EXACT[1:] for kind in (Dicing, OnlyOne)),
+        ("reinforce", Reach, {"dense": True}, (50, 190)),  # with continuous actions
+    ],
+)
 def test_whatever_generator_an_environment_draws_from_comes_back(
-    tmp_path: Path, monkeypatch, name: str, kind: type
+    tmp_path: Path, monkeypatch, name: str, kind: type, given: dict | None, moments: tuple
 ) -> None:
-    options = {"env_id": register_with(monkeypatch, kind), "env_kwargs": None}
+    options = {"env_id": register_with(monkeypatch, kind), "env_kwargs": given}
     whole = train(tmp_path / "whole", name, **options)
-    for asked in (37, 60):
-        run = train(tmp_path / str(asked), name, InterruptAfter(asked), **options)
+    for asked in moments:
+        run = train(tmp_path / str(asked), name, runs.InterruptAfter(asked), **options)
+        assert rows(run) != rows(whole), "interrupted"
         assert_same_run(whole, resume(run))
 
 
@@ -91,28 +84,26 @@ def test_resuming_a_complete_training_changes_nothing(whole, tmp_path: Path, nam
 @pytest.mark.parametrize("name", EXACT)
 def test_a_complete_training_prolonged_is_a_longer_one(tmp_path: Path, name: str) -> None:
     unit = "total_timesteps" if name == "dqn" else "episodes"
-    longer, constant = {unit: small(name).record()["run"][unit]}, {}
+    longer, constant = {unit: runs.small(name).record()["run"][unit]}, {}
     if name == "dqn":
         constant = {"lr_schedule": "constant", "exploration_fraction": 0}
     whole = train(tmp_path / "whole", name, **constant)
     shorter = {unit: longer[unit] // 2}
     run = train(tmp_path / "run", name, **constant, **shorter)
-    began = record(run)["began"]
-    resume(run, InterruptAfter(40), **longer)
-    assert not summary(run)["complete"]
+    began = runs.record(run)["began"]
+    resume(run, runs.InterruptAfter(40), **longer)
+    assert not runs.summary(run)["complete"]
     resume(run)
-    assert summary(run)["complete"] and record(run)["run"][unit] == longer[unit]
-    assert record(run)["began"] == began
+    assert runs.summary(run)["complete"] and runs.record(run)["run"][unit] == longer[unit]
+    assert runs.record(run)["began"] == began
     assert rows(run) == rows(whole)
     mine, other = checkpoint(run), checkpoint(whole)
-    assert_same(mine, other)
+    runs.assert_same(mine, other)
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_after_a_change_of_the_task_the_best_is_evaluated_again(
-    tmp_path: Path, monkeypatch, capsys, name: str
-) -> None:
-    interrupt = InterruptAfter(1)
+def test_the_best_of_a_changed_task_is_evaluated_again(tmp_path, monkeypatch, capsys, name) -> None:
+    interrupt = runs.InterruptAfter(1)
     run = train(tmp_path / "run", name)
     best = checkpoint(run, "best.pt")
     step_of_best, score = best.get("best_at_the_end", best["history"]["best"])
@@ -124,16 +115,16 @@ def test_after_a_change_of_the_task_the_best_is_evaluated_again(
 
     monkeypatch.setattr(CheckedEnvironment, "step", halved)
     assert resume(run, interrupt) and "evaluated again" not in capsys.readouterr().out
-    before = record(run)["task"]
+    before = runs.record(run)["task"]
     monkeypatch.setattr(training, "source_digest", lambda env: "another")
     with monkeypatch.context() as interrupted:
         interrupted.setattr(Evaluator, "evaluate", lambda *_, **__: None)
         resume(run)
-    assert record(run)["task"] == before, "the next resumption evaluates it"
+    assert runs.record(run)["task"] == before, "the next resumption evaluates it"
     resume(run)
     after = checkpoint(run)["history"]["best"]
     assert "best.pt is evaluated again" in capsys.readouterr().out
-    assert after == [step_of_best, score / 2] and record(run)["task"] == "another"
+    assert after == [step_of_best, score / 2] and runs.record(run)["task"] == "another"
     resume(run)
     assert checkpoint(run)["history"]["best"] == after
 
@@ -150,16 +141,14 @@ def test_an_evaluation_that_a_checkpoint_knows_of_is_not_held_again(tmp_path: Pa
         path.unlink()  # killed after the one of step 150, which was evaluated
     assert checkpoint(run, "checkpoints/step_000000150.pt")["history"]["evaluations"]
     assert_same_run(whole, resume(run))
-    assert_no_doubles(run)
+    runs.assert_no_doubles(run)
 
 
 # Killed.
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_there_is_something_to_resume_from_the_first_moment_on(
-    whole, tmp_path: Path, monkeypatch, name: str
-) -> None:
+def test_it_can_be_resumed_from_the_first_moment_on(whole, tmp_path, monkeypatch, name) -> None:
     def killed(*arguments: object) -> None:
         raise Killed
 
@@ -172,9 +161,7 @@ def test_there_is_something_to_resume_from_the_first_moment_on(
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_killed_between_the_names_of_a_best_checkpoint(
-    whole, tmp_path: Path, monkeypatch, name: str
-) -> None:
+def test_killed_between_the_names_of_a_best_checkpoint(whole, tmp_path, monkeypatch, name) -> None:
     """Resumed, the training comes to the same best checkpoint."""
     give_name, save, bests = run_checkpoints.give_name, Checkpoints.save, [False]
 
@@ -196,17 +183,15 @@ def test_killed_between_the_names_of_a_best_checkpoint(
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_killed_before_its_first_checkpoint_it_begins_anew(
-    whole, tmp_path: Path, capsys, name: str
-) -> None:
-    run = train(tmp_path / "run", name, InterruptAfter(2))
+def test_killed_before_its_first_checkpoint_it_begins_anew(whole, tmp_path, capsys, name) -> None:
+    run = train(tmp_path / "run", name, runs.InterruptAfter(2))
     (run / "last.pt").unlink()
     for path in (run / "checkpoints").iterdir():
         path.rename(path.with_name(f".{path.name}.a1b2c3"))  # half written
     resume(run)
     assert "has no checkpoint yet; starting from scratch" in capsys.readouterr().out
     assert_same_run(whole(name), run)
-    assert_no_doubles(run)
+    runs.assert_no_doubles(run)
     assert not list((run / "checkpoints").glob(".*"))
 
 

@@ -5,28 +5,10 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from support.training.learning_fakes import (
-    POLE,
-    Elsewhere,
-    Fragile,
-    OnlyOne,
-    Pole,
-    register_with,
-    run_episode,
-)
-from support.training.training_runs import (
-    InterruptAfter,
-    assert_no_doubles,
-    assert_same,
-    assert_same_run,
-    checkpoint,
-    record,
-    resume,
-    rows,
-    small,
-    summary,
-    train,
-)
+from support.training import learning_fakes
+from support.training import training_runs as runs
+from support.training.learning_fakes import POLE, Elsewhere, Fragile, OnlyOne, Pole, register_with
+from support.training.training_runs import assert_same, checkpoint, resume, summary, train
 
 from rl_workbench.agents.reinforce import ReinforceAgent
 from rl_workbench.errors import WorkbenchError
@@ -63,7 +45,7 @@ def test_each_plays_what_it_would_play_alone() -> None:
         agent.generator = np.random.default_rng((7, index)) if index else first
         env.reset(seed=7 + index)
         for episodes in rounds:
-            alone = run_episode(env, agent)
+            alone = learning_fakes.run_episode(env, agent)
             assert_same(alone.state_dict(), episodes[index].state_dict())
     lengths = [[episode.length for episode in episodes] for episodes in rounds]
     assert len({length for each in lengths for length in each}) > 3, "they differ"
@@ -77,20 +59,20 @@ def test_rounds_are_whole_and_batches_are_of_all(tmp_path: Path) -> None:
     ends = [sum(lengths[: 3 * count]) for count in range(1, 6)]
     evaluated = [step for step, _ in summary(run)["evaluations"]]
     assert evaluated and set(evaluated) <= set(ends), "between rounds"
-    updates = [step for step, tag, _ in rows(run) if tag == "losses/policy_loss"]
+    updates = [step for step, tag, _ in runs.rows(run) if tag == "losses/policy_loss"]
     assert updates == [str(ends[1]), str(ends[3])], "two episodes of each of the three"
     assert len(checkpoint(run)["agent"]["batch"]) == 3
     longer = train(tmp_path / "longer", "reinforce", **MANY | {"episodes": 21})
-    assert_same_run(longer, resume(run, episodes=21))
+    runs.assert_same_run(longer, resume(run, episodes=21))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("asked", [40, 333, 700])
 def test_broken_off_in_a_round_it_comes_to_the_same_bits(whole: Path, tmp_path, asked: int) -> None:
-    broken = train(tmp_path / "broken", "reinforce", InterruptAfter(asked), **MANY)
-    assert not summary(broken)["complete"] and len(rows(broken)) < len(rows(whole))
-    assert_same_run(whole, resume(broken))
-    assert_no_doubles(broken)
+    broken = train(tmp_path / "broken", "reinforce", runs.InterruptAfter(asked), **MANY)
+    assert not summary(broken)["complete"] and len(runs.rows(broken)) < len(runs.rows(whole))
+    runs.assert_same_run(whole, resume(broken))
+    runs.assert_no_doubles(broken)
 
 
 @pytest.mark.slow
@@ -98,7 +80,7 @@ def test_steps_are_begun_in_all_before_one_is_taken(whole, tmp_path: Path, monke
     env_id = register_with(monkeypatch, Elsewhere)
     options = MANY | {"env_id": env_id, "env_kwargs": {"noise": 0.05}}
     Elsewhere.calls.clear()
-    begun = train(tmp_path / "begun", "reinforce", InterruptAfter(333), **options)
+    begun = train(tmp_path / "begun", "reinforce", runs.InterruptAfter(333), **options)
     calls = Elsewhere.calls
     assert [name for name, _ in calls[:3]] == ["begin"] * 3
     assert [name for name, _ in calls[3:9]] == ["step", "begin"] * 3
@@ -121,9 +103,7 @@ def test_the_one_that_fails_is_named(tmp_path: Path, monkeypatch) -> None:
 
 
 @pytest.mark.slow
-def test_a_round_that_nothing_can_be_learned_from_is_given_up_whole(
-    whole: Path, tmp_path: Path, monkeypatch
-) -> None:
+def test_a_round_without_anything_to_learn_is_given_up(whole, tmp_path, monkeypatch) -> None:
     updated = ReinforceAgent._update
 
     def failing(agent: ReinforceAgent, batch: list) -> None:
@@ -133,7 +113,7 @@ def test_a_round_that_nothing_can_be_learned_from_is_given_up_whole(
     monkeypatch.setattr(ReinforceAgent, "_update", failing)
     with pytest.raises(WorkbenchError, match="the policy loss is nan; .* 3 episodes, progress"):
         train(tmp_path, "reinforce", **MANY)
-    assert_same_run(whole, resume(tmp_path))
+    runs.assert_same_run(whole, resume(tmp_path))
 
 
 def test_one_that_can_not_be_made_is_named(tmp_path: Path, monkeypatch) -> None:
@@ -160,11 +140,11 @@ def test_each_has_a_robot_of_its_own(tmp_path: Path, monkeypatch) -> None:
         train(tmp_path / "alone", "reinforce", env_id=alone, **options)
     run = train(tmp_path / "copied", "reinforce", env_id=copied, **options)
     assert summary(run)["episodes"] == 4
-    assert record(run)["run"]["env_kwargs"] == {}, "for whoever looks at its policy"
+    assert runs.record(run)["run"]["env_kwargs"] == {}, "for whoever looks at its policy"
 
 
 @pytest.mark.parametrize("name", ["dqn", "reinforce-document"])
 def test_others_learn_in_one(name: str) -> None:
     words = f"^{name} learns in one environment: num_envs must be 1, not 2$"
     with pytest.raises(WorkbenchError, match=words):
-        small(name, num_envs=2)
+        runs.small(name, num_envs=2)

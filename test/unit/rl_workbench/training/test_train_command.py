@@ -125,14 +125,10 @@ def test_wrong_words(capsys, arguments: list[str], words: str) -> None:
 def test_a_reader_that_goes_away_before_the_help(tmp_path: Path) -> None:
     reading, writing = os.pipe()
     os.close(reading)
-    for command, code in (
-        (["train", "--algo=dqn", "--help"], 0),
-        (["--help"], 0),
-        (["eval", "--help"], 0),
-        (["train", "--algo=dqn", "--gamma=5"], 2),
-    ):
+    helps = ("train --algo=dqn --help", "--help", "eval --help")
+    for words, code in (*((each, 0) for each in helps), ("train --algo=dqn --gamma=5", 2)):
         done = subprocess.run(
-            [sys.executable, "-m", "rl_workbench", *command],
+            [sys.executable, "-m", "rl_workbench", *words.split()],
             stdout=writing, stderr=subprocess.PIPE, text=True, check=False,
         )  # fmt: skip
         assert done.returncode == code

@@ -4,20 +4,8 @@ import csv
 from pathlib import Path
 
 import pytest
-from support.training.training_runs import (
-    ALL,
-    EXACT,
-    assert_no_doubles,
-    assert_same,
-    assert_same_run,
-    checkpoint,
-    files,
-    points,
-    rows,
-    small,
-    summary,
-    train,
-)
+from support.training import training_runs as runs
+from support.training.training_runs import ALL, EXACT, checkpoint, points, rows, summary, train
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tensorboard.plugins.hparams import plugin_data_pb2
 
@@ -44,12 +32,12 @@ OF_REINFORCE = BY_EPISODE | {"losses/value_loss", "losses/policy_loss"}
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_training_leaves_its_files(whole, name: str) -> None:
-    assert files(whole(name)) == FILES | OWN_FILES.get(name, NETWORKS)
+    assert runs.files(whole(name)) == FILES | OWN_FILES.get(name, NETWORKS)
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_the_summary_tells_it_all(whole, name: str) -> None:
-    result, run = summary(whole(name)), small(name).run
+    result, run = summary(whole(name)), runs.small(name).run
     assert result["complete"] and not result["interrupted"] and result["failure"] is None
     assert result["episodes"] == len(result["returns"]) == len(result["lengths"]) > 0
     assert result["steps"] == (run.total_timesteps or sum(result["lengths"]))
@@ -68,7 +56,7 @@ def test_the_summary_tells_it_all(whole, name: str) -> None:
 def test_tensorboard_shows_what_the_csv_holds(whole, name: str) -> None:
     run, result = whole(name), summary(whole(name))
     assert set(points(run)) == TAGS | OWN_TAGS.get(name, OF_REINFORCE)
-    assert_no_doubles(run)
+    runs.assert_no_doubles(run)
     by_tag: dict[str, list[float]] = {}
     with (run / "scalars.csv").open(newline="") as file:
         for row in csv.DictReader(file):
@@ -90,7 +78,7 @@ def test_hyper_parameters_stand_beside_the_result(whole, name: str) -> None:
     read = plugin_data_pb2.HParamsPluginData.FromString
     start = read(content["_hparams_/session_start_info"]).session_start_info
     assert start.hparams["gamma"].number_value == 0.99
-    assert start.hparams["env_id"].string_value == small(name).run.env_id
+    assert start.hparams["env_id"].string_value == runs.small(name).run.env_id
     if name == "dqn":
         assert start.hparams["double"].string_value == "True", "not the number 1"
     experiment = read(content["_hparams_/experiment"]).experiment
@@ -104,18 +92,14 @@ def test_hyper_parameters_stand_beside_the_result(whole, name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
-def test_the_same_seed_gives_the_same_bits_and_another_one_others(
-    whole, tmp_path: Path, name: str
-) -> None:
-    assert_same_run(whole(name), train(tmp_path / "again", name))
+def test_the_same_seed_gives_the_same_bits_and_another_one_others(whole, tmp_path, name) -> None:
+    runs.assert_same_run(whole(name), train(tmp_path / "again", name))
     assert rows(train(tmp_path / "other", name, seed=4)) != rows(whole(name))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
-def test_evaluations_and_checkpoints_change_nothing_that_is_learned(
-    whole, tmp_path: Path, name: str
-) -> None:
+def test_evaluations_and_checkpoints_change_nothing_that_is_learned(whole, tmp_path, name) -> None:
     """Without a frequency it is evaluated at the end alone."""
     none = {"eval_frequency": 0, "checkpoint_frequency": 0, "eval_episodes": 5}
     plain, evaluated = train(tmp_path, name, **none), whole(name)
@@ -129,7 +113,7 @@ def test_evaluations_and_checkpoints_change_nothing_that_is_learned(
     for content in (mine, other):
         del content["config"], content["history"]
         content.pop("best_at_the_end", None)
-    assert_same(mine, other)
+    runs.assert_same(mine, other)
 
 
 # How long it lasts.

@@ -11,20 +11,10 @@ from robot_envs.deployment.kinematics import LinkView
 
 FILES = Path(__file__).resolve().parents[3] / "data" / "robots"
 EFFORTS = ("shoulder_effort_controller", "elbow_effort_controller")
-ARM = Robot(
-    FILES / "two_link_arm.urdf",
-    FILES / "two_link_arm.yaml",
-    EFFORTS,
-    pose=Pose((0.3, -0.2, 0.1), (0.0, 0.0, 0.6, 0.8)),
-)
-ALL = StateQuery(
-    links=(
-        LinkQuery("tip"),
-        LinkQuery("fore", "world"),
-        LinkQuery("two_link_arm::upper"),
-        LinkQuery("two_link_arm::tip", "upper"),
-    )
-)
+POSE = Pose((0.3, -0.2, 0.1), (0.0, 0.0, 0.6, 0.8))
+ARM = Robot(FILES / "two_link_arm.urdf", FILES / "two_link_arm.yaml", EFFORTS, pose=POSE)
+LINKS = (("tip",), ("fore", "world"), ("two_link_arm::upper",), ("two_link_arm::tip", "upper"))
+ALL = StateQuery(links=tuple(LinkQuery(*names) for names in LINKS))
 
 
 class Flail(Task):

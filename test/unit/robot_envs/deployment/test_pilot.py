@@ -40,12 +40,8 @@ def test_it_commands_and_sees_what_an_environment_does(identifier: str) -> None:
         states.append(env._state)
         assert not terminated
     found, again = [], iter(actions)
-    pilot = Pilot(
-        env.scene.robots[0],
-        type(env.task)(),
-        lambda each: (found.append(each), next(again))[1],
-        PERIOD,
-    )
+    act = lambda each: (found.append(each), next(again))[1]  # noqa: E731
+    pilot = Pilot(env.scene.robots[0], type(env.task)(), act, PERIOD)
     pilot.begin(states[0].joints)
     commands = [pilot.step(state.time, state.joints) for state in states[:-1]]
     assert commands == sent

@@ -103,9 +103,7 @@ def test_it_stops_when_nobody_listens_any_more(furuta: PolicyNode, monkeypatch) 
     assert furuta._trouble(0.0) == f"nobody listens to {topic.name} any more"
 
 
-def test_messages_that_cannot_be_read_are_told_before_those_that_are_missing(
-    furuta: PolicyNode,
-) -> None:
+def test_messages_that_cannot_be_read_are_told_before_those_that_are_missing(furuta) -> None:
     fault = "the sensor 'camera': pictures are yuv422"
     furuta._sensors = SimpleNamespace(missing=lambda: ["/eye/image_raw"], fault=lambda: fault)
     know_joints(furuta, FURUTA)
@@ -246,9 +244,7 @@ def test_odometry_that_is_no_pose_is_a_fault(clock: SimpleNamespace) -> None:
     assert "the sensor 'odometry': pose and speed are (0.0, 0.0, 0.0, 0.0" in node._sensors.fault()
 
 
-def test_reasons_that_change_fast_are_a_line_a_second(
-    furuta: PolicyNode, clock: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_reasons_that_change_fast_are_a_line_a_second(furuta, clock, monkeypatch) -> None:
     lines, now = clock.lines, 0.0
     monkeypatch.setattr(rospy, "loginfo", lines.append)
     monkeypatch.setattr(policy_node, "time", SimpleNamespace(monotonic=lambda: now))

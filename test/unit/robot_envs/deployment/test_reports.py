@@ -105,9 +105,7 @@ def test_what_was_forgotten_comes_anew_with_earlier_stamps(clock: Clock) -> None
         (message(1e-9, elbow=(1.0, 0.0)), "stamped 1.5 s in the past"),
     ],
 )
-def test_a_state_that_cannot_be_is_a_fault_until_a_good_one_comes(
-    clock: Clock, bad: JointStateMsg, fault: str
-) -> None:
+def test_a_state_that_cannot_be_is_a_fault_until_a_good_one_comes(clock, bad, fault) -> None:
     joints, subscriber = listener("elbow")
     subscriber.take(message(1.0, elbow=(1.0, 0.0)))
     assert joints.fault() == ""

@@ -164,9 +164,7 @@ def test_a_faulty_ray_counts_for_nothing_and_a_sector_without_others_is_an_error
         ({"furthest": math.inf}, "furthest"),
     ],
 )
-def test_options_of_gymnasium_reach_the_base_class_and_are_checked(
-    wrong: dict[str, float], message: str
-) -> None:
+def test_options_of_gymnasium_reach_the_base_class_and_are_checked(wrong, message) -> None:
     with pytest.raises(TaskError, match=message):
         gymnasium.make("robot_envs/Navigate-v0", **wrong).close()
     with pytest.raises(TaskError, match="helped is a share from 0 to 1, not 2"):

@@ -81,8 +81,5 @@ def test_a_variation_undone_is_nominal_and_names_the_same(variation):
     assert variation.undone.is_nominal
     for name, value in vars(variation).items():
         undone = getattr(variation.undone, name)
-        assert (
-            undone.keys() == value.keys()
-            if isinstance(value, dict)
-            else (undone is None) == (value is None)
-        )
+        assert (undone is None) == (value is None)
+        assert not isinstance(value, dict) or undone.keys() == value.keys()

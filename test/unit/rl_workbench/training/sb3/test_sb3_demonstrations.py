@@ -7,20 +7,13 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
+from support.training import training_runs
 from support.training.goal_environments import REACH
 from support.training.learning_fakes import register_with
-from support.training.training_runs import (
-    InterruptAfter,
-    assert_same_run,
-    checkpoint,
-    failure,
-    options_of,
-    resume,
-    run,
-    summary,
-)
+from support.training.recorded import recorded
+from support.training.training_runs import InterruptAfter, assert_same_run, options_of, run, summary
 
-from rl_workbench.training.demonstrations import Origin, Recorder, load, paths, save
+from rl_workbench.training.demonstrations import Origin, load, paths
 
 pytestmark = pytest.mark.extras("stable_baselines3")
 
@@ -47,22 +40,6 @@ class Noise(gymnasium.Env):
         return self._look(), float(action), False, self._steps == 5, {}
 
 
-def recorded(folder: Path, env_id: str, lengths: tuple[int, ...], **options: Any) -> Path:
-    """Demonstrations of random actions, each so long; a driver stops them."""
-    folder.mkdir(parents=True)
-    origin = Origin(env_id, options)
-    env = origin.make()
-    env.action_space.seed(1)
-    recorder = Recorder(env, origin)
-    for seed, length in enumerate(lengths):
-        recorder.begin(seed)
-        for _ in range(length):
-            recorder.step(env.action_space.sample())
-        save(folder, recorder.episode())
-    env.close()
-    return folder
-
-
 @pytest.fixture(scope="module")
 def demos(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The first episode is whole; not to be changed."""
@@ -76,7 +53,7 @@ def sac(folder: Path, demos: Path, interrupt: Any = None, **changed: Any) -> Pat
 def begun(folder: Path) -> dict[str, np.ndarray]:
     """The buffer before the first step."""
     first = min((folder / "checkpoints").iterdir())
-    buffer = checkpoint(folder, str(first.relative_to(folder)))["buffer"]
+    buffer = training_runs.checkpoint(folder, str(first.relative_to(folder)))["buffer"]
     return {name: array.numpy() for name, array in buffer["arrays"].items()}
 
 
@@ -121,12 +98,12 @@ def test_a_resumed_training_needs_them_no_more(tmp_path: Path) -> None:
     demos.rename(tmp_path / "elsewhere")
     for each in runs:
         assert summary(each)["interrupted"] and summary(each)["steps"] < 60
-        assert_same_run(whole, resume(each))
+        assert_same_run(whole, training_runs.resume(each))
 
 
 def test_those_that_do_not_fit_are_one_line(tmp_path: Path, demos: Path) -> None:
     def told(folder: Path, **changed: Any) -> str:
-        return failure(lambda: sac(tmp_path / "run", folder, **changed))
+        return training_runs.failure(lambda: sac(tmp_path / "run", folder, **changed))
 
     assert "reach has 27 steps, but the replay buffer holds 20" in told(demos, buffer_size=20)
     assert "has no demonstrations" in told(tmp_path)

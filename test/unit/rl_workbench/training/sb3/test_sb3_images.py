@@ -6,17 +6,9 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
-from support.training import workbench_runs
+from support.training import training_runs, workbench_runs
 from support.training.learning_fakes import register_with
-from support.training.training_runs import (
-    InterruptAfter,
-    assert_same_run,
-    options_of,
-    resume,
-    rows,
-    run,
-    summary,
-)
+from support.training.training_runs import InterruptAfter, assert_same_run, options_of, run, summary
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
@@ -95,15 +87,13 @@ def policy_of(monkeypatch: pytest.MonkeyPatch, kind: type[Dot], **changed: objec
 
 
 @pytest.mark.slow
-def test_images_are_learned_by_a_cnn_that_resumes_and_is_evaluated(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_cnn_learns_from_images_and_resumes(tmp_path: Path, monkeypatch, capsys) -> None:
     env_id = register_with(monkeypatch, Dot)
     whole = run(options_of("ppo", SMALL | {"env_id": env_id}), tmp_path / "whole")
     interrupt = InterruptAfter(40)
     part = run(options_of("ppo", SMALL | {"env_id": env_id}), tmp_path / "part", interrupt)
     assert summary(part)["steps"] == 32
-    assert_same_run(whole, resume(part))
+    assert_same_run(whole, training_runs.resume(part))
     learned, out = load_learned(open_run(whole)), tmp_path / "policy.pt"
     assert type(learned.env.observation_space) is spaces.Box
     assert cli.main(["eval", str(whole), "--episodes=2"]) == 0
@@ -138,9 +128,7 @@ def test_arguments_of_the_policy_may_be_classes(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize("algorithm", ["dqn", "reinforce"])
-def test_our_own_refuse_images_and_say_what_learns_from_them(
-    algorithm: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_our_own_refuse_images_and_say_what_takes_them(algorithm, tmp_path, monkeypatch) -> None:
     env_id = register_with(monkeypatch, Dot)
     words = rf"{env_id} observes images, uint8 of \(36, 36, 3\): .* --algo ppo, a2c or dqn-sb3"
     with pytest.raises(WorkbenchError, match=words):
@@ -182,5 +170,5 @@ def test_numbers_in_info_become_curves(algorithm: str, tmp_path: Path, monkeypat
         folder = make(tmp_path / "run", total_timesteps=64, **given)
     else:
         folder = workbench_runs.policy_gradient(tmp_path / "run", "reinforce", episodes=2, **given)
-    found = [row for row in rows(folder) if row[1].startswith("info/")]
+    found = [row for row in training_runs.rows(folder) if row[1].startswith("info/")]
     assert found[:2] == [("8", "info/side", "1.0"), ("8", "info/steps_so_far", "4.5")]

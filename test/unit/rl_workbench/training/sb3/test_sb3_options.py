@@ -59,32 +59,26 @@ def test_noise_of_actions_is_a_standard_deviation() -> None:
     assert made.action_noise._sigma.tolist() == [0.2]
 
 
+CHOICES = (
+    "can't choose from Discrete(2), the actions of CartPole-v1; ppo, a2c, dqn-sb3, dqn, reinforce"
+)
+
+
 @pytest.mark.parametrize(
-    ("flags", "told"),
+    ("algorithm", "flags", "told"),
     [
-        (["--n-epochs=0"], "n_epochs must be at least 1, not 0"),
-        (["--params", "net_arch=["], "--params: net_arch must be a YAML value, not '['"),
-        (["--num-envs=0"], "num_envs must be between 1 and 1024, not 0"),
-        (["--net-arch=64,wide"], "net_arch must be whole numbers, as in 64,64, not '64,wide'"),
+        ("ppo", "--n-epochs=0", "n_epochs must be at least 1, not 0"),
+        ("ppo", "--params net_arch=[", "--params: net_arch must be a YAML value, not '['"),
+        ("ppo", "--num-envs=0", "num_envs must be between 1 and 1024, not 0"),
+        ("ppo", "--net-arch=64,wide", "net_arch must be whole numbers, as in 64,64, not '64,wide'"),
+        *((name, "", f"{name} {CHOICES} fit it") for name in ("sac", "td3", "ddpg")),
+        ("dqn-sb3", "--env-id=Pendulum-v1", "Pendulum-v1; ppo, a2c, sac, td3, ddpg fit it"),
     ],
-)  # fmt: skip
-def test_wrong_options_are_one_line(flags: list[str], told: str) -> None:
+)
+def test_options_that_do_not_fit_are_one_line(algorithm: str, flags: str, told: str) -> None:
     with pytest.raises(WorkbenchError) as raised:
-        model("ppo", *flags)
+        model(algorithm, *flags.split())
     assert told in str(raised.value) and "\n" not in str(raised.value)
-
-
-@pytest.mark.parametrize("algorithm", ["sac", "td3", "ddpg"])
-def test_an_algorithm_that_does_not_fit_names_those_that_do(algorithm: str) -> None:
-    with pytest.raises(WorkbenchError) as raised:
-        model(algorithm)
-    words = "can't choose from Discrete(2), the actions of CartPole-v1; ppo, a2c, dqn-sb3, dqn, "
-    assert f"{algorithm} {words}reinforce fit it" in str(raised.value)
-
-
-def test_single_actions_do_not_fit_a_pendulum() -> None:
-    with pytest.raises(WorkbenchError, match="Pendulum-v1; ppo, a2c, sac, td3, ddpg fit it"):
-        model("dqn-sb3", "--env-id=Pendulum-v1")
 
 
 @pytest.mark.parametrize("algorithm", ["ppo", "a2c", "sac", "td3", "ddpg", "dqn-sb3"])

@@ -7,19 +7,9 @@ from typing import Any
 import gymnasium
 import pytest
 import torch
+from support.training import training_runs as runs
 from support.training.goal_environments import REACH
-from support.training.training_runs import (
-    InterruptAfter,
-    assert_no_doubles,
-    assert_same,
-    assert_same_run,
-    checkpoint,
-    options_of,
-    resume,
-    rows,
-    run,
-    summary,
-)
+from support.training.training_runs import InterruptAfter, checkpoint, resume, run, summary
 
 pytestmark = [pytest.mark.extras("stable_baselines3"), pytest.mark.slow]
 
@@ -52,7 +42,7 @@ USUAL = ("ppo", "ppo-3", "a2c", "dqn-3", "sac", "td3-3", "ddpg")
 
 def train(folder: Path, name: str, interrupt: Any = None, **changed: Any) -> Path:
     algorithm, options = TRAININGS[name]
-    return run(options_of(algorithm, options | changed), folder, interrupt)
+    return run(runs.options_of(algorithm, options | changed), folder, interrupt)
 
 
 def killed(folder: Path, to: Path, step: int) -> Path:
@@ -79,12 +69,12 @@ def test_resumed_it_is_the_training_that_was_never_broken_off(tmp_path: Path, na
     whole = train(tmp_path / "whole", name, counting)
     run = killed(whole, tmp_path / "killed", 70)
     assert 0 < checkpoint(run)["steps"] <= 70
-    assert_same_run(whole, resume(run))
+    runs.assert_same_run(whole, resume(run))
     run = train(tmp_path / "interrupted", name, InterruptAfter(counting.times * 45 // 100))
     assert summary(run)["interrupted"] and 0 < summary(run)["steps"] < 120
-    assert_same_run(whole, resume(run))
+    runs.assert_same_run(whole, resume(run))
     if not name.endswith("-3"):  # of which some end at the same step
-        assert_no_doubles(run)
+        runs.assert_no_doubles(run)
 
 
 @pytest.mark.parametrize("name", ["a2c", "td3"])
@@ -94,8 +84,8 @@ def test_prolonged_it_is_the_one_that_was_longer_from_the_start(tmp_path: Path, 
     whole = train(tmp_path / "whole", name, **constant)
     run = train(tmp_path / "run", name, **constant, total_timesteps=73)
     resume(run, total_timesteps=120)
-    assert rows(run) == rows(whole)
-    assert_same(checkpoint(run), checkpoint(whole))
+    assert runs.rows(run) == runs.rows(whole)
+    runs.assert_same(checkpoint(run), checkpoint(whole))
 
 
 @pytest.mark.parametrize("name", ["ppo-3", "sac-3"])

@@ -6,19 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from support.training import training_runs as runs
 from support.training.learning_fakes import POLE, Elsewhere, register_with
-from support.training.training_runs import (
-    assert_no_doubles,
-    assert_same,
-    checkpoint,
-    options_of,
-    record,
-    resume,
-    run,
-    small,
-    summary,
-    train,
-)
+from support.training.training_runs import assert_same, checkpoint, options_of, summary, train
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithm import load_policy
@@ -43,12 +33,10 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
      ("ppo", {"total_timesteps": 200, "n_steps": 50, "batch_size": 100, "num_envs": 2,
               "eval_frequency": 100})],
 )  # fmt: skip
-def test_every_algorithm_trains_and_its_policy_is_the_librarys(
-    tmp_path: Path, algorithm: str, options: dict
-) -> None:
+def test_each_trains_and_its_policy_is_the_librarys(tmp_path, algorithm: str, options) -> None:
     import stable_baselines3
 
-    folder = run(options_of(algorithm, options), tmp_path)
+    folder = runs.run(options_of(algorithm, options), tmp_path)
     result = summary(folder)
     assert result["complete"] and result["steps"] >= 200 and result["episodes"] > 0
     evaluated = [step for step, _ in result["evaluations"]][:2]
@@ -95,7 +83,8 @@ def test_steps_are_begun_in_all_before_one_is_taken(tmp_path: Path, monkeypatch)
 def test_the_record_says_with_which_version(whole) -> None:
     import stable_baselines3
 
-    assert record(whole("ppo"))["versions"]["stable_baselines3"] == stable_baselines3.__version__
+    told = runs.record(whole("ppo"))["versions"]
+    assert told["stable_baselines3"] == stable_baselines3.__version__
 
 
 # --resume
@@ -104,16 +93,16 @@ def test_the_record_says_with_which_version(whole) -> None:
 def test_a_resumed_training_goes_on_with_figures_and_networks(whole, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(whole("ppo"), tmp_path / "run"))
     before, state = summary(folder), checkpoint(folder)
-    resume(folder, total_timesteps=512)
+    runs.resume(folder, total_timesteps=512)
     after, later = summary(folder), checkpoint(folder)
     assert after["steps"] == 512 and after["complete"]
     assert after["returns"][: len(before["returns"])] == before["returns"]
     assert [step for step, _ in after["evaluations"]] == [128, 256, 320, 448, 512]
-    assert_no_doubles(folder)
+    runs.assert_no_doubles(folder)
     optimizers = [each["optimizers"]["policy.optimizer"]["state"][0]["step"]
                   for each in (state, later)]  # fmt: skip
     assert optimizers[1] == 2 * optimizers[0] > 0
-    assert record(folder)["run"]["total_timesteps"] == 512
+    assert runs.record(folder)["run"]["total_timesteps"] == 512
 
 
 def test_the_state_comes_back_whole(whole) -> None:
@@ -121,7 +110,7 @@ def test_the_state_comes_back_whole(whole) -> None:
     from rl_workbench.training.sb3.adapter import make
 
     saved = torch.load(whole("sac") / "last.pt", weights_only=True)
-    options = small("sac")
+    options = runs.small("sac")
     envs = training_environments(options)
     training = make(options, envs)
     training.load_state_dict(saved)
@@ -159,5 +148,5 @@ def test_a_rate_that_blows_up(tmp_path: Path) -> None:
 def test_a_rate_that_torch_refuses(tmp_path: Path) -> None:
     options = {"learning_rate": 1e38, "learning_starts": 10, "buffer_size": 50}
     with pytest.raises(WorkbenchError, match=r"^dqn-sb3 failed: [^\n]*--resume"):
-        run(options_of("dqn-sb3", options), tmp_path)
+        runs.run(options_of("dqn-sb3", options), tmp_path)
     assert summary(tmp_path)["failure"]

@@ -45,10 +45,8 @@ def test_a_journal_brings_another_simulator_to_the_same_state_or_says_where_it_d
     world = Replayed()
     replay(journal, world, last)
     assert world.asked == [begun, *commands, "save"]
-    with pytest.raises(
-        SimulatorFault,
-        match="4 steps lead to another state.*: joints '[a-z]+': .*position=4.5.*, not ",
-    ):
+    words = "4 steps lead to another state.*: joints '[a-z]+': .*position=4.5.*, not "
+    with pytest.raises(SimulatorFault, match=words):
         replay(journal, Replayed(drift=0.5), last)
     replay([], world, None)
 
@@ -56,12 +54,9 @@ def test_a_journal_brings_another_simulator_to_the_same_state_or_says_where_it_d
 def test_a_variation_leaves_what_it_does_not_name() -> None:
     first = Variation({"rod": LinkScale(2.0)}, {"hinge": 1.0}, gravity=0.5)
     second = Variation({"hand": LinkScale(3.0)}, {"hinge": 2.0}, gains={"arm": 1.5})
-    assert first.merged(second) == Variation(
-        {"rod": LinkScale(2.0), "hand": LinkScale(3.0)},
-        {"hinge": 2.0},
-        gains={"arm": 1.5},
-        gravity=0.5,
-    )
+    links = {"rod": LinkScale(2.0), "hand": LinkScale(3.0)}
+    both = Variation(links, {"hinge": 2.0}, gains={"arm": 1.5}, gravity=0.5)
+    assert first.merged(second) == both
 
 
 def test_a_plausible_answer_is_fine() -> None:
@@ -123,6 +118,5 @@ def test_where_one_does_not_start_all_are_ended() -> None:
     with pytest.raises(RobotEnvError), side_by_side(3):
         for number in range(3):
             World(events, fails=number == 1)
-    assert events[3:] == [
-        "connect 1", "connect 2", "close 1", "close 2", "close 3", "wait 1", "wait 2", "wait 3",
-    ]  # fmt: skip
+    ends = ["close 1", "close 2", "close 3", "wait 1", "wait 2", "wait 3"]
+    assert events[3:] == ["connect 1", "connect 2", *ends]

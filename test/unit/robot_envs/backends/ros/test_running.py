@@ -25,12 +25,8 @@ def fail(simulator, error):
 def test_one_that_is_there_changes_no_error(master) -> None:
     running = RunningSimulator()
     assert running.is_registered()
-    for error in (
-        SimulatorHangs("no answer"),
-        SimulatorError("refused"),
-        rospy.ROSException("x"),
-        KeyError(),
-    ):
+    errors = SimulatorHangs("no answer"), SimulatorError("no"), rospy.ROSException("x"), KeyError()
+    for error in errors:
         with pytest.raises(type(error)) as raised:
             fail(running, error)
         assert raised.value is error
@@ -40,10 +36,8 @@ def test_one_that_ended_changes_no_error(master) -> None:
     running = RunningSimulator()
     with socket.socket() as reserved:  # bound only: connections are refused
         reserved.bind(("127.0.0.1", 0))
-        for address in (
-            master.nodes.pop("/gazebo"),
-            f"http://127.0.0.1:{reserved.getsockname()[1]}",
-        ):
+        dead = f"http://127.0.0.1:{reserved.getsockname()[1]}"
+        for address in (master.nodes.pop("/gazebo"), dead):
             if address != master.uri:
                 master.nodes["/gazebo"] = address
             assert not running.is_registered()
@@ -55,9 +49,8 @@ def test_another_one_in_its_place_is_told(master, other_master) -> None:
     running = RunningSimulator()
     master.nodes["/gazebo"] = other_master.uri
     assert not running.is_registered()
-    with pytest.raises(
-        SimulatorError, match="another one runs as /gazebo .* ROS_MASTER_URI .*model does not"
-    ):
+    words = "another one runs as /gazebo .* ROS_MASTER_URI .*model does not"
+    with pytest.raises(SimulatorError, match=words):
         fail(running, SimulatorError("model does not exist"))
 
 

@@ -106,9 +106,7 @@ def test_messages_become_readings(heard: Heard) -> None:
         ("old_imu", "/old_imu", "<updateRate>60", "<updateRate>20", 0.15),
     ],
 )
-def test_the_slower_rate_of_sensor_and_plugin_counts(
-    heard: Heard, name: str, topic: str, old: str, new: str, most: float
-) -> None:
+def test_the_slower_rate_of_sensor_and_plugin_counts(heard, name, topic, old, new, most) -> None:
     text = str(SEEING.urdf)
     assert old in text
     found = listener(heard, name, robot=replace(SEEING, urdf=text.replace(old, new)))
@@ -165,9 +163,7 @@ def test_a_world_that_stood_paused_while_a_policy_learned_goes_on(
         world.act({})
 
 
-def test_after_a_reset_the_fault_of_messages_is_told_first(
-    heard: Heard, world: RealtimeWorld, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_after_a_reset_the_fault_of_messages_is_told_first(heard, world, monkeypatch) -> None:
     world.look(StateQuery(sensors=("front_laser", "camera")))
     strange = picture("yuv422", np.zeros((2, 2, 2), np.uint8))
     monkeypatch.setattr(world._sensors, "forget", lambda: heard.send("/eye/image_raw", strange))

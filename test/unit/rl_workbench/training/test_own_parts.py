@@ -1,21 +1,15 @@
-"""What is the policy gradients' own in a training: networks, tags by episode, batches."""
+"""What is one algorithm's own in a training: networks, tags, batches; DQN's checkpoint and its episode."""
 
 from pathlib import Path
 
 import pytest
 import torch
-from support.training.training_runs import (
-    EXACT,
-    checkpoint,
-    files,
-    points,
-    record,
-    rows,
-    summary,
-    train,
-)
+from support.training import training_runs as runs
+from support.training.training_runs import EXACT, checkpoint, points, rows, summary, train
+from torch import nn
 
 from rl_workbench.agents.document import PolicyNetwork, ValueNetwork
+from rl_workbench.agents.dqn_agent import Epsilon
 
 NAMES = EXACT[1:]
 BY_EPISODE = ("Reward", "Value Loss", "Policy Loss")
@@ -26,7 +20,7 @@ def load(path: Path) -> dict[str, torch.Tensor]:
 
 
 def networks(run: Path) -> set[str]:
-    return {name for name in files(run) if name.endswith(".pth")}
+    return {name for name in runs.files(run) if name.endswith(".pth")}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -75,4 +69,46 @@ def test_the_scale_of_observations_counts(whole, tmp_path: Path) -> None:
     assert summary(scaled)["returns"] != summary(whole("reinforce"))["returns"]
     ones = train(tmp_path / "ones", "reinforce", observation_scale="1,1,1,1")
     assert summary(ones)["returns"] == summary(whole("reinforce"))["returns"]
-    assert record(scaled)["hyperparameters"]["observation_scale"] == [1.0, 1.0, 0.1, 2.0]
+    assert runs.record(scaled)["hyperparameters"]["observation_scale"] == [1.0, 1.0, 0.1, 2.0]
+
+
+# DQN.
+
+
+@pytest.mark.slow
+def test_a_checkpoint_has_the_documents_keys_and_no_more_than_its_weights(whole) -> None:
+    content = checkpoint(whole("dqn"))
+    assert {"q_net", "target_net", "epsilon", "optimizer", "replay"} <= set(content)
+    theirs = nn.Module()  # the layers of the DQN tutorial's class
+    layers = [nn.Linear(4, 16), nn.ReLU(), nn.Linear(16, 16), nn.ReLU(), nn.Linear(16, 2)]
+    theirs.net = nn.Sequential(*layers)
+    theirs.load_state_dict(content["q_net"])
+    assert content["q_net"]["net.0.weight"].untyped_storage().nbytes() == 16 * 4 * 4
+    assert content["config"]["hyperparameters"]["hidden_sizes"] == (16, 16)
+
+
+def test_epsilon_is_logged_at_each_episodes_end(whole) -> None:
+    settings, wanted = runs.small("dqn").hyperparameters, []
+    for step, _ in points(whole("dqn"))["charts/episodic_length"]:
+        epsilon = Epsilon(settings)
+        epsilon.step_done(step)
+        wanted.append(epsilon.value)
+    assert [float(each) for _, tag, each in rows(whole("dqn")) if tag == "charts/epsilon"] == wanted
+
+
+def test_losses_are_logged_every_so_many_steps_from_the_first_one_on(whole) -> None:
+    steps = [step for step, _ in points(whole("dqn"))["losses/td_loss"]]
+    assert steps == list(range(60, 401, 20))
+    assert steps == [step for step, _ in points(whole("dqn"))["losses/q_values"]]
+
+
+@pytest.mark.slow
+def test_an_environment_that_goes_another_way_costs_its_episode(tmp_path: Path, capsys) -> None:
+    run = train(tmp_path / "run", "dqn", runs.InterruptAfter(90))
+    content = torch.load(run / "last.pt", weights_only=True)
+    assert len(content["environment"]["episode"]["actions"]) > 0
+    content["environment"]["episode"]["observation"] += 1
+    torch.save(content, run / "last.pt")
+    runs.resume(run)
+    assert "the current episode is abandoned" in capsys.readouterr().err
+    assert summary(run)["complete"]
