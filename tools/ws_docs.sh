@@ -9,7 +9,7 @@ API=(
         robot_envs.backends.ros.session.RosSession"
     "robot_envs.testing"
     "rl_workbench rl_workbench.agents.dqn_agent.DQNAgent rl_workbench.agents.settings rl_workbench.tools.policies
-        rl_workbench.tools.runs rl_workbench.training.demonstrations"
+        rl_workbench.tools.runs rl_workbench.training.demonstrations rl_workbench.training.options"
     "robot_sim"
     "bullet_gazebo.plugins.plugin_loader.PluginContext bullet_gazebo.plugins.sensor_topics.SensorPlugin"
     "ros_utils ros_utils.readiness ros_utils.ros_controllers ros_utils.ros_gazebo ros_utils.ros_launch
@@ -17,6 +17,14 @@ API=(
         ros_utils.step_client ros_utils.testing ros_calls.service"
     "cartpole.environment cartpole.robot cartpole.tasks"
 )
+
+members() {  # name
+    # A lazy package makes its __all__ as it runs, which mkdocstrings can't read.
+    local file=$ROOT/src/${1//.//}/__init__.py
+    [[ ! -f $file ]] || ! grep -q "= attach(" "$file" || PYTHONPATH=$ROOT/src "$VENV/bin/python3" -c '
+import importlib, sys
+print(f"    options:\n      members: {importlib.import_module(sys.argv[1]).__all__}")' "$1"
+}
 
 mkdocs() {  # command, argument...
     local source=$WS/docs/source
@@ -28,7 +36,7 @@ mkdocs() {  # command, argument...
         read -rd '' -a on_page <<<"$page" || true
         printf '# %s\n' "${on_page[0]}" >"$source/api/${on_page[0]}.md"
         for name in "${on_page[@]}"; do
-            printf '\n::: %s\n' "$name" >>"$source/api/${on_page[0]}.md"
+            printf '\n::: %s\n%s\n' "$name" "$(members "$name")" >>"$source/api/${on_page[0]}.md"
         done
     done
     cd -- "$ROOT" || return

@@ -1,0 +1,8 @@
+// The site's search takes a word after a dash as one to leave out. An option's own entry has underscores.
+const post = Worker.prototype.postMessage;
+Worker.prototype.postMessage = function (message, ...rest) {
+  const option = (_, blank, name) => `${blank}${name} ${name.replaceAll("-", "_")}`;
+  if (typeof message?.data === "string")
+    message = { ...message, data: message.data.replace(/(^|\s)-+([\w-]+)/g, option) };
+  return post.call(this, message, ...rest);
+};
