@@ -62,34 +62,26 @@ def test_distances_between_angles():
     assert shortest_distance_within(0.0, 1.0, -0.5, 0.5) == 1.0
 
 
+HARD = JointLimits(-0.5, 0.5, 7.0, 30.0)
+SOFT = JointLimits(-1.0, 1.0, 2.0, 30.0, SoftLimits(-0.9, 0.9, 10.0, 20.0))
+
+
 @pytest.mark.parametrize(
-    ("position", "velocity", "command", "wanted"),
+    ("limits", "position", "velocity", "command", "wanted"),
     [
-        (0.0, 0.0, 100.0, 30.0), (0.0, 0.0, -100.0, -30.0), (0.0, 0.0, 5.0, 5.0),
-        (0.6, 0.0, 5.0, 0.0), (0.6, 0.0, -5.0, -5.0), (-0.6, 0.0, -5.0, 0.0), (-0.6, 0.0, 5.0, 5.0),
-        (0.0, 8.0, 5.0, 0.0), (0.0, 8.0, -5.0, -5.0), (0.0, -8.0, -5.0, 0.0), (0.0, -8.0, 5.0, 5.0),
+        (HARD, 0.0, 0.0, 100.0, 30.0), (HARD, 0.0, 0.0, -100.0, -30.0), (HARD, 0.0, 0.0, 5.0, 5.0),
+        (HARD, 0.6, 0.0, 5.0, 0.0), (HARD, 0.6, 0.0, -5.0, -5.0), (HARD, -0.6, 0.0, -5.0, 0.0),
+        (HARD, -0.6, 0.0, 5.0, 5.0), (HARD, 0.0, 8.0, 5.0, 0.0), (HARD, 0.0, 8.0, -5.0, -5.0),
+        (HARD, 0.0, -8.0, -5.0, 0.0), (HARD, 0.0, -8.0, 5.0, 5.0), (JointLimits(), 0.0, 0.0, 1e9, 1e9),
+        # At 0.85 rad at most 10 * 0.05 = 0.5 rad/s are allowed; 1 rad/s is braked with 20 * 0.5 N m.
+        (SOFT, 0.85, 1.0, 30.0, -10.0),
     ],
 )  # fmt: skip
-def test_effort_saturation_only_blocks_pushing_further(position, velocity, command, wanted):
-    joint = JointHandle("j", "prismatic", JointLimits(-0.5, 0.5, 7.0, 30.0))
+def test_limits_only_block_pushing_further(limits, position, velocity, command, wanted):
+    joint = JointHandle("j", "prismatic", limits)
     joint.position, joint.velocity, joint.command = position, velocity, command
-    effort_enforcer(joint.limits)(joint)
-    assert joint.command == wanted
-
-
-def test_without_limits_nothing_is_enforced():
-    joint = JointHandle("j", "prismatic", command=1e9)
-    effort_enforcer(joint.limits)(joint)
-    assert joint.command == 1e9
-
-
-def test_soft_limits_brake_before_the_end():
-    limits = JointLimits(-1.0, 1.0, 2.0, 30.0, SoftLimits(-0.9, 0.9, 10.0, 20.0))
-    joint = JointHandle("j", "revolute", limits)
-    # At 0.85 rad at most 10 * 0.05 = 0.5 rad/s are allowed; at 1 rad/s that is braked with 20 * 0.5 N m.
-    joint.position, joint.velocity, joint.command = 0.85, 1.0, 30.0
     effort_enforcer(limits)(joint)
-    assert joint.command == pytest.approx(-10.0)
+    assert joint.command == pytest.approx(wanted)
 
 
 def test_the_description_gives_joints_limits_and_transmissions():
