@@ -8,10 +8,16 @@ def robot(*parts: str, name: str = "r") -> str:
     return f'<robot name="{name}">{"".join(parts)}</robot>'
 
 
+def _moments(moment: object) -> tuple[object, ...]:
+    """Of inertia about x, y and z: three, or one for all."""
+    return moment if isinstance(moment, tuple) else (moment,) * 3
+
+
 def inertial(mass: object = 1.0, com: str = "0 0 0", moment: object = 0.1) -> str:
+    x, y, z = _moments(moment)
     return (
-        f'<inertial><origin xyz="{com}"/><mass value="{mass}"/><inertia ixx="{moment}" iyy="{moment}" '
-        f'izz="{moment}" ixy="0" ixz="0" iyz="0"/></inertial>'
+        f'<inertial><origin xyz="{com}"/><mass value="{mass}"/>'
+        f'<inertia ixx="{x}" iyy="{y}" izz="{z}" ixy="0" ixz="0" iyz="0"/></inertial>'
     )
 
 
@@ -45,10 +51,10 @@ def sdf_link(
     name: str, pose: str = "0 0 0 0 0 0", more: str = "", mass: object = 1.0, moment: object = 0.1,
     com: str = "0 0 0",
 ) -> str:  # fmt: skip
+    x, y, z = _moments(moment)
     return (
         f'<link name="{name}"><pose>{pose}</pose><inertial><pose>{com} 0 0 0</pose><mass>{mass}</mass>'
-        f"<inertia><ixx>{moment}</ixx><iyy>{moment}</iyy><izz>{moment}</izz></inertia></inertial>"
-        f"{more}</link>"
+        f"<inertia><ixx>{x}</ixx><iyy>{y}</iyy><izz>{z}</izz></inertia></inertial>{more}</link>"
     )
 
 

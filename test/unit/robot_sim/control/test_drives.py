@@ -32,11 +32,14 @@ class Lift:
     ):
         text = lift_urdf(interface, **urdf)
         self.sim = Simulator(world, lockstep=True)
-        self.robot = add_robot(self.sim, "lift", text, gains=gains, control_period=period)
-        self.model, self.manager = self.robot.model, self.robot.manager
-        self.joint = self.robot.hardware.joints["rail"]
+        made = add_robot(self.sim, "lift", text, gains=gains, control_period=period)
+        self.model, self.manager, self.joint = (
+            made.model,
+            made.manager,
+            made.hardware.joints["rail"],
+        )
         if controller:
-            start(self.robot, {"c": {"type": controller, "joint": "rail"} | (params or {})})
+            start(made, {"c": {"type": controller, "joint": "rail"} | (params or {})})
 
     def advance(self, seconds):
         self.sim.advance(round(seconds / DT))
@@ -51,6 +54,7 @@ def make(make_world):
     return lambda *args, **kwargs: Lift(make_world(), *args, **kwargs)
 
 
+EFFORT = "effort_controllers/JointEffortController"
 POSITION = "position_controllers/JointPositionController"
 VELOCITY = "velocity_controllers/JointVelocityController"
 GAINS = {"rail": {"p": 20000.0, "d": 500.0}}
@@ -66,14 +70,11 @@ def test_a_position_command_is_where_the_joint_is_one_step_later(make):
     assert lift.joint.effort == 0.0
 
 
-def test_a_position_joint_without_a_controller_stays_where_it_is_put(make):
+def test_a_position_joint_stays_where_it_is_put_and_goes_at_the_pace_of_its_limit(make):
     lift = make("Position")
     assert lift.advance(0.2) == pytest.approx(0.0, abs=1e-6)
     lift.sim.set_joint_states(lift.model, {"rail": 0.4})
     assert lift.advance(0.2) == pytest.approx(0.4, abs=1e-6)
-
-
-def test_the_velocity_limit_sets_the_pace_of_a_position_command(make):
     lift = make("Position", POSITION)
     lift.command(5.0)
     assert lift.advance(0.25) == pytest.approx(0.5, abs=1e-6)
@@ -130,14 +131,10 @@ def test_a_controller_with_a_pid_reaches_its_set_point(make, interface, controll
     assert found == pytest.approx(wanted, abs=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("interface", "controller"),
-    [
-        ("Effort", "effort_controllers/JointEffortController"),
-        ("Position", POSITION),
-        ("Velocity", VELOCITY),
-    ],
-)
+KINDS = {"Effort": EFFORT, "Position": POSITION, "Velocity": VELOCITY}
+
+
+@pytest.mark.parametrize(("interface", "controller"), KINDS.items())
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_what_is_no_number_never_reaches_the_world(make, interface, controller, bad):
     lift = make(interface, controller)
@@ -162,7 +159,7 @@ def test_controllers_run_on_every_control_period_with_the_nominal_dt(make, perio
 
 def test_limits_act_on_each_step_also_between_control_periods(make):
     limit = 'lower="-1" upper="0.05" effort="100" velocity="20"'
-    lift = make("Effort", "effort_controllers/JointEffortController", period=0.1, limit=limit)
+    lift = make("Effort", EFFORT, period=0.1, limit=limit)
     lift.command(100.0)
     lift.advance(0.04)
     assert lift.joint.effort == 100.0

@@ -1,7 +1,4 @@
-"""JointTrajectoryController, tick by tick: parameters, law, time, joints, goals.
-
-See docs/contract/ros_control.md 3.5.
-"""
+"""JointTrajectoryController, tick by tick (docs/contract/ros_control.md 3.5)."""
 
 import math
 
@@ -102,7 +99,7 @@ def test_errors_are_the_shortest_turn_but_on_a_rail_the_whole_way():
     assert commands == pytest.approx([short, short, -40.0])
 
 
-def test_it_starts_by_holding_what_it_finds():
+def test_it_starts_by_holding_what_it_finds_or_slows_it_down_in_its_stop_duration():
     rig = Rig("Effort")
     joint = rig.joints["shoulder"]
     joint.position, joint.command = 0.7, 5.0
@@ -111,9 +108,6 @@ def test_it_starts_by_holding_what_it_finds():
     rig.run(10)
     assert joint.command == 0.0
     assert rig.controller.query(rig.now)[0] == (0.7, 0.0, 0.0)
-
-
-def test_with_a_stop_duration_a_moving_joint_is_slowed_down():
     rig = Rig("Position", stop_trajectory_duration=0.5)
     joint = rig.joints["shoulder"]
     joint.position, joint.velocity = 0.2, 1.0
@@ -122,16 +116,6 @@ def test_with_a_stop_duration_a_moving_joint_is_slowed_down():
     assert joint.command == pytest.approx(0.201, abs=1e-5)
     rig.run(1000)
     assert joint.command == pytest.approx(0.2 + 0.625 * 0.5)
-
-
-def test_no_points_hold_the_joints_where_they_are():
-    rig = Rig("Effort").start()
-    rig.controller.follow(move((1.0, (1.0,))))
-    rig.run(500)
-    rig.joints["shoulder"].position = 0.4
-    rig.controller.follow(Trajectory((), ()))
-    rig.run()
-    assert rig.controller.sample().desired == ((0.4,), (0.0,), (0.0,))
 
 
 def test_a_stamp_in_the_future_waits_and_the_old_trajectory_goes_on():
@@ -185,15 +169,11 @@ def test_state_comes_at_its_rate_and_not_at_all_for_a_rate_of_0():
     assert samples == []
 
 
-def test_joints_may_come_in_another_order():
-    rig = Rig(joints=("shoulder", "rail")).start()
-    rig.controller.follow(move((1.0, (2.0, 1.0)), names=("rail", "shoulder")))
-    rig.run(1100)
-    assert [rig.joints[name].position for name in ("shoulder", "rail")] == [1.0, 2.0]
-
-
-def test_joints_that_are_not_named_go_on():
+def test_joints_may_come_in_another_order_and_those_that_are_not_named_go_on():
     rig = Rig(joints=("shoulder", "rail"), allow_partial_joints_goal=True).start()
+    rig.controller.follow(move((1.0, (-2.0, -1.0)), names=("rail", "shoulder")))
+    rig.run(1100)
+    assert [rig.joints[name].position for name in ("shoulder", "rail")] == [-1.0, -2.0]
     rig.controller.follow(move((2.0, (1.0,))))
     rig.run(500)
     told = rig.pursue(move((0.5, (2.0,)), names=("rail",)))
@@ -203,15 +183,14 @@ def test_joints_that_are_not_named_go_on():
     assert [rig.joints[name].position for name in ("shoulder", "rail")] == [1.0, 2.0]
 
 
-def test_a_tolerance_that_is_no_number_is_refused():
-    rig = Rig().start()
-    for tolerances in (
-        {"path": {"shoulder": Tolerance(math.nan)}},
-        {"goal": {"x": Tolerance(0, math.nan)}},
-    ):
-        with pytest.raises(TrajectoryRefused, match="not a number") as refusal:
-            rig.pursue(move((1.0, (1.0,))), **tolerances)
-        assert refusal.value.code == INVALID_GOAL
+@pytest.mark.parametrize(
+    "tolerances",
+    [{"path": {"shoulder": Tolerance(math.nan)}}, {"goal": {"x": Tolerance(0, math.nan)}}],
+)
+def test_a_tolerance_that_is_no_number_is_refused(tolerances):
+    with pytest.raises(TrajectoryRefused, match="not a number") as refusal:
+        Rig().start().pursue(move((1.0, (1.0,))), **tolerances)
+    assert refusal.value.code == INVALID_GOAL
 
 
 def test_a_goal_is_told_of_at_the_monitors_rate_and_succeeds():
@@ -324,10 +303,14 @@ def test_cancel_holds_the_joints_and_knows_its_goal():
     assert rig.joints["shoulder"].position == here
 
 
-def test_a_goal_without_points_holds_and_succeeds():
-    rig = Rig().start()
+def test_no_points_hold_the_joints_where_they_are_and_such_a_goal_succeeds():
+    rig = Rig("Effort").start()
     rig.controller.follow(move((1.0, (1.0,))))
-    rig.run(1100)
+    rig.run(500)
+    rig.joints["shoulder"].position = 0.4
+    rig.controller.follow(Trajectory((), ()))
+    rig.run()
+    assert rig.controller.sample().desired == ((0.4,), (0.0,), (0.0,))
     told = rig.pursue(Trajectory(("shoulder",), ()))
     rig.run(100)
     assert told.outcomes == [GoalOutcome("succeeded")]

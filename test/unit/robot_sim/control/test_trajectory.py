@@ -87,14 +87,11 @@ def test_the_lowest_common_level_counts(first, last, level):
     assert segment.sample(S // 3) == same.sample(S // 3)
 
 
-def test_outside_its_time_a_segment_stands():
+def test_outside_its_time_a_segment_stands_and_without_duration_it_is_its_end():
     segment = Segment(S, Waypoint(1.0, 5.0, 5.0), 2 * S, Waypoint(2.0, 5.0, 5.0))
     assert segment.sample(S - 1) == State(1.0, 0.0, 0.0)
     assert segment.sample(2 * S + 1) == State(2.0, 0.0, 0.0)
     assert segment.sample(2 * S).velocity == pytest.approx(5.0)
-
-
-def test_a_segment_without_duration_is_its_end():
     assert Segment(5, Waypoint(1.0), 5, Waypoint(2.0, 3.0)).sample(5) == State(2.0)
 
 
@@ -131,25 +128,24 @@ def test_the_past_of_a_track_is_forgotten():
     assert len(spline._segments) <= 3
 
 
+TURN = 2.0 * math.pi
+
+
 @pytest.mark.parametrize(
     ("at", "to", "wanted"),
     [
-        (0.0, 2 * math.pi + 0.5, 0.5),
-        (6.0, 0.0, 2 * math.pi),
-        (-20.0, -20.0, -20.0),
-        (3.0, -3.0, 3.2832),
+        (0.0, (TURN + 0.5,), (0.5,)),
+        (6.0, (0.0,), (TURN,)),
+        (-20.0, (-20.0,), (-20.0,)),
+        (3.0, (-3.0,), (3.2832,)),
+        # Whole turns are added to all points alike.
+        (0.0, (7.0, 12.0, 20.0), (7.0 - TURN, 12.0 - TURN, 20.0 - TURN)),
     ],
 )
 def test_a_continuous_joint_takes_the_short_way_round(at, to, wanted):
-    spline = JointSpline([still(0, at)]).continued(0, 0, [(S, Waypoint(to))], turns=True)
-    assert spline.at(S).position == pytest.approx(wanted, abs=1e-4)
-
-
-def test_whole_turns_are_added_to_all_points_alike():
-    points = [(S, Waypoint(7.0)), (2 * S, Waypoint(12.0)), (3 * S, Waypoint(20.0))]
-    spline = JointSpline([still(0, 0.0)]).continued(0, 0, points, turns=True)
-    found = [spline.at(time).position for time, _ in points]
-    assert found == pytest.approx([p.position - 2 * math.pi for _, p in points])
+    points = [((number + 1) * S, Waypoint(each)) for number, each in enumerate(to)]
+    spline = JointSpline([still(0, at)]).continued(0, 0, points, turns=True)
+    assert [spline.at(time).position for time, _ in points] == pytest.approx(wanted, abs=1e-4)
 
 
 def point(time, *positions, **others):
