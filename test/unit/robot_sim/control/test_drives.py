@@ -1,10 +1,11 @@
-"""Position and velocity interfaces, limits and control periods, in the physics."""
+"""Position and velocity interfaces, limits and control periods, in the physics and against contacts."""
 
 import math
 
 import pytest
 from support.robots.grippers import transmission
 from support.robots.snippets import WORLD, joint, link, robot
+from support.robots.vehicles import RADIUS, TRACK, two_wheels
 from support.robots.worlds import add_robot, start
 
 from robot_sim.control.errors import ControlError
@@ -12,6 +13,8 @@ from robot_sim.control.hardware import PositionDrive, RobotHardware
 from robot_sim.control.joint import JointHandle, JointLimits, SoftLimits
 from robot_sim.control.limits import PositionLimiter, VelocityLimiter
 from robot_sim.control.transmissions import read_description
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose
 from robot_sim.simulator import Simulator
 
 WEIGHT = 2.0 * 9.8  # [N] of the lift
@@ -245,3 +248,69 @@ def test_the_effort_of_a_drive_speeds_no_joint_up_beyond_its_velocity_limit(
     lift.command(-0.9)
     lift.advance(2.0 * DT)
     assert lift.joint.effort == -100.0
+
+
+def solid(name, mass, size, moment):
+    shape = f'<collision><geometry><box size="{size}"/></geometry></collision>'
+    return link(name, mass, moment=moment, more=shape)
+
+
+def slide(name, parent, place, axis, limit):
+    moving = joint(name, "prismatic", parent, f"{name}_link", place, axis=axis, limit=limit)
+    return moving + transmission(name, "Position")
+
+
+def gripper():
+    """Two fingers that close along x, on a lift."""
+    parts = [WORLD, solid("lift_link", 1.0, "0.02 0.02 0.02", 0.01)]
+    limit = 'lower="-1" upper="1" effort="500" velocity="0.5"'
+    parts.append(slide("lift", "world", "0 0 0.5", "0 0 1", limit))
+    limit = 'lower="0" upper="0.1" effort="20" velocity="0.1"'
+    for name, side in (("left", 1), ("right", -1)):
+        parts.append(solid(f"{name}_link", 0.1, "0.02 0.1 0.2", 0.001))
+        parts.append(slide(name, "lift_link", f"{side * 0.1} 0 -0.4", f"{-side} 0 0", limit))
+    return robot(*parts)
+
+
+class Bench:
+    """A robot on the ground, its joints under one group controller."""
+
+    def __init__(self, world, text, pose, kind, joints, gains=None):
+        self.sim = Simulator(world, lockstep=True)
+        self.robot = add_robot(self.sim, "robot", text, pose, gains)
+        start(self.robot, {"group": {"type": kind, "joints": joints}})
+
+    def advance(self, seconds, *commands):
+        self.robot.manager.get("group").command_all(commands)
+        self.sim.advance(round(1000 * seconds))
+
+
+@pytest.mark.parametrize(("left", "right"), [(5.0, 5.0), (2.0, -2.0)])
+def test_a_robot_drives_straight_and_turns_as_fast_as_its_wheels_say(world, left, right):
+    kind, joints = (
+        "velocity_controllers/JointGroupVelocityController",
+        ["left_joint", "right_joint"],
+    )
+    bench = Bench(world, two_wheels(), Pose((0.0, 0.0, RADIUS)), kind, joints)
+    bench.advance(0.5, left, right)
+    before = bench.robot.model.state()[0].position
+    bench.advance(2.0, left, right)
+    (pose, (_, angular)) = bench.robot.model.state()
+    way = 2.0 * RADIUS * (left + right) / 2
+    assert pose.position[0] - before[0] == pytest.approx(way, abs=0.01)
+    assert pose.position[1] == pytest.approx(0.0, abs=0.01)
+    assert angular[2] == pytest.approx(RADIUS * (right - left) / TRACK, rel=0.1, abs=0.01)
+
+
+def test_a_gripper_with_gains_holds_a_box_and_lifts_it(world):
+    kind = "position_controllers/JointGroupPositionController"
+    gains = {name: {"p": 2000.0, "d": 40.0} for name in ("left", "right")}
+    bench = Bench(world, gripper(), Pose(), kind, ["left", "right", "lift"], gains)
+    description = parse_urdf(robot(solid("box", 0.5, "0.08 0.08 0.1", 0.001)))
+    box = world.spawn("box", description, Pose((0.0, 0.0, 0.05)))
+    bench.advance(0.3, 0.0, 0.0, 0.0)
+    bench.advance(2.0, 0.06, 0.06, 0.0)
+    fingers = [bench.robot.hardware.joints[name].position for name in ("left", "right")]
+    assert fingers == pytest.approx([0.05, 0.05], abs=0.003)
+    bench.advance(2.0, 0.06, 0.06, 0.3)
+    assert box.state()[0].position == pytest.approx((0.0, 0.0, 0.35), abs=0.01)

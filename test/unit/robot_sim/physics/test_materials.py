@@ -1,23 +1,23 @@
 """Gazebo's own materials, by their names in SDF and URDF."""
 
 import pytest
+from support.robots import snippets
+from support.robots.snippets import box, link, robot, sdf_link
 
 from robot_sim.physics.files.sdf import parse_sdf
 from robot_sim.physics.files.urdf import parse_urdf
 
-BOX = "<geometry><box>{}</box></geometry>"
 RED, GREEN, BLUE = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0)
 UNKNOWN = "the colour of material 'mine/Own' is not known"
 
 
 def sdf(*materials):
-    box = BOX.format("<size>1 1 1</size>")
+    shape = f"<geometry>{box('1 1 1')}</geometry>"
     visuals = "".join(
-        f'<visual name="{number}">{box}<material>{each}</material></visual>'
+        f'<visual name="{number}">{shape}<material>{each}</material></visual>'
         for number, each in enumerate(materials)
     )
-    text = f'<sdf version="1.6"><model name="m"><link name="l">{visuals}</link></model></sdf>'
-    model = parse_sdf(text)
+    model = parse_sdf(snippets.sdf(sdf_link("l", more=visuals)))
     return [shape.rgba for shape in model.links["l"].visuals], model.warnings
 
 
@@ -27,13 +27,10 @@ def script(name):
 
 
 def urdf(*blocks):
-    box = '<geometry><box size="1 1 1"/></geometry>'
+    shape = '<geometry><box size="1 1 1"/></geometry>'
     blue = '<material name="b"><color rgba="0 0 1 1"/></material>'
-    inertial = """<inertial><mass value="1"/>
-      <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>"""
-    text = f"""<robot name="m"><link name="l">{inertial}
-      <visual>{box}{blue}</visual><visual>{box}</visual></link>{"".join(blocks)}</robot>"""
-    model = parse_urdf(text)
+    visuals = f"<visual>{shape}{blue}</visual><visual>{shape}</visual>"
+    model = parse_urdf(robot(link("l", more=visuals), *blocks))
     return [shape.rgba for shape in model.links["l"].visuals], model.warnings
 
 
@@ -53,13 +50,10 @@ def test_a_material_of_gazebos_has_its_colour(name, rgba):
     assert urdf(block) == ([rgba, rgba], [])
 
 
-def test_a_colour_in_the_same_material_goes_before_its_script():
+def test_a_colour_goes_before_its_script_the_last_block_counts_and_may_have_an_attribute():
     assert sdf(script("Gazebo/Red") + "<diffuse>0 1 0 1</diffuse>") == ([GREEN], [])
-
-
-def test_the_last_block_of_a_link_counts_and_its_value_may_be_an_attribute():
-    blocks = [f'<gazebo reference="l">{each}</gazebo>' for each in (
-        "<material>Gazebo/Red</material>", '<material value=" Gazebo/Green "/>')]  # fmt: skip
+    red, green = "<material>Gazebo/Red</material>", '<material value=" Gazebo/Green "/>'
+    blocks = [f'<gazebo reference="l">{each}</gazebo>' for each in (red, green)]
     assert urdf(*blocks) == ([GREEN, GREEN], [])
 
 
