@@ -100,21 +100,18 @@ def test_a_stopped_controller_measures_nothing_and_goes_on_when_it_starts(bot):
     assert bot.stamps("imu/data")[-1] == 291
 
 
-def test_without_topics_it_runs_and_measures_nothing(world):
-    bot = Bot(world)
-    for makers in bot.robot.hardware.sensors.values():
-        makers.clear()
-    offer_sensors(bot.robot.hardware, bot.sim, bot.robot.model, sensing=None)
-    bot.start(imu=IMU, forces=FORCES)
-    bot.sim.advance(50)
-    assert not bot.sim.listeners
-    assert bot.sent == {"imu/data": [], "wrist_ft": []}
-
-
-def test_a_rate_of_0_publishes_nothing(bot):
+def test_a_rate_of_0_and_one_without_topics_publish_nothing(bot):
     bot.start(imu=IMU | {"publish_rate": 0})
     bot.sim.advance(20)
     assert bot.sent == {"imu/data": []}
+    bot.robot.manager.switch([], ["imu"])
+    for makers in bot.robot.hardware.sensors.values():
+        makers.clear()
+    offer_sensors(bot.robot.hardware, bot.sim, bot.robot.model, sensing=None)
+    bot.start(again=IMU, forces=FORCES)
+    bot.sim.advance(50)
+    assert not bot.sim.listeners
+    assert bot.sent == {"imu/data": [], "wrist_ft": []}
 
 
 def test_what_is_missing_or_faulty_is_named(world, make_world):

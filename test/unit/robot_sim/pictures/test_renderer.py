@@ -2,10 +2,10 @@
 
 import math
 import re
-from collections.abc import Callable
 
 import numpy as np
 import pytest
+import trimesh
 from support.pages.pictures import pixel
 from support.robots.snippets import link, robot, sdf, sdf_joint, sdf_link
 from support.robots.worlds import assert_near
@@ -97,29 +97,12 @@ def test_what_is_seen_through_is_not_drawn_and_collisions_stand_for_missing_visu
     assert len(where(shown(scene), 0)) > 50
 
 
-def ball_stl(rows: int) -> str:
-    """Triangles of a ball of radius 0.2: 2 rows² of them, as text."""
-    angles = np.linspace(0.0, math.pi, rows + 1)
-    turns = np.linspace(0.0, 2 * math.pi, rows + 1)
-    at: Callable[[int, int], np.ndarray] = lambda i, j: 0.2 * np.array(  # noqa: E731
-        [math.sin(angles[i]) * math.cos(turns[j]), math.sin(angles[i]) * math.sin(turns[j]),
-         math.cos(angles[i])]
-    )  # fmt: skip
-    lines = ["solid ball"]
-    for i in range(rows):
-        for j in range(rows):
-            a, b, c, d = at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)
-            for corners in ((a, b, c), (a, c, d)):
-                lines += ["facet normal 0 0 0", "outer loop"]
-                lines += [f"vertex {x} {y} {z}" for x, y, z in corners]
-                lines += ["endloop", "endfacet"]
-    return "\n".join([*lines, "endsolid ball"])
-
-
 @pytest.mark.slow
 def test_a_mesh_of_more_triangles_than_the_renderer_takes_at_once(scene, tmp_path):
     path = tmp_path / "ball.stl"
-    path.write_text(ball_stl(135))  # 36450 triangles
+    mesh = trimesh.creation.uv_sphere(radius=0.2, count=(100, 100))
+    assert len(mesh.faces) > 36_000
+    mesh.export(path)
     put(scene, f'<mesh filename="{path}" scale="2 2 2"/>')
     radius = np.ptp(where(shown(scene), 0), axis=0) / 2.0
     assert radius == pytest.approx(0.4 / 3.0 * HEIGHT / (2 * CAMERA.slope), abs=2.0)
