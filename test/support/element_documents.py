@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from functools import cache
 from itertools import product
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -58,8 +59,6 @@ SAMPLES = {  # values of URDF's attributes, and of SDF's whose schema has none
     "xyz": "0 0 1", "rpy": "0 0 0", "size": "1 1 1", "scale": "1 1 1", "rgba": "1 0 0 1", "type": "revolute",
     "joint": "j", "uri": "model://table", "link": "l", "filename": "no.stl",
 }  # fmt: skip
-
-
 NEEDED = (("cylinder", "radius"), ("mesh", "filename"), ("mimic", "joint"))  # attributes of URDF
 
 
@@ -162,6 +161,14 @@ def _put(element: Element, way: list[str], value: str) -> None:
         found.text = value or SAMPLES.get(last, "")
 
 
+def _row(section: str, path: str, other: str = "*") -> Any:
+    """The table's row of a path, or that of `other` names where it has none; None if there is neither."""
+    row = element_table()[section].top
+    for part in path.split("/"):
+        row = row and (row.below.get(part) or row.below.get(other))
+    return row
+
+
 def schema_paths(version: str) -> tuple[dict[tuple[str, str], str], list[str]]:
     """What SDF's schema of a version has: values by sections and paths of the table, and what has no row."""
     found: dict[tuple[str, str], str] = {}
@@ -191,13 +198,9 @@ def schema_paths(version: str) -> tuple[dict[tuple[str, str], str], list[str]]:
     def walk(element: Element, section: str, path: str, where: str) -> None:
         for name, child in children(element):
             here = f"{path}/{name}" if path else name
-            row = element_table()[section].top
-            for part in here.split("/"):
-                row = row.below.get(part) or row.below.get("*")
-                if row is None:
-                    missing.append(f"{where}/{name}")
-                    break
+            row = _row(section, here)
             if row is None:
+                missing.append(f"{where}/{name}")
                 continue
             found[section, here] = child.get("default") or ""
             if row.answer not in ("", READ):
@@ -226,11 +229,7 @@ def urdf_paths() -> tuple[set[tuple[str, str]], list[str]]:
             mark = "@" if child.tag.endswith("attribute") else ""
             name = f"{mark}{child.get('name')}"
             here = f"{path}/{name}" if path else name
-            row = element_table()[section].top
-            for part in here.split("/"):
-                row = row.below.get(part)
-                if row is None:
-                    break
+            row = _row(section, here, "")
             if row is None:
                 missing.append(f"{where}/{name}")
                 continue

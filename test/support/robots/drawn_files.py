@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hypothesis import strategies as st
+from support.robots.snippets import ball, box, sdf_joint, sdf_world
 
 Draw = Callable[[st.SearchStrategy[Any]], Any]
 
@@ -61,11 +62,8 @@ def urdf_robots(draw: Draw) -> str:
 
 
 def _urdf_shapes(draw: Draw) -> str:
-    solids = (
-        '<box size="0.1 0.2 0.3"/>',
-        '<sphere radius="0.4"/>',
-        '<cylinder radius="0.1" length="2"/>',
-    )
+    cylinder = '<cylinder radius="0.1" length="2"/>'
+    solids = '<box size="0.1 0.2 0.3"/>', '<sphere radius="0.4"/>', cylinder
     shapes = []
     for tag in ("collision", "visual"):
         for own in draw(st.lists(st.sampled_from(["", *NAMES]), max_size=2)):
@@ -122,10 +120,8 @@ def _sdf_model(draw: Draw, version: str, name: str, depth: int = 1) -> str:
             inner = _sdf_model(draw, version, "inner", depth - 1)
             ends.append("inner::" + inner.partition('<link name="')[2].partition('"')[0])
         else:
-            inner = (
-                "<include><uri>model://crate</uri><name>inner</name>"
-                f"{_pose(draw, version, [])}</include>"
-            )
+            named = f"<name>inner</name>{_pose(draw, version, [])}"
+            inner = f"<include><uri>model://crate</uri>{named}</include>"
             ends.append("inner::body")
         parts.append(inner)
     for number, link in enumerate(links):
@@ -140,10 +136,7 @@ def _sdf_model(draw: Draw, version: str, name: str, depth: int = 1) -> str:
         parts.append(f'<frame name="extra"{attached}>{_pose(draw, version, known)}</frame>')
         known.append("extra")
     if depth and ends == links and draw(st.integers(0, 3)) == 0:  # we have it first in any case
-        parts.append(
-            '<joint name="anchor" type="fixed"><parent>world</parent>'
-            f"<child>{links[0]}</child></joint>"
-        )
+        parts.append(sdf_joint("anchor", "fixed", "world", links[0]))
     for number in range(1, len(ends)):
         parent = ends[draw(st.integers(0, number - 1))]
         parts.append(_sdf_joint(draw, version, f"joint_{number}", parent, ends[number], known))
@@ -169,11 +162,8 @@ def _sdf_inertial(draw: Draw) -> str:
 
 
 def _sdf_shapes(draw: Draw, version: str, frames: list[str]) -> str:
-    solids = (
-        "<box><size>0.1 0.2 0.3</size></box>",
-        "<sphere><radius>0.4</radius></sphere>",
-        "<cylinder><radius>0.1</radius><length>2</length></cylinder>",
-    )
+    cylinder = "<cylinder><radius>0.1</radius><length>2</length></cylinder>"
+    solids = box("0.1 0.2 0.3"), ball(0.4), cylinder
     shapes = []
     for tag in ("collision", "visual"):
         for name in draw(st.lists(st.sampled_from(NAMES), max_size=2, unique=True)):
@@ -222,9 +212,8 @@ def worlds(draw: Draw, folders: tuple[str, ...]) -> str:
         parts.append(_sdf_model(draw, version, f"model_{number}", depth=0))
     for number, folder in enumerate(draw(st.lists(st.sampled_from(folders), max_size=3))):
         pose = f"<pose>{words(draw(SIX))}</pose>" if draw(st.booleans()) else ""
-        parts.append(
-            f"<include><uri>model://{folder}</uri><name>included_{number}</name>{pose}</include>"
-        )
+        named = f"<name>included_{number}</name>{pose}"
+        parts.append(f"<include><uri>model://{folder}</uri>{named}</include>")
     for kind in draw(st.lists(st.sampled_from(["point", "directional", "spot"]), unique=True)):
         direction = "" if kind == "point" else "<direction>0 0.6 -0.8</direction>"
         color = words(draw(st.tuples(*[st.integers(0, 8).map(lambda n: n / 8)] * 4)))
@@ -243,4 +232,4 @@ def worlds(draw: Draw, folders: tuple[str, ...]) -> str:
     )
     parts += [physics] if draw(st.booleans()) else []
     parts += [gravity] if version != "1.4" and draw(st.booleans()) else []
-    return f'<sdf version="{version}"><world name="drawn">{"".join(parts)}</world></sdf>'
+    return sdf_world(*parts, version=version)

@@ -2,6 +2,8 @@
 
 import math
 
+from support.robots.snippets import box, collision, sdf, sdf_joint, sdf_link
+
 CRANK, COUPLER, ROCKER, GROUND = 0.4, 1.0, 0.8, 1.0  # [m]
 WIDTH = 0.02  # [m]
 START = 1.0  # [rad], the crank's angle in the file
@@ -53,11 +55,8 @@ def four_bar(closing: str = "", order: int = 1, static: bool = False, rooted: bo
         hinge("tip", "coupler", "rocker", f"{ROCKER} 0 0 0 0 0", closing),
     ][::order]
     if rooted:
-        joints.append(
-            '<joint name="foot" type="fixed"><parent>world</parent><child>ground</child></joint>'
-        )
-    return f"""<sdf version="1.6"><model name="four_bar"><static>{int(static)}</static>
-      {"".join(links + joints)}</model></sdf>"""
+        joints.append(weld("foot", "world", "ground"))
+    return sdf(*links, *joints, static=static)
 
 
 CUBE = 0.2  # [m]
@@ -65,21 +64,10 @@ CUBE = 0.2  # [m]
 
 def cube(name: str, x: float, y: float, size: float = CUBE, mass: float = 1.0) -> str:
     """SDF of a link that is a cube on the ground."""
-    moment = mass * size**2 / 6.0
-    return f"""<link name="{name}"><pose>{x} {y} {size / 2.0} 0 0 0</pose><inertial><mass>{mass}</mass>
-      <inertia><ixx>{moment}</ixx><iyy>{moment}</iyy><izz>{moment}</izz></inertia></inertial>
-      <collision name="c"><geometry><box><size>{size} {size} {size}</size></box></geometry></collision>
-    </link>"""
+    shape = collision(box(f"{size} {size} {size}"))
+    return sdf_link(name, f"{x} {y} {size / 2.0} 0 0 0", shape, mass, mass * size**2 / 6.0)
 
 
 def weld(name: str, parent: str, child: str) -> str:
     """SDF of a fixed joint."""
-    return (
-        f'<joint name="{name}" type="fixed"><parent>{parent}</parent><child>{child}</child></joint>'
-    )
-
-
-def sdf(*parts: str, static: int = 0) -> str:
-    """A file with one model."""
-    text = "".join(parts)
-    return f'<sdf version="1.6"><model name="m"><static>{static}</static>{text}</model></sdf>'
+    return sdf_joint(name, "fixed", parent, child)

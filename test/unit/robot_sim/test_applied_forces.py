@@ -1,7 +1,4 @@
-"""Efforts and wrenches on joints and links: limits, adding up, overwriting, frames.
-
-See docs/contract/gazebo.md 2.18 and 2.19.
-"""
+"""Efforts and wrenches on joints and links (docs/contract/gazebo.md 2.18 and 2.19)."""
 
 import math
 from types import SimpleNamespace
@@ -37,7 +34,6 @@ class FakeModel:
 
     joint_names = ("a", "b")
     all_joints = ("a", "b", "fixed")
-
     name = "robot"
 
     def __init__(self):
@@ -53,33 +49,24 @@ class FakeModel:
         return 0.0, self.speed
 
 
-def effort(joint, model, value=1.0):
-    return AppliedEffort(model, joint, value, ActingTime(0, -1))
-
-
-def test_efforts_add_up_each_clamped_to_the_joint():
-    model, applied = FakeModel(), AppliedForces()
-    for value in (1.0, 5.0, -9.0):
-        applied.efforts.append(effort("b", model, value))
-    applied.apply(TICK)
-    assert model.body.efforts == [(1, 1.0), (1, 2.0), (1, -2.0)]
-
-
-@pytest.mark.parametrize("speed, value, expected", [(8.0, 1.0, 0.0), (8.0, -1.0, -1.0),
-                                                   (-8.0, -1.0, 0.0), (7.0, 1.0, 1.0)])  # fmt: skip
-def test_no_effort_beyond_the_velocity_limit(speed, value, expected):
+@pytest.mark.parametrize(
+    ("joint", "speed", "values", "expected"),
+    [
+        ("b", 0.0, (1.0, 5.0, -9.0), [(1, 1.0), (1, 2.0), (1, -2.0)]),
+        ("b", 8.0, (1.0, -1.0), [(1, 0.0), (1, -1.0)]),
+        ("b", -8.0, (-1.0,), [(1, 0.0)]),
+        ("b", 7.0, (1.0,), [(1, 1.0)]),
+        ("a", 8.0, (1e9,), [(0, 1e9)]),
+        ("fixed", 0.0, (1.0,), []),
+    ],
+)
+def test_efforts_add_up_each_within_the_joints_limits(joint, speed, values, expected):
     model, applied = FakeModel(), AppliedForces()
     model.speed = speed
-    applied.efforts.append(effort("b", model, value))
+    for value in values:
+        applied.efforts.append(AppliedEffort(model, joint, value, ActingTime(0, -1)))
     applied.apply(TICK)
-    assert model.body.efforts == [(1, expected)]
-
-
-def test_an_effort_on_a_fixed_joint_does_nothing():
-    model, applied = FakeModel(), AppliedForces()
-    applied.efforts.append(effort("fixed", model))
-    applied.apply(TICK)
-    assert model.body.efforts == []
+    assert model.body.efforts == expected
 
 
 def wrench(model, force, link="cart", duration=-1):

@@ -37,8 +37,7 @@ def test_a_pid_moves_a_follower_with_no_more_than_its_effort(world):
         model.put_followers()
         for _ in range(1000):
             model.body.add_effort(model.joint_index("right"), effort)
-            with sim.lock:
-                sim.advance(1)
+            sim.advance(1)
         # With 0.4 N it gives way by p; with 0.6 N up to the stop.
         assert (model.joint_state("right")[0] < 0.03) == holds
 
@@ -103,21 +102,26 @@ def test_a_suction_asks_once_a_tick_where_it_is(world, monkeypatch):
 RULE = GripRule(math.radians(120.0), threshold=2, most=5, release=0.005)
 
 
-def test_what_opposing_fingers_grip_stays_until_they_open(world):
-    """Also while they have no force."""
-    robot = world.spawn("gripper", parse_urdf(gripper()), Pose())
+def grasping(world, text, place, mass=0.05):
+    """A gripper around a cube, and `press(effort, looks)`, which closes it."""
+    robot = world.spawn("gripper", parse_urdf(text), Pose())
     robot.set_motor("lift", 0.0, 1e4)
-    box = world.spawn("cube", parse_urdf(cube(0.1)), Pose((0.0, 0.0, 0.025)))
+    box = world.spawn("cube", parse_urdf(cube(mass)), Pose(place))
     hold = GraspHold(world, robot, "lift_link", ["left_link", "right_link"], RULE)
-    left = robot.joint_index("left")
 
-    def press(effort, looks):
+    def press(effort, looks, ticks=100):
         for look in range(looks):
-            for _ in range(100):
-                robot.body.add_effort(left, effort)
+            for _ in range(ticks):
+                robot.body.add_effort(robot.joint_index("left"), effort)
                 world.step()
             hold.look(look)
 
+    return robot, box, hold, press
+
+
+def test_what_opposing_fingers_grip_stays_until_they_open(world):
+    """Also while they have no force."""
+    robot, box, hold, press = grasping(world, gripper(), (0.0, 0.0, 0.025), 0.1)
     press(2.0, 2)
     assert not world.attachments
     press(2.0, 5)
@@ -133,15 +137,8 @@ def test_what_opposing_fingers_grip_stays_until_they_open(world):
 
 
 def test_one_finger_grips_nothing(world):
-    robot = world.spawn("gripper", parse_urdf(gripper(mimic="")), Pose())
-    robot.set_motor("lift", 0.0, 1e4)
-    world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.03, 0.025)))
-    hold = GraspHold(world, robot, "lift_link", ["left_link", "right_link"], RULE)
-    for look in range(10):
-        for _ in range(20):
-            robot.body.add_effort(robot.joint_index("left"), 0.3)
-            world.step()
-        hold.look(look)
+    *_, press = grasping(world, gripper(mimic=""), (0.0, 0.03, 0.025))
+    press(0.3, 10, 20)
     assert not world.attachments
 
 
@@ -159,15 +156,13 @@ def test_after_a_reset_a_grip_takes_as_long_as_the_first_one(world, monkeypatch)
     sim.listeners.append(lambda now: robot.body.add_effort(left, 2.0))
 
     def ticks_until_held():
-        with sim.lock:
-            return sim.advance(2000, lambda: bool(world.attachments))
+        return sim.advance(2000, lambda: bool(world.attachments))
 
     first = ticks_until_held()
     assert 500 < first < 2000
     for _ in range(2):
         sim.reset_simulation()
-        with sim.lock:
-            sim.advance(first - 150)
+        sim.advance(first - 150)
         assert not world.attachments
         sim.reset_simulation()
         assert ticks_until_held() == first

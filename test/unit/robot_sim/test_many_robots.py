@@ -38,18 +38,17 @@ def tracks(indices: Sequence[int]) -> dict[int, list[tuple[float, ...]]]:
     sim, robots = add_robots(indices)
     draws = {index: random.Random(index) for index in indices}
     found: dict[int, list[tuple[float, ...]]] = {index: [] for index in indices}
-    with sim.lock:
+    for index, robot in robots.items():
+        angle, speed = (draws[index].uniform(-0.3, 0.3) for _ in range(2))
+        sim.set_joint_states(robot.model, {"cart_pole": angle}, {"cart_pole": speed})
+    for _ in range(STEPS):
         for index, robot in robots.items():
-            angle, speed = (draws[index].uniform(-0.3, 0.3) for _ in range(2))
-            sim.set_joint_states(robot.model, {"cart_pole": angle}, {"cart_pole": speed})
-        for _ in range(STEPS):
-            for index, robot in robots.items():
-                robot.manager.get("cart").command(draws[index].uniform(-0.6, 0.6))
-            sim.advance(TICKS)
-            for index, robot in robots.items():
-                joints = robot.hardware.joints.values()
-                state = ((j.position, j.velocity, j.effort) for j in joints)
-                found[index].append(sum(state, ()))
+            robot.manager.get("cart").command(draws[index].uniform(-0.6, 0.6))
+        sim.advance(TICKS)
+        for index, robot in robots.items():
+            joints = robot.hardware.joints.values()
+            state = ((j.position, j.velocity, j.effort) for j in joints)
+            found[index].append(sum(state, ()))
     sim.world.close()
     return found
 
@@ -100,9 +99,8 @@ def test_a_robot_costs_the_same_however_many_there_are(action):
     counts = []
     for robots in (1, 4, 8, 16):
         sim, _ = add_robots(range(robots))
-        with sim.lock:
-            sim.advance(TICKS)
-            counts.append(work(action, sim))
+        sim.advance(TICKS)
+        counts.append(work(action, sim))
         sim.world.close()
     _, few, more, most = counts  # from Python 3.12 on, code that is traced anew counts less
     assert most - more == 2 * (more - few) > 0
@@ -119,23 +117,17 @@ def test_one_more_robot_is_spawned_without_a_look_at_the_others():
     assert among < 1.1 * alone
 
 
-@pytest.fixture
-def one():
-    sim, robots = add_robots([0])
-    yield sim, robots[0]
-    sim.world.close()
-
-
 @pytest.mark.parametrize("whoever", ["service", "plugin"])
-def test_what_moves_a_robot_between_two_ticks_is_seen_by_the_next(one, whoever):
-    sim, robot = one
-    with sim.lock:
-        sim.advance(1)
-        if whoever == "service":
-            sim.set_joint_states(robot.model, {"stand_cart": 0.1})
-        else:  # which has the model, and tells nobody
-            robot.model.set_joint_positions({"stand_cart": 0.1})
-        seen = []
-        sim.listeners.append(lambda _now: seen.append(robot.hardware.joints["stand_cart"].position))
-        sim.advance(1)
+def test_what_moves_a_robot_between_two_ticks_is_seen_by_the_next(whoever):
+    sim, robots = add_robots([0])
+    sim.advance(1)
+    if whoever == "service":
+        sim.set_joint_states(robots[0].model, {"stand_cart": 0.1})
+    else:  # which has the model, and tells nobody
+        robots[0].model.set_joint_positions({"stand_cart": 0.1})
+    seen = []
+    cart = robots[0].hardware.joints["stand_cart"]
+    sim.listeners.append(lambda _now: seen.append(cart.position))
+    sim.advance(1)
     assert seen == [0.1]
+    sim.world.close()

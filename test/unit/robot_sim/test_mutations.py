@@ -7,6 +7,9 @@ from hypothesis import HealthCheck, given, settings
 from support.mutations.models import CASES, CONTROLLERS, spawn
 
 EXAMPLES = {"xacro": 8}  # each takes a process; of the others 150
+QUICK = settings(
+    deadline=None, database=None, derandomize=True, suppress_health_check=[*HealthCheck]
+)
 
 
 @pytest.mark.slow
@@ -15,8 +18,7 @@ def test_a_mutated_model_is_read_or_refused(name):
     case = CASES[name]
     seen: Counter[bool] = Counter()
 
-    @settings(max_examples=EXAMPLES.get(name, 150), deadline=None, database=None, derandomize=True,
-              suppress_health_check=list(HealthCheck))  # fmt: skip
+    @settings(QUICK, max_examples=EXAMPLES.get(name, 150))
     @given(case.texts)
     def look(text):
         seen[case.read(text) == "read"] += 1
@@ -34,8 +36,7 @@ def test_a_duration_beyond_all_clocks_is_one():
 def test_a_mutated_model_that_is_read_stands_in_a_world(make_world):
     world, seen = make_world(), Counter()
 
-    @settings(max_examples=60, deadline=None, database=None, derandomize=True,
-              suppress_health_check=list(HealthCheck))  # fmt: skip
+    @settings(QUICK, max_examples=60)
     @given(CASES["entity"].texts)
     def look(text):
         seen[spawn(world, text) == "read"] += 1

@@ -10,10 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from support.python import run_python
+from support.refusals import refused
 
 from robot_sim.physics.pose import Pose
 from robot_sim.plain_data import Record, differences, misfit, pack, resolve, unpack
@@ -59,6 +60,7 @@ def containers(inner):
 VALUES = st.recursive(ATOMS | ARRAYS, containers, max_leaves=20)
 
 
+@settings(max_examples=60)
 @given(VALUES)
 def test_the_same_comes_back_to_the_bit(value):
     assert list(differences(value, unpack(pack(value)))) == []
@@ -80,12 +82,14 @@ def test_arrays_can_be_written_to_if_they_could():
     assert flags == [True, False]
 
 
-def test_a_class_that_is_not_imported_stays_a_record_until_it_is(tmp_path):
+def test_a_class_that_is_not_imported_stays_a_record_until_it_is():
     value = {"pose": [Record("some.module", "Class", [1, (2, 3)])]}
     data = pack(value)
     assert unpack(data) == value and "some" not in sys.modules
-    with pytest.raises(StateError, match=r"some\.module\.Class"):
+    with refused("some.module.Class", error=StateError):
         resolve(unpack(data))
+    with refused(error=StateError):
+        resolve([Record("some\nmodule", "Class", [])])
 
 
 @pytest.mark.parametrize(
@@ -144,9 +148,8 @@ FORGED = {
 
 @pytest.mark.parametrize("data", FORGED.values(), ids=FORGED)
 def test_forged_input_is_one_error(data):
-    with pytest.raises(StateError) as error:
+    with refused(error=StateError):
         unpack(data)
-    assert "\n" not in str(error.value)
 
 
 def test_entries_have_an_end_also_those_within_others(monkeypatch):
@@ -164,10 +167,15 @@ def nested(depth):
     return value
 
 
-def test_nesting_has_an_end():
+def test_nesting_has_an_end_where_it_is_read_and_where_it_is_written():
     assert unpack(nested(50)) is not None
     with pytest.raises(StateError):
         unpack(nested(5000))
+    value = []
+    for _ in range(200):
+        value = [value]
+    with pytest.raises(StateError, match="nested too deeply"):
+        pack(value)
 
 
 def test_ten_thousand_damaged_inputs_are_read_or_refused():
@@ -203,36 +211,15 @@ print(read)
     assert 0 < int(done.stdout) < 10_000
 
 
-def test_lists_that_nest_too_deeply_are_not_written_either():
-    value = []
-    for _ in range(200):
-        value = [value]
-    with pytest.raises(StateError, match="nested too deeply"):
-        pack(value)
-
-
 def test_a_time_of_messagepack_is_a_number():
     assert unpack(b"\xd6\xff\x00\x00\x00\x05") == 5.0
 
 
-def test_the_name_of_an_unknown_class_is_one_line():
-    with pytest.raises(StateError) as error:
-        resolve([Record("some\nmodule", "Class", [])])
-    assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("given", [float("nan"), float("inf")])
-def test_nothing_that_is_not_finite_takes_the_place_of_a_count(given):
-    assert misfit({"steps": 3}, {"steps": given}) == f"steps is {given}"
-
-
-def test_arrays_keep_their_shapes_where_all_has_to_be_the_same():
-    assert misfit(np.zeros(3), np.zeros(5)) == ""
-    assert misfit(np.zeros(3), np.zeros(5), "efforts", exactly=True).startswith(
-        "efforts is an array"
-    )
-
-
-def test_numpys_numbers_take_the_place_of_pythons():
+def test_what_takes_the_place_of_what():
+    for number in (float("nan"), float("inf")):
+        assert misfit({"steps": 3}, {"steps": number}) == f"steps is {number}"
+    three, five = np.zeros(3), np.zeros(5)
+    assert misfit(three, five) == ""
+    assert misfit(three, five, "efforts", exactly=True).startswith("efforts is an array")
     assert misfit((1.0, [2]), (np.float64(3.0), [np.int32(4)])) == ""
     assert misfit({"a": np.float64(1.0)}, {"a": "x"}) == "a is a str, not a float"

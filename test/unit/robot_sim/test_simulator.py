@@ -1,6 +1,8 @@
 """The clockwork: lock-step, rates, time that is held, and the lock that serves its waiters in turn."""
 
 import threading
+from functools import partial
+from unittest.mock import Mock
 
 import pytest
 from support.robots.cartpole import CONTROLLERS, cartpole_urdf
@@ -44,17 +46,14 @@ def test_lock_step_is_bit_for_bit_repeatable_across_resets(sim):
     assert runs[0] == runs[1] == runs[2]
 
 
-@pytest.mark.parametrize("ticks", [0, -1])
-def test_less_than_one_tick_is_refused(sim, ticks):
-    with sim.lock, pytest.raises(ValueError, match="at least 1"):
-        sim.advance(ticks)
-    assert sim.now == 0
-
-
-def test_a_world_that_runs_by_itself_cannot_be_stepped(sim):
+def test_less_than_one_tick_is_refused_and_all_in_a_world_that_runs_by_itself(sim):
+    for ticks in (0, -1):
+        with pytest.raises(ValueError, match="at least 1"):
+            sim.advance(ticks)
     sim.lockstep = False
-    with sim.lock, pytest.raises(NotInLockstep, match="lockstep:=true"):
+    with pytest.raises(NotInLockstep, match="lockstep:=true"):
         sim.advance(1)
+    assert sim.now == 0
 
 
 def test_a_slow_rate_can_be_changed_and_stopped_at_once(sim):
@@ -120,45 +119,40 @@ def _never():
     raise AssertionError("too late")
 
 
-@pytest.fixture
-def holds() -> Holds:
-    return Holds(FairLock(), lambda: None)
-
-
-def test_it_is_held_for_the_block_alone(holds: Holds) -> None:
-    with holds.hold(60.0, lambda: None):
+def test_it_is_held_for_the_block_alone_and_not_where_no_thread_is_left(monkeypatch):
+    holds = Holds(FairLock(), lambda: None)
+    with holds.hold(60.0, _never):
         assert holds
-    with pytest.raises(ZeroDivisionError), holds.hold(60.0, lambda: None):
+    with pytest.raises(ZeroDivisionError), holds.hold(60.0, _never):
         raise ZeroDivisionError
     assert not holds
-
-
-def test_where_no_thread_is_left_it_is_not_held_for_ever(holds: Holds, monkeypatch) -> None:
-    def none_left(self: threading.Thread) -> None:
-        raise RuntimeError("can't start new thread")
-
+    none_left = Mock(side_effect=RuntimeError("can't start new thread"))
     monkeypatch.setattr(threading.Thread, "start", none_left)
-    with pytest.raises(RuntimeError, match="can't start"), holds.hold(60.0, lambda: None):
+    with pytest.raises(RuntimeError, match="can't start"), holds.hold(60.0, _never):
         raise AssertionError("the block is not reached")
     assert not holds
     holds.await_end(threading.Event())
 
 
+def queue_up(lock, *actions):
+    """Starts threads, each of which asks for the lock before the next one starts."""
+    threads = [threading.Thread(target=action) for action in actions]
+    for count, thread in enumerate(threads):
+        thread.start()
+        while len(lock._waiting) <= count:
+            threading.Event().wait(0.001)
+    return threads
+
+
 def test_the_lock_is_handed_on_in_the_order_of_asking():
-    lock, order, waiting = FairLock(), [], []
+    lock, order = FairLock(), []
 
     def take(name):
-        waiting.append(name)
         with lock:
             order.append(name)
 
     with lock:
-        threads = []
-        for name in range(5):
-            threads.append(threading.Thread(target=take, args=(name,)))
-            threads[-1].start()
-            while len(lock._waiting) <= name:  # the thread has queued up
-                threading.Event().wait(0.001)
+        threads = queue_up(lock, *(partial(take, name) for name in range(5)))
     for thread in threads:
         thread.join(BOUND)
     assert order == [0, 1, 2, 3, 4]
@@ -195,13 +189,9 @@ def test_a_lent_lock_serves_those_who_only_look_and_then_goes_back():
             order.append("looked")
         looked.set()
 
-    threads = [threading.Thread(target=change), threading.Thread(target=look)]
     with lock:
         mine = lock.holder
-        for count, thread in enumerate(threads):  # the change asks first
-            thread.start()
-            while len(lock._waiting) <= count:
-                threading.Event().wait(0.001)
+        threads = queue_up(lock, change, look)
         with lock.lent():
             assert looked.wait(BOUND)
             assert lock.holder is None

@@ -6,7 +6,9 @@ import re
 
 import pytest
 from support.robots.cartpole import cartpole_urdf
+from support.robots.grippers import transmission
 from support.robots.robots_in_trouble import Rig, beyond_stops, urdf_of
+from support.robots.snippets import WORLD, link, robot
 from support.robots.trajectory_rig import Listener
 
 from robot_sim.control.errors import ControlError
@@ -21,7 +23,6 @@ ARM = {  # p and d as arms' packages ship them for effort controllers
     "pan": (4000.0, 500.0), "lift": (4000.0, 500.0), "elbow": (4000.0, 500.0),
     "wrist_1": (1000.0, 50.0), "wrist_2": (1000.0, 50.0), "wrist_3": (1000.0, 20.0),
 }  # fmt: skip
-
 P_ONLY = dict(zip(ARM, (2000.0, 2000.0, 2000.0, 200.0, 100.0, 10.0), strict=True))
 TRAJECTORIES = {
     "type": "effort_controllers/JointTrajectoryController", "joints": list(P_ONLY),
@@ -29,14 +30,11 @@ TRAJECTORIES = {
 }  # fmt: skip
 
 
-def wheel(joint="", plugin=""):
-    return f"""<robot name="wheel"><link name="world"/><link name="disc"><inertial><mass value="1"/>
-      <inertia ixx="{INERTIA}" ixy="0" ixz="0" iyy="{INERTIA}" iyz="0" izz="{INERTIA}"/></inertial></link>
-      <joint name="axle" type="continuous"><parent link="world"/><child link="disc"/><axis xyz="0 0 1"/>
-      {joint}</joint><transmission name="t"><type>transmission_interface/SimpleTransmission</type>
-      <joint name="axle"><hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface>
-      </joint>
-      <actuator name="m"/></transmission>{PLUGIN.format(plugin)}</robot>"""
+def wheel(more="", plugin=""):
+    axle = f"""<joint name="axle" type="continuous"><parent link="world"/><child link="disc"/>
+      <axis xyz="0 0 1"/>{more}</joint>"""
+    drive = transmission("axle", "Effort") + PLUGIN.format(plugin)
+    return robot(WORLD, link("disc", moment=INERTIA), axle, drive, name="wheel")
 
 
 EXACT = wheel(plugin="<pOnlyDamping>0</pOnlyDamping>")
@@ -48,12 +46,8 @@ def rig(make_world):
     return lambda text, step=0.001: Rig(make_world(ground=True, time_step=step), text)
 
 
-# how high is too high
-
-
 def swing(rig, gains, step, text, kind):
-    """Lets the wheel go off its set-point; returns how far off it was at once, at most, and at the end of 400
-    steps, and what was told."""
+    """How far off its set-point the wheel is at once, at most, and after 400 steps, and what was told."""
     robot = rig(text, step)
     robot.load(kind, "axle", gains)
     column = 1 if kind == VELOCITY else 0
@@ -123,20 +117,14 @@ def test_the_joints_own_damping_counts_as_the_engine_takes_it(rig, step):
     assert told
 
 
-def test_the_warning_names_controller_joint_gain_and_what_the_step_can_follow(rig):
-    robot = rig(EXACT)
-    robot.load(POSITION, "axle", {"p": 10.0, "d": 600.0})
-    [told] = robot.warnings()
-    assert "controller 'axle_controller' drives joint 'axle' of model 'wheel' with d = 600" in told
-    assert "3 times what a step of 0.001 s can follow (about 200)" in told
-
-
-def test_it_is_told_once_and_again_for_other_gains_or_another_step(rig):
+def test_the_warning_names_all_once_and_again_for_other_gains_or_another_step(rig):
     robot = rig(EXACT)
     controller = robot.load(POSITION, "axle", {"p": 10.0, "d": 600.0})
     for _ in range(3):
         robot.manager.loops_changed()
-    assert len(robot.warnings()) == 1
+    [told] = robot.warnings()
+    assert "controller 'axle_controller' drives joint 'axle' of model 'wheel' with d = 600" in told
+    assert "3 times what a step of 0.001 s can follow (about 200)" in told
     controller.pids["pid"].gains = Gains(10.0, d=150.0)
     robot.manager.loops_changed()
     assert len(robot.warnings()) == 1
@@ -169,9 +157,6 @@ def test_sane_robots_are_told_nothing_of(rig, name):
     robot.run(0.5)
     assert robot.told == []
     assert robot.model.damping_added == {}
-
-
-# what becomes of the robot
 
 
 @pytest.mark.parametrize("step", [0.001, 0.002, 0.005, 0.01])
@@ -229,16 +214,13 @@ def test_a_blow_up_names_the_joint_and_who_drives_it_once(rig):
     told = [text for text in robot.warnings() if "blew up" in text]
     [wrist] = [text for text in told if "joint 'wrist_3'" in text]
     assert "The controller 'wrist_3_controller' drives it with p = 1000, i = 0, d = 20" in wrist
-
-
-def test_a_blow_up_of_what_nobody_drives_is_told_too(rig):
-    robot = rig(urdf_of("arm"))
-    robot.model.body.reset_joint(5, 0.0, 1e5)
-    robot.run(0.01)
-    [told] = robot.warnings()
+    alone = rig(urdf_of("arm"))
+    alone.model.body.reset_joint(5, 0.0, 1e5)
+    alone.run(0.01)
+    [told] = alone.warnings()
     assert "joint 'wrist_3' of model 'arm' blew up" in told
     assert "No controller with gains drives it" in told
-    assert beyond_stops(robot.model, robot.run(0.1)) < 0.1
+    assert beyond_stops(alone.model, alone.run(0.1)) < 0.1
 
 
 @pytest.mark.parametrize("step", [0.001, 0.01])
@@ -257,9 +239,6 @@ def test_in_a_process_it_is_told_by_pythons_logging(rig, caplog):
     with caplog.at_level(logging.WARNING):
         robot.load(POSITION, "axle", {"p": 10.0, "d": 600.0})
     assert "would shake" in caplog.text
-
-
-# what a P gain alone drives
 
 
 def amplitudes(rig, text, gains=None):
@@ -305,11 +284,8 @@ def outcome_of_a_trajectory(robot):
     return outcome.kind, outcome.text
 
 
-def test_an_arm_with_p_gains_alone_reaches_its_goals(rig):
+def test_an_arm_with_p_gains_alone_reaches_its_goals_but_rings_without_that_damping(rig):
     assert outcome_of_a_trajectory(rig(urdf_of("arm"))) == ("succeeded", "")
-
-
-def test_without_that_damping_it_rings_beyond_its_tolerance(rig):
     exact = re.sub("<plugin.*?/>", "", urdf_of("arm"))
     exact = exact.replace("</robot>", PLUGIN.format("<pOnlyDamping>0</pOnlyDamping>") + "</robot>")
     kind, text = outcome_of_a_trajectory(rig(exact))

@@ -4,7 +4,9 @@ import logging
 
 import numpy as np
 import pytest
+from support.robots.grippers import transmission
 from support.robots.robots_in_trouble import Rig
+from support.robots.snippets import WORLD, box, collision, joint, link, robot, sdf, sdf_link
 
 from robot_sim.physics.files.sdf import parse_sdf
 from robot_sim.physics.pose import Pose
@@ -14,37 +16,30 @@ GOALS = (0.2, 0.6, 0.3, 0.6, 0.2, 0.5)  # [rad]
 EFFORT = 50.0  # [N m]
 STALLED = "joint '{}' of model 'chain' has been stalled for a second"
 POSITION = "effort_controllers/JointPositionController"
-BOX = """<sdf version="1.6"><model name="box"><static>1</static><link name="side"><collision name="c">
-<geometry><box><size>0.4 0.4 0.4</size></box></geometry></collision></link></model></sdf>"""
-LINK = """<link name="l{number}"><inertial><origin xyz="0 0 0.1"/><mass value="2"/>
-<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.0025"/></inertial>
-<collision><origin xyz="0 0 0.1"/><geometry><cylinder radius="0.04" length="0.2"/></geometry></collision>
-</link>
-<joint name="j{number}" type="revolute"><parent link="{parent}"/><child link="l{number}"/>
-<origin xyz="0 0 {height}"/><axis xyz="{axis}"/><limit lower="-3" upper="3" effort="50" velocity="3"/></joint>
-<transmission name="t{number}"><type>transmission_interface/SimpleTransmission</type>
-<joint name="j{number}"><hardwareInterface>hardware_interface/{interface}JointInterface</hardwareInterface>
-</joint><actuator name="m{number}"/></transmission>"""
+BOX = sdf(sdf_link("side", more=collision(box("0.4 0.4 0.4"))), static=True)
+SHAPE = """<collision><origin xyz="0 0 0.1"/><geometry><cylinder radius="0.04" length="0.2"/></geometry>
+</collision>"""
+LIMIT = 'lower="-3" upper="3" effort="50" velocity="3"'
 
 
 def chain(interface, count):
-    links = [
-        LINK.format(
-            number=i, parent=f"l{i - 1}" if i else "world", height=LENGTH if i else 0.0,
-            axis="0 1 0" if i % 2 else "0 0 1", interface=interface,
-        )
-        for i in range(count)
-    ]  # fmt: skip
-    return f'<robot name="chain"><link name="world"/>{"".join(links)}</robot>'
+    parts = [WORLD]
+    for i in range(count):
+        body = link(f"l{i}", 2.0, "0 0 0.1", (0.01, 0.01, 0.0025), SHAPE)
+        axis, parent = "0 1 0" if i % 2 else "0 0 1", f"l{i - 1}" if i else "world"
+        at = f"0 0 {LENGTH if i else 0.0}"
+        hinge = joint(f"j{i}", "revolute", parent, f"l{i}", at, axis=axis, limit=LIMIT)
+        parts += [body, hinge, transmission(f"j{i}", interface)]
+    return robot(*parts, name="chain")
 
 
 @pytest.fixture
 def rig(make_world):
     """Make a chain of six joints, with or without a box where its goal is."""
 
-    def make(interface, box=True):
+    def make(interface, blocked=True):
         world = make_world()
-        if box:
+        if blocked:
             world.spawn("box", parse_sdf(BOX), Pose((0.45, 0.05, 0.4)))
         return Rig(world, chain(interface, len(GOALS)))
 
@@ -81,7 +76,7 @@ def test_joints_that_a_contact_stops_stand_still_and_say_so(rig):
 
 
 def test_motors_that_nothing_stops_reach_their_commands(rig):
-    robot = rig("Position", box=False)
+    robot = rig("Position", blocked=False)
     command(robot, GOALS)
     robot.run(1.5)
     assert np.array(robot.model.joint_states())[:, 0] == pytest.approx(GOALS, abs=1e-5)
@@ -135,8 +130,8 @@ def test_what_its_own_links_hold_off_its_goal_is_told_below_the_limit_too(make_w
     robot = folding(gains, FOLDED)(make_world())
     told = [text for _, text in robot.told if "stalled" in text]
     assert len(told) == 2 and told == [text for text in robot.warnings() if "stalled" in text]
-    for joint, text in zip(("j1", "j2"), sorted(told), strict=True):
-        assert text.startswith(STALLED.format(joint) + ", 0.")
+    for name, text in zip(("j1", "j2"), sorted(told), strict=True):
+        assert text.startswith(STALLED.format(name) + ", 0.")
         assert "rad or m off its goal: link 'l2' touches link 'l0' of its own model" in text
     assert max(abs(each.effort) for each in robot.hardware.joints.values()) < 0.99 * EFFORT
 

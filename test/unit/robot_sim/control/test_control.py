@@ -62,47 +62,35 @@ def test_distances_between_angles():
     assert shortest_distance_within(0.0, 1.0, -0.5, 0.5) == 1.0
 
 
+HARD = JointLimits(-0.5, 0.5, 7.0, 30.0)
+SOFT = JointLimits(-1.0, 1.0, 2.0, 30.0, SoftLimits(-0.9, 0.9, 10.0, 20.0))
+
+
 @pytest.mark.parametrize(
-    ("position", "velocity", "command", "wanted"),
+    ("limits", "position", "velocity", "command", "wanted"),
     [
-        (0.0, 0.0, 100.0, 30.0), (0.0, 0.0, -100.0, -30.0), (0.0, 0.0, 5.0, 5.0),
-        (0.6, 0.0, 5.0, 0.0), (0.6, 0.0, -5.0, -5.0), (-0.6, 0.0, -5.0, 0.0), (-0.6, 0.0, 5.0, 5.0),
-        (0.0, 8.0, 5.0, 0.0), (0.0, 8.0, -5.0, -5.0), (0.0, -8.0, -5.0, 0.0), (0.0, -8.0, 5.0, 5.0),
+        (HARD, 0.0, 0.0, 100.0, 30.0), (HARD, 0.0, 0.0, -100.0, -30.0), (HARD, 0.0, 0.0, 5.0, 5.0),
+        (HARD, 0.6, 0.0, 5.0, 0.0), (HARD, 0.6, 0.0, -5.0, -5.0), (HARD, -0.6, 0.0, -5.0, 0.0),
+        (HARD, -0.6, 0.0, 5.0, 5.0), (HARD, 0.0, 8.0, 5.0, 0.0), (HARD, 0.0, 8.0, -5.0, -5.0),
+        (HARD, 0.0, -8.0, -5.0, 0.0), (HARD, 0.0, -8.0, 5.0, 5.0), (JointLimits(), 0.0, 0.0, 1e9, 1e9),
+        # At 0.85 rad at most 10 * 0.05 = 0.5 rad/s are allowed; 1 rad/s is braked with 20 * 0.5 N m.
+        (SOFT, 0.85, 1.0, 30.0, -10.0),
     ],
 )  # fmt: skip
-def test_effort_saturation_only_blocks_pushing_further(position, velocity, command, wanted):
-    joint = JointHandle("j", "prismatic", JointLimits(-0.5, 0.5, 7.0, 30.0))
+def test_limits_only_block_pushing_further(limits, position, velocity, command, wanted):
+    joint = JointHandle("j", "prismatic", limits)
     joint.position, joint.velocity, joint.command = position, velocity, command
-    effort_enforcer(joint.limits)(joint)
-    assert joint.command == wanted
-
-
-def test_without_limits_nothing_is_enforced():
-    joint = JointHandle("j", "prismatic", command=1e9)
-    effort_enforcer(joint.limits)(joint)
-    assert joint.command == 1e9
-
-
-def test_soft_limits_brake_before_the_end():
-    limits = JointLimits(-1.0, 1.0, 2.0, 30.0, SoftLimits(-0.9, 0.9, 10.0, 20.0))
-    joint = JointHandle("j", "revolute", limits)
-    # At 0.85 rad at most 10 * 0.05 = 0.5 rad/s are allowed; at 1 rad/s that is braked with 20 * 0.5 N m.
-    joint.position, joint.velocity, joint.command = 0.85, 1.0, 30.0
     effort_enforcer(limits)(joint)
-    assert joint.command == pytest.approx(-10.0)
+    assert joint.command == pytest.approx(wanted)
 
 
-def test_the_description_gives_joints_limits_and_transmissions():
+def test_the_description_gives_joints_transmissions_and_limits_which_parameters_override():
     description = read_description(cartpole_urdf())
     assert description.joints["stand_cart"].limits == JointLimits(-0.5, 0.5, 7.0, 30.0)
     assert description.joints["cart_pole"].limits == JointLimits(None, None, 7.0, 30.0)
     assert [t.joint for t in description.transmissions] == ["stand_cart", "cart_pole"]
-
-
-def test_parameters_override_limits_field_by_field():
     own = {"has_effort_limits": True, "max_effort": 3, "has_position_limits": False}
-    description = read_description(cartpole_urdf()).limited_by({"stand_cart": own})
-    limits = description.joints["stand_cart"].limits
+    limits = description.limited_by({"stand_cart": own}).joints["stand_cart"].limits
     assert limits == JointLimits(None, None, 7.0, 3.0)
 
 
@@ -127,21 +115,18 @@ def test_of_several_transmissions_of_a_joint_the_first_counts():
     assert warning == "Joint 'stand_cart' has several transmissions; the first is used."
 
 
-def test_a_negative_limit_would_push_so_it_is_refused():
+def test_a_negative_limit_would_push_so_it_is_refused_as_an_unknown_interface_is():
     with pytest.raises(ControlError, match="<limit effort='-30'> is negative"):
         read_description(cartpole_urdf().replace('effort="30"', 'effort="-30"', 1))
+    with pytest.raises(ControlError, match="NoJointInterface"):
+        read_description(cartpole_urdf().replace("EffortJointInterface", "NoJointInterface"))
     params = {"stand_cart": {"has_effort_limits": True, "max_effort": -3}}
     description = read_description(cartpole_urdf()).limited_by(params)
     assert description.joints["stand_cart"].limits.effort == 30.0
     assert "max_effort is missing, negative or no number" in description.warnings[-1]
 
 
-def test_an_unknown_interface_is_fatal():
-    with pytest.raises(ControlError, match="NoJointInterface"):
-        read_description(cartpole_urdf().replace("EffortJointInterface", "NoJointInterface"))
-
-
-def test_joint_states_come_in_alphabetical_order_at_120_hz_on_the_tick_grid(hardware):
+def test_joint_states_come_in_alphabetical_order_at_120_hz_also_after_time_went_back(hardware):
     controller = built_in()[STATE].create("jsc", {"publish_rate": 120}, hardware)
     samples = collect(controller)
     controller.starting(0)
@@ -152,16 +137,10 @@ def test_joint_states_come_in_alphabetical_order_at_120_hz_on_the_tick_grid(hard
     assert stamps[0] == 1
     assert {b - a for a, b in pairwise(stamps)} == {8, 9}
     assert len(samples) == 1201  # one at the start, then 120 a second
-
-
-def test_joint_states_keep_coming_after_time_went_back(hardware):
-    controller = built_in()[STATE].create("jsc", {"publish_rate": 100}, hardware)
-    samples = collect(controller)
-    controller.starting(100_000 * MS)
-    controller.joints_moved(0)
+    controller.joints_moved(0)  # time has gone back
     for tick in range(1, 101):
         controller.update(tick * MS, 0.001)
-    assert len(samples) == 10
+    assert len(samples) == 1201 + 1 + 12  # at once, then 120 a second
 
 
 def test_extra_joints_stand_last_and_bad_ones_are_left_out(hardware):
@@ -198,14 +177,6 @@ def test_bad_parameters_are_refused(hardware, kind, params):
         built_in()[kind].create("c", params, hardware)
 
 
-def test_a_position_controller_starts_by_holding_what_it_finds(hardware):
-    joint = hardware.joints["stand_cart"]
-    joint.position = 0.2
-    controller = position_controller(hardware)
-    controller.update(MS, 0.001)
-    assert (controller.set_point, joint.command) == (0.2, 0.0)
-
-
 def test_a_set_point_beyond_the_rail_is_clamped_but_not_the_angle_of_a_continuous_joint(hardware):
     cart, pole = position_controller(hardware), position_controller(hardware, "cart_pole")
     samples = collect(cart), collect(pole)
@@ -215,7 +186,12 @@ def test_a_set_point_beyond_the_rail_is_clamped_but_not_the_angle_of_a_continuou
     assert [s[0].set_point for s in samples] == [0.5, 2.0]
 
 
-def test_a_pole_takes_the_short_way_round(hardware):
+def test_a_position_controller_holds_what_it_finds_and_a_pole_takes_the_short_way(hardware):
+    joint = hardware.joints["stand_cart"]
+    joint.position = 0.2
+    controller = position_controller(hardware)
+    controller.update(MS, 0.001)
+    assert (controller.set_point, joint.command) == (0.2, 0.0)
     controller = position_controller(hardware, "cart_pole", d=0.0)
     controller.command(20 * math.pi + 0.1)
     controller.update(MS, 0.001)

@@ -143,26 +143,24 @@ def test_a_ctrl_c_that_comes_while_a_controller_is_updated_is_no_fault_of_its(
     assert states(manager)["faulty"] == "running" and not faults
 
 
-def test_a_controller_that_raises_at_its_start_is_refused_and_the_others_start(manager, faults):
-    manager.load("faulty", {"type": "test/Faulty", "where": "starting"})
-    with pytest.raises(ControlError, match=r"Could not start \['faulty'\]"):
-        manager.switch(["faulty", "cart"], [], STRICT)
-    assert (states(manager)["faulty"], states(manager)["cart"]) == ("stopped", "running")
-    assert faults == [("faulty", "starting")]
-
-
-def test_a_controller_that_raises_at_its_stop_is_stopped_all_the_same(manager, faults):
-    manager.load("faulty", {"type": "test/Faulty", "where": "stopping"})
-    manager.switch(["faulty"], [], STRICT)
-    manager.switch([], ["faulty"], STRICT)
-    assert states(manager)["faulty"] == "stopped"
-    assert faults == [("faulty", "stopping")]
-
-
-def test_a_controller_that_raises_while_it_is_made_is_refused_with_the_reason(manager, faults):
+def test_one_that_raises_while_it_is_made_or_started_is_refused_and_stops_all_the_same(
+    manager, faults
+):
     with pytest.raises(ControlError, match="Initializing controller 'faulty' failed: KeyError"):
         manager.load("faulty", {"type": "test/Faulty", "where": "create"})
     assert "faulty" not in states(manager)
+    faulty = manager.load("faulty", {"type": "test/Faulty", "where": "starting"})
+    with pytest.raises(ControlError, match=r"Could not start \['faulty'\]"):
+        manager.switch(["faulty", "cart"], [], STRICT)
+    assert (states(manager)["faulty"], states(manager)["cart"]) == ("stopped", "running")
+    faulty.where = "stopping"
+    manager.switch(["faulty"], [], STRICT)
+    manager.switch([], ["faulty"], STRICT)
+    assert states(manager)["faulty"] == "stopped"
+    assert faults == [("faulty", "starting"), ("faulty", "stopping")]
+
+
+CLAIM = "isn't a tuple of names of controlled joints"
 
 
 @pytest.mark.parametrize(
@@ -170,28 +168,14 @@ def test_a_controller_that_raises_while_it_is_made_is_refused_with_the_reason(ma
     [
         ({"name": "cart"}, "calls itself 'cart'"),
         ({"interface": 3}, "lacks `interface`"),
-        *(
-            ({"claimed": claimed}, "isn't a tuple of names of controlled joints")
-            for claimed in ("stand_cart", ("elbow",), None, (3,))
-        ),
+        *(({"claimed": claimed}, CLAIM) for claimed in ("stand_cart", ("elbow",), None, (3,))),
+        (None, "returned None"),
     ],
 )
-def test_a_controller_that_could_not_be_listed_is_refused(
-    manager, faults, change, text, monkeypatch
-):
-    def create(name, params, hardware):
-        made = Faulty(name, "")
-        vars(made).update(change)
-        return made
-
-    monkeypatch.setattr(Faulty, "create", create)
+def test_what_could_not_be_listed_is_refused(manager, faults, change, text, monkeypatch):
+    made = Faulty("faulty", "")
+    vars(made).update(change or {})
+    monkeypatch.setattr(Faulty, "create", lambda *_: made if change else None)
     with pytest.raises(ControlError, match=text):
-        manager.load("faulty", {"type": "test/Faulty"})
-    assert "faulty" not in states(manager)
-
-
-def test_a_type_that_makes_no_controller_is_refused(manager, faults, monkeypatch):
-    monkeypatch.setattr(Faulty, "create", lambda name, params, hardware: None)
-    with pytest.raises(ControlError, match="returned None"):
         manager.load("faulty", {"type": "test/Faulty"})
     assert "faulty" not in states(manager)

@@ -1,8 +1,11 @@
-"""Position and velocity interfaces, limits and control periods, in the physics."""
+"""Position and velocity interfaces, limits and control periods, in the physics and against contacts."""
 
 import math
 
 import pytest
+from support.robots.grippers import transmission
+from support.robots.snippets import WORLD, joint, link, robot
+from support.robots.vehicles import RADIUS, TRACK, two_wheels
 from support.robots.worlds import add_robot, start
 
 from robot_sim.control.errors import ControlError
@@ -10,22 +13,18 @@ from robot_sim.control.hardware import PositionDrive, RobotHardware
 from robot_sim.control.joint import JointHandle, JointLimits, SoftLimits
 from robot_sim.control.limits import PositionLimiter, VelocityLimiter
 from robot_sim.control.transmissions import read_description
+from robot_sim.physics.files.urdf import parse_urdf
+from robot_sim.physics.pose import Pose
 from robot_sim.simulator import Simulator
 
 WEIGHT = 2.0 * 9.8  # [N] of the lift
 DT = 0.001  # [s]
 
 
-def lift_urdf(interface, limit='<limit lower="-1" upper="1" effort="100" velocity="2"/>', extra=""):
-    """A lift of 2 kg on a vertical rail, and an arm of 1 kg that hangs from it and swings freely."""
-    return f"""<robot name="lift"><link name="world"/>
-      <link name="lift"><inertial><mass value="2"/>
-        <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
-      <joint name="rail" type="prismatic"><parent link="world"/><child link="lift"/>
-        <axis xyz="0 0 1"/>{limit}{extra}</joint>
-      <transmission name="t"><type>transmission_interface/SimpleTransmission</type>
-        <joint name="rail"><hardwareInterface>hardware_interface/{interface}JointInterface
-        </hardwareInterface></joint><actuator name="m"/></transmission></robot>"""
+def lift_urdf(interface, limit='lower="-1" upper="1" effort="100" velocity="2"'):
+    """A lift of 2 kg on a vertical rail."""
+    rail = joint("rail", "prismatic", "world", "lift", limit=limit)
+    return robot(WORLD, link("lift", 2.0), rail, transmission("rail", interface), name="lift")
 
 
 class Lift:
@@ -36,15 +35,17 @@ class Lift:
     ):
         text = lift_urdf(interface, **urdf)
         self.sim = Simulator(world, lockstep=True)
-        self.robot = add_robot(self.sim, "lift", text, gains=gains, control_period=period)
-        self.model, self.manager = self.robot.model, self.robot.manager
-        self.joint = self.robot.hardware.joints["rail"]
+        made = add_robot(self.sim, "lift", text, gains=gains, control_period=period)
+        self.model, self.manager, self.joint = (
+            made.model,
+            made.manager,
+            made.hardware.joints["rail"],
+        )
         if controller:
-            start(self.robot, {"c": {"type": controller, "joint": "rail"} | (params or {})})
+            start(made, {"c": {"type": controller, "joint": "rail"} | (params or {})})
 
     def advance(self, seconds):
-        with self.sim.lock:
-            self.sim.advance(round(seconds / DT))
+        self.sim.advance(round(seconds / DT))
         return self.joint.position
 
     def command(self, value):
@@ -56,6 +57,7 @@ def make(make_world):
     return lambda *args, **kwargs: Lift(make_world(), *args, **kwargs)
 
 
+EFFORT = "effort_controllers/JointEffortController"
 POSITION = "position_controllers/JointPositionController"
 VELOCITY = "velocity_controllers/JointVelocityController"
 GAINS = {"rail": {"p": 20000.0, "d": 500.0}}
@@ -71,15 +73,11 @@ def test_a_position_command_is_where_the_joint_is_one_step_later(make):
     assert lift.joint.effort == 0.0
 
 
-def test_a_position_joint_without_a_controller_stays_where_it_is_put(make):
+def test_a_position_joint_stays_where_it_is_put_and_goes_at_the_pace_of_its_limit(make):
     lift = make("Position")
     assert lift.advance(0.2) == pytest.approx(0.0, abs=1e-6)
-    with lift.sim.lock:
-        lift.sim.set_joint_states(lift.model, {"rail": 0.4})
+    lift.sim.set_joint_states(lift.model, {"rail": 0.4})
     assert lift.advance(0.2) == pytest.approx(0.4, abs=1e-6)
-
-
-def test_the_velocity_limit_sets_the_pace_of_a_position_command(make):
     lift = make("Position", POSITION)
     lift.command(5.0)
     assert lift.advance(0.25) == pytest.approx(0.5, abs=1e-6)
@@ -96,7 +94,7 @@ def test_a_position_joint_with_gains_is_an_effort_pid_within_the_effort_limit(ma
 
 
 def test_a_weak_position_servo_is_cut_at_the_effort_limit(make):
-    limit = '<limit lower="-1" upper="1" effort="10" velocity="2"/>'
+    limit = 'lower="-1" upper="1" effort="10" velocity="2"'
     lift = make("Position", POSITION, gains=GAINS, limit=limit)
     lift.advance(0.1)
     assert lift.joint.effort == pytest.approx(10.0)
@@ -115,7 +113,7 @@ def test_a_velocity_controller_reaches_its_set_point_against_gravity(make, gains
 
 
 def test_a_velocity_motor_has_no_more_than_its_effort(make):
-    limit = '<limit lower="-9" upper="9" effort="10" velocity="5"/>'
+    limit = 'lower="-9" upper="9" effort="10" velocity="5"'
     lift = make("Velocity", VELOCITY, limit=limit)
     lift.advance(0.1)
     assert lift.joint.position == pytest.approx(0.5 * (10.0 - WEIGHT) / 2.0 * 0.1**2, rel=0.03)
@@ -136,14 +134,10 @@ def test_a_controller_with_a_pid_reaches_its_set_point(make, interface, controll
     assert found == pytest.approx(wanted, abs=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("interface", "controller"),
-    [
-        ("Effort", "effort_controllers/JointEffortController"),
-        ("Position", POSITION),
-        ("Velocity", VELOCITY),
-    ],
-)
+KINDS = {"Effort": EFFORT, "Position": POSITION, "Velocity": VELOCITY}
+
+
+@pytest.mark.parametrize(("interface", "controller"), KINDS.items())
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_what_is_no_number_never_reaches_the_world(make, interface, controller, bad):
     lift = make(interface, controller)
@@ -167,8 +161,8 @@ def test_controllers_run_on_every_control_period_with_the_nominal_dt(make, perio
 
 
 def test_limits_act_on_each_step_also_between_control_periods(make):
-    limit = '<limit lower="-1" upper="0.05" effort="100" velocity="20"/>'
-    lift = make("Effort", "effort_controllers/JointEffortController", period=0.1, limit=limit)
+    limit = 'lower="-1" upper="0.05" effort="100" velocity="20"'
+    lift = make("Effort", EFFORT, period=0.1, limit=limit)
     lift.command(100.0)
     lift.advance(0.04)
     assert lift.joint.effort == 100.0
@@ -248,11 +242,75 @@ def test_the_effort_of_a_drive_speeds_no_joint_up_beyond_its_velocity_limit(
     lift = make(interface, controller, gains={"rail": {"p": 5000.0, "i_clamp": 0.0}})
     lift.model.body.reset_joint(0, 0.0, 2.5)
     lift.command(0.9 if interface == "Position" else 2.0)
-    lift.advance(DT)
-    lift.advance(DT)
+    lift.advance(2.0 * DT)
     assert (lift.joint.effort == 0.0) == (interface == "Position")
     lift.model.body.reset_joint(0, 0.5, 2.5)
     lift.command(-0.9)
-    lift.advance(DT)
-    lift.advance(DT)
+    lift.advance(2.0 * DT)
     assert lift.joint.effort == -100.0
+
+
+def solid(name, mass, size, moment):
+    shape = f'<collision><geometry><box size="{size}"/></geometry></collision>'
+    return link(name, mass, moment=moment, more=shape)
+
+
+def slide(name, parent, place, axis, limit):
+    moving = joint(name, "prismatic", parent, f"{name}_link", place, axis=axis, limit=limit)
+    return moving + transmission(name, "Position")
+
+
+def gripper():
+    """Two fingers that close along x, on a lift."""
+    parts = [WORLD, solid("lift_link", 1.0, "0.02 0.02 0.02", 0.01)]
+    limit = 'lower="-1" upper="1" effort="500" velocity="0.5"'
+    parts.append(slide("lift", "world", "0 0 0.5", "0 0 1", limit))
+    limit = 'lower="0" upper="0.1" effort="20" velocity="0.1"'
+    for name, side in (("left", 1), ("right", -1)):
+        parts.append(solid(f"{name}_link", 0.1, "0.02 0.1 0.2", 0.001))
+        parts.append(slide(name, "lift_link", f"{side * 0.1} 0 -0.4", f"{-side} 0 0", limit))
+    return robot(*parts)
+
+
+class Bench:
+    """A robot on the ground, its joints under one group controller."""
+
+    def __init__(self, world, text, pose, kind, joints, gains=None):
+        self.sim = Simulator(world, lockstep=True)
+        self.robot = add_robot(self.sim, "robot", text, pose, gains)
+        start(self.robot, {"group": {"type": kind, "joints": joints}})
+
+    def advance(self, seconds, *commands):
+        self.robot.manager.get("group").command_all(commands)
+        self.sim.advance(round(1000 * seconds))
+
+
+@pytest.mark.parametrize(("left", "right"), [(5.0, 5.0), (2.0, -2.0)])
+def test_a_robot_drives_straight_and_turns_as_fast_as_its_wheels_say(world, left, right):
+    kind, joints = (
+        "velocity_controllers/JointGroupVelocityController",
+        ["left_joint", "right_joint"],
+    )
+    bench = Bench(world, two_wheels(), Pose((0.0, 0.0, RADIUS)), kind, joints)
+    bench.advance(0.5, left, right)
+    before = bench.robot.model.state()[0].position
+    bench.advance(2.0, left, right)
+    (pose, (_, angular)) = bench.robot.model.state()
+    way = 2.0 * RADIUS * (left + right) / 2
+    assert pose.position[0] - before[0] == pytest.approx(way, abs=0.01)
+    assert pose.position[1] == pytest.approx(0.0, abs=0.01)
+    assert angular[2] == pytest.approx(RADIUS * (right - left) / TRACK, rel=0.1, abs=0.01)
+
+
+def test_a_gripper_with_gains_holds_a_box_and_lifts_it(world):
+    kind = "position_controllers/JointGroupPositionController"
+    gains = {name: {"p": 2000.0, "d": 40.0} for name in ("left", "right")}
+    bench = Bench(world, gripper(), Pose(), kind, ["left", "right", "lift"], gains)
+    description = parse_urdf(robot(solid("box", 0.5, "0.08 0.08 0.1", 0.001)))
+    box = world.spawn("box", description, Pose((0.0, 0.0, 0.05)))
+    bench.advance(0.3, 0.0, 0.0, 0.0)
+    bench.advance(2.0, 0.06, 0.06, 0.0)
+    fingers = [bench.robot.hardware.joints[name].position for name in ("left", "right")]
+    assert fingers == pytest.approx([0.05, 0.05], abs=0.003)
+    bench.advance(2.0, 0.06, 0.06, 0.3)
+    assert box.state()[0].position == pytest.approx((0.0, 0.0, 0.35), abs=0.01)

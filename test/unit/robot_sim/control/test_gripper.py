@@ -79,7 +79,7 @@ def test_a_new_goal_cancels_the_old_one_and_a_canceled_one_is_held():
     assert rig.joint.command == 0.3
 
 
-def test_the_effort_interface_has_no_force_without_max_effort():
+def test_the_effort_interface_has_no_force_without_max_effort_and_position_takes_the_place():
     rig = Rig()
     rig.joint.position = 1.0
     rig.run(1)
@@ -87,9 +87,6 @@ def test_the_effort_interface_has_no_force_without_max_effort():
     rig.pursue(2.0, effort=0.0)
     rig.run(1)
     assert rig.joint.command == 0.0
-
-
-def test_the_position_interface_takes_the_position_alone():
     rig = Rig("Position")
     rig.pursue(0.7, effort=0.0)
     rig.run(1)

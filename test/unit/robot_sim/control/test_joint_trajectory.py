@@ -1,7 +1,4 @@
-"""JointTrajectoryController, tick by tick: parameters, law, time, joints, goals.
-
-See docs/contract/ros_control.md 3.5.
-"""
+"""JointTrajectoryController, tick by tick (docs/contract/ros_control.md 3.5)."""
 
 import math
 
@@ -21,24 +18,18 @@ from robot_sim.control.trajectory_goals import (
     TrajectoryRefused,
 )
 
-# parameters
 
-
-def test_there_is_one_for_each_interface():
+def test_there_is_one_for_each_interface_which_touches_no_joint_before_it_starts():
     for interface in ("Effort", "Position", "Velocity"):
         rig = Rig(interface, ("wrist", "shoulder"))
+        rig.joints["shoulder"].position = 1.0
+        rig.controller.create("other", {"joints": ["shoulder"], "gains": GAINS}, rig.hardware)
+        assert rig.joints["shoulder"].command == 0.0
         assert rig.controller.claimed == ("shoulder", "wrist")
         assert rig.controller.joint_names == ("wrist", "shoulder")
         assert rig.controller.interface == f"{interface}JointInterface"
     assert list(Rig("Effort").controller.pids) == ["gains/shoulder"]
     assert Rig("Position").controller.pids == {}
-
-
-def test_loading_touches_no_joint():
-    rig = Rig("Position")
-    rig.joints["shoulder"].position = 1.0
-    rig.controller.create("other", {"joints": ["shoulder"]}, rig.hardware)
-    assert rig.joints["shoulder"].command == 0.0
 
 
 @pytest.mark.parametrize(
@@ -75,9 +66,6 @@ def test_a_robot_without_the_interface_is_refused():
         )
 
 
-# the law
-
-
 @pytest.mark.parametrize("interface", ["Effort", "Velocity"])
 def test_effort_and_velocity_are_feed_forward_and_pid_on_both_errors(interface):
     rig = Rig(interface, velocity_ff={"shoulder": 3.0}).start()
@@ -111,10 +99,7 @@ def test_errors_are_the_shortest_turn_but_on_a_rail_the_whole_way():
     assert commands == pytest.approx([short, short, -40.0])
 
 
-# start, hold, stop
-
-
-def test_it_starts_by_holding_what_it_finds():
+def test_it_starts_by_holding_what_it_finds_or_slows_it_down_in_its_stop_duration():
     rig = Rig("Effort")
     joint = rig.joints["shoulder"]
     joint.position, joint.command = 0.7, 5.0
@@ -123,9 +108,6 @@ def test_it_starts_by_holding_what_it_finds():
     rig.run(10)
     assert joint.command == 0.0
     assert rig.controller.query(rig.now)[0] == (0.7, 0.0, 0.0)
-
-
-def test_with_a_stop_duration_a_moving_joint_is_slowed_down():
     rig = Rig("Position", stop_trajectory_duration=0.5)
     joint = rig.joints["shoulder"]
     joint.position, joint.velocity = 0.2, 1.0
@@ -134,19 +116,6 @@ def test_with_a_stop_duration_a_moving_joint_is_slowed_down():
     assert joint.command == pytest.approx(0.201, abs=1e-5)
     rig.run(1000)
     assert joint.command == pytest.approx(0.2 + 0.625 * 0.5)
-
-
-def test_no_points_hold_the_joints_where_they_are():
-    rig = Rig("Effort").start()
-    rig.controller.follow(move((1.0, (1.0,))))
-    rig.run(500)
-    rig.joints["shoulder"].position = 0.4
-    rig.controller.follow(Trajectory((), ()))
-    rig.run()
-    assert rig.controller.sample().desired == ((0.4,), (0.0,), (0.0,))
-
-
-# time
 
 
 def test_a_stamp_in_the_future_waits_and_the_old_trajectory_goes_on():
@@ -200,18 +169,11 @@ def test_state_comes_at_its_rate_and_not_at_all_for_a_rate_of_0():
     assert samples == []
 
 
-# joints
-
-
-def test_joints_may_come_in_another_order():
-    rig = Rig(joints=("shoulder", "rail")).start()
-    rig.controller.follow(move((1.0, (2.0, 1.0)), names=("rail", "shoulder")))
-    rig.run(1100)
-    assert [rig.joints[name].position for name in ("shoulder", "rail")] == [1.0, 2.0]
-
-
-def test_joints_that_are_not_named_go_on():
+def test_joints_may_come_in_another_order_and_those_that_are_not_named_go_on():
     rig = Rig(joints=("shoulder", "rail"), allow_partial_joints_goal=True).start()
+    rig.controller.follow(move((1.0, (-2.0, -1.0)), names=("rail", "shoulder")))
+    rig.run(1100)
+    assert [rig.joints[name].position for name in ("shoulder", "rail")] == [-1.0, -2.0]
     rig.controller.follow(move((2.0, (1.0,))))
     rig.run(500)
     told = rig.pursue(move((0.5, (2.0,)), names=("rail",)))
@@ -221,18 +183,14 @@ def test_joints_that_are_not_named_go_on():
     assert [rig.joints[name].position for name in ("shoulder", "rail")] == [1.0, 2.0]
 
 
-def test_a_tolerance_that_is_no_number_is_refused():
-    rig = Rig().start()
-    for tolerances in (
-        {"path": {"shoulder": Tolerance(math.nan)}},
-        {"goal": {"x": Tolerance(0, math.nan)}},
-    ):
-        with pytest.raises(TrajectoryRefused, match="not a number") as refusal:
-            rig.pursue(move((1.0, (1.0,))), **tolerances)
-        assert refusal.value.code == INVALID_GOAL
-
-
-# goals
+@pytest.mark.parametrize(
+    "tolerances",
+    [{"path": {"shoulder": Tolerance(math.nan)}}, {"goal": {"x": Tolerance(0, math.nan)}}],
+)
+def test_a_tolerance_that_is_no_number_is_refused(tolerances):
+    with pytest.raises(TrajectoryRefused, match="not a number") as refusal:
+        Rig().start().pursue(move((1.0, (1.0,))), **tolerances)
+    assert refusal.value.code == INVALID_GOAL
 
 
 def test_a_goal_is_told_of_at_the_monitors_rate_and_succeeds():
@@ -278,11 +236,17 @@ def test_a_goals_own_tolerances_override_or_disable_the_parameters():
     ("own", "ticks"),
     [({}, 1500), ({"goal_time": S // 5}, 1200), ({"goal_time": -S}, 1000)],  # below 0 is none
 )
-def test_a_missed_end_aborts_once_its_time_is_over(own, ticks):
+@pytest.mark.parametrize("late", [False, True])
+def test_a_missed_end_aborts_once_its_time_is_over_and_a_late_arrival_succeeds(own, ticks, late):
     rig = Rig("Effort", constraints={"shoulder": {"goal": 0.1}, "goal_time": 0.5}).start()
     told = rig.pursue(move((1.0, (1.0,))), **own)
     rig.run(ticks - 1)
     assert told.outcomes == []
+    if late:
+        rig.joints["shoulder"].position = 0.95
+        rig.run(100)
+        assert [outcome.kind for outcome in told.outcomes] == ["succeeded"]
+        return
     rig.run(2)
     (outcome,) = told.outcomes
     assert (outcome.kind, outcome.code) == ("aborted", GOAL_TOLERANCE_VIOLATED)
@@ -298,15 +262,6 @@ def test_a_joint_that_does_not_come_to_rest_misses_its_end_by_default():
     rig.joints["shoulder"].velocity = 0.009
     told = rig.pursue(move((0.1, (0.0,))))
     rig.run(200)
-    assert [outcome.kind for outcome in told.outcomes] == ["succeeded"]
-
-
-def test_a_late_arrival_within_its_time_succeeds():
-    rig = Rig("Effort", constraints={"shoulder": {"goal": 0.1}, "goal_time": 0.5}).start()
-    told = rig.pursue(move((1.0, (1.0,))))
-    rig.run(1300)
-    rig.joints["shoulder"].position = 0.95
-    rig.run(100)
     assert [outcome.kind for outcome in told.outcomes] == ["succeeded"]
 
 
@@ -348,10 +303,14 @@ def test_cancel_holds_the_joints_and_knows_its_goal():
     assert rig.joints["shoulder"].position == here
 
 
-def test_a_goal_without_points_holds_and_succeeds():
-    rig = Rig().start()
+def test_no_points_hold_the_joints_where_they_are_and_such_a_goal_succeeds():
+    rig = Rig("Effort").start()
     rig.controller.follow(move((1.0, (1.0,))))
-    rig.run(1100)
+    rig.run(500)
+    rig.joints["shoulder"].position = 0.4
+    rig.controller.follow(Trajectory((), ()))
+    rig.run()
+    assert rig.controller.sample().desired == ((0.4,), (0.0,), (0.0,))
     told = rig.pursue(Trajectory(("shoulder",), ()))
     rig.run(100)
     assert told.outcomes == [GoalOutcome("succeeded")]

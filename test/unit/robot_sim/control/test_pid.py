@@ -11,31 +11,30 @@ from robot_sim.control.pid import Gains, Pid
 
 
 @pytest.mark.parametrize(
-    ("gains", "errors", "wanted", "dt"),
+    ("gains", "errors", "wanted", "times"),
     [
-        (Gains(1, 1, 1, 5, -5), [-0.5, -0.5, -1.0], [-1.5, -1.5, -3.5], 1.0),
-        (Gains(0, 0, 1), [-0.5, -0.5, -1.0, -0.5], [-0.5, 0.0, -0.5, 0.5], 1.0),
-        (Gains(0, 2, 0, 1, -1, True), [-1, -1, 0.5, -1], [-1, -1, 0, -1], 1.0),
-        (Gains(0, -2.5, 0, 0.5, -0.2, True), [0.1, 0.1, -0.05], [-0.2, -0.2, -0.075], 1.0),
-        (Gains(0, 100, 0), [1.0, 1.0], [0.0, 0.0], 1.0),  # without i_clamp there is no integral
-        (Gains(100, 0.01, 10), [0.05, 0.05], [505.0, 5.0], 0.001),  # a step kicks for one tick
+        (Gains(1, 1, 1, 5, -5), [-0.5, -0.5, -1.0], [-1.5, -1.5, -3.5], [1.0] * 3),
+        (Gains(0, 0, 1), [-0.5, -0.5, -1.0, -0.5], [-0.5, 0.0, -0.5, 0.5], [1.0] * 4),
+        (Gains(0, 2, 0, 1, -1, True), [-1, -1, 0.5, -1], [-1, -1, 0, -1], [1.0] * 4),
+        (Gains(0, -2.5, 0, 0.5, -0.2, True), [0.1, 0.1, -0.05], [-0.2, -0.2, -0.075], [1.0] * 3),
+        (Gains(0, 100, 0), [1.0, 1.0], [0.0, 0.0], [1.0] * 2),  # no i_clamp, no integral
+        (Gains(100, 0.01, 10), [0.05, 0.05], [505.0, 5.0], [0.001] * 2),  # kicks for one tick
+        # Time that goes backwards integrates backwards, to 0, and keeps the rate, 1.
+        (Gains(0, 1, 1, 5, -5), [1.0, 1.0], [2.0, 1.0], [1.0, -1.0]),
     ],
 )
-def test_check_vectors(gains, errors, wanted, dt):
+def test_check_vectors(gains, errors, wanted, times):
     pid = Pid(gains)
     pid.clear()
-    assert [pid.compute(error, dt) for error in errors] == pytest.approx(wanted)
+    assert list(map(pid.compute, errors, times)) == pytest.approx(wanted)
 
 
-def test_without_antiwindup_the_integral_winds_behind_its_clamp():
+def test_without_antiwindup_the_integral_winds_behind_its_clamp_and_unseeded_there_is_no_kick():
     pid = Pid(Gains(0, 1, 0, 1, -1))
     pid.clear()
     for _ in range(5):
         assert pid.compute(1.0, 1.0) == 1.0
     assert pid.i_error == 5.0
-
-
-def test_unseeded_there_is_no_kick():
     assert Pid(Gains(1, 0, 10)).compute(0.5, 0.001) == 0.5
 
 
@@ -48,13 +47,6 @@ def test_a_bad_error_gives_nothing_and_leaves_the_state(error):
     assert pid.compute(error, 1.0) == 0.0
     assert pid.compute(1.0, 0.0) == 0.0
     assert (pid.i_error, pid.last_error, pid.d_error) == before
-
-
-def test_time_going_backwards_integrates_backwards_and_keeps_the_rate():
-    pid = Pid(Gains(0, 1, 1, 5, -5))
-    pid.clear()
-    pid.compute(1.0, 1.0)
-    assert pid.compute(1.0, -1.0) == pytest.approx(0.0 + 1.0)  # integral back at 0, rate still 1
 
 
 finite = st.floats(-1e3, 1e3)

@@ -1,6 +1,7 @@
 """Controllers that report IMUs and force-torque sensors, with both engines: rates, resets, refusals."""
 
 import pytest
+from support.robots.snippets import link
 from support.robots.worlds import add_robot, start
 
 from robot_sim.control.controllers import built_in
@@ -14,12 +15,8 @@ G = 9.8
 MS = 1_000_000
 IMU = {"type": "imu_sensor_controller/ImuSensorController"}
 FORCES = {"type": "force_torque_sensor_controller/ForceTorqueSensorController"}
-SOLID = (
-    '<inertial><mass value="{}"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>'
-    '<collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision>'
-)
-URDF = f"""<robot name="r"><link name="base">{SOLID.format(3)}</link>
-<link name="hand">{SOLID.format(2)}</link>
+SOLID = '<collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision>'
+URDF = f"""<robot name="r">{link("base", 3, more=SOLID)}{link("hand", 2, more=SOLID)}
 <joint name="wrist" type="fixed"><parent link="base"/><child link="hand"/><origin xyz="0 0 0.3"/></joint>
 <gazebo reference="base"><sensor name="imu/data" type="imu"><update_rate>{{rate}}</update_rate>
 <imu><angular_velocity><x>
@@ -45,10 +42,6 @@ class Bot:
             for output in each.outputs:
                 output.sink = self.sent.setdefault(output.topic, []).append
 
-    def advance(self, ticks):
-        with self.sim.lock:
-            self.sim.advance(ticks)
-
     def stamps(self, topic):
         return [sample.stamp // MS for sample in self.sent[topic]]
 
@@ -60,7 +53,7 @@ def bot(world):
 
 def test_both_report_at_their_rate_what_the_sensors_feel(bot):
     bot.start(imu=IMU, forces=FORCES)
-    bot.advance(1000)
+    bot.sim.advance(1000)
     imu, wrench = bot.sent["imu/data"], bot.sent["wrist_ft"]
     assert bot.stamps("imu/data")[:3] == bot.stamps("wrist_ft")[:3] == [11, 21, 31]
     assert all(output.shared for each in bot.robot.manager.loaded for output in each.outputs)
@@ -72,7 +65,7 @@ def test_both_report_at_their_rate_what_the_sensors_feel(bot):
 def test_a_sensor_with_a_rate_keeps_its_last_measurement_between(world):
     bot = Bot(world, rate=50)
     bot.start(imu=IMU)
-    bot.advance(200)
+    bot.sim.advance(200)
     values = [sample.value for sample in bot.sent["imu/data"]]
     assert len(values) == 19
     assert len(set(values[-10:])) <= 6
@@ -83,45 +76,42 @@ def test_nothing_is_stale_or_silent_after_resets(world, relatch):
     bot = Bot(world, relatch=relatch)
     bot.start(imu=IMU, forces=FORCES)
     for reset in (bot.sim.reset_simulation, bot.sim.reset_world, bot.sim.reset_time):
-        bot.advance(150)
+        bot.sim.advance(150)
         bot.robot.model.place(Pose((0.0, 0.0, 5.0)), ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
         bot.sent["imu/data"].clear()
         reset()
         now = bot.sim.now
         assert [sample.stamp for sample in bot.sent["imu/data"]] == [now]  # at once
-        bot.advance(11)
+        bot.sim.advance(11)
         for sent in bot.sent.values():
             assert now < sent[-1].stamp <= now + 11 * MS
 
 
 def test_a_stopped_controller_measures_nothing_and_goes_on_when_it_starts(bot):
     bot.start(imu=IMU)
-    bot.advance(100)
+    bot.sim.advance(100)
     bot.robot.manager.switch([], ["imu"])
     assert not bot.sim.listeners
     bot.sent["imu/data"].clear()
-    bot.advance(100)
+    bot.sim.advance(100)
     assert not bot.sent["imu/data"]
     bot.robot.manager.switch(["imu"], [])
-    bot.advance(100)
+    bot.sim.advance(100)
     assert bot.stamps("imu/data")[-1] == 291
 
 
-def test_without_topics_it_runs_and_measures_nothing(world):
-    bot = Bot(world)
+def test_a_rate_of_0_and_one_without_topics_publish_nothing(bot):
+    bot.start(imu=IMU | {"publish_rate": 0})
+    bot.sim.advance(20)
+    assert bot.sent == {"imu/data": []}
+    bot.robot.manager.switch([], ["imu"])
     for makers in bot.robot.hardware.sensors.values():
         makers.clear()
     offer_sensors(bot.robot.hardware, bot.sim, bot.robot.model, sensing=None)
-    bot.start(imu=IMU, forces=FORCES)
-    bot.advance(50)
+    bot.start(again=IMU, forces=FORCES)
+    bot.sim.advance(50)
     assert not bot.sim.listeners
     assert bot.sent == {"imu/data": [], "wrist_ft": []}
-
-
-def test_a_rate_of_0_publishes_nothing(bot):
-    bot.start(imu=IMU | {"publish_rate": 0})
-    bot.advance(20)
-    assert bot.sent == {"imu/data": []}
 
 
 def test_what_is_missing_or_faulty_is_named(world, make_world):

@@ -5,6 +5,8 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.robots.grippers import transmission
+from support.robots.snippets import WORLD, joint, link, robot
 from support.robots.trajectory_rig import Listener
 from support.robots.worlds import add_robot, start
 
@@ -85,14 +87,11 @@ def test_the_lowest_common_level_counts(first, last, level):
     assert segment.sample(S // 3) == same.sample(S // 3)
 
 
-def test_outside_its_time_a_segment_stands():
+def test_outside_its_time_a_segment_stands_and_without_duration_it_is_its_end():
     segment = Segment(S, Waypoint(1.0, 5.0, 5.0), 2 * S, Waypoint(2.0, 5.0, 5.0))
     assert segment.sample(S - 1) == State(1.0, 0.0, 0.0)
     assert segment.sample(2 * S + 1) == State(2.0, 0.0, 0.0)
     assert segment.sample(2 * S).velocity == pytest.approx(5.0)
-
-
-def test_a_segment_without_duration_is_its_end():
     assert Segment(5, Waypoint(1.0), 5, Waypoint(2.0, 3.0)).sample(5) == State(2.0)
 
 
@@ -129,25 +128,24 @@ def test_the_past_of_a_track_is_forgotten():
     assert len(spline._segments) <= 3
 
 
+TURN = 2.0 * math.pi
+
+
 @pytest.mark.parametrize(
     ("at", "to", "wanted"),
     [
-        (0.0, 2 * math.pi + 0.5, 0.5),
-        (6.0, 0.0, 2 * math.pi),
-        (-20.0, -20.0, -20.0),
-        (3.0, -3.0, 3.2832),
+        (0.0, (TURN + 0.5,), (0.5,)),
+        (6.0, (0.0,), (TURN,)),
+        (-20.0, (-20.0,), (-20.0,)),
+        (3.0, (-3.0,), (3.2832,)),
+        # Whole turns are added to all points alike.
+        (0.0, (7.0, 12.0, 20.0), (7.0 - TURN, 12.0 - TURN, 20.0 - TURN)),
     ],
 )
 def test_a_continuous_joint_takes_the_short_way_round(at, to, wanted):
-    spline = JointSpline([still(0, at)]).continued(0, 0, [(S, Waypoint(to))], turns=True)
-    assert spline.at(S).position == pytest.approx(wanted, abs=1e-4)
-
-
-def test_whole_turns_are_added_to_all_points_alike():
-    points = [(S, Waypoint(7.0)), (2 * S, Waypoint(12.0)), (3 * S, Waypoint(20.0))]
-    spline = JointSpline([still(0, 0.0)]).continued(0, 0, points, turns=True)
-    found = [spline.at(time).position for time, _ in points]
-    assert found == pytest.approx([p.position - 2 * math.pi for _, p in points])
+    points = [((number + 1) * S, Waypoint(each)) for number, each in enumerate(to)]
+    spline = JointSpline([still(0, at)]).continued(0, 0, points, turns=True)
+    assert [spline.at(time).position for time, _ in points] == pytest.approx(wanted, abs=1e-4)
 
 
 def point(time, *positions, **others):
@@ -211,6 +209,7 @@ def test_tolerances():
     assert tolerance.changed(Tolerance(-1.0, 0.0)).violation(1e9, 0.1) == ""
 
 
+LIMIT = 'lower="-3" upper="3" effort="100" velocity="10"'
 JOINTS = ("shoulder", "elbow")
 REST = (0.0, 0.0)
 GAINS = {"p": 400.0, "i": 400.0, "d": 20.0, "i_clamp": 20.0}
@@ -226,27 +225,15 @@ KINDS = {
 
 def arm(interface):
     """Two links of 0.5 m and 1 kg that swing in a vertical plane."""
-
-    def link(name):
-        return (
-            f'<link name="{name}"><inertial><origin xyz="0 0 -0.25"/><mass value="1"/>'
-            '<inertia ixx="0.021" ixy="0" ixz="0" iyy="0.021" iyz="0" izz="0.001"/></inertial></link>'
-        )
-
-    def joint(name, parent, child, z):
-        return (
-            f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
-            f'<origin xyz="0 0 {z}"/><axis xyz="0 1 0"/>'
-            '<limit lower="-3" upper="3" effort="100" velocity="10"/></joint>'
-            f'<transmission name="t_{name}"><type>transmission_interface/SimpleTransmission</type>'
-            f'<joint name="{name}"><hardwareInterface>hardware_interface/{interface}JointInterface'
-            f'</hardwareInterface></joint><actuator name="m_{name}"/></transmission>'
-        )
-
-    return (
-        f'<robot name="arm"><link name="world"/>{link("upper")}{link("lower")}'
-        f"{joint('shoulder', 'world', 'upper', 2)}{joint('elbow', 'upper', 'lower', -0.5)}</robot>"
-    )
+    parts = [WORLD]
+    for name, parent, child, z in (
+        ("shoulder", "world", "upper", 2),
+        ("elbow", "upper", "lower", -0.5),
+    ):
+        parts.append(link(child, com="0 0 -0.25", moment=0.021))
+        parts.append(joint(name, "revolute", parent, child, f"0 0 {z}", axis="0 1 0", limit=LIMIT))
+        parts.append(transmission(name, interface))
+    return robot(*parts, name="arm")
 
 
 @pytest.fixture
@@ -255,11 +242,11 @@ def sim(make_world):
 
 
 def run_arm(sim, interface):
-    robot = add_robot(sim, "arm", arm(interface))
+    made = add_robot(sim, "arm", arm(interface))
     kind = f"{interface.lower()}_controllers/JointTrajectoryController"
     params = {"type": kind, "joints": list(JOINTS), "constraints": {"goal_time": 0.5}}
-    start(robot, {"arm": params | KINDS[interface]})
-    return robot, robot.manager.get("arm")
+    start(made, {"arm": params | KINDS[interface]})
+    return made, made.manager.get("arm")
 
 
 def pursue(controller, points, path):
@@ -274,40 +261,36 @@ def pursue(controller, points, path):
     ("interface", "path"), [("Effort", 0.02), ("Position", 0.01), ("Velocity", 0.01)]
 )
 def test_a_quintic_is_followed_within_its_tolerances(sim, interface, path):
-    robot, controller = run_arm(sim, interface)
+    made, controller = run_arm(sim, interface)
     points = [
         TrajectoryPoint(S, (0.5, 0.4), (0.4, -0.2), (0.0, 0.3)),
         TrajectoryPoint(2 * S, (0.8, -0.6), (0.0, 0.0), (0.0, 0.0)),
     ]
-    with sim.lock:
-        sim.advance(1)
-        told = pursue(controller, points, path)
-        sim.advance(2500)
+    sim.advance(1)
+    told = pursue(controller, points, path)
+    sim.advance(2500)
     assert told.outcomes == [GoalOutcome("succeeded")]
     assert len(told.samples) == pytest.approx(40, abs=2)
-    found = [robot.hardware.joints[name].position for name in JOINTS]
+    found = [made.hardware.joints[name].position for name in JOINTS]
     assert found == pytest.approx([0.8, -0.6], abs=path)
 
 
 def test_a_way_too_fast_for_the_motors_aborts_the_goal(sim):
     _, controller = run_arm(sim, "Effort")
-    with sim.lock:
-        sim.advance(1)
-        told = pursue(controller, [TrajectoryPoint(S // 10, (1.5, 1.5), REST, REST)], 0.05)
-        sim.advance(200)
+    sim.advance(1)
+    told = pursue(controller, [TrajectoryPoint(S // 10, (1.5, 1.5), REST, REST)], 0.05)
+    sim.advance(200)
     assert told.outcomes[0].kind == "aborted"
     assert "path error" in told.outcomes[0].text
 
 
 @pytest.mark.parametrize("interface", ["Effort", "Position", "Velocity"])
 def test_after_a_reset_the_arm_hangs_where_it_was_put(sim, interface):
-    robot, controller = run_arm(sim, interface)
-    with sim.lock:
-        told = pursue(controller, [TrajectoryPoint(S, (1.0, -1.0))], 0.0)
-        sim.advance(500)
-        sim.set_joint_states(robot.model, {"shoulder": 0.0, "elbow": 0.0})
+    made, controller = run_arm(sim, interface)
+    told = pursue(controller, [TrajectoryPoint(S, (1.0, -1.0))], 0.0)
+    sim.advance(500)
+    sim.set_joint_states(made.model, {"shoulder": 0.0, "elbow": 0.0})
     assert [outcome.kind for outcome in told.outcomes] == ["canceled"]
-    with sim.lock:
-        sim.advance(500)
-    places = [joint.position for joint in robot.hardware.joints.values()]
+    sim.advance(500)
+    places = [each.position for each in made.hardware.joints.values()]
     assert places == pytest.approx([0.0, 0.0], abs=1e-6)

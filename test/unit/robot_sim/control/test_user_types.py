@@ -36,16 +36,12 @@ def module(tmp_path, monkeypatch, request):
         del sys.modules[each]
 
 
-@pytest.mark.parametrize("place", ["{module}.py", "{module}/__init__.py"])
+@pytest.mark.parametrize("place", ["{module}.py", "{module}/__init__.py", "{module}/springs.py"])
 def test_a_users_class_is_found(module, place) -> None:
     name = module(CONTROLLER, place)
+    if "springs" in place:
+        module("from {module}.springs import Spring", "{module}/__init__.py")
     assert find_type(f"{name}/Spring").type_name == f"{name}/Spring"
-
-
-def test_it_may_lie_in_a_module_of_the_package(module) -> None:
-    module(CONTROLLER, "{module}/springs.py")
-    name = module("from {module}.springs import Spring", "{module}/__init__.py")
-    assert find_type(f"{name}/Spring").__name__ == "Spring"
 
 
 @pytest.mark.parametrize(

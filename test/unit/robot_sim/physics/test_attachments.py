@@ -34,7 +34,7 @@ def near(pose, other, most=1e-4):
     return max(map(abs, (*gap.position, *gap.orientation[:3]))) < most
 
 
-def test_what_is_attached_goes_along(world):
+def test_what_is_attached_goes_along_and_a_motor_bears_its_weight(world):
     robot, box, _ = pair(world)
     before = between(robot, box)
     run(world, 500)
@@ -43,10 +43,8 @@ def test_what_is_attached_goes_along(world):
     run(world, 1000)
     assert robot.joint_state("lift")[0] > 0.29
     assert near(between(robot, box), before)
-
-
-def test_a_motor_bears_the_weight_of_what_is_attached(world):
-    robot, _, _ = pair(world)
+    robot.set_motor("lift", 0.0, 1e4)
+    run(world, 100)
     weight = (1.0 + 0.1 + 0.05) * 9.8
     for most, holds in ((1.01 * weight, True), (0.99 * weight, False)):
         robot.set_motor("lift", 0.0, most)
@@ -116,22 +114,21 @@ def test_one_that_is_placed_takes_along_what_is_free_and_leaves_what_is_fixed(wo
     assert near(robot.state()[0], Pose())
 
 
-@pytest.mark.parametrize("joints", [False, True])
-def test_a_reset_detaches(world, joints):
-    _, box, _ = pair(world, Pose((0.3, 0.0, 1.0)))
-    world.reset(joints)
-    assert not world.attachments
-    run(world, 100)
-    assert box.state()[0].position[2] < 0.97
-
-
-@pytest.mark.parametrize("name", ["gripper", "cube"])
-def test_it_ends_with_either_model(world, name):
-    pair(world)
-    world.delete(name)
-    assert not world.attachments
-    run(world, 10)
-    world.spawn(name, parse_urdf({"gripper": gripper(), "cube": cube()}[name]), PLACE)
+def test_it_ends_with_a_reset_and_with_either_model(world):
+    robot, box, _ = pair(world, Pose((0.3, 0.0, 1.0)))
+    for joints in (False, True):
+        world.reset(joints)
+        assert not world.attachments
+        run(world, 100)
+        assert box.state()[0].position[2] < 0.97
+        world.attach((robot, "lift_link"), (box, "cube_link"))
+    for name, text in (("cube", cube()), ("gripper", gripper())):
+        world.delete(name)
+        assert not world.attachments
+        run(world, 10)
+        world.spawn(name, parse_urdf(text), PLACE)
+        models = world.models["gripper"], world.models["cube"]
+        world.attach(*zip(models, ("lift_link", "cube_link"), strict=True))
     run(world, 10)
 
 

@@ -12,6 +12,7 @@ from support.element_documents import (
     schema_paths,
     urdf_paths,
 )
+from support.robots.snippets import box, collision, link, robot, sdf, sdf_link, sdf_world
 
 from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.files.element_table import (
@@ -150,48 +151,52 @@ def test_nothing_is_said_of_other_elements(section, path):
 
 MODEL = """<sdf version="1.6" xmlns:custom="urn:else"><model name="m" custom:a="1">
 <custom:parts><x/></custom:parts>{}<link name="l"/></model></sdf>"""
-COLLISION = """<collision name="{}"><geometry><box/></geometry>
-<surface><contact><ode><kp>1e6</kp><kd>{}</kd></ode></contact></surface></collision>"""
+STIFF = "<surface><contact><ode><kp>1e6</kp><kd>{}</kd></ode></contact></surface>"
+SHAPES = "".join(collision("<box/>", STIFF.format(kd), name) for name, kd in (("a", 1), ("b", 7)))
+POSE = '<pose relative_to="{}">1 0 0 0 0 0</pose>'
+SENSOR = '<link name="m"><sensor name="s" type="{}"/></link>'
+TOLD = [  # of a model of SDF; its warnings
+    (sdf(f'<model name="cart"><link name="wheel" color="red">{SHAPES}</link><joints/></model>',
+         '<link name="l"><enable_wind>1</enable_wind><graviti>0</graviti></link>', static=True),
+     # One line names each once, with its first place and how many there are.
+     ["no effect here: <enable_wind> of link 'l', "
+      "<kp> of model 'cart', link 'wheel', collision 'a' (and 1 more), "
+      "<kd> of model 'cart', link 'wheel', collision 'b'; unknown: <graviti> of link 'l', "
+      "<joints> of model 'cart', <link color> of model 'cart', link 'wheel' (docs/files.md)"]),
+    *((sdf(SENSOR.format(kind)),
+       ["no effect here: <sensor type> of link 'm', sensor 's' (docs/files.md)"])
+      for kind in ("gps", "thermal_camera", "wireless_receiver", "rya")),
+    (MODEL.format(""), []),  # names of other namespaces are for others
+    (MODEL.format(POSE.format("table")), ["<pose>: it is the world's, not relative to 'table'"]),
+    (MODEL.format(POSE.format("")), []),
+    (MODEL.format(POSE.format("world")), []),
+]  # fmt: skip
 
 
-def test_one_line_names_all_that_has_no_effect_and_what_nobody_knows():
-    """Each is named once, with its first place and how many there are."""
-    shapes = COLLISION.format("a", 1) + COLLISION.format("b", 7)
-    inner = f'<model name="cart"><link name="wheel" color="red">{shapes}</link><joints/></model>'
-    model = parse_sdf(
-        f"""<sdf version="1.6"><model name="m"><static>1</static>{inner}<link name="l">
-        <enable_wind>1</enable_wind><graviti>0</graviti></link></model></sdf>"""
-    )
-    assert model.warnings == [
-        "no effect here: <enable_wind> of link 'l', "
-        "<kp> of model 'cart', link 'wheel', collision 'a' (and 1 more), "
-        "<kd> of model 'cart', link 'wheel', collision 'b'; unknown: <graviti> of link 'l', "
-        "<joints> of model 'cart', <link color> of model 'cart', link 'wheel' (docs/files.md)"
-    ]
+@pytest.mark.parametrize(("text", "told"), TOLD)
+def test_what_has_no_effect_and_what_nobody_knows_is_told(text, told):
+    assert parse_sdf(text).warnings == told
 
 
 def test_a_world_has_a_line_of_its_own_and_each_model_too():
-    found = parse_world(
-        """<sdf version="1.6"><world name="w"><wind><linear_velocity>1 0 0</linear_velocity></wind><models/>
-        <physics type="ode"><ode><solver><type>world</type></solver></ode></physics>
-        <model name="m"><link name="l"><enable_wind>true</enable_wind></link></model></world></sdf>""",
-        Resources(),
+    text = sdf_world(
+        "<wind><linear_velocity>1 0 0</linear_velocity></wind><models/>",
+        '<physics type="ode"><ode><solver><type>world</type></solver></ode></physics>',
+        '<model name="m"><link name="l"><enable_wind>true</enable_wind></link></model>',
     )
+    found = parse_world(text, Resources())
     assert found.warnings == [
         "no effect here: <linear_velocity> of world 'w', <type> of world 'w', physics; "
         "unknown: <models> of world 'w' (docs/files.md)"
     ]
-    [warning] = found.models["m"].warnings
-    assert warning == "no effect here: <enable_wind> of link 'l' (docs/files.md)"
+    told = "no effect here: <enable_wind> of link 'l' (docs/files.md)"
+    assert found.models["m"].warnings == [told]
 
 
 def test_a_urdf_names_its_blocks():
     extensions = """<gazebo reference="l"><kp>1e6</kp><mu1>0.2</mu1><mu2>0.2</mu2><fdir1/></gazebo>
     <gazebo reference="l"><mu1 value="0.3"/><mu2 value="0.2"/></gazebo>"""
-    model = parse_urdf(
-        f"""<robot name="r"><link name="l"><inertial><mass value="1"/>
-        <inertia ixx="1" iyy="1" izz="1"/></inertial><visuals/></link>{extensions}</robot>"""
-    )
+    model = parse_urdf(robot(link("l", more="<visuals/>"), extensions))
     assert model.warnings == [
         "no effect here: <kp> of gazebo 'l', <mu2> of gazebo 'l'; unknown: <visuals> of link 'l' "
         "(docs/files.md)"
@@ -210,41 +215,20 @@ def test_a_urdf_names_its_blocks():
 )
 def test_a_friction_in_one_direction_alone_is_told(friction, warned):
     """Gazebo's other direction has 1."""
-    box = '<geometry><box size="1 1 1"/></geometry>'
-    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
-    urdf = parse_urdf(
-        f"""<robot name="r"><link name="l">{inertial}<collision>{box}</collision></link>
-        <gazebo reference="l">{friction.format("mu1")}</gazebo></robot>"""
-    )
-    shape = "<geometry><box><size>1 1 1</size></box></geometry>"
+    shape = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
+    block = f'<gazebo reference="l">{friction.format("mu1")}</gazebo>'
+    one = parse_urdf(robot(link("l", more=shape), block))
     surface = f"<surface><friction><ode>{friction.format('mu')}</ode></friction></surface>"
-    link = f'<link name="l"><collision name="c">{shape}{surface}</collision></link>'
-    sdf = parse_sdf(f'<sdf version="1.6"><model name="m">{link}</model></sdf>')
-    for model, name, place in ((urdf, "mu1", "gazebo 'l'"), (sdf, "mu", "link 'l', collision 'c'")):
+    other = parse_sdf(sdf(sdf_link("l", more=collision(box("1 1 1"), surface))))
+    for model, name, place in (
+        (one, "mu1", "gazebo 'l'"),
+        (other, "mu", "link 'l', collision 'c'"),
+    ):
         lines = [f"{each.format(name, place)} (docs/files.md)" for each in warned]
         assert model.warnings == lines
-
-
-@pytest.mark.parametrize("kind", ["gps", "thermal_camera", "wireless_receiver", "rya"])
-def test_a_sensor_of_a_type_that_is_not_measured_is_told(kind):
-    link = f'<link name="m"><sensor name="s" type="{kind}"/></link>'
-    [line] = parse_sdf(f'<sdf version="1.6"><model name="m">{link}</model></sdf>').warnings
-    assert line == "no effect here: <sensor type> of link 'm', sensor 's' (docs/files.md)"
-
-
-def test_names_of_other_namespaces_are_for_others():
-    assert parse_sdf(MODEL.format("")).warnings == []
 
 
 def test_the_line_is_bounded():
     many = "".join(f"<x{number}{'x' * 90}/>" for number in range(200))
     [line] = parse_sdf(MODEL.format(many)).warnings
     assert line.endswith(", and 190 other elements (docs/files.md)") and len(line) < 1100
-
-
-def test_a_pose_in_the_world_that_is_relative_to_a_model_is_told():
-    poses = '<pose relative_to="{}">1 0 0 0 0 0</pose>'
-    [warning] = parse_sdf(MODEL.format(poses.format("table"))).warnings
-    assert warning == "<pose>: it is the world's, not relative to 'table'"
-    for frame in ("", "world"):
-        assert parse_sdf(MODEL.format(poses.format(frame))).warnings == []

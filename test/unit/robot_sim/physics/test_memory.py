@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 from support.memory import stays
+from support.python import run_python
 from support.robots.cartpole import cartpole_urdf
+from support.robots.snippets import joint, link, robot
 
 from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.engines import bullet_engine as bullet
@@ -47,15 +49,12 @@ def model_of(shape: str, tmp_path: Path, number: int = 0):
 
 def chain(count: int = 30) -> str:
     """Links of a box and a sphere each, one turning on the other."""
-    link = """<link name="{0}"><inertial><mass value="1"/>
-      <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
-      <collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>
-      <collision><geometry><sphere radius="0.1"/></geometry></collision></link>"""
-    joint = """<joint name="j{1}" type="continuous"><parent link="{0}"/><child link="{1}"/>
-      <axis xyz="1 0 0"/></joint>"""
-    links = "".join(link.format(number) for number in range(count))
-    joints = "".join(joint.format(number, number + 1) for number in range(count - 1))
-    return f'<robot name="m">{links}{joints}</robot>'
+    shape = "<collision><geometry>{}</geometry></collision>".format
+    shapes = shape('<box size="0.1 0.1 0.1"/>') + shape('<sphere radius="0.1"/>')
+    links = [link(str(number), moment=1.0, more=shapes) for number in range(count)]
+    for n in range(count - 1):
+        links.append(joint(f"j{n + 1}", "continuous", str(n), str(n + 1), axis="1 0 0"))
+    return robot(*links)
 
 
 @pytest.mark.usefixtures("often")
@@ -199,3 +198,28 @@ def test_a_new_world_of_the_engine_is_not_noticed(monkeypatch):
         assert one[:2] == other[:2]
         for numbers, expected in zip(one[2:], other[2:], strict=True):
             assert numbers == pytest.approx(expected, abs=1e-12)
+
+
+COUNT = """
+import ctypes, threading
+from robot_sim.heap import use_one_arena
+{}
+libc, done = ctypes.CDLL(None), threading.Barrier(5)
+
+def allocate():
+    libc.malloc(100)
+    done.wait()
+
+for _ in range(4):
+    threading.Thread(target=allocate).start()
+done.wait()
+libc.fopen.restype = ctypes.c_void_p
+file = ctypes.c_void_p(libc.fopen(b"/dev/stdout", b"w"))
+libc.malloc_info(0, file)
+libc.fclose(file)
+"""
+
+
+@pytest.mark.parametrize(("call", "one"), [("use_one_arena()", True), ("", False)])
+def test_threads_share_one_arena_once_it_is_asked_for(call, one):
+    assert (run_python(COUNT.format(call)).stdout.count("<heap nr=") == 1) == one

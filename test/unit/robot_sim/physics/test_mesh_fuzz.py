@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import HealthCheck, given, settings
 from support.mutations.meshes import mesh_files
+from support.robots.snippets import collision, sdf, sdf_link
 from support.robots.worlds import run
 
 from robot_sim.physics.description import DescriptionError
@@ -11,11 +12,9 @@ from robot_sim.physics.files.sdf import parse_sdf
 from robot_sim.physics.pose import Pose
 
 QUICK = settings(deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-SDF = """<sdf version="1.6"><model name="m"><static>{static}</static><link name="l"><collision name="c">
-<geometry><mesh><uri>{path}</uri></mesh></geometry></collision></link></model></sdf>"""
+pytestmark = pytest.mark.slow
 
 
-@pytest.mark.slow
 @settings(QUICK, max_examples=300)
 @given(mesh_files())
 def test_what_is_read_is_whole(tmp_path_factory, file):
@@ -33,16 +32,16 @@ def test_what_is_read_is_whole(tmp_path_factory, file):
     assert mesh.faces.max() < len(mesh.vertices)
 
 
-@pytest.mark.slow
 @settings(QUICK, max_examples=60)
 @given(file=mesh_files())
 def test_no_mesh_ends_an_engine(world, tmp_path_factory, file):
     """One that moves and one that stands; an engine that crashes ends this process."""
     path = tmp_path_factory.getbasetemp() / f"mesh{file[0]}"
     path.write_bytes(file[1])
-    for static in (0, 1):
+    shape = sdf_link("l", more=collision(f"<mesh><uri>{path}</uri></mesh>"))
+    for static in (False, True):
         try:
-            world.spawn("m", parse_sdf(SDF.format(static=static, path=path)), Pose())
+            world.spawn("m", parse_sdf(sdf(shape, static=static)), Pose())
         except DescriptionError as error:
             assert str(path) in str(error) and "\n" not in str(error)
         else:

@@ -186,26 +186,25 @@ def test_meshes_are_equal_by_what_they_hold(tmp_path):
     assert one != other
 
 
+def directions(count, seed):
+    """Points on the unit ball."""
+    drawn = np.random.default_rng(seed).normal(size=(count, 3))
+    return drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
+
+
 def test_a_hull_of_very_many_corners_is_cut_down_by_next_to_nothing():
     """A ball of 20,000 points: seen from any side it stays as it is, to a thousandth of its radius."""
-    random = np.random.default_rng(0)
-    ball = random.normal(size=(20_000, 3))
-    ball *= [[3.0, 2.0, 1.0]] / np.linalg.norm(ball, axis=1, keepdims=True)
+    ball, sides = directions(20_000, 0) * [[3.0, 2.0, 1.0]], directions(300, 1)
     hull = hull_points(ball)
     assert len(hull) <= MOST_POINTS
-    sides = random.normal(size=(300, 3))
-    sides /= np.linalg.norm(sides, axis=1, keepdims=True)
     lost = (ball @ sides.T).max(axis=0) - (hull @ sides.T).max(axis=0)
     assert 0.0 <= lost.max() < 0.006
 
 
 @pytest.mark.parametrize("scale, place", [((1.0, 1.0, 1.0), 1e6), ((1.0, 1.0, 1e-6), 0.0)])
 def test_a_hull_far_from_the_origin_and_one_of_a_thin_plate_keep_their_corners(scale, place):
-    random = np.random.default_rng(0)
-    ball = random.normal(size=(1000, 3))
-    ball /= np.linalg.norm(ball, axis=1, keepdims=True)
-    inside = random.uniform(-0.5, 0.5, (MOST_POINTS, 3))
-    corners = ball * scale + place
+    inside = np.random.default_rng(0).uniform(-0.5, 0.5, (MOST_POINTS, 3))
+    corners = directions(1000, 0) * scale + place
     assert np.array_equal(hull_points(np.concatenate([corners, inside * scale + place])), corners)
 
 

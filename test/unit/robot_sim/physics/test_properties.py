@@ -51,40 +51,33 @@ def test_gravity_and_time_step_act(world, box):
     world.step()
 
 
-def test_no_speed_limit_on_a_single_body(world, box):
+def push(world, model, ticks, **forces):
+    """Lets forces and torques act on links without gravity."""
     world.set_gravity((0.0, 0.0, 0.0))
-    box.place(UP, ((1e4, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    world.step()
-    assert box.state()[1][0] == pytest.approx((1e4, 0.0, 0.0))
-
-
-def test_a_force_at_the_centre_of_mass_gives_f_over_m(world, box):
-    world.set_gravity((0.0, 0.0, 0.0))
-    for _ in range(500):
-        box.body.add_wrench("body", (3.0, 0.0, -1.0), (0.0, 0.0, 0.0))
+    for _ in range(ticks):
+        for name, wrench in forces.items():
+            model.body.add_wrench(name, wrench[:3], wrench[3:])
         world.step()
+
+
+def test_a_force_at_the_centre_of_mass_gives_f_over_m_and_nothing_limits_the_speed(world, box):
+    push(world, box, 500, body=(3.0, 0.0, -1.0, 0.0, 0.0, 0.0))
     linear, angular = box.state()[1]
     assert linear == pytest.approx((3.0 / 2 * 0.5, 0.0, -1.0 / 2 * 0.5))
     assert angular == pytest.approx((0.0, 0.0, 0.0))
     world.step()
     assert box.state()[1][0] == pytest.approx(linear)  # it acts in the step it was given for
+    box.place(UP, ((1e4, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    world.step()
+    assert box.state()[1][0] == pytest.approx((1e4, 0.0, 0.0))
 
 
-def test_a_torque_in_world_axes(world, box):
-    world.set_gravity((0.0, 0.0, 0.0))
+def test_a_torque_is_in_world_axes_and_a_force_on_a_link_moves_its_joints(world, box, cartpole):
     box.place(UP._replace(orientation=from_rpy(math.pi / 2, 0.0, 0.0)))
-    for _ in range(100):
-        box.body.add_wrench("body", (0.0, 0.0, 0.0), (0.0, 0.0, 2.0))  # about the link's y
-        world.step()
+    push(world, box, 100, body=(0.0, 0.0, 0.0, 0.0, 0.0, 2.0))  # about the link's y
     assert box.state()[1][1] == pytest.approx((0.0, 0.0, 2.0 / 0.2 * 0.1), abs=1e-9)
-
-
-def test_a_force_on_a_link_moves_its_joints(world, cartpole):
-    world.set_gravity((0.0, 0.0, 0.0))
-    for _ in range(100):
-        cartpole.body.add_wrench("cart", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        cartpole.body.add_wrench("pole", (0.0, 0.0, 5.0), (0.0, 0.0, 0.0))
-        world.step()
+    pole = (0.0, 0.0, 5.0, 0.0, 0.0, 0.0)
+    push(world, cartpole, 100, cart=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0), pole=pole)
     assert cartpole.joint_state("stand_cart")[1] > 0.1
 
 
@@ -138,7 +131,11 @@ def test_a_robot_that_is_loaded_anew_goes_on_where_it_was(world, cartpole):
     assert len(world.models) == 2
 
 
-def test_without_gravity_a_body_floats(world, box):
+def test_without_gravity_a_body_floats_and_a_static_one_keeps_its_properties(world, box):
+    plane = world.models["ground_plane"]
+    assert link_inertia(plane, "link").mass == 1.0  # as Gazebo tells it
+    set_link_properties(world, plane, "link", Inertia(7.0, ixx=1.0, iyy=1.0, izz=1.0), True)
+    assert link_inertia(plane, "link").mass == 7.0
     inertia = link_inertia(box, "body")
     set_link_properties(world, box, "body", inertia, False)
     run(world, 1000)
@@ -150,13 +147,6 @@ def test_without_gravity_a_body_floats(world, box):
     set_link_properties(world, box, "body", moved, True)
     run(world, 1000)
     assert box.state()[0].position[2] == pytest.approx(50.0 - 4.9, abs=0.01)
-
-
-def test_a_static_link_keeps_its_properties_without_effect(world):
-    plane = world.models["ground_plane"]
-    assert link_inertia(plane, "link").mass == 1.0  # as Gazebo tells it
-    set_link_properties(world, plane, "link", Inertia(7.0, ixx=1.0, iyy=1.0, izz=1.0), True)
-    assert link_inertia(plane, "link").mass == 7.0
 
 
 @pytest.mark.parametrize("com", [Pose((0.1, 0.0, 0.2)), Pose((0.3, 0.0, 0.0))])

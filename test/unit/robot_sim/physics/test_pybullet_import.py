@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from support.comma_locale import NAME, write_comma_locale
+from support.python import run_python
 
 SRC = Path(__file__).resolve().parents[4] / "src"
 LIBRARY = SRC / "robot_sim/physics/engines/quiet_pybullet.py"
@@ -110,13 +111,10 @@ assert locale.localeconv()["decimal_point"] == ("," if sys.argv[1] == "comma" el
 )
 def test_a_decimal_comma_moves_no_robot_otherwise(tmp_path, engine):
     write_comma_locale(tmp_path)
+    env = {**os.environ, "LOCPATH": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
     texts = {}
     for name, sign in (("C", "."), (NAME, ",")):
-        done = subprocess.run(
-            [sys.executable, "-c", PROGRAM, name, engine, str(tmp_path)], check=False, text=True,
-            env={**os.environ, "LOCPATH": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)},
-            cwd=tmp_path, capture_output=True,
-        )  # fmt: skip
+        done = run_python(PROGRAM, name, engine, str(tmp_path), check=False, env=env, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert done.stderr.splitlines()[0] == sign
         texts[name] = done.stdout

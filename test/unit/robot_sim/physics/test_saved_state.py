@@ -3,13 +3,13 @@
 from math import cos, pi, sin
 
 import pytest
+from support.robots.snippets import sdf_joint, sdf_link, sdf_world
 from support.robots.worlds import assert_near
 
 from bullet_gazebo.services.spawn_services import fill_world
 from robot_sim.physics.files.reading import Resources
 from robot_sim.physics.files.world_file import parse_world
 from robot_sim.physics.pose import Pose, from_rpy
-from robot_sim.physics.world import World
 from robot_sim.simulator import Simulator
 
 BODY = "<collision name='c'><geometry><box><size>0.1 0.1 0.1</size></box></geometry></collision>"
@@ -21,23 +21,18 @@ ANGLE = 0.7  # [rad]
 
 
 @pytest.fixture
-def begun(new_engine):
+def begun(make_world):
     """Starts a world with models and the children of a `<state>`."""
-    open_worlds = []
 
     def begin(models, *states):
-        given = "".join(f"<state world_name='w'>{state}</state>" for state in states)
-        text = f'<sdf version="1.6"><world name="w">{models}{given}</world></sdf>'
-        found = parse_world(text, Resources())
-        sim = Simulator(World(new_engine()), lockstep=True)
-        open_worlds.append(sim.world)
+        given = [f"<state world_name='w'>{state}</state>" for state in states]
+        found = parse_world(sdf_world(models, *given), Resources())
+        sim = Simulator(make_world(), lockstep=True)
         fill_world(sim, found, lambda: False)
         sim.warnings = found.warnings
         return sim
 
-    yield begin
-    for world in open_worlds:
-        world.close()
+    return begin
 
 
 def near(pose, position, rpy=(0.0, 0.0, 0.0)):
@@ -82,17 +77,15 @@ def test_a_static_models_links_lie_where_the_state_has_them(begun):
 
 def pendulum(anchor):
     """Two bars of 1 m, hanging from (0, 0, 2), which turn about x at their upper ends."""
-    bar = '<link name="{}"><pose>0 0 {} 0 0 0</pose>{}</link>'
-    joint = """<joint name="{0}" type="revolute"><parent>{1}</parent><child>{2}</child>
-        <pose>0 0 0.5 0 0 0</pose><axis><xyz>1 0 0</xyz></axis></joint>"""
-    return f"""<model name="p"><pose>0 0 2 0 0 0</pose>{anchor}
-        {bar.format("one", -0.5, BODY)}{bar.format("two", -1.5, BODY)}
-        {joint.format("upper", "base" if anchor else "world", "one")}
-        {joint.format("lower", "one", "two")}</model>"""
+    top = "<pose>0 0 0.5 0 0 0</pose>"
+    ends = ("upper", "base" if anchor else "world", "one"), ("lower", "one", "two")
+    joints = [sdf_joint(a, "revolute", b, c, "1 0 0", top) for a, b, c in ends]
+    bars = [sdf_link(n, f"0 0 {z} 0 0 0", BODY) for n, z in (("one", -0.5), ("two", -1.5))]
+    parts = "".join([anchor, *bars, *joints])
+    return f'<model name="p"><pose>0 0 2 0 0 0</pose>{parts}</model>'
 
 
-BASE = """<link name="base"/>
-    <joint name="held" type="fixed"><parent>world</parent><child>base</child></joint>"""
+BASE = '<link name="base"/>' + sdf_joint("held", "fixed", "world", "base")
 FREE = '<link name="base"><inertial><mass>1e6</mass></inertial></link>'
 
 
@@ -127,18 +120,12 @@ def test_joints_stand_as_the_poses_of_their_links(begun, anchor):
 
 
 def test_slides_and_turns_beyond_half_a_circle_are_within_their_limits(begun):
+    limit = "<limit><lower>{}</lower><upper>{}</upper></limit>".format
     parts = [
-        f'<link name="{name}">{BODY}<inertial><mass>{mass}</mass></inertial></link>'
-        for name, mass in (("base", 1e6), ("slide", 1), ("arm", 1))
-    ]
-    joint = (
-        '<joint name="{0}" type="{1}"><parent>{2}</parent><child>{3}</child><axis><xyz>{4}</xyz>'
-        "<limit><lower>{5}</lower><upper>{6}</upper></limit></axis></joint>"
-    )
-    parts += [
-        joint.format("rail", "prismatic", "base", "slide", "0 1 0", -1, 1),
-        joint.format("turn", "revolute", "slide", "arm", "0 0 1", 0, 6),
-    ]
+        sdf_link("base", mass=1e6), sdf_link("slide"), sdf_link("arm"),
+        sdf_joint("rail", "prismatic", "base", "slide", "0 1 0", more=limit(-1, 1)),
+        sdf_joint("turn", "revolute", "slide", "arm", more=limit(0, 6)),
+    ]  # fmt: skip
     state = """<model name="m"><pose>1 0 0 0 0 0</pose><link name="base"><pose>1 0 0 0 0 0</pose></link>
         <link name="slide"><pose>1 0.4 0 0 0 0</pose></link>
         <link name="arm"><pose>1 0.4 0 0 0 -1</pose></link></model>"""
@@ -154,17 +141,14 @@ NESTED = f"""<model name="m"><link name="l">{BODY}</link><model name="in"><pose>
 
 def test_loops_are_closed_in_the_state(begun):
     """A parallelogram begins leaning; its last joint, which closes it, too."""
-    bar = '<link name="{}"><pose>{} 0 0 0</pose><inertial><pose>{} 0 0 0</pose></inertial></link>'
-    links = "".join([
-        '<link name="base"/>', bar.format("left", "0 0 0", "0 0 .5"),
-        bar.format("right", "1 0 0", "0 0 .5"), bar.format("top", "0 0 1", ".5 0 0"),
-    ])  # fmt: skip
-    hinge = """<joint name="{0}" type="revolute"><pose>0 0 {3} 0 0 0</pose><parent>{1}</parent>
-        <child>{2}</child><axis><xyz>0 1 0</xyz></axis></joint>"""
+    bars = ("left", "0 0 0", "0 0 .5"), ("right", "1 0 0", "0 0 .5"), ("top", "0 0 1", ".5 0 0")
+    parts = [sdf_link(n, f"{at} 0 0 0", moment=1.0, com=com) for n, at, com in bars]
     joints = [("a", "base", "left", 0), ("b", "base", "right", 0), ("c", "left", "top", 0),
               ("d", "top", "right", 1)]  # fmt: skip
-    links += '<joint name="foot" type="fixed"><parent>world</parent><child>base</child></joint>'
-    model = f'<model name="m">{links}{"".join(hinge.format(*each) for each in joints)}</model>'
+    for name, parent, child, z in joints:
+        pose = f"<pose>0 0 {z} 0 0 0</pose>"
+        parts.append(sdf_joint(name, "revolute", parent, child, "0 1 0", pose))
+    model = f'<model name="m">{BASE}{"".join(parts)}</model>'
     ends = {"left": f"0 0 0 0 {ANGLE} 0", "right": f"1 0 0 0 {ANGLE} 0",
             "top": f"{sin(ANGLE)} 0 {cos(ANGLE)} 0 0 0"}  # fmt: skip
     state = "".join(f'<link name="{n}"><pose>{pose}</pose></link>' for n, pose in ends.items())
@@ -217,8 +201,7 @@ def test_time_begins_as_saved_and_a_reset_sets_it_to_0(begun):
 def test_a_time_that_is_none_is_one_line(begun, text):
     sim = begun(CRATE, f"<sim_time>{text}</sim_time>")
     assert sim.now == 0
-    (warning,) = sim.warnings
-    assert warning.startswith("<state>: <sim_time>")
+    assert [each.startswith("<state>: <sim_time>") for each in sim.warnings] == [True]
 
 
 def test_what_a_state_inserts_and_deletes(begun):

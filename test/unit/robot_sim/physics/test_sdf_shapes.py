@@ -1,20 +1,22 @@
-"""Shapes of SDF beyond box, ball and cylinder: polylines, planes that are seen, capsules, ellipsoids."""
+"""SDF beyond box, ball and cylinder: polylines, seen planes, capsules, ellipsoids; and Gazebo's materials."""
 
 import math
 
 import numpy as np
 import pytest
+from support.refusals import refused
+from support.robots.snippets import ball, box, link, robot, sdf, sdf_link
 from support.robots.worlds import run
 
-from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.files.sdf import parse_sdf
+from robot_sim.physics.files.urdf import parse_urdf
 from robot_sim.physics.pose import Pose
 from robot_sim.pictures.visuals import pieces_of, solid_of, visible_model, visible_shapes
 from robot_sim.sensors.rays import RayScene
 
 DOWN = np.array([[0.0, 0.0, -1.0]])
 RADIUS = 0.1
-BALL = f"<sphere><radius>{RADIUS}</radius></sphere>"
+BALL = ball(RADIUS)
 
 
 def outline(points, height=0.5):
@@ -29,13 +31,9 @@ def square(half):
 L_SHAPE = [(0, 0), (1, 0), (1, 0.2), (0.2, 0.2), (0.2, 1), (0, 1)]
 
 
-def model(geometry, static=False, tags=("collision",), more=""):
+def model(geometry, static=False, tags=("collision",)):
     shapes = "".join(f'<{tag} name="c"><geometry>{geometry}</geometry></{tag}>' for tag in tags)
-    return parse_sdf(
-        f"""<sdf version="1.6"><model name="m"><static>{int(static)}</static><link name="l"><inertial>
-        <mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>
-        {shapes}{more}</link></model></sdf>"""
-    )
+    return parse_sdf(sdf(sdf_link("l", more=shapes), static=static))
 
 
 def dropped(world, at, geometry=BALL, name="ball"):
@@ -85,27 +83,23 @@ def test_a_convex_polyline_is_one_hull():
     ],
 )  # fmt: skip
 def test_a_fault_in_a_shape_is_one_line(geometry, fault):
-    with pytest.raises(DescriptionError) as raised:
+    with refused(fault):
         model(geometry)
-    assert fault in str(raised.value)
 
 
-def test_a_capsule_ends_in_balls(make_world):
-    capsule = "<capsule><radius>0.1</radius><length>0.4</length></capsule>"
+@pytest.mark.parametrize(
+    ("shape", "middle", "x", "top"),
+    [
+        ("<capsule><radius>0.1</radius><length>0.4</length></capsule>",
+         0.3, 0.05, 0.5 + math.sqrt(0.01 - 0.05**2)),
+        ("<ellipsoid><radii>0.4 0.3 0.1</radii></ellipsoid>", 0.1, 0.2, 0.1 + 0.1 * math.sqrt(0.75)),
+    ],
+)  # fmt: skip
+def test_a_capsule_stands_on_its_balls_and_an_ellipsoid_lies(make_world, shape, middle, x, top):
     world = make_world(ground=True)
-    at = dropped(world, (0.0, 0.0, 0.3), capsule, "capsule")
-    assert at[2] == pytest.approx(0.3, abs=2e-3)  # it stands
-    top = RayScene(world).cast(np.array([0.05, 0.0, 2.0]), DOWN).distances[0]
-    assert 2.0 - top == pytest.approx(0.5 + math.sqrt(0.01 - 0.05**2), abs=2e-3)
-
-
-def test_an_ellipsoid_rests_on_its_short_axis(make_world):
-    ellipsoid = "<ellipsoid><radii>0.4 0.3 0.1</radii></ellipsoid>"
-    world = make_world(ground=True)
-    at = dropped(world, (0.0, 0.0, 0.2), ellipsoid, "ellipsoid")
-    assert at[2] == pytest.approx(0.1, abs=2e-3)
-    top = RayScene(world).cast(np.array([0.2, 0.0, 2.0]), DOWN).distances[0]
-    assert 2.0 - top == pytest.approx(0.1 + 0.1 * math.sqrt(0.75), abs=3e-3)
+    assert dropped(world, (0.0, 0.0, middle), shape, "it")[2] == pytest.approx(middle, abs=2e-3)
+    met = RayScene(world).cast(np.array([x, 0.0, 2.0]), DOWN).distances[0]
+    assert 2.0 - met == pytest.approx(top, abs=3e-3)
 
 
 def test_a_plane_that_is_seen_has_its_size(make_world):
@@ -140,5 +134,61 @@ def test_a_plane_that_collides_has_no_end_and_is_seen_once(make_world):
 def test_another_geometry_is_a_warning(tag, geometry):
     found = model(f"<{geometry}/>", tags=(tag,))
     assert found.links["l"].collisions == found.links["l"].visuals == []
-    [warning] = found.warnings
-    assert warning == f"link 'l', {tag} 'c': geometry <{geometry}> is not simulated; it is left out"
+    told = f"link 'l', {tag} 'c': geometry <{geometry}> is not simulated; it is left out"
+    assert found.warnings == [told]
+
+
+RED, GREEN, BLUE = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0)
+UNKNOWN = "the colour of material 'mine/Own' is not known"
+
+
+def seen_in_sdf(*materials):
+    shape = f"<geometry>{box('1 1 1')}</geometry>"
+    visuals = "".join(
+        f'<visual name="{number}">{shape}<material>{each}</material></visual>'
+        for number, each in enumerate(materials)
+    )
+    model = parse_sdf(sdf(sdf_link("l", more=visuals)))
+    return [shape.rgba for shape in model.links["l"].visuals], model.warnings
+
+
+def script(name):
+    uri = "<uri>file://media/materials/scripts/gazebo.material</uri>"
+    return f"<script>{uri}<name>{name}</name></script>"
+
+
+def seen_in_urdf(*blocks):
+    shape = '<geometry><box size="1 1 1"/></geometry>'
+    blue = '<material name="b"><color rgba="0 0 1 1"/></material>'
+    visuals = f"<visual>{shape}{blue}</visual><visual>{shape}</visual>"
+    model = parse_urdf(robot(link("l", more=visuals), *blocks))
+    return [shape.rgba for shape in model.links["l"].visuals], model.warnings
+
+
+@pytest.mark.parametrize(
+    ("name", "rgba"),
+    [
+        ("Gazebo/Red", RED),
+        ("Gazebo/Green", GREEN),
+        ("Gazebo/SkyBlue", BLUE),
+        ("Gazebo/DarkGrey", (0.175, 0.175, 0.175, 1.0)),
+        ("Gazebo/BlueTransparent", (0.0, 0.0, 1.0, 0.5)),
+    ],
+)
+def test_a_material_of_gazebos_has_its_colour(name, rgba):
+    assert seen_in_sdf(script(name)) == ([rgba], [])
+    block = f'<gazebo reference="l"><material>{name}</material></gazebo>'
+    assert seen_in_urdf(block) == ([rgba, rgba], [])
+
+
+def test_a_colour_goes_before_its_script_the_last_block_counts_and_may_have_an_attribute():
+    assert seen_in_sdf(script("Gazebo/Red") + "<diffuse>0 1 0 1</diffuse>") == ([GREEN], [])
+    red, green = "<material>Gazebo/Red</material>", '<material value=" Gazebo/Green "/>'
+    blocks = [f'<gazebo reference="l">{each}</gazebo>' for each in (red, green)]
+    assert seen_in_urdf(*blocks) == ([GREEN, GREEN], [])
+
+
+def test_an_unknown_material_leaves_the_colour_and_is_one_warning():
+    assert seen_in_sdf(script("mine/Own"), script("mine/Own")) == ([None, None], [UNKNOWN])
+    block = '<gazebo reference="l"><material>mine/Own</material></gazebo>'
+    assert seen_in_urdf(block) == ([BLUE, None], [UNKNOWN])

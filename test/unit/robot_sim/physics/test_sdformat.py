@@ -53,13 +53,9 @@ class Sdformat:
     def __init__(self, program: Path, folder: Path) -> None:
         self.resources = Resources(models=(folder,), package=lambda name: str(ROOT / name))
         self.folder = folder
-        self._process = subprocess.Popen(
-            [program, folder],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
+        pipe, null = subprocess.PIPE, subprocess.DEVNULL
+        command = [program, folder]
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=null, text=True)
 
     def read(self, path: Path) -> list[list[str]]:
         """The words of each line of a file."""
@@ -76,22 +72,20 @@ class Sdformat:
 @pytest.fixture(scope="session")
 def sdformat(tmp_path_factory):
     package = ["pkg-config", "--cflags", "--libs", "sdformat12"]
-    missing = "sdformat is missing: apt-get install libsdformat-dev pkgconf"
-    if shutil.which(package[0]) is None:
-        pytest.skip(missing)
-    found = subprocess.run(package, check=False, capture_output=True, text=True)
-    if found.returncode:
-        pytest.skip(missing)
+    found = shutil.which(package[0]) and subprocess.run(
+        package, check=False, capture_output=True, text=True
+    )
+    if not found or found.returncode:
+        pytest.skip("sdformat is missing: apt-get install libsdformat-dev pkgconf")
     program = tmp_path_factory.mktemp("sdformat") / "read"
     subprocess.run(["g++", str(SOURCE), "-o", str(program), *shlex.split(found.stdout)], check=True)
     folder = tmp_path_factory.mktemp("models")
+    config = '<model><name>{}</name><sdf version="1.6">model.sdf</sdf></model>'
     for name, element in own_models().items():
         (folder / name).mkdir()
         text = ElementTree.tostring(element, encoding="unicode")
         (folder / name / "model.sdf").write_text(f'<sdf version="1.6">{text}</sdf>')
-        (folder / name / "model.config").write_text(
-            f'<model><name>{name}</name><sdf version="1.6">model.sdf</sdf></model>'
-        )
+        (folder / name / "model.config").write_text(config.format(name))
     (folder / "crate").symlink_to(ROOT / "test/data/models/crate")
     process = Sdformat(program, folder)
     yield process
@@ -122,9 +116,7 @@ def rows_of_model(model: ModelDescription) -> Iterator[Row]:
     yield ["model", model.name, model.initial_pose, float(model.static)]
     poses = link_poses(model, model.root_pose, {})
     for name, link in model.links.items():
-        if (
-            name == WORLD or link.part_of
-        ):  # no link for sdformat; one for the engine, that closes a loop
+        if name == WORLD or link.part_of:  # no links for sdformat; the latter closes a loop
             continue
         inertia = link.inertia
         assert inertia is not None
@@ -248,25 +240,22 @@ def test_built_in_models(sdformat, name):
     check(sdformat, sdformat.folder / name / "model.sdf")
 
 
-@settings(max_examples=50)
-@given(text=urdf_robots())
-def test_drawn_urdf(sdformat, tmp_path_factory, text):
-    path = tmp_path_factory.getbasetemp() / "drawn.urdf"
-    path.write_text(text)
-    check(sdformat, path)
+DRAWN = {
+    "urdf": (urdf_robots(), 40),
+    "sdf": (sdf_models(), 40),
+    "world": (worlds((*OWN, "crate")), 10),
+}
 
 
-@settings(max_examples=50)
-@given(text=sdf_models())
-def test_drawn_sdf(sdformat, tmp_path_factory, text):
-    path = tmp_path_factory.getbasetemp() / "drawn.sdf"
-    path.write_text(text)
-    check(sdformat, path)
+@pytest.mark.parametrize("kind", DRAWN)
+def test_drawn_files(sdformat, tmp_path, kind):
+    texts, count = DRAWN[kind]
+    path = tmp_path / f"drawn.{kind}"
 
+    @settings(max_examples=count)
+    @given(texts)
+    def look(text):
+        path.write_text(text)
+        check(sdformat, path)
 
-@settings(max_examples=10)
-@given(text=worlds((*OWN, "crate")))
-def test_drawn_worlds(sdformat, tmp_path_factory, text):
-    path = tmp_path_factory.getbasetemp() / "drawn.world"
-    path.write_text(text)
-    check(sdformat, path)
+    look()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from support.robots.snippets import inertial
 from support.robots.worlds import run
 
 from file_access.limited import RequestRefused
@@ -13,7 +14,6 @@ from robot_sim.physics.pose import Pose
 
 pytestmark = pytest.mark.slow
 
-INERTIAL = '<inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1"/></inertial>'
 LIMIT = 1.6
 # A post and a foot, an upper arm over them, and a fore arm that hangs into the angle between the two.
 ARM = """<robot name="arm"><gazebo><self_collide>true</self_collide></gazebo><link name="world"/>
@@ -24,7 +24,7 @@ ARM = """<robot name="arm"><gazebo><self_collide>true</self_collide></gazebo><li
 <joint name="f" type="fixed"><parent link="world"/><child link="stand"/></joint>
 <joint name="shoulder" type="revolute"><parent link="stand"/><child link="upper"/><origin xyz="0.05 0 1.1"/>
 <axis xyz="0 1 0"/><limit lower="0" upper="0" effort="100" velocity="1"/></joint>
-<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="{reach} 0 0"/>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0.6 0 0"/>
 <axis xyz="0 1 0"/><limit lower="-1" upper="{limit}" effort="100" velocity="1"/></joint></robot>"""
 
 
@@ -43,8 +43,8 @@ def stand(tmp_path, monkeypatch):
     return write_stl(tmp_path / "stand.stl", post, foot)
 
 
-def arm(mesh, reach=0.6):
-    return parse_urdf(ARM.format(mesh=mesh, reach=reach, limit=LIMIT, inertial=INERTIAL))
+def arm(mesh, text=ARM):
+    return parse_urdf(text.format(mesh=mesh, limit=LIMIT, inertial=inertial()))
 
 
 def lowered(world, model):
@@ -69,8 +69,7 @@ def test_the_pieces_are_solid(make_world, stand):
     world = make_world(gravity=(0.0, 0.0, 0.0))
     assert 2 <= len(in_pieces(read_mesh(stand)).hulls) <= 16
     long = ARM.replace('size="0.8 ', 'size="1.2 ').replace('xyz="0.4 ', 'xyz="0.6 ')
-    text = long.format(mesh=stand, reach=0.6, limit=LIMIT, inertial=INERTIAL)
-    assert lowered(world, world.spawn("arm", parse_urdf(text), Pose())) < LIMIT - 0.3
+    assert lowered(world, world.spawn("arm", arm(stand, long), Pose())) < LIMIT - 0.3
 
 
 def test_pieces_are_computed_once(stand, tmp_path, monkeypatch):
@@ -95,8 +94,8 @@ def test_what_cannot_be_split_keeps_its_hull(stand, monkeypatch):
         return ask(data)
 
     monkeypatch.setattr(meshes._process, "ask", answer)
-    (warning,) = arm(stand).warnings
-    assert warning == f"mesh '{stand}' collides by its convex hull: No module named 'vhacdx'"
+    told = f"mesh '{stand}' collides by its convex hull: No module named 'vhacdx'"
+    assert arm(stand).warnings == [told]
 
 
 def test_convex_meshes_and_robots_without_self_collision_stay_whole(tmp_path, stand, monkeypatch):
@@ -105,8 +104,7 @@ def test_convex_meshes_and_robots_without_self_collision_stay_whole(tmp_path, st
     assert in_pieces(whole) is whole
     calls = []
     monkeypatch.setattr(reading, "in_pieces", calls.append)
-    text = ARM.replace("<self_collide>true", "<self_collide>false")
-    parse_urdf(text.format(mesh=stand, reach=0.6, limit=LIMIT, inertial=INERTIAL))
+    arm(stand, ARM.replace("<self_collide>true", "<self_collide>false"))
     assert calls == []
 
 
@@ -114,9 +112,8 @@ def test_links_that_overlap_from_the_start_do_not_collide(make_world, stand):
     """The fore arm begins within the post: it goes where it likes, and one line says so."""
     world = make_world(gravity=(0.0, 0.0, 0.0))
     text = ARM.replace('xyz="0.05 0 1.1"', 'xyz="-0.6 0 0.5"')
-    text = text.format(mesh=stand, reach=0.6, limit=LIMIT, inertial=INERTIAL)
     for name in ("one", "another"):  # at the same place
-        model = world.spawn(name, parse_urdf(text), Pose((0.0, float(len(world.models)), 0.0)))
+        model = world.spawn(name, arm(stand, text), Pose((0.0, float(len(world.models)), 0.0)))
         (warning,) = model.description.warnings
         assert warning.startswith("links that overlap in the initial pose don't collide")
         assert warning.endswith(": fore and stand")

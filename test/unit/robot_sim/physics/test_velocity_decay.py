@@ -2,7 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
+from support.robots import snippets
+from support.robots.snippets import joint, robot, sdf_joint, sdf_link
 from support.robots.worlds import run
 
 from robot_sim.physics.files.sdf import parse_sdf
@@ -11,18 +14,21 @@ from robot_sim.physics.pose import Pose, rotate
 
 LINEAR, ANGULAR = 0.01, 0.02  # of the velocity, in a step
 HIGH = Pose((0.0, 0.0, 100.0), (0.5, 0.5, 0.5, 0.5))
-MOMENTS = "<ixx>0.02</ixx><iyy>0.03</iyy><izz>0.04</izz>"
-DECAY = f"<velocity_decay><linear>{LINEAR}</linear><angular>{ANGULAR}</angular></velocity_decay>"
-FIX = '<joint name="fix" type="fixed"><parent>world</parent><child>base</child></joint>'
+
+
+def decays(linear, angular):
+    return f"<velocity_decay><linear>{linear}</linear><angular>{angular}</angular></velocity_decay>"
+
+
+DECAY = decays(LINEAR, ANGULAR)
 
 
 def link(name, decay="", com="0 0 0", at="0 0 0"):
-    return f"""<link name="{name}"><pose>{at} 0 0 0</pose>{decay}<inertial><pose>{com} 0 0 0</pose>
-      <mass>2</mass><inertia>{MOMENTS}</inertia></inertial></link>"""
+    return sdf_link(name, f"{at} 0 0 0", decay, 2.0, (0.02, 0.03, 0.04), com)
 
 
 def sdf(*parts):
-    return parse_sdf(f'<sdf version="1.6"><model name="m">{"".join(parts)}</model></sdf>')
+    return parse_sdf(snippets.sdf(*parts))
 
 
 @pytest.mark.parametrize("step", [0.001, 0.004])
@@ -64,18 +70,16 @@ def test_it_falls_at_a_final_speed(make_world):
 def test_an_arm(make_world, all_links):
     """Each link loses a share of its momentum: where all do, joints do, too."""
     world = make_world(gravity=(0.0, 0.0, 0.0))
-    both = f"<velocity_decay><linear>{LINEAR}</linear><angular>{LINEAR}</angular></velocity_decay>"
-    joints = "".join(
-        f"""<joint name="{name}" type="revolute"><parent>{parent}</parent><child>{child}</child>
-        <axis><xyz>0 0 1</xyz></axis></joint>"""
-        for name, parent, child in (("a", "base", "upper"), ("b", "upper", "fore"))
-    )
+    both = decays(LINEAR, LINEAR)
     parts = [
-        link("base", both, at="0 0 0"),
+        link("base", both),
         link("upper", both if all_links else "", com="0.5 0 0"),
         link("fore", both, com="0.5 0 0", at="1 0 0"),
+        sdf_joint("fix", "fixed", "world", "base"),
+        sdf_joint("a", "revolute", "base", "upper"),
+        sdf_joint("b", "revolute", "upper", "fore"),
     ]
-    model = world.spawn("m", sdf(*parts, FIX, joints), HIGH)
+    model = world.spawn("m", sdf(*parts), HIGH)
     model.set_joint_velocities({"a": 1.0})
     world.step()
     a, b = (speed for _, speed in model.joint_states())
@@ -84,21 +88,15 @@ def test_an_arm(make_world, all_links):
         return
     # The forearm's momentum alone decays; M Δv = -share Jᵀ m J v, for masses of 2 kg and moments of 0.04.
     m, moment, upper, fore = 2.0, 0.04, 0.5, 1.5
-    mass = [
-        [m * upper**2 + moment + m * fore**2 + moment, m * fore * 0.5 + moment],
-        [m * fore * 0.5 + moment, m * 0.25 + moment],
-    ]
     lost = [m * fore**2 + moment, m * fore * 0.5 + moment]
-    det = mass[0][0] * mass[1][1] - mass[0][1] ** 2
-    da = (mass[1][1] * lost[0] - mass[0][1] * lost[1]) / det
-    db = (mass[0][0] * lost[1] - mass[0][1] * lost[0]) / det
+    mass = [[m * upper**2 + moment + lost[0], lost[1]], [lost[1], m * 0.25 + moment]]
+    da, db = np.linalg.solve(mass, lost)
     assert (a, b) == pytest.approx((1.0 - LINEAR * da, -LINEAR * db), abs=1e-5)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.5])
 def test_large_shares(world, share):
-    decay = f"<velocity_decay><linear>{share}</linear><angular>{share}</angular></velocity_decay>"
-    model = world.spawn("m", sdf(link("base", decay)), HIGH)
+    model = world.spawn("m", sdf(link("base", decays(share, share))), HIGH)
     model.place(HIGH, ((3.0, 0.0, 0.0), (5.0, 1.0, 0.0)))
     run(world, 100)
     _, (linear, angular) = model.state()
@@ -106,38 +104,36 @@ def test_large_shares(world, share):
     assert math.hypot(*angular) <= 0.01
 
 
-def urdf(*blocks):
-    body = """<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0"
-      iyz="0"/></inertial>"""
-    return parse_urdf(f"""<robot name="r"><link name="base">{body}</link><link name="tip">{body}</link>
-      <joint name="j" type="fixed"><parent link="base"/><child link="tip"/></joint>
-      {"".join(blocks)}</robot>""")
+def urdf(**blocks):
+    given = [f'<gazebo reference="{name}">{block}</gazebo>' for name, block in blocks.items()]
+    parts = [snippets.link("base"), snippets.link("tip"), joint("j", "fixed", "base", "tip")]
+    return parse_urdf(robot(*parts, *given))
+
+
+def factor(value):
+    return f"<dampingFactor>{value}</dampingFactor>"
 
 
 @pytest.mark.parametrize(
     ("blocks", "decay"),
     [
-        (['<gazebo reference="base"><dampingFactor>0.01</dampingFactor></gazebo>'], (0.01, 0.01)),
-        (['<gazebo reference="base"><dampingFactor value="0.1"/></gazebo>'], (0.1, 0.1)),
-        ([f'<gazebo reference="base">{DECAY}</gazebo>'], (LINEAR, ANGULAR)),
-        (['<gazebo reference="tip"><dampingFactor>0.3</dampingFactor></gazebo>'], (0.3, 0.3)),
-        (
-            ['<gazebo reference="tip"><dampingFactor>0.3</dampingFactor></gazebo>',
-             '<gazebo reference="base"><dampingFactor>0.1</dampingFactor></gazebo>'],
-            (0.1, 0.1),
-        ),
-        ([], None),
+        ({"base": factor(0.01)}, (0.01, 0.01)),
+        ({"base": '<dampingFactor value="0.1"/>'}, (0.1, 0.1)),
+        ({"base": DECAY}, (LINEAR, ANGULAR)),
+        ({"tip": factor(0.3)}, (0.3, 0.3)),
+        ({"tip": factor(0.3), "base": factor(0.1)}, (0.1, 0.1)),
+        ({}, None),
     ],
-)  # fmt: skip
+)
 def test_urdf(blocks, decay):
-    model = urdf(*blocks)
+    model = urdf(**blocks)
     assert model.links["base"].decay == decay
     assert not model.warnings
 
 
-@pytest.mark.parametrize("factor", ["-0.1", "1.5"])
-def test_a_share_that_is_none(factor):
-    model = urdf(f'<gazebo reference="base"><dampingFactor>{factor}</dampingFactor></gazebo>')
+@pytest.mark.parametrize("share", ["-0.1", "1.5"])
+def test_a_share_that_is_none(share):
+    model = urdf(base=factor(share))
     assert model.links["base"].decay is None
     assert "link 'base', velocity_decay: " in model.warnings[0]
     assert "not between 0 and 1" in model.warnings[0]

@@ -52,16 +52,19 @@ def test_poses_are_composed_as_one_by_one():
         assert row == pytest.approx((*position, *orientation))
 
 
+def draw(picture, *models):
+    """Draws models, their links in a row."""
+    picture.draw([*models], [])
+    picture.move(in_a_row(sum(len(model.links) for model in models)))
+
+
 def test_what_is_left_stays_where_it_is_when_others_go(server, picture):
     first, second, third = boxes(1, 3), boxes(2, 2), boxes(3, 1)
-    picture.draw([first, second, third], [])
-    picture.move(in_a_row(6))
+    draw(picture, first, second, third)
     assert heights(server) == {1.0: 0, 1.001: 1, 1.002: 2, 2.0: 3, 2.001: 4, 3.0: 5}
-    picture.draw([first, third, boxes(4, 1)], [])
-    picture.move(in_a_row(5))
+    draw(picture, first, third, boxes(4, 1))
     assert heights(server) == {1.0: 0, 1.001: 1, 1.002: 2, 3.0: 3, 4.0: 4}
-    picture.draw([], [])
-    picture.move(in_a_row(0))
+    draw(picture)
     assert heights(server) == {}
 
 
@@ -83,8 +86,7 @@ def test_a_thousand_links_are_a_few_objects_and_what_rests_is_not_told_again(ser
 
 
 def test_what_is_lost_stays_where_it_was_seen_last(server, picture):
-    picture.draw([boxes(1, 2)], [])
-    picture.move(in_a_row(2))
+    draw(picture, boxes(1, 2))
     poses = in_a_row(2) + 1.0
     poses[0, 0] = np.nan
     picture.move(poses)
@@ -94,8 +96,7 @@ def test_what_is_lost_stays_where_it_was_seen_last(server, picture):
 def test_looks_go_together_and_a_mesh_that_is_not_there_is_a_box(server, picture, complaints):
     mesh = [Link("l", visuals=[Shape("mesh", (1.0, 1.0, 1.0), mesh="gone.stl")])]
     clear = boxes(2, 1, rgba=(1.0, 0.0, 0.0, 0.5))
-    picture.draw([boxes(1, 1), clear, VisibleModel(3, "m3", mesh)], [])
-    picture.move(in_a_row(3))
+    draw(picture, boxes(1, 1), clear, VisibleModel(3, "m3", mesh))
     found = Recording(server.get_scene_serializer().serialize())
     opacities = [each["props"]["opacity"] for each in found.of("BatchedMeshesMessage")]
     assert sorted(opacities, key=bool) == [None, 1.0]
@@ -110,8 +111,7 @@ def test_a_file_with_looks_is_sent_once_for_all_models(server, picture, tmp_path
     path.write_text("mtllib looks.mtl\nv 0 0 0\nv 1 0 0\nv 0 0 1\nusemtl red\nf 1 2 3\n")
     link = Link("l", visuals=[Shape("mesh", (1.0, 1.0, 2.0), mesh=str(path))])
     models = [VisibleModel(i, f"m{i}", [link]) for i in range(5)]
-    picture.draw(models, [])
-    picture.move(in_a_row(5))
+    draw(picture, *models)
     recording = Recording(server.get_scene_serializer().serialize())
     (whole,) = recording.of("BatchedGlbMessage")
     props = whole["props"]
@@ -119,8 +119,7 @@ def test_a_file_with_looks_is_sent_once_for_all_models(server, picture, tmp_path
     assert props["batched_positions"].reshape(-1, 3)[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
     assert props["batched_scales"].reshape(-1, 3)[0].tolist() == [1.0, 1.0, 2.0]
     picture.move(in_a_row(5) + 0.5)
-    picture.draw(models[:2], [])
-    picture.move(in_a_row(2))
+    draw(picture, *models[:2])
 
 
 def test_all_shapes_are_drawn_without_scipy_and_networkx():

@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 from support.pages.viser_recording import of_page
 from support.robots.cartpole import cartpole_urdf
+from support.robots.snippets import link, robot
 
 from robot_sim.physics.engines import make_engine
 from robot_sim.physics.files.urdf import parse_urdf
@@ -21,10 +22,9 @@ from robot_sim.pictures.recording import RecordingError, RecordingOptions, Simul
 from robot_sim.simulator import Simulator
 
 LIMIT = 120.0  # [s] for the other process to end
-BALL = """<robot name="ball"><link name="base">
-  <inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
-  <visual><geometry><sphere radius="0.2"/></geometry>
-    <material name="red"><color rgba="1 0 0 1"/></material></visual></link></robot>"""
+RED = """<visual><geometry><sphere radius="0.2"/></geometry>
+  <material name="red"><color rgba="1 0 0 1"/></material></visual>"""
+BALL = robot(link("base", more=RED))
 
 
 @pytest.fixture
@@ -51,6 +51,12 @@ def options(path: Path, **changed: object) -> RecordingOptions:
     return RecordingOptions(path / "a.mp4", **{"rate": 20.0, "width": 64, "height": 48, **changed})
 
 
+def finish(*recorders: SimulationRecorder) -> None:
+    for recorder in recorders:
+        recorder.close(LIMIT)
+        assert recorder._process.wait(LIMIT) == 0
+
+
 @pytest.mark.slow
 def test_pictures_come_at_simulated_times_and_show_who_comes_and_goes(sim, tmp_path):
     recorder = SimulationRecorder(sim, options(tmp_path))
@@ -59,8 +65,7 @@ def test_pictures_come_at_simulated_times_and_show_who_comes_and_goes(sim, tmp_p
     sim.advance(200)
     sim.world.delete("ball")
     sim.advance(200)
-    recorder.close(LIMIT)
-    assert recorder._process.wait(LIMIT) == 0
+    finish(recorder)
     there = [red(frame) > 20 for frame in frames(tmp_path / "a.mp4")]
     assert there == [False] * 5 + [True] * 4 + [False] * 4
 
@@ -70,8 +75,7 @@ def test_time_that_begins_anew_is_recorded_on(sim, tmp_path):
     for _ in range(3):
         sim.advance(100)
         sim.reset(everything=True)
-    recorder.close(LIMIT)
-    assert recorder._process.wait(LIMIT) == 0
+    finish(recorder)
     assert len(frames(tmp_path / "a.mp4")) == 9
 
 
@@ -81,13 +85,11 @@ def test_recording_changes_no_bit_of_the_simulation(tmp_path):
         sim = Simulator(World(make_engine()), lockstep=True)
         model = sim.world.spawn("it", parse_urdf(cartpole_urdf()), Pose())
         model.set_joint_positions({"cart_pole": 0.1})
-        recorder = SimulationRecorder(sim, options(tmp_path)) if looking else None
+        recorders = [SimulationRecorder(sim, options(tmp_path))] if looking else []
         sim.advance(300)
         finals.append(model.joint_states())
         sim.world.close()
-        if recorder is not None:
-            recorder.close(LIMIT)
-            assert recorder._process.wait(LIMIT) == 0
+        finish(*recorders)
     assert finals[0] == finals[1]
 
 
@@ -131,8 +133,7 @@ def test_what_the_other_process_cannot_take_in_time_is_left_out(sim, tmp_path, m
     sim.advance(100)
     monkeypatch.setattr(recording, "MOST_WAITING", -1)
     sim.advance(100)
-    recorder.close(LIMIT)
-    assert recorder._process.wait(LIMIT) == 0
+    finish(recorder)
     assert "2 frames of the recording were dropped" in caplog.text
     assert len(frames(tmp_path / "a.mp4")) == 3
 
@@ -179,9 +180,7 @@ def test_a_page_plays_what_happened_and_a_picture_shows_the_last_moment(sim, tmp
     recorders = [SimulationRecorder(sim, RecordingOptions(each, 20.0, 64, 48)) for each in paths]
     sim.world.spawn("ball", parse_urdf(BALL), Pose((0.0, 0.0, 3.0)))
     sim.advance(500)
-    for recorder in recorders:
-        recorder.close(LIMIT)
-        assert recorder._process.wait(LIMIT) == 0
+    finish(*recorders)
     played = of_page(paths[0].read_text())
     assert played.duration == pytest.approx(0.5 + END, abs=0.1)
     heights = [max(part["position"][2] for part in played.parts(at)) for at in (0.1, 0.3, 0.5)]

@@ -2,16 +2,18 @@
 
 import math
 import re
-from collections.abc import Callable
 
 import numpy as np
 import pytest
+import trimesh
 from support.pages.pictures import pixel
+from support.robots.snippets import link, robot, sdf, sdf_joint, sdf_link
 from support.robots.worlds import assert_near
 
 from robot_sim.physics.description import Shape
 from robot_sim.physics.dynamics import link_poses
 from robot_sim.physics.engines import make_engine
+from robot_sim.physics.files.sdf import parse_sdf
 from robot_sim.physics.files.urdf import parse_urdf
 from robot_sim.physics.pose import Pose, from_rpy
 from robot_sim.physics.world import World
@@ -24,14 +26,8 @@ CAMERA = Camera(target=(0.0, 0.0, 1.0), distance=3.0, yaw=0.0, pitch=-10.0)
 RED, GREEN = "1 0 0 1", "0 1 0 1"
 
 
-def body(shape: str, colour: str = RED, tag: str = "visual") -> str:
-    return f"""<robot name="it"><link name="base">
-      <inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
-      <{tag}><geometry>{shape}</geometry><material name=""><color rgba="{colour}"/></material></{tag}>
-    </link></robot>"""
-
-
 BOX = '<box size="0.4 0.4 0.4"/>'
+MIDDLE = Pose((0.0, 0.0, 1.0))
 
 
 @pytest.fixture
@@ -39,6 +35,14 @@ def scene():
     made = Renderer()
     yield made
     made.close()
+
+
+def put(scene, shape, pose=MIDDLE, colour=RED, tag="visual", name="it"):
+    """Draws a link of one shape."""
+    look = f'<material name=""><color rgba="{colour}"/></material>'
+    text = f"<{tag}><geometry>{shape}</geometry>{look}</{tag}>"
+    scene.add(name, visible_shapes(parse_urdf(robot(link("base", more=text)))))
+    scene.place(name, {"base": pose})
 
 
 def shown(scene: Renderer, camera: Camera = CAMERA) -> np.ndarray:
@@ -57,8 +61,7 @@ def where(picture: np.ndarray, channel: int) -> np.ndarray:
     "shape", [BOX, '<sphere radius="0.2"/>', '<cylinder radius="0.2" length="0.4"/>']
 )
 def test_a_shape_is_seen_where_it_is_in_its_colour(scene, shape, place):
-    scene.add("it", visible_shapes(parse_urdf(body(shape))))
-    scene.place("it", {"base": Pose(place)})
+    put(scene, shape, Pose(place))
     found = where(shown(scene), 0)
     assert len(found) > 50
     assert found.mean(axis=0) == pytest.approx(pixel(CAMERA, place, WIDTH, HEIGHT), abs=2.0)
@@ -66,19 +69,20 @@ def test_a_shape_is_seen_where_it_is_in_its_colour(scene, shape, place):
 
 
 def test_it_turns_with_its_link(scene):
-    scene.add("it", visible_shapes(parse_urdf(body('<box size="0.1 0.1 0.8"/>'))))
     spans = []
     for lean in (0.0, math.pi / 2):
-        scene.place("it", {"base": Pose((0.0, 0.0, 1.0), from_rpy(0.0, lean, 0.0))})
+        put(
+            scene,
+            '<box size="0.1 0.1 0.8"/>',
+            MIDDLE._replace(orientation=from_rpy(0.0, lean, 0.0)),
+        )
         spans.append(np.ptp(where(shown(scene), 0), axis=0))
     assert spans[0][1] > 4 * spans[0][0] and spans[1][0] > 3 * spans[1][1]
 
 
 def test_what_is_nearer_hides_what_is_behind_and_the_ground_what_is_below(scene):
-    scene.add("near", visible_shapes(parse_urdf(body(BOX))))
-    scene.add("far", visible_shapes(parse_urdf(body(BOX, GREEN))))
-    scene.place("near", {"base": Pose((0.0, -0.5, 1.0))})
-    scene.place("far", {"base": Pose((0.0, 0.5, 1.0))})
+    put(scene, BOX, Pose((0.0, -0.5, 1.0)), name="near")
+    put(scene, BOX, Pose((0.0, 0.5, 1.0)), GREEN, name="far")
     hidden = len(where(shown(scene), 1))
     scene.remove("near")
     assert hidden < 0.3 * len(where(shown(scene), 1))
@@ -87,39 +91,19 @@ def test_what_is_nearer_hides_what_is_behind_and_the_ground_what_is_below(scene)
 
 
 def test_what_is_seen_through_is_not_drawn_and_collisions_stand_for_missing_visuals(scene):
-    scene.add("it", visible_shapes(parse_urdf(body(BOX, "1 0 0 0"))))
-    scene.place("it", {"base": Pose((0.0, 0.0, 1.0))})
+    put(scene, BOX, colour="1 0 0 0")
     assert len(where(shown(scene), 0)) == 0
-    scene.add("it", visible_shapes(parse_urdf(body(BOX, RED, "collision"))))
-    scene.place("it", {"base": Pose((0.0, 0.0, 1.0))})
+    put(scene, BOX, tag="collision")
     assert len(where(shown(scene), 0)) > 50
-
-
-def ball_stl(rows: int) -> str:
-    """Triangles of a ball of radius 0.2: 2 rows² of them, as text."""
-    angles = np.linspace(0.0, math.pi, rows + 1)
-    turns = np.linspace(0.0, 2 * math.pi, rows + 1)
-    at: Callable[[int, int], np.ndarray] = lambda i, j: 0.2 * np.array(  # noqa: E731
-        [math.sin(angles[i]) * math.cos(turns[j]), math.sin(angles[i]) * math.sin(turns[j]),
-         math.cos(angles[i])]
-    )  # fmt: skip
-    lines = ["solid ball"]
-    for i in range(rows):
-        for j in range(rows):
-            a, b, c, d = at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)
-            for corners in ((a, b, c), (a, c, d)):
-                lines += ["facet normal 0 0 0", "outer loop"]
-                lines += [f"vertex {x} {y} {z}" for x, y, z in corners]
-                lines += ["endloop", "endfacet"]
-    return "\n".join([*lines, "endsolid ball"])
 
 
 @pytest.mark.slow
 def test_a_mesh_of_more_triangles_than_the_renderer_takes_at_once(scene, tmp_path):
     path = tmp_path / "ball.stl"
-    path.write_text(ball_stl(135))  # 36450 triangles
-    scene.add("it", visible_shapes(parse_urdf(body(f'<mesh filename="{path}" scale="2 2 2"/>'))))
-    scene.place("it", {"base": Pose((0.0, 0.0, 1.0))})
+    mesh = trimesh.creation.uv_sphere(radius=0.2, count=(100, 100))
+    assert len(mesh.faces) > 36_000
+    mesh.export(path)
+    put(scene, f'<mesh filename="{path}" scale="2 2 2"/>')
     radius = np.ptp(where(shown(scene), 0), axis=0) / 2.0
     assert radius == pytest.approx(0.4 / 3.0 * HEIGHT / (2 * CAMERA.slope), abs=2.0)
 
@@ -127,15 +111,14 @@ def test_a_mesh_of_more_triangles_than_the_renderer_takes_at_once(scene, tmp_pat
 def test_a_mesh_that_cannot_be_read_is_left_out_with_a_line(scene, tmp_path, caplog):
     path = tmp_path / "broken.stl"
     path.write_bytes(b"solid what is this")
-    scene.add("it", visible_shapes(parse_urdf(body(f'<mesh filename="{path}"/>'))))
+    put(scene, f'<mesh filename="{path}"/>')
     assert len(where(shown(scene), 0)) == 0
     (line,) = [record.getMessage() for record in caplog.records]
     assert "model 'it', link 'base' isn't drawn whole" in line and "broken.stl" in line
 
 
 def test_what_is_lost_in_space_stays_where_it_was_seen_last(scene):
-    scene.add("it", visible_shapes(parse_urdf(body(BOX))))
-    scene.place("it", {"base": Pose((0.0, 0.0, 1.0))})
+    put(scene, BOX)
     before = shown(scene)
     for place in ((math.nan, 0.0, 0.0), (math.inf, 0.0, 0.0), (1e30, 0.0, 0.0)):
         scene.place("it", {"base": Pose(place)})
@@ -143,30 +126,26 @@ def test_what_is_lost_in_space_stays_where_it_was_seen_last(scene):
 
 
 def test_pictures_are_the_callers_own_and_the_same_each_time(scene):
-    scene.add("it", visible_shapes(parse_urdf(body(BOX))))
+    put(scene, BOX)
     first = scene.picture(CAMERA, WIDTH, HEIGHT)
     kept = first.copy()
     first[:] = 0
     assert np.array_equal(scene.picture(CAMERA, WIDTH, HEIGHT), kept)
 
 
-ANCHORED = """<sdf version="1.6"><model name="it"><pose>0.3 0 1 0 0 0.4</pose>
-  <link name="a"><pose>0.1 0 0 0.2 0 0</pose></link>
-  <link name="b"><pose>0.4 0.2 0.5 0 0.3 0</pose></link>
-  <link name="c"><pose>0.9 0 0.5 0 0 0.7</pose></link>
-  <joint name="turn" type="revolute"><pose>0.1 -0.2 0 0 0 0.5</pose><parent>a</parent><child>b</child>
-    <axis><xyz>0 0.6 0.8</xyz></axis></joint>
-  <joint name="slide" type="prismatic"><pose>0 0 0.1 0.3 0 0</pose><parent>b</parent><child>c</child>
-    <axis><xyz>1 0 0</xyz></axis></joint>
-</model></sdf>"""
+ANCHORED = sdf(
+    "<pose>0.3 0 1 0 0 0.4</pose>",
+    sdf_link("a", "0.1 0 0 0.2 0 0"),
+    sdf_link("b", "0.4 0.2 0.5 0 0.3 0"),
+    sdf_link("c", "0.9 0 0.5 0 0 0.7"),
+    sdf_joint("turn", "revolute", "a", "b", "0 0.6 0.8", "<pose>0.1 -0.2 0 0 0 0.5</pose>"),
+    sdf_joint("slide", "prismatic", "b", "c", "1 0 0", "<pose>0 0 0.1 0.3 0 0</pose>"),
+)
 
 
 def test_links_are_where_the_engine_has_them():
-    from robot_sim.physics.files.reading import Reading, Resources
-    from robot_sim.physics.files.world_file import read_entity
-
     world, joints = World(make_engine()), {"turn": 0.7, "slide": -0.3}
-    model = world.spawn("it", read_entity(ANCHORED, "it", Resources(), Reading()), Pose())
+    model = world.spawn("it", parse_sdf(ANCHORED), Pose())
     model.set_joint_positions(joints)
     found = link_poses(model.description, model.root_state()[0], joints)
     assert set(found) == set(model.link_names) == {"a", "b", "c"}
@@ -180,8 +159,7 @@ def test_links_are_where_the_engine_has_them():
 )
 def test_the_part_that_is_rendered_has_all_of_it(scene, place, monkeypatch):
     """Also at the edges, and where the camera stands within."""
-    scene.add("it", visible_shapes(parse_urdf(body('<box size="0.9 0.3 0.5"/>'))))
-    scene.place("it", {"base": Pose(place, from_rpy(0.3, 0.2, 0.9))})
+    put(scene, '<box size="0.9 0.3 0.5"/>', Pose(place, from_rpy(0.3, 0.2, 0.9)))
     part = shown(scene)
     monkeypatch.setattr(Renderer, "_region", lambda self, camera, *size: (0, 0, *size))
     assert np.abs(part - shown(scene)).max() <= 60  # of edges, whose samples lie elsewhere

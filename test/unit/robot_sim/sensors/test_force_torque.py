@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.robots.snippets import inertial, link, robot
 
 from robot_sim.applied_forces import ActingTime, AppliedEffort, AppliedWrench
 from robot_sim.physics.description import DescriptionError
@@ -11,14 +12,9 @@ from robot_sim.sensors.force_torque import JointForces, LinkForces
 from robot_sim.simulator import Simulator
 
 G = 9.8
-SOLID = (
-    '<inertial><origin xyz="{}"/><mass value="{}"/>'
-    '<inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>'
-)
-ROBOT = f"""<robot name="r"><link name="world"/><link name="base">{SOLID.format("0 0 0", 5)}</link>
-<link name="arm">{SOLID.format("0.5 0 0", 2)}
+ROBOT = f"""<robot name="r"><link name="world"/>{link("base", 5)}<link name="arm">{inertial(2, "0.5 0 0")}
 <collision><origin xyz="0.5 0 0"/><geometry><sphere radius=".1"/></geometry></collision></link>
-<link name="tip">{SOLID.format("0 0 -0.2", 1)}</link>
+{link("tip", com="0 0 -0.2")}
 <joint name="mount" type="fixed"><parent link="world"/><child link="base"/><origin xyz="0 0 {{z}}"/></joint>
 <joint name="wrist" type="{{kind}}"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
 <origin xyz="0.1 0 0" rpy="{{rpy}}"/><limit lower="{{low}}" upper="0" effort="1000" velocity="100"/></joint>
@@ -41,8 +37,7 @@ def make(make_world):
 def borne(sim, forces, ticks=20):
     """What `forces` measures after some ticks."""
     sim.listeners = [lambda now: forces.look(now, 0)]
-    with sim.lock:
-        sim.advance(ticks)
+    sim.advance(ticks)
     return np.ravel(forces.wrench())
 
 
@@ -120,11 +115,9 @@ def test_after_a_move_nothing_is_known_until_two_ticks_have_passed(make):
     assert borne(sim, forces) is not None
     forces.look(sim.now, 1)
     assert forces.wrench() is None
-    moves = [lambda now: forces.look(now, 1)]
+    sim.listeners = [lambda now: forces.look(now, 1)]
     for known in (False, True):
-        sim.listeners = moves
-        with sim.lock:
-            sim.advance(1)
+        sim.advance(1)
         assert (forces.wrench() is not None) == known
 
 
@@ -137,14 +130,12 @@ def test_a_joint_that_is_not_there_is_refused(make):
 def test_the_net_force_on_a_link_is_what_accelerates_it(make_world):
     sim = Simulator(make_world(ground=True), lockstep=True)
     shape = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
-    text = f'<robot name="b"><link name="b">{SOLID.format("0 0 0", 2)}{shape}</link></robot>'
-    box = sim.world.spawn("b", parse_urdf(text), Pose((0.0, 0.0, 0.6), from_rpy(0.0, 0.0, 0.3)))
+    description = parse_urdf(robot(link("b", 2, more=shape)))
+    box = sim.world.spawn("b", description, Pose((0.0, 0.0, 0.6), from_rpy(0.0, 0.0, 0.3)))
     forces = LinkForces(sim, box, ["b"])
     sim.listeners = [lambda now: forces.look(now, 0)]
-    with sim.lock:
-        sim.advance(5)
+    sim.advance(5)
     np.testing.assert_allclose(forces.net[0], [0, 0, -2 * G], atol=1e-6)
-    with sim.lock:
-        sim.advance(800)
+    sim.advance(800)
     np.testing.assert_allclose(forces.net[0], 0.0, atol=1e-2)
     assert forces.known[0][2] == pytest.approx(0.0, abs=0.2)  # the ground bears its weight

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
+from support.refusals import refused
+from support.robots.snippets import sdf, sdf_link
 from support.scenes.seeing_rover import SEEING, Look
 
 from robot_envs import RobotEnv
@@ -27,16 +29,18 @@ CAMERA = """<camera><horizontal_fov>1.3</horizontal_fov>
 EYE = Pose((-3.0, 0.2, 1.0), from_rpy(0.1, 0.2, 0.05))
 SUN = "directional"
 SIZES = {"box": (0.4, 0.6, 0.8), "cylinder": (0.3, 0.8), "sphere": (0.35,)}
-MESH = """<sdf version="1.6"><model name="m"><static>{}</static><link name="l">
-<inertial><mass>1</mass></inertial>
-<visual name="v"><geometry><mesh><uri>file://{}</uri><scale>1 1.2 1</scale></mesh></geometry></visual>
-</link></model></sdf>"""
+MESH = """<visual name="v"><geometry><mesh><uri>file://{}</uri><scale>1 1.2 1</scale></mesh></geometry>
+</visual>"""
 QUAD = """mtllib quad.mtl
 usemtl m
 v 0 -1 0\nv 0 1 0\nv 0 1 2\nv 0 -1 2
 vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
 f 1/1 2/2 3/3\nf 1/1 3/3 4/4
 """
+
+
+def mesh_model(path, static=True):
+    return parse_sdf(sdf(sdf_link("l", more=MESH.format(path)), static=static))
 
 
 @pytest.fixture
@@ -116,7 +120,7 @@ def test_meshes_with_textures_and_sheets_from_behind(world, gl, tmp_path):
         ("quad.obj", Pose((1.0, -1.3, 0.2), from_rpy(0.0, 0.1, 3.0)), 1),
         ("ring.stl", Pose((-0.5, 0.3, 1.0), from_rpy(0.4, 1.2, 0.3)), 0),
     )):  # fmt: skip
-        world.spawn(f"mesh{number}", parse_sdf(MESH.format(static, tmp_path / file)), pose)
+        world.spawn(f"mesh{number}", mesh_model(tmp_path / file, static), pose)
     seen = compare(gl, WorldScene(world, visuals=True), textures=True).colours.astype(int)
     for colour in range(3):
         others = [each for each in range(3) if each != colour]
@@ -132,15 +136,14 @@ def test_meshes_that_mujoco_would_refuse_are_drawn(world, gl, tmp_path, corners)
     vertices = np.vstack([points, [[0.0, 0.0, 0.3], [0.0, 0.3, 0.3], [0.0, 0.0, 0.6]]])
     mesh = trimesh.Trimesh(vertices, [*faces, [len(points) + i for i in range(3)]], process=False)
     mesh.export(tmp_path / "mesh.obj")
-    world.spawn("mesh", parse_sdf(MESH.format(1, tmp_path / "mesh.obj")), Pose((1.0, 0.0, 0.3)))
+    world.spawn("mesh", mesh_model(tmp_path / "mesh.obj"), Pose((1.0, 0.0, 0.3)))
     compare(gl, WorldScene(world, visuals=True))
 
 
 def test_without_gl_it_says_so_in_a_line_and_auto_takes_rays(monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "nothing")
-    with pytest.raises(RendererError, match="MUJOCO_GL=nothing gives no GL: .*ws extras") as raised:
+    with refused("MUJOCO_GL=nothing gives no GL: ", "ws extras", error=RendererError):
         make_renderer("gl")
-    assert "\n" not in str(raised.value)
     assert isinstance(make_renderer("auto"), RayRenderer)
     assert os.environ["MUJOCO_GL"] == "nothing"
     with pytest.raises(RendererError, match="'ray' is not known; there are rays, gl, auto"):

@@ -4,6 +4,7 @@ import logging
 import os
 import signal
 import threading
+from contextlib import ExitStack
 from xml.etree.ElementTree import fromstring
 
 import numpy as np
@@ -58,15 +59,14 @@ class Scene:
 
 @pytest.fixture
 def make_scene():
-    made = []
+    with ExitStack() as made:
 
-    def make(lockstep=False):
-        made.append(Scene(lockstep))
-        return made[-1]
+        def make(lockstep=False):
+            scene = Scene(lockstep)
+            made.callback(scene.sim.world.close)
+            return scene
 
-    yield make
-    for scene in made:
-        scene.sim.world.close()
+        yield make
 
 
 @pytest.fixture
@@ -149,15 +149,12 @@ def test_a_picture_from_before_a_reset_is_not_sent(make_scene, gate):
 def test_what_is_closed_sends_nothing(make_scene, gate):
     held, at = gate
     scene = make_scene()
-    scene.take("late")
-    assert at.acquire(timeout=BOUND)
-    scene.stream.close()
-    held.release()
-    scene.stream = PictureStream("another", scene.process, scene.sensing.schedule)
-    scene.take("later")
-    assert at.acquire(timeout=BOUND)
-    scene.process.close()
-    held.release()
+    for part in (scene.stream, scene.process):
+        scene.take("late")
+        assert at.acquire(timeout=BOUND)
+        part.close()
+        held.release()
+        scene.stream = PictureStream("another", scene.process, scene.sensing.schedule)
     scene.process._thread.join(BOUND)
     assert not scene.process._thread.is_alive() and not scene.sent
 

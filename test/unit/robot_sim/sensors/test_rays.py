@@ -6,7 +6,10 @@ from xml.etree.ElementTree import fromstring
 
 import numpy as np
 import pytest
+import trimesh
+from support.robots.snippets import collision, sdf, sdf_link
 
+from robot_sim.physics.files.sdf import parse_sdf
 from robot_sim.physics.pose import Pose, from_rpy
 from robot_sim.sensors import pinhole, rays
 from robot_sim.sensors import scene as scenes
@@ -34,7 +37,7 @@ def test_near_and_far_bound_a_ray(world, put):
 
 @pytest.mark.parametrize("kind", SIZES)
 @pytest.mark.parametrize("static", [True, False])
-def test_shapes_are_met_where_the_engine_meets_them_or_exactly(world, put, kind, static):
+def test_shapes_are_met_exactly(world, put, kind, static):
     """The formula of each shape, in its own frame, is the oracle."""
     pose = Pose((1.0, 0.4, 0.3), from_rpy(0.4, 0.3, 0.2))
     put("thing", kind, SIZES[kind], pose, static)
@@ -44,10 +47,8 @@ def test_shapes_are_met_where_the_engine_meets_them_or_exactly(world, put, kind,
     back = pose.inverse()
     start = np.array(back.compose(Pose(tuple(origin))).position)
     ends = [back.compose(Pose(tuple(origin + way))).position for way in directions]
-    ways = np.array(ends) - start
-    size = np.zeros((721, 3))
-    size[:, : len(SIZES[kind])] = SIZES[kind]
-    exact = DISTANCES[kind](np.tile(start, (721, 1)), ways, size)
+    size = np.tile((*SIZES[kind], 0.0, 0.0)[:3], (721, 1))
+    exact = DISTANCES[kind](np.tile(start, (721, 1)), np.array(ends) - start, size)
     met = np.array([t != NONE and scene.targets[t].shape.kind != "plane" for t in hits.targets])
     assert np.isfinite(exact).sum() > 30
     # A ray that only grazes a curved shape may miss the triangles of one that never moves.
@@ -100,31 +101,30 @@ def test_visuals_and_collisions_are_apart_and_both_meet_the_ground(world, put):
 
 
 def test_a_moving_mesh_is_met_as_it_is_not_as_its_hull(world, tmp_path):
-    import trimesh
-
-    from robot_sim.physics.files.sdf import parse_sdf
-
     ring = trimesh.creation.annulus(r_min=0.8, r_max=1.0, height=0.4)
     ring.export(tmp_path / "ring.stl")
-    text = f"""<sdf version="1.6"><model name="m"><link name="l"><inertial><mass>1</mass></inertial>
-    <collision name="c"><geometry><mesh><uri>file://{tmp_path}/ring.stl</uri></mesh></geometry></collision>
-    </link></model></sdf>"""
-    world.spawn("ring", parse_sdf(text), Pose((0.0, 0.0, 3.0)))
+    mesh = collision(f"<mesh><uri>file://{tmp_path}/ring.stl</uri></mesh>")
+    world.spawn("ring", parse_sdf(sdf(sdf_link("l", more=mesh))), Pose((0.0, 0.0, 3.0)))
     hits = RayScene(world).cast(np.array([0.0, 0.0, 3.0]), X)
     assert hits.distances[0] == pytest.approx(0.8, abs=0.01)
 
 
-def test_equal_rays_give_equal_bits(world, put):
+def test_equal_rays_give_equal_bits_and_without_embree_the_same_hits(world, put, monkeypatch):
     for index, kind in enumerate([*SIZES] * 4):
         at = Pose((math.cos(index) * 2.0, math.sin(index) * 2.0, 0.4), from_rpy(index, 0.0, 0.3))
         put(f"thing{index}", kind, SIZES[kind], at, static=index % 2 == 0)
     scene, other = RayScene(world), RayScene(world)
-    first = scene.cast(np.array([0.0, 0.0, 0.4]), fan(360), 0.1, 10.0)
+    origin, ways = np.array([0.0, 0.0, 0.4]), fan(360)
+    first = scene.cast(origin, ways, 0.1, 10.0)
     for again in (scene, other):
         again.expire()
-        hits = again.cast(np.array([0.0, 0.0, 0.4]), fan(360), 0.1, 10.0)
+        hits = again.cast(origin, ways, 0.1, 10.0)
         assert hits.distances.tobytes() == first.distances.tobytes()
         assert hits.targets.tobytes() == first.targets.tobytes()
+    monkeypatch.setattr(rays, "Triangles", rays._EachTriangle)
+    hits = RayScene(world).cast(origin, ways, 0.1, 10.0)
+    assert hits.targets.tolist() == first.targets.tolist()
+    np.testing.assert_allclose(hits.distances, first.distances, atol=1e-5)
 
 
 def test_what_a_model_looks_like_is_read_once_though_others_come(world, put, monkeypatch):
@@ -136,18 +136,6 @@ def test_what_a_model_looks_like_is_read_once_though_others_come(world, put, mon
         scene.expire()
         scene.cast(np.array([0.0, 0.0, 0.4]), fan(4))
     assert len(read) == 4  # with the ground
-
-
-def test_without_embree_rays_meet_the_same(world, put, monkeypatch):
-    for index, kind in enumerate(SIZES):
-        at = Pose((1.5, index - 1.0, 0.4), from_rpy(index, 0.0, 0.3))
-        put(f"thing{index}", kind, SIZES[kind], at)
-    origin, ways = np.array([0.0, 0.0, 0.4]), fan(180)
-    expected = RayScene(world).cast(origin, ways, 0.1, 10.0)
-    monkeypatch.setattr(rays, "Triangles", rays._EachTriangle)
-    found = RayScene(world).cast(origin, ways, 0.1, 10.0)
-    assert found.targets.tolist() == expected.targets.tolist()
-    np.testing.assert_allclose(found.distances, expected.distances, atol=1e-5)
 
 
 def test_the_engines_own_rays_agree(world, put):

@@ -4,6 +4,7 @@ import threading
 from types import SimpleNamespace
 
 import pytest
+from support.robots.snippets import link, robot
 from support.robots.worlds import advance
 
 from robot_sim.physics.files.urdf import parse_urdf
@@ -14,8 +15,7 @@ from robot_sim.sensors.sensing import Sensing
 from robot_sim.simulator import Simulator
 
 MS = 1_000_000
-BALL = """<robot name="ball"><link name="b"><inertial><mass value="1"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
+BALL = robot(link("b"))
 
 
 class Sensor:
@@ -26,8 +26,7 @@ class Sensor:
         self.times = []
         self.listeners = 0
         measure = measure or self.times.append
-        with sim.lock:
-            self.clock = schedule.begin(model, rate, measure, lambda: self.listeners > 0, **options)
+        self.clock = schedule.begin(model, rate, measure, lambda: self.listeners > 0, **options)
 
     def come(self):
         self.listeners += 1
@@ -49,8 +48,7 @@ def schedule(sim):
 
 
 def spawn(sim, name):
-    with sim.lock:
-        return sim.world.spawn(name, parse_urdf(BALL), Pose())
+    return sim.world.spawn(name, parse_urdf(BALL), Pose())
 
 
 @pytest.fixture
@@ -65,14 +63,14 @@ def make(sim, schedule, model):
 
 
 def reseed(sim):
-    with sim.lock, sim.moves.as_one():
+    with sim.moves.as_one():
         sim.reseed(5)
         sim.reset(everything=False)
 
 
 def reset_and_place(sim):
     """In one request."""
-    with sim.lock, sim.moves.as_one():
+    with sim.moves.as_one():
         sim.reset(everything=False)
         sim.place_model(sim.world.models["ball"], Pose((0.0, 0.0, 1.0)), AT_REST)
 
@@ -142,8 +140,7 @@ def test_resets_and_moves_measure_at_once_what_is_heard(sim, make, model):
     sensor.come()
     advance(sim, 15)
     sim.reset_world()
-    with sim.lock:
-        sim.place_model(model, Pose((0.0, 0.0, 1.0)), AT_REST)
+    sim.place_model(model, Pose((0.0, 0.0, 1.0)), AT_REST)
     assert sensor.times == [10 * MS, 15 * MS, 15 * MS]
     sim.reset_simulation()
     advance(sim, 10)
@@ -158,14 +155,12 @@ def test_a_move_of_a_model_measures_what_it_carries_and_nothing_else(sim, schedu
         each.come()
     for _ in range(10):
         advance(sim, 100)
-        with sim.lock:
-            sim.place_model(obstacle, Pose((5.0, 0.0, 1.0)), AT_REST)
+        sim.place_model(obstacle, Pose((5.0, 0.0, 1.0)), AT_REST)
     assert own.times == far.times == [n * 200 * MS for n in range(6)]
     assert len(other.times) == 16
     assert schedule.last_move(model).number == 0 < schedule.last_move(obstacle).number
-    with sim.lock:
-        sim.world.attach((obstacle, "b"), (attached, "b"))
-        sim.place_link(obstacle, "b", Pose((5.0, 0.0, 1.0)), AT_REST)
+    sim.world.attach((obstacle, "b"), (attached, "b"))
+    sim.place_link(obstacle, "b", Pose((5.0, 0.0, 1.0)), AT_REST)
     assert (len(own.times), len(other.times), len(far.times)) == (6, 17, 7)
 
 
@@ -211,18 +206,14 @@ def draws(sensing, key="base::eye", now=5):
     return sensing.noise(model, key, now).normal(size=3).tolist()
 
 
-def test_noise_is_that_of_seed_sensor_and_time(sim):
+def test_noise_is_that_of_seed_sensor_and_time_and_resets_draw_another(sim):
     first, other = Sensing(sim, 1), Sensing(sim, 2)
     assert draws(first) == draws(Sensing(sim, 1)) == draws(first)
     assert draws(first) != draws(other)
     assert draws(first) != draws(first, "base::ear") and draws(first) != draws(first, now=6)
-
-
-def test_resets_draw_other_noise_and_a_seed_the_same_again(sim):
-    sensing = Sensing(sim, 1)
     sim.reseed(7)
-    before = draws(sensing)
+    before = draws(first)
     sim.reset_simulation()
-    assert draws(sensing) != before
+    assert draws(first) != before
     sim.reseed(7)
-    assert draws(sensing) == before
+    assert draws(first) == before

@@ -35,44 +35,40 @@ def test_a_controlled_robot_goes_on_as_before(sim):
     assert first[-1][3] != first[0][3]
 
 
-def test_a_trajectory_is_followed_from_where_it_was(sim):
+@pytest.fixture
+def arm(sim):
     robot = add_robot(sim, "cartpole", cartpole_urdf())
     joint = {"joints": ["stand_cart"], "gains": {"stand_cart": {"p": 500.0, "i": 10.0, "d": 20.0}}}
     start(robot, {"arm": {"type": "effort_controllers/JointTrajectoryController", **joint}})
-    arm = robot.manager.get("arm")
+    return robot.manager.get("arm")
 
-    def way(*places):
-        points = [TrajectoryPoint((k + 1) * S // 5, [x]) for k, x in enumerate(places)]
-        arm.follow(Trajectory(["stand_cart"], points))
 
-    way(0.1, -0.2, 0.2)
+def way(*places):
+    points = [TrajectoryPoint((k + 1) * S // 5, [x]) for k, x in enumerate(places)]
+    return Trajectory(["stand_cart"], points)
+
+
+def test_a_trajectory_is_followed_from_where_it_was(sim, arm):
+    arm.follow(way(0.1, -0.2, 0.2))
     future(sim, 150)
-    first = check_branches(sim, lambda: way(-0.3) or future(sim, 50), ticks=300)
+    first = check_branches(sim, lambda: arm.follow(way(-0.3)) or future(sim, 50), ticks=300)
     assert max(abs(states[1][0][0][0]) for _, states, *_ in first) > 0.1
 
 
-def test_goals_are_their_clients_who_are_told_that_they_end(sim):
-    robot = add_robot(sim, "cartpole", cartpole_urdf())
-    joint = {"joints": ["stand_cart"], "gains": {"stand_cart": {"p": 500.0, "i": 10.0, "d": 20.0}}}
-    start(robot, {"arm": {"type": "effort_controllers/JointTrajectoryController", **joint}})
-    arm = robot.manager.get("arm")
-
+def test_goals_are_their_clients_who_are_told_that_they_end(sim, arm):
     def pursue(key, place):
         told = Listener()
-        trajectory = Trajectory(["stand_cart"], [TrajectoryPoint(S // 5, [place])])
-        arm.pursue(key, GoalRequest(trajectory), told)
+        arm.pursue(key, GoalRequest(way(place)), told)
         return told
 
     first = pursue("first", 0.1)
     future(sim, 50)
-    with sim.lock:
-        snapshot = sim.save_state()
+    snapshot = sim.save_state()
     after = future(sim, 400)
     assert [each.kind for each in first.outcomes] == ["succeeded"]
     second = pursue("second", -0.1)
     future(sim, 20)
-    with sim.lock:
-        sim.restore_state(snapshot)
+    sim.restore_state(snapshot)
     assert [each.kind for each in second.outcomes] == ["canceled"]
     assert future(sim, 400) == after
     assert len(first.outcomes) == len(second.outcomes) == 1
@@ -126,8 +122,7 @@ def test_a_users_controller_is_saved_by_its_attributes(sim):
 def test_all_else_is_restored_where_a_users_controller_cannot(sim):
     with_controller(sim, Faulty)
     future(sim, 10)
-    with sim.lock:
-        snapshot = sim.save_state()
+    snapshot = sim.save_state()
     model = sim.world.models["cartpole"]
     before = sim.now, model.joint_states()
     future(sim, 20)
@@ -150,12 +145,10 @@ def test_sensors_measure_the_same_with_the_same_noise(sim):
     robot = add_robot(sim, "cartpole", cartpole_urdf().replace("</robot>", IMU))
     start(robot, CONTROLLERS)
     sensing = Sensing(sim, seed=3)
-    with sim.lock:
-        readers = SensorReaders(sim, sensing, ["feel"])
+    readers = SensorReaders(sim, sensing, ["feel"])
     robot.manager.get("cart").command(0.2)
     future(sim, 25)
-    with sim.lock:
-        snapshot = sim.save_state()
+    snapshot = sim.save_state()
 
     def measured():
         seen = []
@@ -171,27 +164,23 @@ def test_sensors_measure_the_same_with_the_same_noise(sim):
         sim.reseed(seed)
         sim.reset_simulation()
         measured()
-        with sim.lock:
-            sim.restore_state(snapshot)
+        sim.restore_state(snapshot)
         assert measured() == first
 
 
 def test_a_sensor_that_is_heard_only_since_measures_at_its_times(sim):
     schedule, seen, heard = Schedule(sim), [], False
     model = next(iter(sim.world.models.values()))
-    with sim.lock:
-        schedule.begin(model, 10.0, seen.append, lambda: heard, at_once=False)
+    schedule.begin(model, 10.0, seen.append, lambda: heard, at_once=False)
     future(sim, 250)
-    with sim.lock:
-        snapshot = sim.save_state()
-        heard = True
-        schedule.review()
+    snapshot = sim.save_state()
+    heard = True
+    schedule.review()
     future(sim, 300)
     first = seen.copy()
     seen.clear()
-    with sim.lock:
-        sim.restore_state(snapshot)
-        heard = True
-        schedule.review()
+    sim.restore_state(snapshot)
+    heard = True
+    schedule.review()
     future(sim, 300)
     assert seen == first == [3 * S // 10, 4 * S // 10, 5 * S // 10]
