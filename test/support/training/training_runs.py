@@ -36,66 +36,31 @@ CLOCKED = "charts/SPS"  # the only tag whose values depend on the wall clock
 _EVERYWHERE = {"eval_episodes": 2, "confirm_episodes": 3, "seed": 3}
 # Options of trainings that are quick and use everything there is to save.
 SMALL: dict[str, dict[str, Any]] = {
-    "dqn": _EVERYWHERE
-    | {
-        "total_timesteps": 400,
-        "learning_starts": 50,
-        "train_frequency": 2,
-        "hidden_sizes": "16,16",
-        "batch_size": 16,
-        "buffer_size": 200,
-        "n_step": 3,
-        "normalize_observations": "true",
-        "lr_schedule": "linear",
-        "eval_frequency": 150,
-        "checkpoint_frequency": 70,
-        "log_frequency": 20,
-        "end_e": 0.2,
+    "dqn": _EVERYWHERE | {
+        "total_timesteps": 400, "learning_starts": 50, "train_frequency": 2, "hidden_sizes": "16,16",
+        "batch_size": 16, "buffer_size": 200, "n_step": 3, "normalize_observations": "true",
+        "lr_schedule": "linear", "eval_frequency": 150, "checkpoint_frequency": 70,
+        "log_frequency": 20, "end_e": 0.2,
     },
-    "reinforce": _EVERYWHERE
-    | {
+    "reinforce": _EVERYWHERE | {
         "episodes": 13,  # four batches and one more
-        "batch_episodes": 3,
-        "value_epochs": 2,
-        "policy_hidden": 4,
-        "value_hidden": 4,
-        "eval_frequency": 90,
-        "checkpoint_frequency": 60,
-        "save_every": 5,
+        "batch_episodes": 3, "value_epochs": 2, "policy_hidden": 4, "value_hidden": 4,
+        "eval_frequency": 90, "checkpoint_frequency": 60, "save_every": 5,
     },
-    "reinforce-document": _EVERYWHERE
-    | {
-        "env_id": POLE,
-        "env_kwargs": {"noise": 0.05},
-        "episodes": 13,
-        "eval_frequency": 90,
-        "checkpoint_frequency": 60,
-        "save_every": 5,
+    "reinforce-document": _EVERYWHERE | {
+        "env_id": POLE, "env_kwargs": {"noise": 0.05}, "episodes": 13, "eval_frequency": 90,
+        "checkpoint_frequency": 60, "save_every": 5,
     },
-    "ppo": _EVERYWHERE
-    | {
-        "total_timesteps": 256,
-        "n_steps": 64,
-        "batch_size": 64,
-        "log_frequency": 64,
-        "net_arch": "8",
-        "eval_frequency": 100,
-        "checkpoint_frequency": 70,
+    "ppo": _EVERYWHERE | {
+        "total_timesteps": 256, "n_steps": 64, "batch_size": 64, "log_frequency": 64, "net_arch": "8",
+        "eval_frequency": 100, "checkpoint_frequency": 70,
     },
-    "sac": _EVERYWHERE
-    | {
-        "env_id": "Pendulum-v1",
-        "env_kwargs": {"max_episode_steps": 20},
-        "total_timesteps": 140,
-        "learning_starts": 20,
-        "buffer_size": 60,
-        "batch_size": 8,
-        "net_arch": "8",
-        "eval_frequency": 60,
-        "checkpoint_frequency": 30,
-        "log_frequency": 20,
+    "sac": _EVERYWHERE | {
+        "env_id": "Pendulum-v1", "env_kwargs": {"max_episode_steps": 20}, "total_timesteps": 140,
+        "learning_starts": 20, "buffer_size": 60, "batch_size": 8, "net_arch": "8",
+        "eval_frequency": 60, "checkpoint_frequency": 30, "log_frequency": 20,
     },
-}
+}  # fmt: skip
 
 
 def flags(options: dict[str, Any]) -> list[str]:
@@ -108,11 +73,7 @@ def flags(options: dict[str, Any]) -> list[str]:
 
 
 class InterruptAfter(Interrupt):
-    """Ctrl-C, pressed when the training asks for the n-th time.
-
-    Args:
-        asked: n; None: never.
-    """
+    """Ctrl-C, pressed when the training asks for the n-th time; None: never."""
 
     def __init__(self, asked: int | None = None) -> None:
         super().__init__()
