@@ -3,10 +3,10 @@
 
     ./ws python3 benchmark/scripts_on_wheels.py [--out FOLDER] [--rounds 3] [--episodes 10] [--steps 60]
 
-Runs the four scripts of test/data/scripts that know a laser (360 rays at 5 Hz) or a cloud (16 x 360 rays at
-10 Hz), unchanged, each in a world of its own; wait_for_scan.py has five helper nodes. Prints a table of all
-rounds and writes scripts_on_wheels.json. A script says by itself how fast it was, from its first episode to
-its last one.
+Runs three scripts of test/data/scripts and one of on_wheels that know a laser (360 rays at 5 Hz) or a cloud
+(16 x 360 rays at 10 Hz), unchanged, each in a world of its own; wait_for_scan.py has five helper nodes.
+Prints a table of all rounds and writes scripts_on_wheels.json. A script says by itself how fast it was, from
+its first episode to its last one.
 """
 
 import os
@@ -22,7 +22,8 @@ from ros_calls.waiting import wait_until
 from ros_utils import ros_gazebo
 from ros_utils.simulation import reserved_port
 
-SCRIPTS = Path(__file__).resolve().parents[1] / "test/data/scripts"
+HERE = Path(__file__).resolve().parent
+SCRIPTS = HERE.parent / "test/data/scripts"
 TARGETS = {"goal_model": ">= 8", "state_topic": ">= 8", "newest_cloud": ">= 4",
            "wait_for_scan": ">= 10"}  # fmt: skip
 BOUND = 600.0  # [s]
@@ -33,13 +34,15 @@ def times_real_time(name: str, *arguments: object) -> float:
     port = str(reserved_port())
     uri = f"http://127.0.0.1:{port}"
     environment = {**os.environ, "ROS_MASTER_URI": uri, "GZSERVER_ARGS": "--lockstep --seed 0"}
-    command = ["rosrun", "cartpole", "lockstep.py", "--seed", "0", str(SCRIPTS / f"{name}.py")]
+    helped = name == "wait_for_scan"
+    script = (HERE / "on_wheels" if helped else SCRIPTS) / f"{name}.py"
+    command = ["rosrun", "cartpole", "lockstep.py", "--seed", "0", str(script)]
     if name == "state_topic":  # starts its world by itself
         environment.update(ROS_MASTER_URI=f"http://127.0.0.1:{reserved_port()}", GZSERVER_ARGS="")
         return _run([*command, port, *map(str, arguments)], environment)
-    file = "helped.launch" if name == "wait_for_scan" else "scout.launch"
+    file = script.with_name("helped.launch") if helped else SCRIPTS / "scout.launch"
     launch = subprocess.Popen(
-        ["roslaunch", "-p", port, str(SCRIPTS / file)],
+        ["roslaunch", "-p", port, str(file)],
         env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     try:

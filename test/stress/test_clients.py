@@ -6,12 +6,11 @@ from collections import Counter
 
 import pytest
 from gazebo_msgs.srv import GetModelState
-from support.stress.bad_clients import SERVICE, BadClient, address
+from support.stress.bad_clients import SERVICE, BadClient
 from support.stress.places import waits
 from support.stress.scenario import Scenario
 from support.stress.worlds import Usage, world
 
-from ros_calls import master
 from ros_calls.service import ServiceClient
 
 CLIENTS = 40
@@ -40,10 +39,7 @@ def test_bad_clients(scenario: Scenario, engine: str) -> None:
     most: list[Usage] = []
     slowest = [0.0]
     with world(engine) as here, here.active():
-        places = (
-            address(master.call("lookupService", SERVICE)),
-            address(master.call("lookupNode", "/gazebo")),
-        )
+        places = here.doors()
         good = ServiceClient(SERVICE, GetModelState, persistent=True, timeout=LONGEST)
 
         def served() -> None:

@@ -26,13 +26,8 @@ def test_odd_requests(scenario: Scenario, engine: str, mode: str) -> None:
     with world(engine, mode) as here:
 
         def case(number: int, dice: random.Random) -> None:
-            odd = here.place.start(
-                sys.executable,
-                "-m",
-                "support.stress.odd_calls",
-                str(dice.randrange(2**31)),
-                str(size),
-            )
+            command = [sys.executable, "-m", "support.stress.odd_calls"]
+            odd = here.place.start(*command, str(dice.randrange(2**31)), str(size))
             assert odd.end(20 * BOUND) == 0, odd.output[-3000:]
             sent.update(json.loads(odd.output.splitlines()[-1])["sent"])
             here.check()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from support.ros.programs import NETWORKS
-from support.stress.places import launch, leftovers, no_traceback, pid_of, place, send, waits
+from support.stress.places import ended, launch, leftovers, no_traceback, pid_of, place, send, waits
 from support.stress.scenario import Scenario
 from support.stress.trainings import BOUND, forked, new, wait_for_newer_checkpoint
 from support.training.training_runs import assert_no_doubles, assert_same_run, summary
@@ -103,9 +103,7 @@ def test_to_roslaunch(scenario: Scenario) -> None:
             launched.wait_for("SUMMARY", BOUND)
             time.sleep(dice.uniform(0.0, 6.0))
             launched.send(ROSLAUNCHS[number % len(ROSLAUNCHS)])
-            launched.end(BOUND)
-            left = here.left_after(30)
-            assert not left, left
+            ended(launched, here)
             no_traceback(launched.output)
             assert not leftovers(here), leftovers(here)
 
@@ -127,9 +125,7 @@ def test_to_a_simulator(scenario: Scenario) -> None:
                 waits(lambda: False, 1.0)
                 assert simulator in here.processes(), launched.output
             launched.send(signal.SIGINT)
-            launched.end(BOUND)
-            left = here.left_after(30)
-            assert not left, left
+            ended(launched, here)
             no_traceback(launched.output)
             assert sent in FATAL or not leftovers(here), leftovers(here)
 

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 from gazebo_msgs.srv import GetModelState
-from support.stress.bad_clients import SERVICE, address
+from support.stress.bad_clients import SERVICE
 from support.stress.disks import can_mount, small_disk
-from support.stress.places import BOUND, launch, place, send, waits
+from support.stress.places import BOUND, ended, launch, place, send, waits
 from support.stress.robots import random_robot
 from support.stress.scenario import Scenario
 from support.stress.worlds import World, world
@@ -22,7 +22,6 @@ from support.stress.worlds import World, world
 from cartpole.robot import ROBOT
 from robot_envs.backends.ros.bringup import bring_up
 from robot_envs.scene import Scene
-from ros_calls import master
 from ros_calls.service import ServiceClient, ServiceFailed, ServiceHangs
 from ros_utils.step_client import StepClient
 
@@ -101,9 +100,7 @@ def test_a_clock_that_jumps(scenario: Scenario) -> None:
                 made.check_time()
             made.check()
             launched.interrupt()
-            launched.end(BOUND)
-            left = here.left_after(30)
-            assert not left, left
+            ended(launched, here)
 
     scenario.run("clocks that jump by hours", 6, case)
 
@@ -124,10 +121,7 @@ def limited(here: World, kind: int, most: int):
 def test_no_more_files(scenario: Scenario, engine: str) -> None:
     """A crowd takes the last file descriptors: who comes is served once it has gone."""
     with world(engine) as here, here.active():
-        places = (
-            address(master.call("lookupService", SERVICE)),
-            address(master.call("lookupNode", "/gazebo")),
-        )
+        places = here.doors()
 
         def case(number: int, dice: random.Random) -> None:
             room = here.usage().files + dice.randrange(10)

@@ -5,11 +5,10 @@ import contextlib
 import json
 import os
 import signal
-import unittest
 
 import rostest
 import torch
-from support.ros.programs import NETWORKS, Place
+from support.ros.programs import NETWORKS, PlaceCase
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from cartpole import pg_train
@@ -27,33 +26,23 @@ TAGS = {
 }
 
 
-class PgTrain(unittest.TestCase):
-    def place(self) -> Place:
-        place = Place()
-        self.addCleanup(place.close)
-        return place
-
+class PgTrain(PlaceCase):
     def test_from_nothing_by_its_launch_file(self):
-        place = self.place()
-        training = place.start(
+        run = self.place.run
+        output = self.run_here(
             "roslaunch", "cartpole", "pg_train.launch", "episodes:=5", "seed:=2", "save_every:=4",
-            "gui:=true", f"run_dir:={place.run}", "params:=gamma=0.98",
+            "gui:=true", f"run_dir:={run}", "params:=gamma=0.98",
         )  # fmt: skip
-        training.end()
-        output = training.output
-        self.assertEqual(place.left_after(), {}, output)
-        self.assertNotIn("Traceback", output)
+        self.assert_nothing_left(output)
         self.assertIn("the window is the page http://127.0.0.1:", output)
         self.assertIn("trained 5 episodes", output)
-        self.assertIn(str(place.run), output)
-        self.assertLessEqual(
-            NETWORKS | {"learning_curve.png", "summary.json", "policy_network_episode_4.pth"},
-            place.files(),
-        )
-        record = json.loads((place.run / "config.json").read_text())
+        self.assertIn(str(run), output)
+        others = {"learning_curve.png", "summary.json", "policy_network_episode_4.pth"}
+        self.assertLessEqual(NETWORKS | others, self.place.files())
+        record = json.loads((run / "config.json").read_text())
         self.assertEqual((record["run"]["episodes"], record["run"]["seed"]), (5, 2))
         self.assertEqual(record["hyperparameters"]["gamma"], 0.98)
-        log = EventAccumulator(str(place.run))
+        log = EventAccumulator(str(run))
         log.Reload()
         self.assertEqual(set(log.Tags()["scalars"]), TAGS)
         self.assertEqual([point.step for point in log.Scalars("Reward")], [0, 1, 2, 3, 4])
@@ -71,9 +60,8 @@ class PgTrain(unittest.TestCase):
         moves the robots."""
         flags = ("--start-noise=0.05", "--episodes=30", "--eval-episodes=1", "--num-envs=2", "--seed=4",
                  "--checkpoint-frequency=60")  # fmt: skip
-        inside = self.place()
+        inside, killed = self.place, self.new_place()
         self.assertEqual(pg_train.main([f"--run-dir={inside.run}", *flags, "--backend=bullet"]), 0)
-        killed = self.place()
         training = killed.train(*flags)
         training.wait_for("Episode   20 |")
         for pid in killed.processes():
@@ -81,34 +69,28 @@ class PgTrain(unittest.TestCase):
                 os.kill(pid, signal.SIGKILL)
         training.end()
         resumed = killed.start("rosrun", "cartpole", "pg_train.py", f"--resume={killed.run}")
-        self.assertEqual(resumed.end(), 0, resumed.output)
-        self.assertIn("resuming at step", resumed.output)
+        self.assertIn("resuming at step", self.ends(resumed))
         self.assert_same_weights(inside, killed)
         self.assertEqual(killed.left_after(), {})
 
     def test_a_simulator_that_is_there_is_used_and_left_as_it_was(self):
-        place = self.place()
+        place = self.place
         world = place.start("roslaunch", "cartpole", "simulation.launch")
         world.wait_for("starting joint_state_controller")
         world.wait_for("process has finished cleanly")
         before = set(place.processes())
-        self.assertIn("True", self.ask(place, "/gazebo/delete_model", "cartpole"))
-        training = place.train("--episodes=2", "--gui")  # it has no window: one is opened
-        self.assertEqual(training.end(), 0, training.output)
-        self.assertNotIn("Traceback", training.output)
-        self.assertNotIn("starting the simulator", training.output)
-        self.assertIn("opening the simulator's window", training.output)
-        self.assertIn("the window is the page http://127.0.0.1:", training.output)
+        deleted = self.run_here("rosservice", "call", "/gazebo/delete_model", "cartpole")
+        self.assertIn("True", deleted)
+        output = self.ends(place.train("--episodes=2", "--gui"))  # it has no window: one is opened
+        self.assertNotIn("starting the simulator", output)
+        self.assertIn("opening the simulator's window", output)
+        self.assertIn("the window is the page http://127.0.0.1:", output)
         self.assertEqual(set(place.processes()), before)
-        self.assertNotIn("cartpole", self.ask(place, "/gazebo/get_world_properties"))
+        properties = self.run_here("rosservice", "call", "/gazebo/get_world_properties")
+        self.assertNotIn("cartpole", properties)
         world.interrupt()
         world.end()
-        self.assertEqual(place.left_after(), {})
-
-    def ask(self, place: Place, service: str, *request: str) -> str:
-        asked = place.start("rosservice", "call", service, *request)
-        self.assertEqual(asked.end(), 0, asked.output)
-        return asked.output
+        self.assert_nothing_left()
 
 
 if __name__ == "__main__":

@@ -22,9 +22,11 @@ from ros_utils import ros_controllers, ros_gazebo
 from ros_utils.readiness import Ready
 
 BOUND = 180.0  # [s of wall time] for anything
-READY = Ready(["cartpole"], ["joint_state_controller", "stand_cart_position_controller"])
+STATES, CONTROLLER = "joint_state_controller", "stand_cart_position_controller"
+COMMAND = f"/{CONTROLLER}/command"
+READY = Ready(["cartpole"], [STATES, CONTROLLER])
 SLOWLY = 0.3  # of real time: a busy machine is in time as well
-UPRIGHT, LONG = 0.2, 2.5  # [rad], [s of simulated time]
+UPRIGHT, LONG = 0.2, 1.5  # [rad], [s of simulated time]
 PUSHED = [0.0, 0.04]  # [m], [rad]: held as it is, the cart's pole is down within a second
 TRAINING = {
     "env_id": "cartpole/Balance-v0", "env_kwargs": {"noise": 0.05, "max_steps": 500}, "seed": 1,
@@ -33,8 +35,8 @@ TRAINING = {
     "value_learning_rate": 0.01, "value_epochs": 20,
 }  # fmt: skip
 MOVES, LATE = "the policy moves the robot", "no joint state on /joint_states for 1 s"
-CONTROLLER, BEYOND = "stand_cart_position_controller", "beyond its stops at -0.5 and 0.5"
-OVER, AGAIN, STOPPED = "an episode would be over here", "continuing", "the robot is stopped"
+BEYOND, OVER = "beyond its stops at -0.5 and 0.5", "an episode would be over here"
+AGAIN, STOPPED = "continuing", "the robot is stopped"
 
 
 class PolicyNode(unittest.TestCase):
@@ -52,11 +54,10 @@ class PolicyNode(unittest.TestCase):
     def setUp(self):
         self.news = threading.Condition()
         self.joints, self.commands = [], []  # (time, cart, pole); numbers
-        for topic, kind, take in (
-            ("/joint_states", JointState, self.take_joints),
-            ("/stand_cart_position_controller/command", Float64, self.take_command),
+        for subscriber in (
+            rospy.Subscriber("/joint_states", JointState, self.take_joints, queue_size=None),
+            rospy.Subscriber(COMMAND, Float64, self.take_command, queue_size=None),
         ):
-            subscriber = rospy.Subscriber(topic, kind, take, queue_size=None)
             self.addCleanup(subscriber.unregister)
 
     def take_joints(self, message):
@@ -76,29 +77,20 @@ class PolicyNode(unittest.TestCase):
             self.assertTrue(self.news.wait_for(holds, BOUND), f"{what}:\n{self.node.output}")
 
     def start(self, policy) -> Process:
-        self.node = self.place.start(
-            "rosrun", "cartpole", "policy_node.py", str(policy), "--late=1"
-        )
+        command = ("rosrun", "cartpole", "policy_node.py", str(policy), "--late=1")
+        self.node = self.place.start(*command)
         self.addCleanup(lambda: (self.node.send(signal.SIGKILL), self.node.end()))
         self.node.wait_for(MOVES, BOUND)
-        self.assertTrue(
-            wait_until_heard("/joint_states", "/stand_cart_position_controller/command")
-        )
+        self.assertTrue(wait_until_heard("/joint_states", COMMAND))
         return self.node
 
-    def put(self, positions):
-        """Joints in place, at rest; returns how many joint states were there before."""
-        with self.news:
-            count = len(self.joints)
-        answer = ros_gazebo.gazebo_set_model_configuration(
-            "cartpole", ["stand_cart", "cart_pole"], positions
-        )
-        self.assertTrue(answer)
-        return count
+    def push(self):
+        joints = ["stand_cart", "cart_pole"]
+        self.assertTrue(ros_gazebo.gazebo_set_model_configuration("cartpole", joints, PUSHED))
 
     def stays_upright(self) -> bool:
         """Whether it does, from a push on."""
-        self.put(PUSHED)
+        self.push()
         with self.news:
             self.joints.clear()
 
@@ -137,7 +129,7 @@ class PolicyNode(unittest.TestCase):
         """With the exported policy."""
         node = self.start(self.exported)
         self.assertNotIn(LATE, node.output)
-        self.assertTrue(ros_controllers.stop_controllers_srv(["joint_state_controller"]))
+        self.assertTrue(ros_controllers.stop_controllers_srv([STATES]))
         node.wait_for(LATE, BOUND)
         with self.news:
             self.commands.clear()
@@ -147,9 +139,9 @@ class PolicyNode(unittest.TestCase):
             held = self.commands[-1]
             self.assertTrue(any(cart == held for _, cart, _ in self.joints))
         self.assertEqual(node.output.count(LATE), 1)
-        self.assertTrue(ros_controllers.start_controllers_srv(["joint_state_controller"]))
+        self.assertTrue(ros_controllers.start_controllers_srv([STATES]))
         node.wait_for(OVER, BOUND)  # it has fallen meanwhile
-        self.put(PUSHED)
+        self.push()
         node.wait_for(AGAIN, BOUND)
         self.assertTrue(ros_gazebo.gazebo_reset_sim())
         with self.news:
@@ -168,7 +160,7 @@ class PolicyNode(unittest.TestCase):
         deadline = time.monotonic() + BOUND
         while BEYOND not in node.output and time.monotonic() < deadline:
             source.publish(bad)  # again, as the simulator's next good state takes its place
-            self.put(PUSHED)
+            self.push()
         node.wait_for(BEYOND, BOUND)
         node.wait_for(AGAIN, BOUND)
         self.assertTrue(ros_controllers.stop_controllers_srv([CONTROLLER]))
@@ -176,9 +168,7 @@ class PolicyNode(unittest.TestCase):
         before, deadline = node.output.count(AGAIN), time.monotonic() + BOUND
         self.assertTrue(ros_controllers.start_controllers_srv([CONTROLLER]))
         while node.output.count(AGAIN) == before and time.monotonic() < deadline:
-            self.put(
-                PUSHED
-            )  # again, as the pole falls until the node knows that the controller runs
+            self.push()  # again, as the pole falls until the node knows that the controller runs
         self.eventually("continuing", lambda: node.output.count(AGAIN) > before)
         with self.news:
             self.assertTrue(all(abs(each) <= 0.5 for each in self.commands))
@@ -189,15 +179,12 @@ class PolicyNode(unittest.TestCase):
         """Joint states that don't come, and the service that tells why."""
         service = rospy.Service("/gazebo/step_world", Empty, lambda _: None)
         self.addCleanup(service.shutdown)
-        controller = ["joint_state_controller"]
-        self.assertTrue(ros_controllers.stop_controllers_srv(controller))
-        self.addCleanup(ros_controllers.start_controllers_srv, controller)
+        self.assertTrue(ros_controllers.stop_controllers_srv([STATES]))
+        self.addCleanup(ros_controllers.start_controllers_srv, [STATES])
         node = self.place.start("rosrun", "cartpole", "policy_node.py", str(self.exported))
         node.wait_for("lockstep:=false", BOUND)
-        line = next(each for each in node.output.splitlines() if "lockstep:=false" in each)
-        self.assertRegex(
-            line, "waiting for the state of .* on /joint_states; the simulator is in lock-step"
-        )
+        told = "waiting for the state of .* on /joint_states; the simulator is in lock-step"
+        self.assertRegex(node.output, f"{told}.*lockstep:=false")
         node.interrupt()
         self.assertEqual(node.end(BOUND), 130, node.output)
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import rospkg
 import rostest
-from support.ros.calls import executable
+from support.ros.programs import piped
 
 from ros_calls import master
 from ros_calls.waiting import wait_until
@@ -44,15 +44,7 @@ def environment():
     return os.environ | {"ROS_MASTER_URI": uri, "ROS_IP": "127.0.0.1", "PYTHONUNBUFFERED": "1"}
 
 
-def start(*arguments, **options):
-    return piped(executable("cartpole", "lockstep.py"), *arguments, **options)
-
-
-def piped(*command, **options):
-    return subprocess.Popen(
-        list(map(str, command)),
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, **options,
-    )  # fmt: skip
+start = partial(piped, "rosrun", "cartpole", "lockstep.py")
 
 
 @contextlib.contextmanager
@@ -76,22 +68,25 @@ def scouting(**variables):
 
 
 class LaunchingTest(unittest.TestCase):
+    def ends(self, process, code=0):
+        """Waits for its end with that exit code; returns its output and errors."""
+        out, err = process.communicate(timeout=BOUND)
+        self.assertEqual(process.returncode, code, err)
+        return out, err
+
     def test_a_script_that_launches_everything_is_repeatable_also_on_a_busy_machine(self):
         """Two at once: each has a simulator, and takes the processor from the other."""
         script = SCRIPTS / "publish_read.py"
         both = [start("--seed", 3, script, env=environment()) for _ in range(2)]
         seen = []
         for process in both:
-            out, err = process.communicate(timeout=BOUND)
-            self.assertEqual(process.returncode, 0, err)
+            out, _ = self.ends(process)
             seen.append([line for line in out.splitlines() if re.match(r"\d \d+ ", line)])
             self.assertGreater(len(seen[-1]), 190, out)
         self.assertEqual(*seen)
 
     def test_a_script_may_wait_for_a_message_before_its_simulator_is_up(self):
-        process = start(SCRIPTS / "launch_and_wait.py", env=environment())
-        out, err = process.communicate(timeout=BOUND)
-        self.assertEqual(process.returncode, 0, err)
+        out, _ = self.ends(start(SCRIPTS / "launch_and_wait.py", env=environment()))
         self.assertIn("ground_plane", out)
 
     @unittest.skipUnless(EXISTING.is_file(), "the existing script isn't here")
@@ -120,8 +115,7 @@ class LaunchingTest(unittest.TestCase):
 
     def told(self, process):
         """The lines that a script prints after each episode, and at its end."""
-        out, err = process.communicate(timeout=BOUND)
-        self.assertEqual(process.returncode, 0, err)
+        out, _ = self.ends(process)
         lines = [line for line in out.splitlines() if re.match(r"\d+ |learned ", line)]
         self.assertIn("learned", lines[-1], out)
         return lines
@@ -147,25 +141,20 @@ class LaunchingTest(unittest.TestCase):
             for name in "goal_model.py", "newest_cloud.py":
                 process = piped(sys.executable, SCRIPTS / name, 1, 3, env=here)
                 self.assertEqual(len(self.told(process)), 2)
-            process = start(SCRIPTS / "rate_loop.py", env=here)
-            _, err = process.communicate(timeout=BOUND)
-            self.assertEqual(process.returncode, 2, err)
+            _, err = self.ends(start(SCRIPTS / "rate_loop.py", env=here), 2)
             self.assertIn("runs in real time", err)
             self.assertIn('GZSERVER_ARGS="--lockstep --seed 0"', err)
         self.assertEqual(len(self.told(own)), 2)
 
-    def run_script(self, text):
-        """Runs a script at a simulator of its own; returns exit code, output and errors."""
+    def run_script(self, text, code=0):
+        """Runs a script at a simulator of its own; returns its output and errors."""
         with tempfile.TemporaryDirectory() as folder, Simulation(lockstep=True) as simulation:
             path = Path(folder, "script.py")
             path.write_text(text)
-            process = start(path, env=simulation.environment())
-            out, err = process.communicate(timeout=BOUND)
-        return process.returncode, out, err
+            return self.ends(start(path, env=simulation.environment()), code)
 
     def test_a_simulator_that_dies_is_told_of(self):
-        code, out, err = self.run_script(KILLING + "time.sleep(0.1)\nprint('went on')\n")
-        self.assertEqual(code, 1, err)
+        out, err = self.run_script(KILLING + "time.sleep(0.1)\nprint('went on')\n", 1)
         self.assertIn("the simulator has died", err)
         self.assertNotIn("Traceback", err)
         self.assertNotIn("went on", out)
@@ -176,8 +165,7 @@ class LaunchingTest(unittest.TestCase):
             "threading.Thread(target=loop).start()\n"
             "while True:\n try: rospy.sleep(0.1)\n except: pass\n"
         )
-        code, _, err = self.run_script(KILLING + text)
-        self.assertEqual(code, 1, err)
+        _, err = self.run_script(KILLING + text, 1)
         self.assertEqual(err.count("lockstep: "), 1, err)
 
     def test_the_end_of_a_script_is_told_once_for_all_nodes_that_follow_it(self):
@@ -187,8 +175,7 @@ class LaunchingTest(unittest.TestCase):
             f" subprocess.Popen([sys.executable, '-c', {node!r}, name])\n"
             "rospy.init_node('script')\nrospy.sleep(1.0)\n"
         )
-        code, _, err = self.run_script(text)
-        self.assertEqual(code, 0, err)
+        _, err = self.run_script(text)
         said = [line for line in err.splitlines() if line.startswith("lockstep: ")]
         self.assertEqual(len(said), 1, err)
         self.assertIn("the nodes that follow its clock: /a, /b, /c", said[0])

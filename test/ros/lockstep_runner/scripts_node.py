@@ -17,10 +17,12 @@ import rospkg
 import rospy
 import rostest
 from controller_manager_msgs.srv import ListControllers
+from support.ros.programs import piped
 
 ROOT = Path(rospkg.RosPack().get_path("cartpole"))
 SCRIPTS = ROOT / "test" / "data" / "scripts"
 BOUND = 120  # [s]
+HAS_SB3 = importlib.util.find_spec("stable_baselines3") is not None
 
 
 def lockstep(*arguments, **options):
@@ -33,9 +35,8 @@ def lockstep(*arguments, **options):
 def written(text):
     """A script of a few lines, in a folder of its own."""
     path = Path(tempfile.mkdtemp(prefix="lockstep_test_")) / "script.py"
-    atexit.register(
-        shutil.rmtree, path.parent, ignore_errors=True
-    )  # rostest runs no module cleanups
+    # rostest runs no module cleanups
+    atexit.register(shutil.rmtree, path.parent, ignore_errors=True)
     path.write_text(text)
     return path
 
@@ -70,12 +71,13 @@ class LockstepTest(unittest.TestCase):
         self.assertNotIn("Traceback", run.stderr)
         return run.stdout
 
-    def twice(self, name, *arguments):
-        one = lockstep("--seed", 3, SCRIPTS / name, *arguments)
-        two = lockstep("--seed", 3, SCRIPTS / name, *arguments)
-        self.check(one)
-        self.check(two)
-        self.assertEqual(one.stdout, two.stdout)
+    def output(self, text, *flags):
+        """What a script prints that begins with HEAD."""
+        return self.check(lockstep(*flags, written(HEAD + text)))
+
+    def twice(self, name):
+        one, two = (lockstep("--seed", 3, SCRIPTS / name) for _ in range(2))
+        self.assertEqual(self.check(one), self.check(two))
         return one
 
     def check_50_hz(self, lines):
@@ -114,23 +116,20 @@ class LockstepTest(unittest.TestCase):
             "import rospy, time; rospy.init_node('follower'); rospy.set_param('/follower_is_up', 1)\n"
             "while not rospy.is_shutdown(): time.sleep(0.01)\n"
         )
-        script = HEAD + (
+        script = (
             "import signal, subprocess\n"
             f"node = subprocess.Popen([sys.executable, '-c', {node!r}])\n"
             "while not rospy.has_param('/follower_is_up'):\n    time.sleep(0.01)\n"
             "time.sleep(0.1)\nrospy.delete_param('/follower_is_up')\n"
             f"node.send_signal(signal.SIGINT)\nprint(node.wait({BOUND / 2}))\n"
         )
-        run = lockstep(written(script))
-        self.assertEqual(self.check(run), "0\n", run.stderr)
+        self.assertEqual(self.output(script), "0\n")
 
     def test_a_thread_that_sleeps_is_told_of_once(self):
         run = self.twice("sleeping_thread.py")
         self.assertEqual(run.stderr.count("thread 'heart' sleeps by time.sleep"), 1, run.stderr)
 
-    @unittest.skipUnless(
-        importlib.util.find_spec("stable_baselines3"), "./ws extras isn't installed"
-    )
+    @unittest.skipUnless(HAS_SB3, "./ws extras isn't installed")
     def test_an_environment_that_sleeps_trains_with_stable_baselines3(self):
         self.assertIn(" 128 ", self.check(lockstep("--seed", 3, SCRIPTS / "gym_sleep.py", 128)))
 
@@ -151,12 +150,11 @@ class LockstepTest(unittest.TestCase):
             "rospy.sleep(0.1)\ntimer.shutdown()\nprint(len(seen), seen == sorted(seen))\n"
         )
         runs = [lockstep(written(script)) for _ in range(2)]
-        for run in runs:
-            self.assertEqual(run.stderr, "")
-        self.assertEqual(self.check(runs[0]), self.check(runs[1]))
+        self.assertEqual([run.stderr for run in runs], ["", ""])
+        self.assertEqual(*map(self.check, runs))
 
     def test_processes_that_are_forked_live_by_the_wall(self):
-        script = HEAD + (
+        script = (
             "import multiprocessing, os\n"
             "def square(x):\n    time.sleep(0.01)\n    return x * x\n"
             # Not terminated: rospy's handler of SIGTERM, which they inherit, doesn't end them.
@@ -168,29 +166,22 @@ class LockstepTest(unittest.TestCase):
             "print(round(rospy.get_time() - before, 6), time.monotonic() - wall == 0.5)\n"
             "print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))\n"
         )
-        out = self.check(lockstep(written(script)))
-        self.assertEqual(out, "[0, 1, 4, 9]\n0.5 False\n3\n")
+        self.assertEqual(self.output(script), "[0, 1, 4, 9]\n0.5 False\n3\n")
 
     def test_the_wall_clock_may_be_simulated(self):
-        script = written(
-            HEAD + "from time import monotonic, perf_counter, sleep, time\n"
+        script = (
+            "from time import monotonic, perf_counter, sleep, time\n"
             "before = time(), monotonic(), perf_counter()\nsleep(25.0)\n"
             "after = time(), monotonic(), perf_counter()\n"
             "print(*(round(two - one, 6) for one, two in zip(before, after)))\n"
         )
-        out = self.check(lockstep("--virtual-wall-clock", script))
-        self.assertEqual(out.split(), ["25.0"] * 3)
+        self.assertEqual(self.output(script, "--virtual-wall-clock"), "25.0 25.0 25.0\n")
 
     def test_scripts_that_were_cut_off_leave_the_world_to_the_next(self):
-        endless = written(
-            HEAD
-            + "while not rospy.is_shutdown():\n    time.sleep(0.5)\n    print('on', flush=True)\n"
-        )
+        text = "while not rospy.is_shutdown():\n    time.sleep(0.5)\n    print('on', flush=True)\n"
+        endless = written(HEAD + text)
         for cut_off in ("closed", "killed"):
-            process = subprocess.Popen(
-                ["rosrun", "cartpole", "lockstep.py", str(endless)],
-                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
-            )  # fmt: skip
+            process = piped("rosrun", "cartpole", "lockstep.py", endless, stderr=subprocess.DEVNULL)
             self.assertEqual(process.stdout.readline(), "on\n")
             if cut_off == "killed":
                 process.kill()
@@ -204,30 +195,21 @@ class LockstepTest(unittest.TestCase):
             "    assert rospy.get_time() - before > 0.0199\nprint('done')\n"
         )
         scripts = [written(text.replace('"script"', f'"script_{n}"')) for n in range(2)]
-        processes = [
-            subprocess.Popen(
-                ["rosrun", "cartpole", "lockstep.py", str(each)],
-                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-            )
-            for each in scripts
-        ]  # fmt: skip
-        for process in processes:
+        for process in [piped("rosrun", "cartpole", "lockstep.py", each) for each in scripts]:
             out, err = process.communicate(timeout=BOUND)
             self.assertEqual((process.returncode, out), (0, "done\n"), err)
 
     def test_a_command_is_a_control_period_where_nobody_waits(self):
-        out = self.check(lockstep("--dt", 0.002, written(HEAD + COMMANDS)))
+        out = self.output(COMMANDS, "--dt", 0.002)
         self.assertEqual(out.split(), ["0.0", "0.004", "0.006", "0.008", "0.01"])
 
     def test_a_paused_world_stands_still_and_holds_nobody_up(self):
-        script = (
-            HEAD + "pause()\nfor _ in range(5):\n    time.sleep(100.0)\nprint(rospy.get_time())\n"
-        )
-        self.assertEqual(self.check(lockstep(written(script))), "0.0\n")
+        script = "pause()\nfor _ in range(5):\n    time.sleep(100.0)\nprint(rospy.get_time())\n"
+        self.assertEqual(self.output(script), "0.0\n")
 
     def test_what_is_left_at_the_end_of_a_script_ends(self):
         """An executor that nobody shut down, one that can't begin, a timer in a paused world."""
-        script = HEAD + (
+        script = (
             "import threading\n"
             "from concurrent.futures import BrokenExecutor, ThreadPoolExecutor\n"
             "left = ThreadPoolExecutor(2)\n"
@@ -238,23 +220,19 @@ class LockstepTest(unittest.TestCase):
             "try:\n    ThreadPoolExecutor(1, initializer=fails).submit(int).result()\n"
             "except BrokenExecutor:\n    print('broken')\n"
         )
-        out = self.check(lockstep(written(script)))
-        self.assertEqual(out.split(), ["5", "broken", "slept", "0.5"])
-        paused = HEAD + (
+        self.assertEqual(self.output(script).split(), ["5", "broken", "slept", "0.5"])
+        paused = (
             "import threading\npause()\n"
             "threading.Timer(0.1, lambda: print('off', rospy.get_time())).start()\n"
         )
-        self.assertEqual(self.check(lockstep(written(paused))), "off 0.0\n")
+        self.assertEqual(self.output(paused), "off 0.0\n")
 
     def test_ctrl_c_in_a_sleep(self):
         script = written(
             HEAD + "print('ready', flush=True)\n"
             "while not rospy.is_shutdown():\n    time.sleep(0.5)\nprint('done')\n"
         )
-        process = subprocess.Popen(
-            ["rosrun", "cartpole", "lockstep.py", str(script)],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-        )  # fmt: skip
+        process = piped("rosrun", "cartpole", "lockstep.py", script)
         self.assertEqual(process.stdout.readline(), "ready\n")
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does
         out, err = process.communicate(timeout=BOUND)
@@ -262,20 +240,17 @@ class LockstepTest(unittest.TestCase):
 
     def test_what_is_raised_in_the_middle_of_a_step(self):
         interrupted = (
-            HEAD
-            + (
-                "import signal\n"
-                "def bell(*_):\n    raise raised\n"
-                "signal.signal(signal.SIGALRM, bell)\n"
-                "for raised in RuntimeError, TimeoutError, SystemExit(5):\n"  # the second as a connection
-                "    signal.setitimer(signal.ITIMER_REAL, 0.2)\n"
-                "    try:\n        while True:\n            time.sleep(0.5)\n"
-                "    except (RuntimeError, TimeoutError):\n        pass\n"
-                "    before = rospy.get_time()\n    time.sleep(1.0)\n"
-                "    print(round(rospy.get_time() - before, 6))\n"
-            )
+            "import signal\n"
+            "def bell(*_):\n    raise raised\n"
+            "signal.signal(signal.SIGALRM, bell)\n"
+            "for raised in RuntimeError, TimeoutError, SystemExit(5):\n"  # the second as a connection
+            "    signal.setitimer(signal.ITIMER_REAL, 0.2)\n"
+            "    try:\n        while True:\n            time.sleep(0.5)\n"
+            "    except (RuntimeError, TimeoutError):\n        pass\n"
+            "    before = rospy.get_time()\n    time.sleep(1.0)\n"
+            "    print(round(rospy.get_time() - before, 6))\n"
         )
-        run = lockstep(written(interrupted))
+        run = lockstep(written(HEAD + interrupted))
         self.assertEqual((run.returncode, run.stdout, run.stderr), (5, "1.0\n1.0\n", ""))
         self.check(lockstep(SCRIPTS / "rate_loop.py"))
 

@@ -7,6 +7,7 @@ import os
 import tempfile
 import unittest
 import unittest.mock
+from functools import partial
 from pathlib import Path
 
 import gymnasium
@@ -15,16 +16,9 @@ import rostest
 import cartpole  # noqa: F401  # registers the environments
 from robot_envs.errors import SimulatorError
 from ros_calls.waiting import wait_until
-from ros_utils import (
-    ros_controllers,
-    ros_gazebo,
-    ros_launch,
-    ros_node,
-    ros_params,
-    ros_spawn,
-    ros_urdf,
-)
+from ros_utils import ros_controllers, ros_gazebo, ros_launch, ros_node, ros_params, ros_spawn
 from ros_utils.readiness import NotReady, Ready
+from ros_utils.ros_urdf import urdf_load_from_pkg
 from ros_utils.service_client import ServiceGone
 from ros_utils.simulation import Simulation, reserved_port
 from ros_utils.step_client import StepClient, StepRefused
@@ -52,6 +46,17 @@ def said(function, *arguments, **options):
 
 
 class Readiness(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.simulation = Simulation()
+        cls.addClassCleanup(cls.simulation.close)
+
+    def empty_world(self):
+        """Calls go to the simulation from now on, which has no robot, and is left without one."""
+        self.enterContext(self.simulation.active())
+        for name in ("cartpole", "cartpole2", "second"):
+            self.addCleanup(ros_gazebo.gazebo_delete_model, name)
+
     def launch_file(self, *controllers, text=LATER):
         folder = self.enterContext(tempfile.TemporaryDirectory())
         path = Path(folder, "arm.launch")
@@ -69,20 +74,13 @@ class Readiness(unittest.TestCase):
         self.addCleanup(started.close)
         with unittest.mock.patch.dict(os.environ, ROS_MASTER_URI=started.master_uri):
             self.assertEqual(ready.missing(), "")
-            self.assertEqual(
-                ros_controllers.list_controllers_srv("arm"), dict.fromkeys(ALL, "running")
-            )
+            states = ros_controllers.list_controllers_srv("arm")
+            self.assertEqual(states, dict.fromkeys(ALL, "running"))
             answer, text = said(
                 ros_gazebo.launch_Gazebo, ready=Ready(["leg"]), timeout=0.2, launch_new_term=False
             )
-            node = ros_node.ros_node_from_pkg(
-                "topic_tools",
-                "relay",
-                args="a b",
-                launch_new_term=False,
-                timeout=PATIENCE,
-                ready=ready,
-            )
+            node = ros_node.ros_node_from_pkg("topic_tools", "relay", args="a b", launch_new_term=False,
+                                              timeout=PATIENCE, ready=ready)  # fmt: skip
         self.assertTrue(node)
         self.assertFalse(answer)
         self.assertIn("there is no model 'leg' in the world (there are: ground_plane, arm)", text)
@@ -104,53 +102,48 @@ class Readiness(unittest.TestCase):
             self.assertIn(f"no simulator runs at {uri}; start one with: roslaunch", READY.missing())
             with self.assertRaisesRegex(ServiceGone, "no simulator runs at .* lockstep:=true"):
                 StepClient().step(1)
-        with Simulation() as simulation, simulation.active():
-            self.assertIn("the simulator isn't in lock-step", READY.missing())
-            with self.assertRaisesRegex(ServiceGone, "isn't in lock-step; .* lockstep:=true"):
-                StepClient().step(1)
-            ready = Ready(["cartpole"], ALL)
-            self.assertIn("there is no model 'cartpole' in the world", ready.missing())
-            self.spawn("cartpole2", "/second")
-            self.assertIn("(did you mean 'cartpole2'?)", ready.missing())
-            leg = Ready([], ALL, "leg").missing()
-            self.assertIn("there is no controller manager in the namespace /leg", leg)
-            self.assertTrue(
-                ros_urdf.urdf_load_from_pkg("cartpole", "cartpole.urdf.xacro", "robot_description")
-            )
-            self.load_parameters()
-            self.spawn("cartpole", "/")
-            # Its manager comes with its plugin, which is made after the model.
-            none = "'/joint_state_controller' isn't loaded (there are none)"
-            self.assertTrue(wait_until(lambda: none in ready.missing(), PATIENCE, "a manager"))
-            self.assertTrue(ros_controllers.load_controller_srv(ALL[0]))
-            self.assertIn("'/joint_state_controller' is initialized, not running; start it with: rosrun "
-                          "controller_manager controller_manager start", ready.missing())  # fmt: skip
+        self.empty_world()
+        self.assertIn("the simulator isn't in lock-step", READY.missing())
+        with self.assertRaisesRegex(ServiceGone, "isn't in lock-step; .* lockstep:=true"):
+            StepClient().step(1)
+        ready = Ready(["cartpole"], ALL)
+        self.assertIn("there is no model 'cartpole' in the world", ready.missing())
+        self.spawn("cartpole2", "/second")
+        self.assertIn("(did you mean 'cartpole2'?)", ready.missing())
+        leg = Ready([], ALL, "leg").missing()
+        self.assertIn("there is no controller manager in the namespace /leg", leg)
+        urdf = ("cartpole", "cartpole.urdf.xacro", "robot_description")
+        self.assertTrue(urdf_load_from_pkg(*urdf))
+        gains = ("cartpole_controller", "joint_position_control.yaml")
+        self.assertTrue(ros_params.ros_load_yaml_from_pkg(*gains))
+        self.spawn("cartpole", "/")
+        # Its manager comes with its plugin, which is made after the model.
+        none = "'/joint_state_controller' isn't loaded (there are none)"
+        self.assertTrue(wait_until(lambda: none in ready.missing(), PATIENCE, "a manager"))
+        self.assertTrue(ros_controllers.load_controller_srv(ALL[0]))
+        self.assertIn("'/joint_state_controller' is initialized, not running; start it with: rosrun "
+                      "controller_manager controller_manager start", ready.missing())  # fmt: skip
 
-            def refusal():  # on a busy machine it may be that a service gives no answer in time
-                with self.assertRaises(NotReady) as refused:
-                    ready.wait(0.1)
-                return str(refused.exception)
+        def refusal():  # on a busy machine it may be that a service gives no answer in time
+            with self.assertRaises(NotReady) as refused:
+                ready.wait(0.1)
+            return str(refused.exception)
 
-            words = "not ready after 0.1 s: the controller"
-            self.assertTrue(wait_until(lambda: words in refusal(), PATIENCE, "the controller"))
-            self.assertTrue(ros_controllers.start_controllers_srv(ALL[:1]))
-            self.assertIn(f"'/{CART}' isn't loaded", ready.missing())
+        words = "not ready after 0.1 s: the controller"
+        self.assertTrue(wait_until(lambda: words in refusal(), PATIENCE, "the controller"))
+        self.assertTrue(ros_controllers.start_controllers_srv(ALL[:1]))
+        self.assertIn(f"'/{CART}' isn't loaded", ready.missing())
 
     def test_a_robot_that_is_spawned_is_ready(self):
-        with Simulation() as simulation, simulation.active():
-            spawned = ros_spawn.spawn_model_in_gazebo(
-                "cartpole", "cartpole.urdf.xacro", "joint_position_control.yaml", ALL,
-                controllers_pkg="cartpole_controller", gazebo_name="cartpole", timeout=PATIENCE, ready=True,
-            )  # fmt: skip
-            self.assertTrue(spawned)
-            self.assertEqual(Ready(["cartpole"], ALL).missing(), "")
-            answer, text = said(
-                ros_spawn.spawn_model_in_gazebo,
-                "cartpole", "cartpole.urdf.xacro", "joint_position_control.yaml", [*ALL, "none"],
-                controllers_pkg="cartpole_controller", gazebo_name="second", timeout=PATIENCE, ready=True,
-            )  # fmt: skip
-            self.assertFalse(answer)
-            self.assertIn("load_controller (none)", text)
+        self.empty_world()
+        files = ("cartpole", "cartpole.urdf.xacro", "joint_position_control.yaml")
+        options = {"controllers_pkg": "cartpole_controller", "timeout": PATIENCE, "ready": True}
+        spawn = partial(ros_spawn.spawn_model_in_gazebo, *files, **options)
+        self.assertTrue(spawn(ALL, gazebo_name="cartpole"))
+        self.assertEqual(Ready(["cartpole"], ALL).missing(), "")
+        answer, text = said(spawn, [*ALL, "none"], gazebo_name="second")
+        self.assertFalse(answer)
+        self.assertIn("load_controller (none)", text)
 
     def test_an_environment_says_what_has_gone_and_what_mends_it(self):
         """With the test's own master, which is that of this process's node."""
@@ -175,11 +168,6 @@ class Readiness(unittest.TestCase):
         with self.assertRaisesRegex(SimulatorError, "there is no model 'cartpole'"):
             env.reset(seed=0)
         env.close()
-
-    def load_parameters(self):
-        self.assertTrue(
-            ros_params.ros_load_yaml_from_pkg("cartpole_controller", "joint_position_control.yaml")
-        )
 
     def spawn(self, name, namespace):
         found = ros_gazebo.gazebo_spawn_urdf_pkg(

@@ -48,10 +48,10 @@ shoulder: {type: effort_controllers/JointPositionController, joint: shoulder,
 """
 LAUNCH = """<launch><arg name="number" default="1"/>
 <param name="number_of_launch" value="$(arg number)"/>
-<node name="window" pkg="gazebo_ros" type="gzclient"/></launch>"""
+<node name="relay" pkg="topic_tools" type="relay" args="a b"/></launch>"""
 FILES = {
     "package.xml": PACKAGE, "urdf/robot.xacro": XACRO, "sdf/box.sdf": SDF, "config/control.yaml": YAML,
-    "worlds/light.world": WORLD, "launch/window.launch": LAUNCH,
+    "worlds/light.world": WORLD, "launch/relay.launch": LAUNCH,
 }  # fmt: skip
 CONTROLLERS = ["states", "shoulder"]
 
@@ -94,14 +94,12 @@ class Package(unittest.TestCase):
     def test_urdf(self):
         expanded = ros_urdf.urdf_parse_from_pkg("my_robot", "robot.xacro", args_xacro=["mass:=7"])
         self.assertIn('<mass value="7"/>', expanded)
-        self.assertEqual(
-            expanded, ros_urdf.urdf_parse_from_path(self.path("urdf/robot.xacro"), ["mass:=7"])
-        )
+        path = self.path("urdf/robot.xacro")
+        self.assertEqual(expanded, ros_urdf.urdf_parse_from_path(path, ["mass:=7"]))
         for number, ns in enumerate((None, "/", "/deep/space")):
             name = f"urdf_{number}"
             self.assertTrue(ros_urdf.urdf_load_from_pkg("my_robot", "robot.xacro", name, ns=ns))
             self.assertIn("<robot", self.parameter(f"{(ns or '').rstrip('/')}/{name}"))
-        path = self.path("urdf/robot.xacro")
         self.assertTrue(ros_urdf.urdf_load_from_path(path, "again", "/deep", ["mass:=7"]))
         self.assertIn("7", self.parameter("/deep/again"))
 
@@ -111,19 +109,21 @@ class Package(unittest.TestCase):
 
     def test_every_way_to_spawn(self):
         self.assertTrue(ros_urdf.urdf_load_from_pkg("my_robot", "robot.xacro", "text", ns="/p"))
+        self.run_in_simulation("rosparam", "set", "/q/box", SDF)
         xml = ros_urdf.urdf_parse_from_pkg("my_robot", "robot.xacro")
         urdf, sdf = self.path("urdf/robot.xacro"), self.path("sdf/box.sdf")
         pose = {"pos_x": 2.0, "ori_z": 1.0, "ori_w": 0.0, "reference_frame": "x"}
         for name, spawned in {
             "a": ros_gazebo.gazebo_spawn_urdf_path(urdf, "a", "/a", **pose)[0],
             "b": ros_gazebo.gazebo_spawn_urdf_pkg(
-                "my_robot", "robot.xacro", model_name="b", robot_namespace="/b", **pose
+                "my_robot", "robot.xacro", "/urdf", "b", "/b", **pose
             )[0],
             "c": ros_gazebo.gazebo_spawn_urdf_string(xml, "c", "/c", verify=True, **pose)[0],
             "d": ros_gazebo.gazebo_spawn_urdf_param("text", "d", "/p", **pose)[0],
             "e": ros_gazebo.gazebo_spawn_sdf_path(sdf, "e", **pose),
             "f": ros_gazebo.gazebo_spawn_sdf_pkg("my_robot", "box.sdf", model_name="f", **pose),
             "g": ros_gazebo.gazebo_spawn_sdf_string(SDF, "g", verify=True, **pose),
+            "h": ros_gazebo.gazebo_spawn_sdf_param("box", "h", "/q", **pose),
         }.items():
             with self.subTest(name):
                 self.assertIs(spawned, True)
@@ -132,19 +132,12 @@ class Package(unittest.TestCase):
                 self.assertEqual((at.position.x, abs(at.orientation.z)), (2.0, 1.0))
                 self.assertTrue(ros_gazebo.gazebo_delete_model(name, verify=True))
 
-    def test_an_sdf_from_a_parameter(self):
-        self.run_in_simulation("rosparam", "set", "/q/box", SDF)
-        self.assertIs(ros_gazebo.gazebo_spawn_sdf_param("box", "q", "/q"), True)
-        self.assertTrue(ros_gazebo.gazebo_delete_model("q"))
-
     def test_a_robot_in_a_namespace_and_its_controllers(self):
         for ns in ("/one", "/two"):
-            self.assertTrue(
-                ros_spawn.spawn_model_in_gazebo(
-                    "my_robot", "robot.xacro", "control.yaml", CONTROLLERS, ns=ns,
-                    gazebo_name=ns[1:], max_pub_freq=20, pos_y=3.0,
-                )
-            )  # fmt: skip
+            files = ("my_robot", "robot.xacro", "control.yaml")
+            options = {"gazebo_name": ns[1:], "max_pub_freq": 20, "pos_y": 3.0}
+            spawned = ros_spawn.spawn_model_in_gazebo(*files, CONTROLLERS, ns=ns, **options)
+            self.assertTrue(spawned)
         for ns in ("/one", "/two/"):
             states = ros_controllers.list_controllers_srv(ns)
             self.assertEqual(states, dict.fromkeys(CONTROLLERS, "running"))
@@ -174,7 +167,7 @@ class Package(unittest.TestCase):
         self.assertEqual(states(), dict.fromkeys(CONTROLLERS, "running"))
 
     def test_the_packages_launch_file(self):
-        launch = ros_launch.ros_launch_from_pkg("my_robot", "window.launch", ["number:=5"])
+        launch = ros_launch.ros_launch_from_pkg("my_robot", "relay.launch", ["number:=5"])
         self.assertTrue(launch)
         self.assertEqual(self.parameter("/number_of_launch"), "5")
         self.assertTrue(launch.close())

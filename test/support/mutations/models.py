@@ -83,13 +83,11 @@ def _control(text: str) -> None:
     RobotHardware(read_description(text))
 
 
-UNSOUND = ("no_class", "broken", "no_joint", "wrong_interface", "no_gains", "nan_gains", "empty_group",
-           "twice", "text_group")  # fmt: skip
 CONTROLLERS: dict[str, Any] = {
     name: params
     for file in ("slides.yaml", "slides_trajectories.yaml")
     for name, params in yaml.safe_load((DATA / "robots" / file).read_text()).items()
-    if name not in UNSOUND and not str(params.get("type")).startswith("my_")
+    if not str(params.get("type")).startswith("my_")
 } | {
     "joint_limits": {
         "effort_a": {"has_position_limits": True, "min_position": -1, "max_position": 1,

@@ -19,11 +19,7 @@ def cartpole_world(state: CartPoleState, set_point: float | None = None) -> Worl
 
 
 class FakePlant:
-    """A pole on a cart that follows its set-point with a lag; semi-implicit Euler.
-
-    Args:
-        fail_after: number of actions after which the simulator "dies"; None: never.
-    """
+    """A pole on a cart that follows its set-point with a lag; after so many actions the simulator "dies"."""
 
     scene, deterministic, complete, shared = Scene([ROBOT]), True, True, False
 

@@ -37,10 +37,7 @@ def plugin(library: str, **elements: object) -> str:
 def gripper(interface: str = "Effort", mimic: str = MIMIC, more: str = "") -> str:
     """Returns the gripper. Its pads are at the height of a cube on the ground while the lift is at 0.
 
-    Args:
-        interface: of the joint `left`; that of `lift` is Velocity.
-        mimic: the element of the joint `right`, which has no transmission.
-        more: of the robot.
+    The joint `left` has the interface; that of `lift` is Velocity; `right`, with `mimic`, has none.
     """
     limit = f'lower="0" upper="0.05" effort="{EFFORT}"'
     pad = "0.03 0.02 0.06"

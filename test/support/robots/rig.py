@@ -85,9 +85,7 @@ SLEDGE = Robot(
 class Watch(Task):
     """Actions are the efforts on rail and drop, and the servo's set-point; every joint is seen.
 
-    Args:
-        sledge: whether there is a sledge beside the rig, which begins at 1 m/s.
-        joints: where the rig's begin, by plain name; others at 0.
+    The rig's joints begin at `joints`, or at 0; a `sledge` beside it begins at 1 m/s.
     """
 
     max_steps = 200

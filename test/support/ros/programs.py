@@ -8,8 +8,10 @@ import subprocess
 import tempfile
 import threading
 import time
+import unittest
 import uuid
 from pathlib import Path
+from typing import Any
 
 from support.ros.calls import executable
 
@@ -18,6 +20,15 @@ from ros_utils.simulation import reserved_port
 BOUND = 120.0  # [s] for anything that a run does on a busy machine
 MARK = "CARTPOLE_TEST_RUN"
 NETWORKS = {"policy_network.pth", "value_network.pth"}
+
+
+def piped(*command: object, **options: Any) -> subprocess.Popen[str]:
+    """A command in a session of its own, whose output and errors can be read."""
+    words = [str(word) for word in command]
+    if words[0] == "rosrun":
+        words = [executable(*words[1:3]), *words[3:]]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+    return subprocess.Popen(words, text=True, start_new_session=True, **pipes)
 
 
 class Place:
@@ -123,3 +134,28 @@ class Process:
         code = self._process.wait(seconds)
         self._reader.join(2)
         return code
+
+
+class PlaceCase(unittest.TestCase):
+    """Each test has a place of its own."""
+
+    def setUp(self) -> None:
+        self.place = self.new_place()
+
+    def new_place(self, master: str | None = None) -> Place:
+        place = Place(master)
+        self.addCleanup(place.close)
+        return place
+
+    def ends(self, process: Process, code: int = 0) -> str:
+        """Waits for its end with that exit code, and without a traceback; returns what it said."""
+        self.assertEqual(process.end(), code, process.output)
+        self.assertNotIn("Traceback", process.output)
+        return process.output
+
+    def run_here(self, *command: str, code: int = 0) -> str:
+        """Starts a command in the place, and waits for such an end of it."""
+        return self.ends(self.place.start(*command), code)
+
+    def assert_nothing_left(self, output: str = "") -> None:
+        self.assertEqual(self.place.left_after(), {}, output)

@@ -53,13 +53,9 @@ def wait_until_heard(*topics):
 
 
 class Listener:
-    """Keeps what comes on a topic.
+    """Keeps what `read` makes of each message of a topic.
 
-    Args:
-        topic: its name.
-        kind: type of the messages.
-        connected: whether to wait first until its publishers send to this process.
-        read: what is kept of a message.
+    If `connected`, it waits first until all who publish send to this process.
     """
 
     def __init__(self, topic, kind, connected=True, read=lambda message: message):

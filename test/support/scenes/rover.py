@@ -51,21 +51,26 @@ CRATE = """<robot name="crate"><link name="crate">
   <gazebo reference="crate"><mu1>0.5</mu1></gazebo></robot>"""
 
 
-class Roll(Task):
-    """Roll forward: the reward sees the hull, the policy the wheels alone."""
+class Wheels(Task):
+    """The action is how fast the wheels turn."""
 
     max_steps = 50
-    reward_query = StateQuery(models=("rover",), links=(LinkQuery("hull"),), all_contacts=True)
 
     def action_space(self) -> Box:
         return Box(-1.0, 1.0, (2,), np.float32)
 
-    def observation_space(self) -> Box:
-        return Box(-np.inf, np.inf, (2,), np.float64)
-
     def apply(self, action: np.ndarray, state: WorldState) -> Commands:
         right, left = (10.0 * action).tolist()
         return {"wheels": (right, left)}
+
+
+class Roll(Wheels):
+    """Roll forward: the reward sees the hull, the policy the wheels alone."""
+
+    reward_query = StateQuery(models=("rover",), links=(LinkQuery("hull"),), all_contacts=True)
+
+    def observation_space(self) -> Box:
+        return Box(-np.inf, np.inf, (2,), np.float64)
 
     def observe(self, state: WorldState) -> np.ndarray:
         return np.array([state.joints[name].velocity for name in ("right_axle", "left_axle")])
@@ -80,17 +85,13 @@ class Roll(Task):
         return {"contacts": float(len(state.contacts))}
 
 
-class Push(Task):
+class Push(Wheels):
     """The rover, put somewhere else in each episode, pushes a crate forward; none of its joints is named."""
 
-    max_steps = 50
     objects = (Object("crate", CRATE, Pose((3.0, 0.0, 0.1))),)
     query = StateQuery(
         all_models=True, links=(LinkQuery("crate::crate", "hull"),), contacts_of=("rover::hull",)
     )
-
-    def action_space(self) -> Box:
-        return Box(-1.0, 1.0, (2,), np.float32)
 
     def observation_space(self) -> Box:
         return Box(-np.inf, np.inf, (10,), np.float64)
@@ -103,10 +104,6 @@ class Push(Task):
                 "crate": Pose((x + 0.4, y, 0.1)),
             }
         )
-
-    def apply(self, action: np.ndarray, state: WorldState) -> Commands:
-        right, left = (10.0 * action).tolist()
-        return {"wheels": (right, left)}
 
     def observe(self, state: WorldState) -> np.ndarray:
         crate = state.links["crate::crate"].pose

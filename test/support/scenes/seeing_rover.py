@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box
-from support.scenes.rover import CRATE, PARTS, ROVER
+from support.scenes.rover import CRATE, PARTS, ROVER, Wheels
 
-from robot_envs import Commands, InitialState, Object, Pose, StateQuery, Task, WorldState
+from robot_envs import InitialState, Object, Pose, StateQuery, WorldState
 
 NOISE = '<noise type="gaussian"><type>gaussian</type><stddev>{}</stddev><bias_stddev>{}</bias_stddev></noise>'
 SCAN = """<ray><scan><horizontal><samples>{}</samples><min_angle>-1.5</min_angle><max_angle>1.5</max_angle>
@@ -56,7 +56,7 @@ SEEING = replace(ROVER, urdf=f'<robot name="seeing">{"".join([*PARTS, *SENSORS])
 NAMES = ("front_laser", "sonar", "imu", "camera", "deep", "bumper", "old_imu")
 
 
-class Look(Task):
+class Look(Wheels):
     """Drives at a crate; all that is observed is what the sensors have measured."""
 
     max_steps = 170
@@ -72,10 +72,6 @@ class Look(Task):
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         y = float(rng.uniform(-0.1, 0.1))
         return InitialState(models={"crate": Pose((0.5, y, 0.1))})
-
-    def apply(self, action: np.ndarray, state: WorldState) -> Commands:
-        right, left = (10.0 * action).tolist()
-        return {"wheels": (right, left)}
 
     def observe(self, state: WorldState) -> np.ndarray:
         ranges = np.clip(state.sensors["front_laser"].ranges, 0.0, 5.0)

@@ -20,10 +20,7 @@ class Hold(Task):
     max_steps = 5
 
     def __init__(self, **parts: Any) -> None:
-        """
-        Args:
-            parts: attributes and methods that are to be others.
-        """
+        """`parts` are attributes and methods that are to be others."""
         vars(self).update(parts)
 
     def action_space(self) -> Box:

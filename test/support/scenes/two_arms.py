@@ -125,10 +125,7 @@ class Volley(Task):
     )
 
     def __init__(self, folder: Path) -> None:
-        """
-        Args:
-            folder: that the plinth's file is written to.
-        """
+        """The plinth's file is written to the folder."""
         plinth = folder / "plinth.urdf"
         plinth.write_text(PLINTH)
         self.objects = (

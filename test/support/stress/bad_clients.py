@@ -74,13 +74,7 @@ def bad_bytes(dice: random.Random, xmlrpc: bool) -> bytes:
 
 
 class BadClient(threading.Thread):
-    """Connects so often, each time with another fault, and holds some of its connections.
-
-    Args:
-        places: where to connect: TCPROS, XML-RPC.
-        dice: of all that it does.
-        count: connections.
-    """
+    """Connects `count` times, each time with another fault, and holds some of its connections."""
 
     def __init__(self, places: tuple[Address, Address], dice: random.Random, count: int) -> None:
         super().__init__(name="bad client", daemon=True)

@@ -62,11 +62,7 @@ Call = Callable[[], object]
 
 
 class OddCalls:
-    """Endless calls of one simulator, of each kind in turn.
-
-    Args:
-        number: of what is drawn.
-    """
+    """Endless calls of one simulator, of each kind in turn, drawn from the seed `number`."""
 
     def __init__(self, number: int) -> None:
         self._dice = random.Random(number)

@@ -19,11 +19,7 @@ OURS = re.compile(r'File "[^"]*/(?:src|scripts|companions)/(?!\.)[^"]*"')  # of 
 
 @contextlib.contextmanager
 def place(folder: Path | None = None) -> Iterator[Place]:
-    """A master's address and a folder.
-
-    Args:
-        folder: for temporary files and logs; None for one of its own.
-    """
+    """A master's address and a folder; temporary files and logs go to `folder`, if it is given."""
     made = Place()
     temporary, logs = (folder or made.folder) / "tmp", (folder or made.folder) / "log"
     temporary.mkdir()
@@ -41,6 +37,13 @@ def launch(where: Place, *arguments: str) -> Process:
     """roslaunch of an empty world, with what it says."""
     world = ["roslaunch", "gazebo_ros", "empty_world.launch", "gui:=false", "output:=screen"]
     return where.start(*world, *arguments)
+
+
+def ended(launched: Process, where: Place) -> None:
+    """Waits for its end, after which nothing of the place lives on."""
+    launched.end(BOUND)
+    left = where.left_after(30)
+    assert not left, left
 
 
 def waits(look: Callable[[], object], seconds: float = BOUND) -> bool:

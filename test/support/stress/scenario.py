@@ -16,15 +16,7 @@ Case = Callable[[int, random.Random], None]
 
 @dataclass
 class Row:
-    """What the table says of a scenario.
-
-    Args:
-        name: what was done, in the words of the table.
-        done: those that were tried.
-        failures: what went wrong, and in which case.
-        notes: figures besides, such as the memory before and after.
-        seconds: of wall time.
-    """
+    """What the table says of a scenario: its notes are figures such as the memory before and after."""
 
     name: str
     done: int = 0
@@ -34,12 +26,9 @@ class Row:
 
 
 class Scenario:
-    """Hands a stress test its share of the cases, its random numbers, and its row.
+    """Hands a stress test its share of the cases (`scale`), its random numbers (`seed`), and its row.
 
-    Args:
-        seed: of all that is drawn.
-        scale: part of the cases that is tried.
-        only: the one case to try, to see a failure again; None: all.
+    Of each scenario it tries the case `only` alone, to see a failure again, or all if that is None.
     """
 
     def __init__(self, seed: int, scale: float, only: int | None = None) -> None:
@@ -55,17 +44,9 @@ class Scenario:
         return random.Random(f"{self.seed}/{name}/{number}")
 
     def run(self, name: str, count: int, case: Case, lanes: int = 1, unit: int = 1) -> Row:
-        """Tries the cases, in so many threads; a case that fails keeps none of the others from it.
+        """Tries `count` cases at full scale, in `lanes` threads; fails in the end, with all that failed.
 
-        Args:
-            name: see `Row`.
-            count: cases at full scale.
-            case: gets its number and its random numbers; an assertion tells what doesn't hold.
-            lanes: cases that go on at a time.
-            unit: what a case counts for, where it holds several of what the row counts.
-
-        Raises:
-            AssertionError: with all failures, in the end.
+        A case gets its number and its random numbers; it counts for `unit`s of what the row counts.
         """
         __tracebackhide__ = True
         row, begin = Row(name), time.monotonic()

@@ -25,25 +25,15 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "reinforce": {"num_envs": 2, "episodes": 90, "eval_frequency": 500, "checkpoint_frequency": 25},
     "reinforce-document": {"episodes": 90, "eval_frequency": 500, "checkpoint_frequency": 25},
     "ppo": {"total_timesteps": 5000, "eval_frequency": 1000, "checkpoint_frequency": 250},
-    "sac": {
-        "env_id": "Pendulum-v1",
-        "env_kwargs": "max_episode_steps=20",
-        "total_timesteps": 800,
-        "eval_frequency": 200,
-        "checkpoint_frequency": 50,
-    },
-}
+    "sac": {"env_id": "Pendulum-v1", "env_kwargs": "max_episode_steps=20", "total_timesteps": 800,
+            "eval_frequency": 200, "checkpoint_frequency": 50},
+}  # fmt: skip
 # Every start of a process reads the exit codes of all that have ended, and each can be read once.
 _ONE_AT_A_TIME = threading.Lock()
 _ANYWHERE = {"env_id": "CartPole-v1", "env_kwargs": None}
 IMPORTED = [
-    "rl_workbench.training.train",
-    "rl_workbench.training.training",
-    "rl_workbench.training.dqn",
-    "rl_workbench.training.pg",
-    "torch._dynamo",
-    "torch.utils.tensorboard",
-    "matplotlib.pyplot",
+    *(f"rl_workbench.training.{name}" for name in ("train", "training", "dqn", "pg")),
+    *("torch._dynamo", "torch.utils.tensorboard", "matplotlib.pyplot"),
 ]
 
 
@@ -55,12 +45,9 @@ def new(name: str, run: Path, **changed: object) -> list[str]:
 
 
 class Forked:
-    """A training command under way.
+    """A training command under way, whose output goes to a file of the folder that it runs in.
 
-    Args:
-        arguments: of `rl-workbench train`.
-        folder: it runs in; its output goes to a file there.
-        limits: of its process, by their numbers in `resource`; RLIMIT_AS is what it may take besides.
+    `limits` are by their numbers in `resource`; RLIMIT_AS is what it may take besides.
     """
 
     def __init__(

@@ -12,7 +12,8 @@ import numpy as np
 from gazebo_msgs.srv import DeleteModel, GetModelState, GetWorldProperties, SpawnModel
 from geometry_msgs.msg import Pose
 from support.ros.programs import Place, Process
-from support.stress.places import BOUND, OURS, launch, leftovers, pid_of, place, waits
+from support.stress.bad_clients import SERVICE, Address, address
+from support.stress.places import BOUND, OURS, ended, launch, leftovers, pid_of, place, waits
 
 from ros_calls import master
 from ros_calls.service import ServiceClient, ServiceFailed
@@ -34,13 +35,7 @@ class Usage(NamedTuple):
 
 
 class World:
-    """A simulator on a master of its own.
-
-    Args:
-        where: master and folder.
-        launched: its roslaunch.
-        complains: tracebacks are no fault.
-    """
+    """A simulator on a master of its own, launched by roslaunch; if it `complains`, it may in tracebacks."""
 
     def __init__(self, where: Place, launched: Process, complains: bool = False) -> None:
         self.place, self.launched, self._complains = where, launched, complains
@@ -61,6 +56,11 @@ class World:
     def active(self) -> contextlib.AbstractContextManager[None]:
         """A block, for one thread, in which calls of `ros_calls` and `ros_utils` go to it."""
         return master.using(self.uri)
+
+    def doors(self) -> tuple[Address, Address]:
+        """Where clients connect: TCPROS of a service, and the node's XML-RPC."""
+        service, node = master.call("lookupService", SERVICE), master.call("lookupNode", "/gazebo")
+        return address(service), address(node)
 
     def call(self, name: str, kind: Any, *fields: Any) -> Any:
         """Calls one of Gazebo's services."""
@@ -134,11 +134,7 @@ def world(
 ) -> Iterator[World]:
     """An empty one, from launch to a clean end with nothing left.
 
-    Args:
-        engine: as `physics:=`.
-        arguments: further ones of the launch file.
-        folder: for its temporary files and logs; None for one of its own.
-        complains: what it lacks, it may tell in tracebacks, or end over, but not in silence.
+    If it `complains`, it may tell what it lacks in tracebacks, or end over it, but not in silence.
     """
     with place(folder) as here:
         launched = launch(here, f"physics:={engine}", *arguments)
@@ -150,6 +146,4 @@ def world(
         else:
             made.check()
         launched.interrupt()
-        launched.end(BOUND)
-        left = here.left_after(30)
-        assert not left, left
+        ended(launched, here)

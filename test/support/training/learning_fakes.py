@@ -73,8 +73,7 @@ class Dicing(gymnasium.Env):
 class OnlyOne(gymnasium.Env):
     """As over ROS: another one of its kind would move the same robot."""
 
-    observation_space = gymnasium.spaces.Box(-9, 9, (4,), np.float32)
-    action_space = gymnasium.spaces.Discrete(2)
+    observation_space, action_space = Dicing.observation_space, Dicing.action_space
     shares_robot = True
 
     def reset(self, *, seed=None, options=None):
@@ -96,9 +95,7 @@ class Died(gymnasium.error.Error):
 class Pole(gymnasium.Env):
     """A pole on a cart that follows its set-point with a lag; an action nudges that. Semi-implicit Euler.
 
-    Args:
-        noise: episodes start within +-noise of the origin [m] and of upright [rad]; 0: all alike.
-        dies_after: number of actions after which the simulator "dies"; None: never.
+    Episodes start within ±`noise` [m], [rad]; after `dies_after` actions the simulator "dies".
     """
 
     observation_space = gymnasium.spaces.Box(-99, 99, (4,), np.float32)
@@ -109,9 +106,8 @@ class Pole(gymnasium.Env):
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        x, angle = (
-            self.np_random.uniform(-self._noise, self._noise, 2) if self._noise else (0.0, 0.0)
-        )
+        drawn = self.np_random.uniform(-self._noise, self._noise, 2) if self._noise else np.zeros(2)
+        x, angle = drawn.tolist()
         self._state, self._set_point = (x, 0.0, angle, 0.0), x
         return np.array(self._state, np.float32), {}
 
@@ -188,12 +184,7 @@ def learned_lengths(agent: PolicyGradientAgent | ReinforceAgent, episodes: int) 
 
 
 class Spoilt(gymnasium.Env):
-    """Gives numbers at its 30th step that are none, or too large to learn from.
-
-    Args:
-        observation: in the observation of that step.
-        reward: of that step.
-    """
+    """Gives an observation and a reward at its 30th step that are no numbers, or too large to learn from."""
 
     observation_space = gymnasium.spaces.Box(-1, 1, (4,), np.float32)
     action_space = gymnasium.spaces.Discrete(2)

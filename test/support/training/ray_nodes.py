@@ -45,12 +45,7 @@ def wait_until(condition: Callable[[], object], what: str, patience: float = PAT
 
 
 class RayNode:
-    """`ray start --block` in a session of its own.
-
-    Args:
-        flags: of `ray start`.
-        without: variables of the environment that it doesn't have.
-    """
+    """`ray start --block` with flags in a session of its own, `without` some variables of the environment."""
 
     def __init__(self, flags: Sequence[str], without: Sequence[str] = ()) -> None:
         # Short, as sockets lie in it.

@@ -48,8 +48,8 @@ SMALL: dict[str, dict[str, Any]] = {
         "checkpoint_frequency": 60, "save_every": 5,
     },
     "ppo": _EVERYWHERE | {
-        "total_timesteps": 256, "n_steps": 64, "batch_size": 64, "log_frequency": 64,
-        "net_arch": "8", "eval_frequency": 100, "checkpoint_frequency": 70,
+        "total_timesteps": 256, "n_steps": 64, "batch_size": 64, "log_frequency": 64, "net_arch": "8",
+        "eval_frequency": 100, "checkpoint_frequency": 70,
     },
     "sac": _EVERYWHERE | {
         "env_id": "Pendulum-v1", "env_kwargs": {"max_episode_steps": 20}, "total_timesteps": 140,
@@ -69,11 +69,7 @@ def flags(options: dict[str, Any]) -> list[str]:
 
 
 class InterruptAfter(Interrupt):
-    """Ctrl-C, pressed when the training asks for the n-th time.
-
-    Args:
-        asked: n; None: never.
-    """
+    """Ctrl-C, pressed when the training asks for the n-th time; None: never."""
 
     def __init__(self, asked: int | None = None) -> None:
         super().__init__()

@@ -39,28 +39,6 @@ class Spring(Controller):
             self.stretch.send(Vector3(x=stretch))
 
 
-class Raises(Controller):
-    """A controller with a fault."""
-
-    type_name = "my_controllers/Raises"
-    interface = "EffortJointInterface"
-
-    def __init__(self, name, joint):
-        super().__init__(name)
-        self.joint = joint
-        self.claimed = (joint.name,)
-
-    @classmethod
-    def create(cls, name, params, hardware):
-        return cls(name, joint_param(params, name, cls.interface, hardware))
-
-    def starting(self, now):
-        self.joint.command = 5.0
-
-    def update(self, now, dt):
-        raise ZeroDivisionError("a user's mistake")
-
-
 class Rude(Controller):
     """A controller that misbehaves at the place that the parameter `where` names."""
 

@@ -78,9 +78,8 @@ class HardwareTest(SlidesTest):
             topic = self.hear(f"/slides/{name}/state", JointControllerState)
             before = self.step(20, **{name: 0.1})[joint]
             self.step(1)
-            self.assertTrue(
-                topic.wait_for(lambda got, due=due: got and got[-1].header.stamp.nsecs == due)
-            )
+            due_now = topic.wait_for(lambda got, due=due: got[-1].header.stamp.nsecs == due)
+            self.assertTrue(due_now)
             state = topic.messages[-1]
             self.assertEqual((state.process_value, state.process_value_dot), before[:2])
             self.assertEqual((state.set_point, state.error), (0.1, 0.1 - before[0]))
@@ -134,9 +133,8 @@ class HardwareTest(SlidesTest):
             self.hear("/slides/rude/report", rospy.AnyMsg)
             self.assertTrue(self.manager.switch(["rude"]))
             joints = self.step(500, effort_position=0.1)
-            self.assertEqual(
-                (self.state("rude"), self.state("effort_position")), ("stopped", "running")
-            )
+            states = (self.state("rude"), self.state("effort_position"))
+            self.assertEqual(states, ("stopped", "running"))
             self.assertAlmostEqual(joints["effort_a"][0], 0.1, delta=0.01)
             self.assertTrue(self.manager.unload("rude"))
 

@@ -14,11 +14,8 @@ CONTROLLERS = {
     "cart": {"type": POSITION, "joint": "stand_cart", "pid": WEAK},
     "cart2": {"type": POSITION, "joint": "stand_cart", "pid": WEAK},
     "pole": {"type": POSITION, "joint": "cart_pole", "pid": WEAK},
-    "both": {
-        "type": "effort_controllers/JointGroupEffortController",
-        "joints": ["stand_cart", "cart_pole"],
-    },
-}
+    "both": {"type": "effort_controllers/JointGroupEffortController", "joints": ["stand_cart", "cart_pole"]},
+}  # fmt: skip
 PLUGIN = re.compile(r"(<plugin [^>]*libgazebo_ros_control[^>]*)/>")
 
 

@@ -55,9 +55,8 @@ class ControllersTest(SlidesTest):
             self.run_controllers(name)
             command = self.publisher(f"/slides/{name}/command", Float64MultiArray)
             index = {"effort_group": 2, "position_group": 0, "velocity_group": 1}[name]
-            self.publish_until(
-                command, Float64MultiArray(data=[9.0]), lambda joints: True
-            )  # the wrong length: ignored, and an error in the log
+            # The wrong length: ignored, and an error in the log.
+            self.publish_until(command, Float64MultiArray(data=[9.0]), lambda joints: True)
             first, last = wanted
             self.publish_until(
                 command,
@@ -82,9 +81,8 @@ class ControllersTest(SlidesTest):
         joints = self.step(100, spring=0.1)
         self.assertIn("my_controllers/Spring", self.manager.types().types)
         self.assertEqual(self.manager.listed()[0].type, "my_controllers/Spring")
-        self.assertEqual(
-            list(self.manager.listed()[0].claimed_resources[0].resources), ["effort_b"]
-        )
+        claimed = self.manager.listed()[0].claimed_resources[0]
+        self.assertEqual(list(claimed.resources), ["effort_b"])
         angle = math.sqrt(30.0) * 0.1  # an oscillator of 1 kg
         self.assertAlmostEqual(joints["effort_b"][0], 0.1 * (1.0 - math.cos(angle)), delta=3e-4)
         self.assertTrue(stretch.wait_for(len))

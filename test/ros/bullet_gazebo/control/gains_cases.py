@@ -37,25 +37,13 @@ class GainsTest(SlidesTest):
         self.assertTrue(state.wait_for(lambda got: got and got[-1].p == 250.0))
         self.assertEqual(rospy.get_param(f"{PID}/p"), 250.0)
 
-    def test_gains_are_written_to_the_parameter_server_at_load(self):
-        self.assertTrue(self.manager.load("effort_position"))
-        self.assertLessEqual(set(NAMES), set(rospy.get_param(PID)))
-        self.assertEqual(rospy.get_param(f"{PID}/i_clamp_max"), 0.0)
-
     def test_gains_take_effect_are_clamped_and_told(self):
         self.run_controllers("effort_position")
         updates = self.hear("/slides/effort_position/pid/parameter_updates", Config)  # latched
         self.assertTrue(updates.wait_for(len))
         answer = reconfigure(PID, p=1e9, d=-1e9, i_clamp_max=-3.0, i_clamp_min=2.0, i=5.0)
-        wanted = {
-            "p": 1e5,
-            "d": -1e3,
-            "i_clamp_max": 0.0,
-            "i_clamp_min": 0.0,
-            "i": 5.0,
-            "antiwindup": False,
-        }
-        self.assertEqual(answer, wanted)
+        clamps = {"i_clamp_max": 0.0, "i_clamp_min": 0.0, "antiwindup": False}
+        self.assertEqual(answer, {"p": 1e5, "d": -1e3, "i": 5.0} | clamps)
         self.assertTrue(updates.wait_for(lambda got: len(got) == 2))
         reconfigure(PID, p=100.0, i=0.0, d=0.0)
         joints = self.step(1, effort_position=0.1)
@@ -83,8 +71,10 @@ class GainsTest(SlidesTest):
             self.assertTrue(math.isfinite(answer["p"]))
         self.assertTrue(math.isfinite(self.step(10, effort_position=0.1)["effort_a"][0]))
 
-    def test_the_descriptions_name_the_six_parameters(self):
+    def test_from_load_on_the_gains_are_on_the_parameter_server_and_described(self):
         self.assertTrue(self.manager.load("effort_position"))
+        self.assertLessEqual(set(NAMES), set(rospy.get_param(PID)))
+        self.assertEqual(rospy.get_param(f"{PID}/i_clamp_max"), 0.0)
         topic = self.hear("/slides/effort_position/pid/parameter_descriptions", ConfigDescription)
         self.assertTrue(topic.wait_for(len))
         description = topic.messages[0]
@@ -104,10 +94,11 @@ class GainsTest(SlidesTest):
 
     def test_every_joint_of_a_group_and_every_drive_has_gains(self):
         self.run_controllers("effort_group_position")
-        answer = reconfigure("/slides/effort_group_position/effort_b/pid", p=111.0)
-        self.assertEqual(answer["p"], 111.0)
-        answer = reconfigure("/slides/gazebo_ros_control/pid_gains/velocity_b", p=222.0)
-        self.assertEqual(answer["p"], 222.0)
+        for gains in (
+            "effort_group_position/effort_b/pid",
+            "gazebo_ros_control/pid_gains/velocity_b",
+        ):
+            self.assertEqual(reconfigure(f"/slides/{gains}", p=111.0)["p"], 111.0)
 
     def test_they_go_with_the_controller(self):
         service = f"{PID}/set_parameters"

@@ -1,5 +1,6 @@
 """spawner and unspawner: in launch files, on the command line, and every line they print."""
 
+import itertools
 import re
 import signal
 import subprocess
@@ -43,15 +44,17 @@ class SpawnerTest(CartPoleCase):
         self.manager = Manager()
         self.programs = []
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
-        for name, text in (("first", FIRST), ("second", SECOND)):
-            (self.folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+        self.first, self.second = self.file("first.yaml", FIRST), self.file("second.yaml", SECOND)
 
     def tearDown(self):
-        for program in list(self.programs):
-            self.end(program, signal.SIGINT)
+        for program in self.programs:
+            program.send_signal(signal.SIGINT)
+            program.communicate(timeout=BOUND)
 
-    def file(self, name):
-        return str(self.folder / f"{name}.yaml")
+    def file(self, name, text):
+        path = self.folder / name
+        path.write_text(text, encoding="utf-8")
+        return str(path)
 
     def start(self, *command):
         program = subprocess.Popen(
@@ -67,14 +70,14 @@ class SpawnerTest(CartPoleCase):
         return self.start(executable("controller_manager", "unspawner"), *arguments)
 
     def end(self, program, number):
-        """Returns the lines that the program has printed, without colours and times."""
-        if program.poll() is None:
-            program.send_signal(number)
-        return self.lines(program)
+        program.send_signal(number)
+        return self.ends(program)
 
-    def lines(self, program):
+    def ends(self, program, code=0):
+        """Returns the lines that the program has printed, without colours and times."""
         self.programs.remove(program)
         output, _ = program.communicate(timeout=BOUND)
+        self.assertEqual(program.returncode, code, output)
         return [STAMP.sub(r"\1: ", line) for line in COLOUR.sub("", output).splitlines()]
 
     def expect_states(self, expected, manager=None):
@@ -85,17 +88,14 @@ class SpawnerTest(CartPoleCase):
     # in a launch file
 
     def launch(self, namespace="/", options=""):
-        path = self.folder / "robot.launch"
-        text = LAUNCH.format(namespace=namespace, file=self.file("first"), options=options)
-        path.write_text(text, encoding="utf-8")
-        return self.start("roslaunch", str(path))
+        text = LAUNCH.format(namespace=namespace, file=self.first, options=options)
+        return self.start("roslaunch", self.file("robot.launch", text))
 
     def test_a_launch_file_starts_controllers_and_takes_them_along_when_it_ends(self):
         launch = self.launch()
         self.expect_states(RUNNING)
         self.end(launch, signal.SIGINT)
         self.expect_states({})
-        self.assertEqual(launch.returncode, 0)
 
     def test_in_the_namespace_of_the_launch_file(self):
         self.spawn_cartpole("second", robot_namespace="/my_robot")
@@ -105,41 +105,36 @@ class SpawnerTest(CartPoleCase):
         self.assertEqual(self.manager.states(), {})
         self.end(launch, signal.SIGTERM)
         self.expect_states({}, robot)
-        self.assertEqual(launch.returncode, 0)
 
     # files, options and lines
 
     def test_files_and_names_in_any_order(self):
-        spawner = self.spawner(self.file("second"), "--timeout", "-1", self.file("first"))
+        spawner = self.spawner(self.second, "--timeout", "-1", self.first)
         self.expect_states({"pole": "running"} | RUNNING)
         self.assertEqual(rospy.get_param("/cart/pid/p"), 1.0)
         self.end(spawner, signal.SIGTERM)
         self.expect_states({})
-        self.assertEqual(spawner.returncode, 0)
-        spawner = self.spawner("pole", self.file("first"))
+        self.spawner("pole", self.first)
         self.expect_states({"pole": "running"} | RUNNING)
 
     def test_a_file_goes_into_the_namespace(self):
         self.spawn_cartpole("second", robot_namespace="/my_robot")
-        self.spawner("--namespace", "/my_robot", self.file("second"))
+        self.spawner("--namespace", "/my_robot", self.second)
         self.expect_states({"pole": "running"}, Manager("/my_robot"))
         self.assertTrue(rospy.has_param("/my_robot/pole/type"))
         self.assertFalse(rospy.has_param("/pole/type"))
 
     def test_a_file_that_is_none(self):
-        path = self.folder / "bad.yaml"
-        path.write_text("just text", encoding="utf-8")
-        spawner = self.spawner(str(path))
-        lines = self.lines(spawner)
-        self.assertEqual(spawner.returncode, 1)
-        self.assertIn(str(path), lines[-1])
+        path = self.file("bad.yaml", "just text")
+        lines = self.ends(self.spawner(path), 1)
+        self.assertIn(path, lines[-1])
         self.assertNotIn("Traceback", "".join(lines))
         self.assertEqual(self.manager.states(), {})
 
     def test_printed_lines(self):
         rospy.set_param("/cart", {"type": "effort_controllers/JointPositionController",
                                   "joint": "stand_cart", "pid": {"p": 1.0}})  # fmt: skip
-        spawner = self.spawner("cart", self.file("second"))
+        spawner = self.spawner("cart", self.second)
         self.expect_states({"cart": "running", "pole": "running"})
         lines = self.end(spawner, signal.SIGINT)
         service = "INFO: Controller Spawner: Waiting for service controller_manager"
@@ -172,7 +167,7 @@ class SpawnerTest(CartPoleCase):
         self.assertIsNone(spawner.poll())
 
     def test_one_that_somebody_else_stopped_keeps_no_other(self):
-        spawner = self.spawner(self.file("second"), self.file("first"))
+        spawner = self.spawner(self.second, self.first)
         self.expect_states({"pole": "running"} | RUNNING)
         self.assertTrue(self.manager.switch([], ["pole"], STRICT))
         self.end(spawner, signal.SIGINT)
@@ -181,35 +176,34 @@ class SpawnerTest(CartPoleCase):
     def test_wait_for_goes_on_after_the_timeout(self):
         gate = rospy.Publisher("/never", Bool, queue_size=1, latch=True)
         gate.publish(False)
-        self.spawner("--wait-for", "/never", "--timeout", "1", self.file("second"))
+        self.spawner("--wait-for", "/never", "--timeout", "1", self.second)
         self.expect_states({"pole": "running"})
 
     def test_wait_for_waits_for_true(self):
         gate = rospy.Publisher("/gate", Bool, queue_size=1, latch=True)
         gate.publish(False)
-        self.spawner("--wait-for", "/gate", "--no-timeout", self.file("second"))
+        self.spawner("--wait-for", "/gate", "--no-timeout", self.second)
         self.assertTrue(wait_until(gate.get_num_connections))
         self.assertEqual(self.manager.states(), {})
         gate.publish(True)
         self.expect_states({"pole": "running"})
 
     def test_an_unknown_controller_does_not_keep_the_others_from_starting(self):
-        spawner = self.spawner("nobody", self.file("second"))
+        spawner = self.spawner("nobody", self.second)
         self.expect_states({"pole": "running"})
         self.assertIn("Failed to load nobody", "".join(self.end(spawner, signal.SIGINT)))
 
     def test_wait_for_is_interrupted_by_ctrl_c(self):
-        spawner = self.spawner("--wait-for", "/never", "--timeout", "0", self.file("second"))
+        spawner = self.spawner("--wait-for", "/never", "--timeout", "0", self.second)
         listeners = rospy.Publisher("/never", Bool, queue_size=1)
         self.assertTrue(wait_until(listeners.get_num_connections))
         self.end(spawner, signal.SIGINT)
-        self.assertEqual(spawner.returncode, 0)
         self.assertEqual(self.manager.states(), {})
 
     # ended by others, and unspawner
 
     def test_rosnode_kill_ends_both_well(self):
-        spawner = self.spawner(self.file("first"), "__name:=my_spawner")
+        spawner = self.spawner(self.first, "__name:=my_spawner")
         self.expect_states(RUNNING)
         unspawner = self.unspawner("cart", "__name:=my_unspawner")
         self.expect_states({"states": "running", "cart": "stopped"})
@@ -218,20 +212,18 @@ class SpawnerTest(CartPoleCase):
             (spawner, "/my_spawner", {}),
         ):
             subprocess.run(["rosnode", "kill", name], check=True, stdout=subprocess.DEVNULL)
-            self.lines(program)
-            self.assertEqual(program.returncode, 0)
+            self.ends(program)
             self.expect_states(states)
 
     def test_unspawner_starts_only_what_it_has_stopped(self):
-        self.spawner(self.file("first"))
+        self.spawner(self.first)
         self.expect_states(RUNNING)
-        self.spawner("--stopped", self.file("second"))
+        self.spawner("--stopped", self.second)
         self.expect_states(RUNNING | {"pole": "initialized"})
         unspawner = self.unspawner("pole", "cart", "nobody")
         self.expect_states({"states": "running", "cart": "stopped", "pole": "initialized"})
         lines = self.end(unspawner, signal.SIGTERM)
         self.expect_states(RUNNING | {"pole": "initialized"})
-        self.assertEqual(unspawner.returncode, 0)
         service = "INFO: Unspawner: Waiting for service controller_manager"
         self.assertEqual(
             lines,
@@ -244,7 +236,7 @@ class SpawnerTest(CartPoleCase):
         )
 
     def test_unspawner_gives_back_what_somebody_else_has_started_meanwhile(self):
-        self.spawner(self.file("first"))
+        self.spawner(self.first)
         self.expect_states(RUNNING)
         unspawner = self.unspawner("cart")
         self.expect_states({"states": "running", "cart": "stopped"})
@@ -259,15 +251,15 @@ class SpawnerTest(CartPoleCase):
         """The last one by its name: from now on simulated time isn't zero any more."""
         gazebo("unpause_physics")
         self.addCleanup(gazebo, "pause_physics")
-        spawner = self.spawner("--namespace", "/nowhere", "--timeout", "1", self.file("second"))
-        lines = self.lines(spawner)
-        self.assertEqual(spawner.returncode, 1)
+        spawner = self.spawner("--namespace", "/nowhere", "--timeout", "1", self.second)
+        lines = self.ends(spawner, 1)
         self.assertIn("couldn't find the expected controller_manager ROS interface", lines[-1])
 
     def test_while_simulated_time_stands_at_zero_the_timeout_begins_anew(self):
-        spawner = self.spawner("--namespace", "/late", "--timeout", "0.2", self.file("second"))
+        spawner = self.spawner("--namespace", "/late", "--timeout", "0.2", self.second)
         # It says so, and the robot comes after several timeouts.
-        for _, line in zip(range(3), filter(is_retry, spawner.stdout), strict=False):
+        retries = (line for line in spawner.stdout if "still waiting" in line)
+        for line in itertools.islice(retries, 3):
             self.assertIn("/late/controller_manager/load_controller", line)
         self.spawn_cartpole("second", robot_namespace="/late")
         reader = threading.Thread(target=spawner.stdout.read, daemon=True)
@@ -276,7 +268,3 @@ class SpawnerTest(CartPoleCase):
         spawner.send_signal(signal.SIGINT)
         reader.join(BOUND)
         self.expect_states({}, Manager("/late"))
-
-
-def is_retry(line):
-    return "still waiting" in line

@@ -1,34 +1,35 @@
 #!/usr/bin/env python3
-"""Arguments of empty_world.launch that matter when the simulator is killed, fails or meets another one."""
+"""Arguments of empty_world.launch that show when the simulator ends, and `record:=FILE`."""
 
 import contextlib
 import os
+import re
 import signal
-import unittest
+import subprocess
 
+import imageio_ffmpeg
 import rosgraph
 import rostest
 from support.ros.calls import process_of, wait_until
-from support.ros.programs import BOUND, Place
+from support.ros.programs import BOUND, PlaceCase
 
 SERVER = ("rosrun", "gazebo_ros", "gzserver")
+WORLD = ("roslaunch", "gazebo_ros", "empty_world.launch", "gui:=false")
 SPAWN = ("rosrun", "gazebo_ros", "spawn_model", "-urdf", "-param", "/box", "-model", "box")
 BOX = """<robot name="box"><link name="body"><inertial><mass value="1"/>
 <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
 <gazebo><plugin name="breaks" filename="libbreaks.so"/></gazebo></robot>"""
 
 
-class LaunchArgumentsTest(unittest.TestCase):
+class LaunchArgumentsTest(PlaceCase):
     def setUp(self):
-        self.place = Place()
-        self.addCleanup(self.place.close)
+        super().setUp()
         self.uri = self.place.environment["ROS_MASTER_URI"]
         self.master = rosgraph.Master("/launch_arguments", self.uri)
 
     def world(self, *arguments):
         """A world launched with arguments of the user's."""
-        launch = ("roslaunch", "gazebo_ros", "empty_world.launch", "gui:=false")
-        return self.place.start(*launch, *arguments)
+        return self.place.start(*WORLD, *arguments)
 
     def simulator(self, unlike=None):
         """Process id of the simulator once it is up, and another one than `unlike`."""
@@ -64,21 +65,41 @@ class LaunchArgumentsTest(unittest.TestCase):
     def test_a_second_simulator_is_refused_while_the_first_lives_unless_it_shall_replace_it(self):
         world = self.world()
         first = self.simulator()
-        second = self.place.start(*SERVER)
-        self.assertEqual(second.end(), 1)
-        self.assertEqual(len(second.output.splitlines()), 1, second.output)
-        self.assertIn(f"/gazebo runs at {self.uri} already", second.output)
-        self.assertIn("ROS_MASTER_URI=http://", second.output)
+        refusal = self.run_here(*SERVER, code=1)
+        self.assertEqual(len(refusal.splitlines()), 1, refusal)
+        self.assertRegex(refusal, f"/gazebo runs at {self.uri} already.*ROS_MASTER_URI=http://")
         self.assertEqual(self.simulator(), first)
         third = self.place.start(*SERVER, "--replace")
         self.assertNotEqual(self.simulator(unlike=first), first)
         third.send(signal.SIGTERM)
-        self.assertEqual(third.end(), 0)
+        self.ends(third)
         world.interrupt()
         world.end()
         self.assertIn("another node has taken the name /gazebo", world.output)
-        self.assertNotIn("Traceback", world.output + third.output)
+        self.assertNotIn("Traceback", world.output)
+
+
+class Recording(PlaceCase):
+    def test_a_video_is_whole_after_ctrl_c(self):
+        video = self.place.folder / "it's a video.mp4"
+        launch = self.place.start("roslaunch", "cartpole", "simulation.launch", "lockstep:=false",
+                                  "paused:=false", f"record:={video}")  # fmt: skip
+        launch.wait_for("starting joint_state_controller")
+        launch.interrupt()
+        self.assert_nothing_left(launch.output)
+        launch.end()
+        told = re.search(r"recording: .*video\.mp4: (\d+) frames, [0-9.]+ s", launch.output)
+        self.assertTrue(told and int(told[1]) > 0, launch.output)
+        read = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(video), "-f", "null", "-"]
+        self.assertEqual(subprocess.run(read, check=False, timeout=BOUND).returncode, 0)
+
+    def test_what_cannot_be_recorded_is_one_line(self):
+        video = f"record:={self.place.folder}/a.avi"
+        launch = self.place.start(*WORLD, "server_required:=true", video)
+        launch.end()
+        self.assertIn("a recording's name ends in .mp4", launch.output)
+        self.assertNotIn("Traceback", launch.output)
 
 
 if __name__ == "__main__":
-    rostest.rosrun("cartpole", "launch_arguments", LaunchArgumentsTest)
+    rostest.rosrun("cartpole", "launch_arguments", "__main__")

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Runs in lock-step, recorded by rosbag or lockstep.py, and repeated by replay.py."""
 
+import contextlib
 import importlib.util
 import os
 import re
@@ -15,7 +16,8 @@ from pathlib import Path
 import rosbag
 import rospkg
 import rostest
-from support.ros.calls import executable, process_of
+from support.ros.calls import process_of
+from support.ros.programs import piped
 
 from bullet_gazebo.clients.gz import RemoteWorld
 from ros_calls import master
@@ -46,20 +48,16 @@ while not rospy.is_shutdown():
 BOUND = 300  # [s]
 
 
-def start(*command, **options):
-    if command[0] == "rosrun":
-        command = executable(*command[1:3]), *command[3:]
-    return subprocess.Popen(
-        list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        start_new_session=True, **options,
-    )  # fmt: skip
-
-
 def replay(*arguments, **options):
     """Returns exit code, standard output and error of a replay."""
-    process = start("rosrun", "cartpole", "replay.py", *arguments, **options)
+    process = piped("rosrun", "cartpole", "replay.py", *arguments, **options)
     out, err = process.communicate(timeout=BOUND)
     return process.returncode, out, err
+
+
+def entries_of(bag):
+    messages = rosbag.Bag(str(bag)).read_messages("/gazebo/journal")
+    return [each for _, message, _ in messages for each in message.entries]
 
 
 def add_cartpole(name="cartpole", pos_y=0.0):
@@ -81,18 +79,25 @@ class ReplayTest(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder)
         self.bag = self.folder / "run.bag"
 
-    def simulation(self, **options):
-        simulation = Simulation(lockstep=True, **options)
-        self.addCleanup(simulation.close)
-        self.enterContext(simulation.active())
-        return simulation
+    @contextlib.contextmanager
+    def simulation(self, arguments=""):
+        with (
+            Simulation(lockstep=True, extra_gazebo_args=arguments) as simulation,
+            simulation.active(),
+        ):
+            yield simulation
+
+    @contextlib.contextmanager
+    def recorded(self, arguments, *topics):
+        """A simulator that is recorded from its beginning to its end, at which it sends the rest."""
+        with self.simulation(arguments) as simulation:
+            recorder = self.record(simulation, *topics)
+            yield simulation
+        recorder.communicate(timeout=BOUND)
 
     def record(self, simulation, *topics):
-        """Starts `rosbag record`, and returns once it is connected.
-
-        It ends after the simulator, which sends the rest when it ends.
-        """
-        recorder = start(
+        """Starts `rosbag record`, and returns once it is connected."""
+        recorder = piped(
             "rosbag", "record", "-O", self.bag, "__name:=recorder", "/gazebo/journal", *topics,
             env=simulation.environment(),
         )  # fmt: skip
@@ -125,11 +130,10 @@ class ReplayTest(unittest.TestCase):
 
     def test_a_stepped_world_with_all_that_comes_and_goes(self):
         """Robots come by services and a spawner and go again, another node commands, time is set back."""
-        with self.simulation(extra_gazebo_args="--seed 3") as simulation:
-            recorder = self.record(simulation, "/clock", "/cartpole/joint_states")
+        with self.recorded("--seed 3", "/clock", "/cartpole/joint_states") as simulation:
             add_cartpole()
             environment = simulation.environment()
-            spawner = start(
+            spawner = piped(
                 "rosrun", "controller_manager", "spawner", "--namespace=/cartpole", STATES, CART,
                 env=environment,
             )  # fmt: skip
@@ -138,42 +142,34 @@ class ReplayTest(unittest.TestCase):
 
             def runs():
                 client.step(1)
-                return (ros_controllers.list_controllers_srv("/cartpole") or {}).get(
-                    CART
-                ) == "running"
+                listed = ros_controllers.list_controllers_srv("/cartpole") or {}
+                return listed.get(CART) == "running"
 
             wait_until(runs, BOUND, "the spawner")
-            another = start(
+            another = piped(
                 sys.executable, "-P", "-c", PUBLISHER, f"/cartpole/{CART}/command", env=environment
             )
             self.addCleanup(self.end, another)
             self.assertEqual(another.stdout.readline(), "connected\n")
-            for index in range(300):
+            for index in range(160):
                 client.step(8 if index % 20 else 3000)  # a long one lets others in between
             add_cartpole("second", pos_y=2.0)
             ros_controllers.spawn_controllers_srv([STATES, CART], ns="/second")
-            for index in range(100):
+            for index in range(50):
                 client.step(8, {f"/second/{CART}": 0.001 * index}, links=["second::pole"])
             ros_gazebo.gazebo_delete_model("second")
             client.step(50)
             client.reset({"cart_pole": 0.1}, everything=True, seed=5)
             client.step(100)
             self.end(another)
-        recorder.communicate(timeout=BOUND)
         topics = rosbag.Bag(str(self.bag)).get_type_and_topic_info().topics
         self.assertIn("/cartpole/joint_states", topics)
-        entries = [
-            each
-            for _, message, _ in rosbag.Bag(str(self.bag)).read_messages("/gazebo/journal")
-            for each in message.entries
-        ]
-        commands = [each for each in entries if each.name == f"/cartpole/{CART}/command"]
-        self.assertGreater(len(commands), 10)
-        self.assertTrue(
-            any(one.ended > other.elapsed > one.elapsed for one in entries for other in commands),
-            "no command came in the middle of a step",
-        )
-        self.check_equal(at_least=500)
+        entries = entries_of(self.bag)
+        sent = [each.elapsed for each in entries if each.name == f"/cartpole/{CART}/command"]
+        self.assertGreater(len(sent), 10)
+        amid = [each for each in entries if any(each.elapsed < at < each.ended for at in sent)]
+        self.assertTrue(amid, "no command came in the middle of a step")
+        self.check_equal(at_least=300)
         gains = self.folder / "gains.yaml"
         gains.write_text("pid: {p: 15.0, i: 0.0, d: 3.0}\n")
         self.check_difference(
@@ -187,24 +183,26 @@ class ReplayTest(unittest.TestCase):
         )
 
     def test_a_recorder_that_comes_late_gets_the_beginning(self):
-        with self.simulation() as simulation:
+        """With MuJoCo where it is installed."""
+        engine = "ode" if importlib.util.find_spec("mujoco") is None else "mujoco"
+        with self.simulation(f"-e {engine}") as simulation:
             add_cartpole()
             client = StepClient()
-            for _ in range(100):
+            client.reset({"cart_pole": 0.3})
+            for _ in range(50):
                 client.step(8)
             recorder = self.record(simulation)
-            client.step(8)
+            for _ in range(50):
+                client.step(8)
         recorder.communicate(timeout=BOUND)
-        self.assertRegex(self.check_equal(at_least=103), "no states were recorded with the first")
+        self.assertIn("no states were recorded with the first", self.check_equal(at_least=104))
 
     def test_snapshots_gains_and_a_noisy_sensor(self):
-        with self.simulation(extra_gazebo_args="--seed 7") as simulation:
-            recorder = self.record(simulation)
+        with self.recorded("--seed 7") as simulation:
             add_cartpole()
             self.go_back(simulation)
             self.change_gains(simulation)
             self.measure()
-        recorder.communicate(timeout=BOUND)
         # Time goes back by 1.2 s twice, and so is recorded three times.
         self.assertIn(" 5.224 s", self.check_equal(at_least=48))
 
@@ -247,7 +245,7 @@ class ReplayTest(unittest.TestCase):
     def test_a_simulator_that_goes_on_behind_the_end_of_its_bag(self):
         """As behind `lockstep.py --record`, if the script leaves its simulator running."""
         first = self.folder / "first.bag"
-        with self.simulation(extra_gazebo_args=f"--journal {first}") as simulation:
+        with self.simulation(f"--journal {first}") as simulation:
             StepClient().step(8)
             RemoteWorld("/gazebo", simulation.master_uri).command("end_journal")
             recorder = self.record(simulation)
@@ -256,18 +254,6 @@ class ReplayTest(unittest.TestCase):
         self.assertIn(" 0.016 s", self.check_equal(at_least=3))
         self.bag = first
         self.assertIn(" 0.008 s", self.check_equal(at_least=2))
-
-    @unittest.skipIf(importlib.util.find_spec("mujoco") is None, "mujoco is not installed")
-    def test_mujoco(self):
-        with self.simulation(extra_gazebo_args="-e mujoco") as simulation:
-            recorder = self.record(simulation)
-            add_cartpole()
-            client = StepClient()
-            client.reset({"cart_pole": 0.3})
-            for _ in range(50):
-                client.step(8)
-        recorder.communicate(timeout=BOUND)
-        self.check_equal(at_least=50)
 
     def test_a_script_that_drives_a_vehicle_until_a_time(self):
         """state_topic.py draws poses, publishes them and commands, and waits for scans."""
@@ -280,10 +266,10 @@ class ReplayTest(unittest.TestCase):
         self.assertEqual(topics["/joint_states"].msg_type, "sensor_msgs/JointState")
 
     def run_script(self, script, *arguments):
-        environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{reserved_port()}"}
-        process = start(
+        uri = f"http://127.0.0.1:{reserved_port()}"
+        process = piped(
             "rosrun", "cartpole", "lockstep.py", "--seed=4", "--record", self.bag, script, *arguments,
-            env={**environment, "ROS_IP": "127.0.0.1"},
+            env={**os.environ, "ROS_MASTER_URI": uri, "ROS_IP": "127.0.0.1"},
         )  # fmt: skip
         self.addCleanup(self.end, process)
         out, err = process.communicate(timeout=BOUND)
@@ -303,7 +289,7 @@ class ReplayTest(unittest.TestCase):
         code, _, err = self.run_script(script)
         self.assertEqual(code, 7, err)
         self.assertIn(f"recorded {self.bag}", err)
-        process = start("rosrun", "cartpole", "replay.py", self.bag, "--from", "1.5", "--gui")
+        process = piped("rosrun", "cartpole", "replay.py", self.bag, "--from", "1.5", "--gui")
         self.addCleanup(self.end, process)
         lines = [next(process.stdout) for _ in range(3)]
         self.assertIn("the window is the page http", lines[0])  # before the replay's end
@@ -319,13 +305,12 @@ class ReplayTest(unittest.TestCase):
             command = ["rosbag", "reindex", "--force", self.bag]
             subprocess.run(command, check=True, capture_output=True, timeout=BOUND)
             try:
-                messages = list(rosbag.Bag(str(self.bag)).read_messages("/gazebo/journal"))
+                names = [each.name for each in entries_of(self.bag)]
             except rosbag.ROSBagUnindexedException:  # nothing is in it yet
                 return False
-            entries = [each.name for _, message, _ in messages for each in message.entries]
-            return entries.count("/gazebo/prepared_step") == 10
+            return names.count("/gazebo/prepared_step") == 10
 
-        with self.simulation(extra_gazebo_args=f"--journal {self.bag}") as simulation:
+        with self.simulation(f"--journal {self.bag}") as simulation:
             add_cartpole()
             client = StepClient()
             for _ in range(10):

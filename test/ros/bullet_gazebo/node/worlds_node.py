@@ -49,12 +49,13 @@ ROBOT = (
     'type="revolute"><parent>base</parent><child>arm</child><pose>0 0 -0.2 0 0 0</pose><axis>'
     "<xyz>0 1 0</xyz><limit><lower>-1</lower><upper>1</upper></limit></axis></joint></model></sdf>"
 )
+LINK = (
+    '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    '</inertial><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
+)
 URDF = (
-    '<robot name="r"><link name="a"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
-    'ixz="0" iyz="0"/></inertial><collision><geometry><sphere radius="0.1"/></geometry></collision>'
-    '</link><link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" '
-    'iyz="0"/></inertial><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
-    '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>'
+    f'<robot name="r">{LINK.format("a")}{LINK.format("b")}<joint name="j" type="fixed">'
+    '<parent link="a"/><child link="b"/></joint></robot>'
 )
 
 

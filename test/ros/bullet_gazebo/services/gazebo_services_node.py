@@ -9,8 +9,17 @@ from gazebo_links_cases import LinksTest
 from gazebo_models_cases import ModelsTest
 from gazebo_physics_cases import PhysicsTest
 from stand_in_cases import StandInTest
+from surface_cases import SurfaceTest
 
-__all__ = ["ForcesTest", "JointsTest", "LinksTest", "ModelsTest", "PhysicsTest", "StandInTest"]
+__all__ = [
+    "ForcesTest",
+    "JointsTest",
+    "LinksTest",
+    "ModelsTest",
+    "PhysicsTest",
+    "StandInTest",
+    "SurfaceTest",
+]
 
 if __name__ == "__main__":
     rospy.init_node("gazebo_services")

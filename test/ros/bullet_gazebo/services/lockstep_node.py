@@ -2,17 +2,20 @@
 """The step service: exact ticks, repeatable bits, several clients; snapshots; and what a window is sent."""
 
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import rospy
 import rostest
-from bullet_gazebo_msgs.srv import StepWorldRequest
-from crowd_cases import CrowdTest
+from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldRequest, StepWorldRequest
 from lockstep_case import LockstepCase, step
 from scene_cases import SceneTest
 from snapshots_cases import SnapshotsTest
-from support.ros.calls import gazebo, sim_time
+from support.ros.calls import BOUND, gazebo, sim_time
 
-__all__ = ["CrowdTest", "LockstepTest", "SceneTest", "SnapshotsTest"]
+from ros_calls.service import ServiceClient
+
+__all__ = ["LockstepTest", "SceneTest", "SnapshotsTest"]
+CLIENTS, TIMES = 20, 25
 
 
 class LockstepTest(LockstepCase):
@@ -53,6 +56,19 @@ class LockstepTest(LockstepCase):
             seen.add(sim_time())
         self.assertGreater(len(seen), 3)
         self.assertAlmostEqual(sim_time(), 100.0, places=6)
+
+    def test_clients_come_ask_and_go_while_others_let_time_pass(self):
+        def work(thread):
+            for number in range(TIMES):
+                advance = ServiceClient("/gazebo/advance_world", AdvanceWorld, timeout=BOUND)
+                node = f"/crowd_{thread}_{number}"
+                topics = ["/clock", "/gazebo/model_states"]
+                answer = advance(AdvanceWorldRequest(node=node, ticks=2, until=topics))
+                self.assertTrue(answer.success and answer.ticks == 2, answer)
+
+        with ThreadPoolExecutor(CLIENTS) as pool:
+            list(pool.map(work, range(CLIENTS)))
+        self.assertAlmostEqual(sim_time(), 0.002 * CLIENTS * TIMES, places=9)
 
 
 if __name__ == "__main__":

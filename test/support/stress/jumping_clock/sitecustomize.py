@@ -15,11 +15,7 @@ HOUR = 3600.0  # [s]
 
 
 class JumpingClock:
-    """`time.time`, and what is derived from it.
-
-    Args:
-        seed: of when and where to it jumps.
-    """
+    """`time.time`, and what is derived from it; the seed is of when and where to it jumps."""
 
     def __init__(self, seed: str) -> None:
         self._dice, self._time, self._offset = random.Random(seed), time.time, 0.0

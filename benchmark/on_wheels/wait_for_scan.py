@@ -21,7 +21,7 @@ GOAL = """<sdf version="1.6"><model name="goal"><static>true</static><link name=
 
 
 class Training:
-    def __init__(self):
+    def __init__(self) -> None:
         self.velocity = rospy.Publisher("cmd_vel", Twist, queue_size=5)
         rospy.Subscriber("odom", Odometry, self.on_odom)
         self.unpause = rospy.ServiceProxy("gazebo/unpause_physics", Empty)
@@ -29,12 +29,12 @@ class Training:
         self.reset_simulation = rospy.ServiceProxy("gazebo/reset_simulation", Empty)
         self.spawn = rospy.ServiceProxy("gazebo/spawn_sdf_model", SpawnModel)
         self.delete = rospy.ServiceProxy("gazebo/delete_model", DeleteModel)
-        self.seen, self.odom, self.has_goal = hashlib.sha256(), None, False
+        self.seen, self.odom, self.has_goal = hashlib.sha256(), Odometry(), False
 
-    def on_odom(self, message):
+    def on_odom(self, message: Odometry) -> None:
         self.odom = message
 
-    def scan(self):
+    def scan(self) -> np.ndarray:
         while True:
             try:
                 message = rospy.wait_for_message("scan", LaserScan, timeout=5)
@@ -45,7 +45,7 @@ class Training:
         self.seen.update(ranges.tobytes())
         return ranges
 
-    def state(self):
+    def state(self) -> tuple[int, bool, bool]:
         ranges, place = self.scan(), self.odom.pose.pose
         yaw = 2.0 * math.atan2(place.orientation.z, place.orientation.w)
         x, y = self.goal[0] - place.position.x, self.goal[1] - place.position.y
@@ -53,7 +53,7 @@ class Training:
         bearing = (math.atan2(y, x) - yaw + math.pi) % (2.0 * math.pi)
         return int(bearing / (math.pi / 4.0)), ranges.min() < 0.25, self.far < 0.3
 
-    def reset(self):
+    def reset(self) -> int:
         if self.has_goal:
             rospy.wait_for_service("gazebo/delete_model")
             self.delete("goal")
@@ -70,7 +70,7 @@ class Training:
         self.unpause()
         return self.state()[0]
 
-    def step(self, action):
+    def step(self, action: int) -> tuple[int, float, bool]:
         command = Twist()
         command.linear.x, command.angular.z = 0.15, (2 - action) * 0.75
         self.velocity.publish(command)
@@ -81,7 +81,7 @@ class Training:
 
 rospy.init_node("wait_for_scan")
 training, values = Training(), np.zeros((9, 5))
-begin, spent = None, 0.0
+begin, spent = 0.0, 0.0
 for episode in range(int(sys.argv[1])):
     state, total = training.reset(), 0.0
     begin = begin or time.time()
