@@ -22,7 +22,7 @@ TRAIN = "train"
 COMMANDS = {
     "eval": "greedy episodes of a run: mean, deviation, every episode",
     "enjoy": "watch greedy episodes in a window, or on a page in the browser",
-    "view": "a page in the browser: curves, and episodes, also while it trains",
+    "view": "a page in the browser that plays episodes, also while it trains",
     "record": "episodes as GIF, MP4 or a page that plays them; needs no display",
     "plot": "the training curves of runs as PNG",
     "export": "a policy as TorchScript, which torch runs without this package",

@@ -1,4 +1,4 @@
-"""The page of a run: recorded episodes of its policies, and the curves of its training."""
+"""The page of a run: recorded episodes of its policies."""
 
 import contextlib
 import select
@@ -25,11 +25,9 @@ from rl_workbench.tools.recording import (
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training.progress import tell, warn
 from web_viewer.address import PortInUse, find_address
-from web_viewer.curves import Curves
 from web_viewer.server import open_browser, serve, stop
 
 PERIOD = 1.0 / 30.0  # [s] between two pictures
-CURVES_PERIOD = 1.0  # [s] between two reads of scalars.csv
 IDLE_PERIOD = 0.25  # [s] between two checks for a viewer
 SPEEDS = {"0.1 ×": 0.1, "0.25 ×": 0.25, "0.5 ×": 0.5, "1 ×": 1.0, "2 ×": 2.0, "5 ×": 5.0}
 LINGER = 1.0  # [s] on the last frame of an episode
@@ -87,19 +85,10 @@ def show_run(
             if is_over():
                 return
             time.sleep(IDLE_PERIOD)
-        with server.gui.add_folder("Episode"):
-            playback = Playback(server.gui, recorder, policies, seed, episodes)
-        curves = Curves(server.gui, server.gui.add_folder("Training"))
-        curves.follow(folder)
-        _play(server, playback, curves, is_over)
+        _play(server, Playback(server.gui, recorder, policies, seed, episodes), is_over)
 
 
-def _play(
-    server: viser.ViserServer, playback: "Playback", curves: Curves, is_over: Callable[[], bool]
-) -> None:
-    ended = threading.Event()
-    drawing = threading.Thread(target=_draw, args=(server, curves, ended), daemon=True)
-    drawing.start()
+def _play(server: viser.ViserServer, playback: "Playback", is_over: Callable[[], bool]) -> None:
     last = time.monotonic()
     while not is_over():
         is_watched = bool(server.get_clients())
@@ -108,14 +97,6 @@ def _play(
         if is_watched:
             playback.tick(min(now - last, IDLE_PERIOD))
         last = now
-    ended.set()
-    drawing.join()
-
-
-def _draw(server: viser.ViserServer, curves: Curves, ended: threading.Event) -> None:
-    has_more = True
-    while not ended.wait(0.0 if has_more else CURVES_PERIOD):
-        has_more = bool(server.get_clients()) and curves.update()
 
 
 class Playback:
