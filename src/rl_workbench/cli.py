@@ -23,7 +23,7 @@ COMMANDS = {
     "eval": "greedy episodes of a run: mean, deviation, every episode",
     "enjoy": "watch greedy episodes in a window, or on a page in the browser",
     "view": "a page in the browser that plays episodes, also while it trains",
-    "record": "episodes as GIF, MP4 or a page that plays them; needs no display",
+    "record": "episodes as GIF or MP4; needs no display",
     "plot": "the training curves of runs as PNG",
     "export": "a policy as TorchScript, which torch runs without this package",
     "demonstrate": "episodes of a policy as demonstrations: seeds and actions, some kilobytes each",

@@ -5,7 +5,7 @@ needs viser, which takes a second to load; the others load at once.
 
 Modules:
     address: `find_address`, `Address`, and the command-line flags of a page.
-    server: `serve`, `stop`, `open_browser`, `hidden_page`.
+    server: `serve`, `stop`, `open_browser`.
     table: `GrowingTable`.
     video: `Mp4Writer`.
 """

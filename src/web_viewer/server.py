@@ -10,9 +10,8 @@ import gzip
 import hmac
 import http
 import io
-import secrets
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -27,7 +26,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from web_viewer import keys
-from web_viewer.address import LOOPBACK, TOKEN_BYTES, Address, PortInUse, has_display, is_loopback
+from web_viewer.address import Address, PortInUse, has_display, is_loopback
 
 Answer = Callable[[Any, Request], Response | None]
 LONGEST_PATH = 1000  # of a request [characters]
@@ -259,16 +258,6 @@ def stop(server: viser.ViserServer) -> None:
     """Stops the server."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
-
-
-@contextlib.contextmanager
-def hidden_page() -> Iterator[viser.ViserServer]:
-    """Serves a page for recordings, which viser makes only from a server; its token is secret."""
-    server = _start(Address(LOOPBACK, 0, secrets.token_urlsafe(TOKEN_BYTES)))
-    try:
-        yield server
-    finally:
-        stop(server)
 
 
 def open_browser(address: Address, warn: Callable[[str], None]) -> None:

@@ -151,7 +151,7 @@ class Driver:
         if self._shown == (seed, recorder.length):
             return
         self._shown = seed, recorder.length
-        self._view.show(self._view.take())
+        self._view.show(self._view.look())
         lines = [f"seed {seed}, step {recorder.length}, return {recorder.total_reward:.1f}"]
         if recorder.has_ended:
             verdict = {None: "", True: ": success", False: ": no success"}[recorder.success]

@@ -2,14 +2,12 @@
 
 import ctypes.util
 import os
-from io import BytesIO
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
 from PIL import Image
-from support.pages import viser_recording
 from support.training.workbench_runs import record as bare_run
 
 import cartpole  # noqa: F401 - registers the environments
@@ -157,19 +155,6 @@ def test_a_gif_that_browsers_would_slow_down_is_refused(robot_run: Path, tmp_pat
     assert "at most 50 frames a second" in capsys.readouterr().err
 
 
-def test_a_page_holds_all_that_it_shows(tmp_path: Path):
-    path = tmp_path / "a.html"
-    frames = [np.full((20, 30, 3), 40 * step, np.uint8) for step in range(5)]
-    write_video(path, frames, 12.5)
-    text = path.read_text()
-    assert 'src="http' not in text and 'href="http' not in text
-    found = viser_recording.of_page(text)
-    assert found.duration == pytest.approx(5 / 12.5)
-    nodes = [found.at(step / 12.5)["/picture"] for step in range(5)]
-    levels = [np.asarray(Image.open(BytesIO(bytes(each["_data"])))).mean() for each in nodes]
-    assert levels == pytest.approx([0, 40, 80, 120, 160], abs=3)
-
-
 class Narrow(Counter):
     """One with a size of its own choice."""
 
@@ -193,43 +178,6 @@ def test_an_environment_without_a_size_has_its_pictures_scaled(tmp_path: Path):
     assert record(run, tmp_path / "a.gif", "--checkpoint", "random", "--size", "100x30") == 0
     with Image.open(tmp_path / "a.gif") as video:
         assert video.size == (100, 30 + 8)
-
-
-# In 3-D. That a browser plays the file: test_record_played.py.
-
-
-def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(robot_run: Path, tmp_path, capsys):
-    out = tmp_path / "a.html"
-    assert record(robot_run, out) == 0
-    steps = int(capsys.readouterr().out.split(" steps")[0].split()[-1])
-    text = out.read_text()
-    assert len(text) < 1_000_000
-    assert 'src="http' not in text and 'href="http' not in text
-    found = viser_recording.of_page(text)
-    frames = len({time for time, _ in found.messages})
-    assert frames == pytest.approx(steps / 5, abs=1.1)  # 125 steps a second, 25 frames
-    assert found.duration == pytest.approx(1.0 + (frames - 1) / 25)
-    labels = {when: found.at(when)["/caption0"]["text"] for when in (0.0, found.duration)}
-    assert labels[0.0].startswith("step 0   return 0.0")
-    assert labels[found.duration].startswith(f"step {steps}   return {steps:.1f}   action ")
-    before, after = ([part["wxyz"] for part in found.parts(when)] for when in (0.0, 9e9))
-    assert before != after
-
-
-def test_several_are_seen_beside_each_other(robot_run: Path, tmp_path: Path, capsys):
-    out = tmp_path / "a.html"
-    assert record(robot_run, out, "--checkpoint", "best", "last", "random", "--fps", "10") == 0
-    first, *told = capsys.readouterr().out.splitlines()
-    assert first == f"recording best, last, random of {robot_run}"
-    assert [line.split(":")[0] for line in told] == ["best", "last", "random", str(out)]
-    nodes = viser_recording.of_page(out.read_text()).at()
-    captions = [nodes[f"/caption{number}"]["text"] for number in range(3)]
-    assert [each.split()[0] for each in captions] == ["best", "last", "random"]
-
-
-def test_a_size_is_refused_where_it_has_none(robot_run: Path, tmp_path: Path, capsys):
-    assert record(robot_run, tmp_path / "a.html", "--size", "64x48") == 1
-    assert "as large as the browser's window" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
