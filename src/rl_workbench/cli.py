@@ -8,6 +8,7 @@ from typing import Any
 from rl_workbench.option import unknown
 from rl_workbench.starting import Interrupt, run_command
 from rl_workbench.training import train as training
+from web_viewer.address import PortInUse
 
 PROG = "rl-workbench"
 DESCRIPTION = """\
@@ -51,7 +52,7 @@ def main(
         arguments.program = program
         module.run(arguments, interrupt)
 
-    return run_command(prog, command)
+    return run_command(prog, command, PortInUse)
 
 
 def parse(argv: list[str], prog: str = PROG) -> argparse.Namespace:

@@ -4,8 +4,9 @@ It knows nothing about robots and trainings. Its modules are imported one by one
 needs viser, which takes a second to load; the others load at once.
 
 Modules:
-    address: `find_address`, `Address`, and the command-line flags of a page.
-    server: `serve`, `stop`, `open_browser`.
+    address: `Address`, and the command-line flags of a page.
+    keys: held keys, and gamepads.
+    server: `Page`.
     table: `GrowingTable`.
     video: `Mp4Writer`.
 """

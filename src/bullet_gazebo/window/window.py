@@ -5,6 +5,7 @@ import io
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from functools import partial
 from typing import Any
 
@@ -26,8 +27,7 @@ from robot_sim.pictures.camera import ASPECT, THIRD, Camera, overview
 from robot_sim.pictures.page import Picture
 from robot_sim.pictures.page_batches import NUMBERS
 from ros_calls.service import ServiceFailed
-from web_viewer.address import Address
-from web_viewer.server import open_browser, serve, stop
+from web_viewer.server import Page
 
 TITLE = "gzclient"
 CAMERA = Camera((0.0, 0.0, 0.35), 2.5, yaw=36.0, pitch=-18.0, view=75.0)  # while nothing moves
@@ -195,24 +195,21 @@ class Window:
         client.send_file_download("gzclient.png", content.getvalue(), save_immediately=True)
 
 
-def show(address: Address, browser: bool) -> None:
+def show(host: str, port: int | None, browser: bool) -> None:
     """Serves the page until the node is shut down; with `browser` opens it where there is a display.
 
-    Raises PortInUse if another process was quicker.
+    Raises PortInUse if nothing can be served there.
     """
-    server = serve(address, TITLE, tuple(CAMERA.eye.tolist()), CAMERA.target)
-    try:
-        window = Window(server)
-        advice = address.advice("the window", "moves the simulation")
-        for line in advice:
-            print(f"gzclient: {line}", flush=True)
-        if not address.token:  # which is for no one else; other programs may show the lines
+    page = Page(TITLE, tuple(CAMERA.eye.tolist()), CAMERA.target, host, port)
+    with closing(page):
+        window = Window(page.server)
+        say = partial(print, "gzclient:", flush=True)
+        warn = partial(rospy.logwarn, "gazebo_gui: %s")
+        advice = page.announce("the window", "moves the simulation", say, warn, browser)
+        if not page.address.token:  # which is for no one else; other programs may show the lines
             rospy.set_param(ADVICE, advice)
-        if browser:  # may block until its user closes it
-            warn = partial(rospy.logwarn, "gazebo_gui: %s")
-            threading.Thread(target=open_browser, args=(address, warn), daemon=True).start()
-        window.run()
-    finally:
-        stop(server)
-        with contextlib.suppress(KeyError, OSError, rospy.ROSException):  # the master has gone
-            rospy.delete_param(ADVICE)
+        try:
+            window.run()
+        finally:
+            with contextlib.suppress(KeyError, OSError, rospy.ROSException):  # the master has gone
+                rospy.delete_param(ADVICE)

@@ -1,11 +1,11 @@
 """The page of a run: recorded episodes of its policies."""
 
-import contextlib
 import select
 import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,6 @@ from typing import Any
 import viser
 
 from rl_workbench.env_ids import import_module_of
-from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
 from rl_workbench.tools.recording import (
     CAMERA,
@@ -24,8 +23,7 @@ from rl_workbench.tools.recording import (
 )
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training.progress import tell, warn
-from web_viewer.address import PortInUse, find_address
-from web_viewer.server import open_browser, serve, stop
+from web_viewer.server import Page
 
 PERIOD = 1.0 / 30.0  # [s] between two pictures
 IDLE_PERIOD = 0.25  # [s] between two checks for a viewer
@@ -66,21 +64,12 @@ def show_run(
         has_ended = beside_training and bool(select.select([sys.stdin], [], [], 0)[0])
         return has_ended or interrupt.requested()
 
-    try:
-        address = find_address(host, port)
-        server = serve(address, folder.name, CAMERA, LOOK_AT)
-    except PortInUse as error:
-        raise WorkbenchError(str(error)) from error
-    with contextlib.ExitStack() as stack:
-        stack.callback(stop, server)
-        recorder = EpisodeRecorder(folder, server, env_options)
-        stack.callback(recorder.close)
+    page = Page(folder.name, CAMERA, LOOK_AT, host, port)
+    server = page.server
+    with closing(page), closing(EpisodeRecorder(folder, server, env_options)) as recorder:
         if is_over():  # the training was shorter than this page's start
             return
-        for line in address.advice("the run", "plays its episodes"):
-            tell(line)
-        if browser:  # some browsers block until the user closes them
-            threading.Thread(target=open_browser, args=(address, warn), daemon=True).start()
+        page.announce("the run", "plays its episodes", tell, warn, browser)
         while not server.get_clients():  # nothing is played without a viewer
             if is_over():
                 return

@@ -16,8 +16,7 @@ from robot_sim.physics.pose import IDENTITY, ZERO
 from robot_sim.pictures.camera import ASPECT, CameraLike
 from robot_sim.pictures.page import Picture
 from robot_sim.pictures.visuals import VisibleModel, visible_model
-from web_viewer.address import LOOPBACK, PortInUse, find_address
-from web_viewer.server import serve, stop
+from web_viewer.server import Page
 
 WORLD, ROBOT = "/world", "/world/robot"  # nodes
 
@@ -95,15 +94,9 @@ class LivePage:
     def __init__(
         self, title: str, draw_on: Callable[[viser.ViserServer], RobotOnPage], period: float
     ) -> None:
-        while True:
-            address = find_address(LOOPBACK, None)  # raises if no port is left
-            try:
-                self._server = serve(address, title, (1.0, 1.0, 1.0), ZERO)
-                break
-            except PortInUse:  # another process has looked for one at the same moment
-                continue
-        print(f"the robot is shown on the page {address.url}", flush=True)
-        self._move, self._period, self._due = draw_on(self._server), period, time.monotonic()
+        self._page = Page(title, (1.0, 1.0, 1.0), ZERO)
+        print(f"the robot is shown on the page {self._page.address.url}", flush=True)
+        self._move, self._period, self._due = draw_on(self._page.server), period, time.monotonic()
 
     def show(self) -> None:
         """Shows the robot as it is, once the state before has been shown long enough."""
@@ -113,7 +106,7 @@ class LivePage:
 
     def close(self) -> None:
         """Closes the page."""
-        stop(self._server)
+        self._page.close()
 
 
 def _draw_ground(server: viser.ViserServer) -> None:
