@@ -15,7 +15,7 @@ import threading
 import webbrowser
 from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import parse_qs, urlsplit
 
 import msgspec
@@ -57,8 +57,6 @@ body:has(#root > *) > #loading { display: none; }
 </style>
 <p id="loading" style="font-family: sans-serif; padding: 1em">The page is loading ...</p>
 """
-LARGEST_INTEGER = 2.0**53  # integers that JavaScript has exactly
-LARGEST_SIDE = 2**14  # of a page [pixels]
 Point = tuple[float, float, float]  # [m]
 
 
@@ -125,41 +123,57 @@ def _said(status: http.HTTPStatus, text: str) -> Response:
     return Response(status, status.phrase, Headers(), f"{text}\n".encode())
 
 
-def _is_camera(message: messages.ViewerCameraMessage) -> bool:
-    """Returns whether a page's camera is made of numbers that can be calculated with."""
-    vectors = (message.wxyz, message.position, message.look_at, message.up_direction)
-    if not all(isinstance(each, (list, tuple)) for each in vectors):
-        return False
-    sides = message.image_height, message.image_width
-    numbers = [*(n for each in vectors for n in each), message.fov, message.near, message.far]
-    return [len(each) for each in vectors] == [4, 3, 3, 3] and (
-        all(type(n) in (int, float) and abs(n) <= LARGEST_INTEGER for n in numbers)
-        and list(message.look_at) != list(message.position)
-        and any(message.up_direction)
-        and all(type(side) is int and 0 <= side <= LARGEST_SIDE for side in sides)
-    )
+# What pages of ours send, by the names of viser's messages; for a field's value see `can_be`.
+Number = Annotated[float, msgspec.Meta(ge=-(2.0**53), le=2.0**53)]  # whose integers are exact
+Side = Annotated[int, msgspec.Meta(ge=0, le=2**14)]  # [pixels]
+Vector = tuple[Number, Number, Number]
 
 
-USED = {  # what pages of ours send, and its check, by type; for a field's value see `can_be`
-    "GuiUpdateMessage": lambda each: isinstance(each.uuid, str) and [*each.updates] == ["value"],
-    "ViewerCameraMessage": _is_camera,
-    "GetRenderResponseMessage": lambda each: isinstance(each.payload, bytes),
-    "CommandTriggerMessage": lambda each: isinstance(each.uuid, str),
-}
+class Value(msgspec.Struct, forbid_unknown_fields=True):
+    value: Any
+
+
+class GuiUpdateMessage(msgspec.Struct, tag=True):
+    uuid: str
+    updates: Value
+
+
+class ViewerCameraMessage(msgspec.Struct, tag=True):
+    wxyz: tuple[Number, Number, Number, Number]
+    position: Vector
+    look_at: Vector
+    up_direction: Vector
+    fov: Number
+    near: Number
+    far: Number
+    image_height: Side
+    image_width: Side
+
+
+class GetRenderResponseMessage(msgspec.Struct, tag=True):
+    payload: bytes
+
+
+class CommandTriggerMessage(msgspec.Struct, tag=True):
+    uuid: str
+
+
+USED = msgspec.msgpack.Decoder(
+    GuiUpdateMessage | ViewerCameraMessage | GetRenderResponseMessage | CommandTriggerMessage
+)
 
 
 def is_used(raw: Any) -> bool:
-    """Returns whether a page's message is one that pages of ours send, and can be read.
+    """Returns whether a page's message is one that pages of ours send.
 
     Args:
         raw: From the websocket. viser also takes files, forms, clicks, ..., and trusts them.
     """
     try:
-        content = msgspec.msgpack.decode(raw)
-        kind = content.pop("type")
-        return kind in USED and USED[kind](getattr(messages, kind)(**content))
-    except (LookupError, TypeError, ValueError, AttributeError, RecursionError):
+        USED.decode(raw)
+    except (msgspec.MsgspecError, TypeError, RecursionError):
         return False
+    return True
 
 
 def can_be(props: object, value: Any) -> bool:

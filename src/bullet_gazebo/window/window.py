@@ -172,9 +172,7 @@ class Window:
             self._time.show_speed()
         self._drive.look()
         self._controllers.look()
-        tree = self._controllers.as_html()
-        if tree != self._tree.content:
-            self._tree.content = tree
+        self._tree.content = self._controllers.as_html()
 
     def _screenshot(self, event: viser.GuiEvent[Any]) -> None:
         """Sends what this page shows, at its size, to its browser as a file."""

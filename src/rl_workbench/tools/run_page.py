@@ -175,8 +175,7 @@ class Playback:
                 self._start()
 
     def _show(self, episode: RecordedEpisode, index: int) -> None:
-        if self._slider.max != max(1, episode.length):
-            self._slider.max = max(1, episode.length)
+        self._slider.max = max(1, episode.length)
         if self._drawn is not None and self._drawn[0] is episode and self._drawn[1] == index:
             return
         self._drawn = (episode, index)
@@ -195,6 +194,5 @@ class Playback:
             lines.append(f"action {frame.action or '-'}")
         if episode.note:
             lines.append(episode.note)
-        text = f'<div style="padding: 0.4em 0.8em">{"<br>".join(map(escape, lines))}</div>'
-        if text != self._about.content:
-            self._about.content = text
+        text = "<br>".join(map(escape, lines))
+        self._about.content = f'<div style="padding: 0.4em 0.8em">{text}</div>'

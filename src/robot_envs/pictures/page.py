@@ -18,7 +18,7 @@ from robot_sim.pictures.page import Picture
 from robot_sim.pictures.visuals import VisibleModel, visible_model
 from web_viewer.server import Page
 
-WORLD, ROBOT = "/world", "/world/robot"  # nodes
+WORLD = "/world"  # node
 
 logger = logging.getLogger(f"rosout.{__name__}")
 
@@ -53,12 +53,16 @@ class RobotOnPage:
         server.initial_camera.fov = float(np.radians(looking.view))
         self._travelled = np.zeros(3)
         self._world = server.scene.add_frame(WORLD, show_axes=False)
-        _draw_ground(server)
         self._follow = server.gui.add_checkbox("Follow", looking.follows, order=-1.0)
         self._follow.on_update(lambda _: self._move_world())
-        self._seen = _seen(placement)
-        self._picture = Picture(server, logger.warning, below=ROBOT)
-        self._picture.draw(self._seen, [])
+        self._seen, world = _seen(placement), empty_world()
+        ground = [
+            visible_model(model, -number, name, list(model.links), [], collisions=False)
+            for number, (name, model) in enumerate(world.models.items(), 1)
+        ]
+        self._picture = Picture(server, logger.warning, below=WORLD)
+        self._picture.draw([*self._seen, *ground], world.lights.values())
+        self._ground = np.array([(*ZERO, *IDENTITY) for model in ground for _ in model.links])
         self()
 
     def __call__(self) -> None:
@@ -76,7 +80,7 @@ class RobotOnPage:
     def show(self, placed: Placed) -> None:
         """Moves it to where it was at another moment."""
         with self._server.atomic():
-            self._picture.move(placed.links)
+            self._picture.move(np.concatenate([placed.links, self._ground]))
             self._travelled = placed.travelled
             self._move_world()
 
@@ -107,17 +111,6 @@ class LivePage:
     def close(self) -> None:
         """Closes the page."""
         self._page.close()
-
-
-def _draw_ground(server: viser.ViserServer) -> None:
-    world = empty_world()
-    seen = [
-        visible_model(model, number, name, list(model.links), [], collisions=False)
-        for number, (name, model) in enumerate(world.models.items())
-    ]
-    ground = Picture(server, logger.warning, below=WORLD)
-    ground.draw(seen, world.lights.values())
-    ground.move(np.array([(*ZERO, *IDENTITY)] * sum(len(model.links) for model in seen)))
 
 
 def _seen(placement: Placement) -> list[VisibleModel]:

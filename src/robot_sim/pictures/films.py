@@ -3,7 +3,6 @@
 import logging
 import pickle
 import queue
-import signal
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -103,7 +102,7 @@ FILMS: dict[str, Callable[[RecordingOptions, Frames], None]] = {
 
 
 def main() -> int:
-    """Draws until standard input ends; SIGTERM drops the frames that aren't drawn yet."""
+    """Draws until standard input ends."""
     logging.basicConfig(format="recording: %(message)s")
     options: RecordingOptions = pickle.load(sys.stdin.buffer)
     try:
@@ -119,21 +118,13 @@ def main() -> int:
 def _draw(options: RecordingOptions) -> int:
     """Draws the frames read from standard input; returns their number."""
     inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    stopping = False
-
-    def stop(*_: object) -> None:
-        nonlocal stopping
-        stopping = True
-        inbox.put(None)
-
-    signal.signal(signal.SIGTERM, stop)
     # In a thread, so that the simulator never waits for a frame.
     threading.Thread(target=_read, args=(sys.stdin.buffer, inbox), daemon=True).start()
     count = 0
 
     def frames() -> Iterator[Any]:
         nonlocal count
-        while (message := inbox.get()) is not None and not stopping:
+        while (message := inbox.get()) is not None:
             count += 1
             yield message
 
