@@ -4,7 +4,6 @@ import contextlib
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from cartpole import NAMESPACE
@@ -80,9 +79,9 @@ def main(argv: list[str] | None = None) -> int:
         # Left before an error is printed: that line comes last, below what ends with the session.
         with contextlib.ExitStack() as beside:
 
-            def begin(folder: Path) -> None:
+            def begin() -> None:
                 if over_ros:
-                    beside.enter_context(session(options, name, words, robot, folder))
+                    beside.enter_context(session(options, name, words, robot))
 
             run_training(options, interrupt, begin, callbacks)
 
@@ -141,9 +140,9 @@ def _backend(options: TrainingOptions) -> str:
 
 @contextlib.contextmanager
 def session(
-    options: TrainingOptions, name: str, argv: list[str], robot: RobotOptions, folder: Path
+    options: TrainingOptions, name: str, argv: list[str], robot: RobotOptions
 ) -> Iterator[None]:
-    """Runs the robot's ROS session until the block ends; the simulator's window shows the folder's curves."""
+    """Runs the robot's ROS session until the block ends."""
     backend = _backend(options)
     need_ros(f"the backend {backend}")
     from cartpole.robot import ROBOT
@@ -152,7 +151,7 @@ def session(
     # With several environments each has its own simulator, and the session's evaluates the policy.
     gui = options.session.gui and options.run.num_envs == 1
     realtime, seed = backend == "ros-realtime", options.run.seed
-    opened = RosSession(ROBOT, name, argv, realtime, gui, seed, robot.rviz, folder)
+    opened = RosSession(ROBOT, name, argv, realtime, gui, seed, robot.rviz)
     try:
         opened.start(tell)
         yield

@@ -8,6 +8,7 @@ from typing import Any
 from rl_workbench.option import unknown
 from rl_workbench.starting import Interrupt, run_command
 from rl_workbench.training import train as training
+from web_viewer.address import PortInUse
 
 PROG = "rl-workbench"
 DESCRIPTION = """\
@@ -22,8 +23,8 @@ TRAIN = "train"
 COMMANDS = {
     "eval": "greedy episodes of a run: mean, deviation, every episode",
     "enjoy": "watch greedy episodes in a window, or on a page in the browser",
-    "view": "a page in the browser: curves, and episodes, also while it trains",
-    "record": "episodes as GIF, MP4 or a page that plays them; needs no display",
+    "view": "a page in the browser that plays episodes, also while it trains",
+    "record": "episodes as GIF or MP4; needs no display",
     "plot": "the training curves of runs as PNG",
     "export": "a policy as TorchScript, which torch runs without this package",
     "demonstrate": "episodes of a policy as demonstrations: seeds and actions, some kilobytes each",
@@ -51,7 +52,7 @@ def main(
         arguments.program = program
         module.run(arguments, interrupt)
 
-    return run_command(prog, command)
+    return run_command(prog, command, PortInUse)
 
 
 def parse(argv: list[str], prog: str = PROG) -> argparse.Namespace:

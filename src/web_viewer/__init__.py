@@ -1,15 +1,15 @@
-"""A page in the browser, the curves of a growing table on it, and MP4 files.
+"""Pages in the browser, tables that grow, and MP4 files.
 
-It knows nothing about robots and trainings. Its modules are imported one by one, because `server` and
-`curves` need viser, which takes a second to load; `address`, `table` and `video` load at once.
+It knows nothing about robots and trainings. Its modules are imported one by one, because `server`
+needs viser, which takes a second to load; the others load at once.
 
 Modules:
-    address: `find_address`, `Address`, and the command-line flags of a page.
-    server: `serve`, `stop`, `open_browser`, `hidden_page`.
-    curves: `Curves`.
+    address: `Address`, and the command-line flags of a page.
+    keys: held keys, and gamepads.
+    server: `Page`.
     table: `GrowingTable`.
     video: `Mp4Writer`.
 """
 
 __wall_time__ = True  # of its waits, also in a script whose time is simulated
-__all__ = ["address", "curves", "server", "table", "video"]
+__all__ = ["address", "keys", "server", "table", "video"]

@@ -1,18 +1,14 @@
-"""Addresses of pages: free ports, flags, tokens, and advice for remote browsers."""
+"""Addresses of pages: flags, tokens, and advice for remote browsers."""
 
 import argparse
 import getpass
 import ipaddress
 import os
-import secrets
 import socket
 from dataclasses import dataclass, field
 
 LOOPBACK = "127.0.0.1"
 FIRST_PORT = 8080
-LAST_PORT = 65535
-MAX_TRIES = 100  # ports from FIRST_PORT on
-TOKEN_BYTES = 16
 
 
 class PortInUse(Exception):
@@ -90,43 +86,15 @@ def _is_any_address(host: str) -> bool:
         return False
 
 
-def find_address(host: str, port: int | None) -> Address:
-    """Returns an address that can be served.
-
-    Args:
-        host: The address to bind to.
-        port: The port; None for the first free one.
-
-    Raises:
-        PortInUse: If nothing can be served there.
-    """
-    ports = [port] if port is not None else range(FIRST_PORT, FIRST_PORT + MAX_TRIES)
-    problem = ""
-    for each in ports:
-        try:
-            free = _bind(host, each)
-        except socket.gaierror as error:  # the same at any port, and each lookup may be slow
-            problem = error.strerror or str(error)
-            break
-        except UnicodeError:  # two dots in a row, more than 63 letters between dots, ...
-            problem = "no host can have that name"
-            break
-        except (OSError, OverflowError) as error:
-            problem = getattr(error, "strerror", None) or str(error)
-            continue
-        return Address(host, free, "" if is_loopback(host) else secrets.token_urlsafe(TOKEN_BYTES))
-    tried = f"port {port}" if port is not None else f"ports {ports[0]} to {ports[-1]}"
-    raise PortInUse(
-        f"the page can't be served on {host}, {tried}: {problem}; choose others with --host, --port"
-    )
-
-
-def _bind(host: str, port: int) -> int:
-    """Binds to a port for a moment; returns it, or the one that the system chose for port 0."""
-    if not 0 <= port <= LAST_PORT:
-        raise OverflowError(f"a port lies between 0 and {LAST_PORT}")
-    family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-    with socket.socket(family, kind, protocol) as trial:
-        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        trial.bind(address)
-        return int(trial.getsockname()[1])
+def check(host: str, port: int | None) -> None:
+    """Raises PortInUse if nothing can be served there; with None as the port, on no port of the host."""
+    try:
+        with socket.socket(socket.getaddrinfo(host, None)[0][0]) as trial:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            trial.bind((host, port or 0))
+    except (OSError, OverflowError, UnicodeError) as error:  # no host, no port, or not its name
+        problem = getattr(error, "strerror", None) or str(error)
+        where = host if port is None else f"{host}, port {port}"
+        raise PortInUse(
+            f"the page can't be served on {where}: {problem}; choose others with --host, --port"
+        ) from error

@@ -11,10 +11,11 @@ import hmac
 import http
 import io
 import secrets
+import threading
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import parse_qs, urlsplit
 
 import msgspec
@@ -27,10 +28,19 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from web_viewer import keys
-from web_viewer.address import LOOPBACK, TOKEN_BYTES, Address, PortInUse, has_display, is_loopback
+from web_viewer.address import (
+    FIRST_PORT,
+    LOOPBACK,
+    Address,
+    PortInUse,
+    check,
+    has_display,
+    is_loopback,
+)
 
 Answer = Callable[[Any, Request], Response | None]
-LONGEST_PATH = 1000  # of a request [characters]
+Say = Callable[[str], object]
+TOKEN_BYTES = 16
 HTML, BEFORE_PROGRAM = "text/html", b"</title>"  # the program that follows is most of the page
 # Words that go when the program has drawn something. On a telephone viser lays its panel over the scene: here
 # the panel stands below, and the scene has what is left.
@@ -47,17 +57,15 @@ body:has(#root > *) > #loading { display: none; }
 </style>
 <p id="loading" style="font-family: sans-serif; padding: 1em">The page is loading ...</p>
 """
-LARGEST_INTEGER = 2.0**53  # integers that JavaScript has exactly
-LARGEST_SIDE = 2**14  # of a page [pixels]
 Point = tuple[float, float, float]  # [m]
 
 
 class Gate:
     """Admits this machine's own browsers, or, beyond loopback, requests that carry the token."""
 
-    def __init__(self, address: Address) -> None:
-        self._token = address.token
-        self._cookie = f"viewer_{address.port}"
+    def __init__(self, token: str) -> None:
+        self._token = token
+        self._cookie = f"viewer_{token[:4]}"  # pages on other ports have others
 
     def refusal(self, request: Request) -> str:
         """Returns why the request is refused; empty if it is admitted."""
@@ -87,13 +95,11 @@ class Gate:
                 refusal = self.refusal(request)
                 if refusal:
                     return _said(http.HTTPStatus.FORBIDDEN, refusal)
-                if len(request.path) > LONGEST_PATH:  # longer than a file's name may be
-                    return _said(http.HTTPStatus.NOT_FOUND, "no such page")
                 response = answer(connection, request)
-            except (LookupError, ValueError, OSError):  # two hosts, a path that is no text, ...
+            except (LookupError, ValueError, OSError):  # two hosts, a path that is no file's, ...
                 return _said(http.HTTPStatus.BAD_REQUEST, "it is no browser's request")
             if response is not None and response.headers.get("Content-Type", "").startswith(HTML):
-                response = _with_head(response)
+                _add_head(response)
             if self._token and response is not None:
                 response.headers["Set-Cookie"] = (
                     f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
@@ -103,57 +109,71 @@ class Gate:
         return guarded
 
 
-def _with_head(response: Response) -> Response:
+def _add_head(response: Response) -> None:
     """Has viser's page say that it is loading until its program runs, and fit a telephone."""
     packed = response.headers.get("Content-Encoding") == "gzip"
     body = gzip.decompress(response.body) if packed else response.body
     body = body.replace(BEFORE_PROGRAM, BEFORE_PROGRAM + HEAD + keys.SCRIPT, 1)
-    body = gzip.compress(body, 1) if packed else body
-    headers = Headers(response.headers)
-    del headers["Content-Length"]
-    headers["Content-Length"] = str(len(body))
-    return Response(response.status_code, response.reason_phrase, headers, body)
+    response.body = gzip.compress(body, 1) if packed else body
+    del response.headers["Content-Length"]
+    response.headers["Content-Length"] = str(len(response.body))
 
 
 def _said(status: http.HTTPStatus, text: str) -> Response:
     return Response(status, status.phrase, Headers(), f"{text}\n".encode())
 
 
-def _is_camera(message: messages.ViewerCameraMessage) -> bool:
-    """Returns whether a page's camera is made of numbers that can be calculated with."""
-    vectors = (message.wxyz, message.position, message.look_at, message.up_direction)
-    if not all(isinstance(each, (list, tuple)) for each in vectors):
-        return False
-    sides = message.image_height, message.image_width
-    numbers = [*(n for each in vectors for n in each), message.fov, message.near, message.far]
-    return [len(each) for each in vectors] == [4, 3, 3, 3] and (
-        all(type(n) in (int, float) and abs(n) <= LARGEST_INTEGER for n in numbers)
-        and list(message.look_at) != list(message.position)
-        and any(message.up_direction)
-        and all(type(side) is int and 0 <= side <= LARGEST_SIDE for side in sides)
-    )
+# What pages of ours send, by the names of viser's messages; for a field's value see `can_be`.
+Number = Annotated[float, msgspec.Meta(ge=-(2.0**53), le=2.0**53)]  # whose integers are exact
+Side = Annotated[int, msgspec.Meta(ge=0, le=2**14)]  # [pixels]
+Vector = tuple[Number, Number, Number]
 
 
-USED = {  # what pages of ours send, and its check, by type; for a field's value see `can_be`
-    "GuiUpdateMessage": lambda each: isinstance(each.uuid, str) and [*each.updates] == ["value"],
-    "ViewerCameraMessage": _is_camera,
-    "GetRenderResponseMessage": lambda each: isinstance(each.payload, bytes),
-    "CommandTriggerMessage": lambda each: isinstance(each.uuid, str),
-}
+class Value(msgspec.Struct, forbid_unknown_fields=True):
+    value: Any
+
+
+class GuiUpdateMessage(msgspec.Struct, tag=True):
+    uuid: str
+    updates: Value
+
+
+class ViewerCameraMessage(msgspec.Struct, tag=True):
+    wxyz: tuple[Number, Number, Number, Number]
+    position: Vector
+    look_at: Vector
+    up_direction: Vector
+    fov: Number
+    near: Number
+    far: Number
+    image_height: Side
+    image_width: Side
+
+
+class GetRenderResponseMessage(msgspec.Struct, tag=True):
+    payload: bytes
+
+
+class CommandTriggerMessage(msgspec.Struct, tag=True):
+    uuid: str
+
+
+USED = msgspec.msgpack.Decoder(
+    GuiUpdateMessage | ViewerCameraMessage | GetRenderResponseMessage | CommandTriggerMessage
+)
 
 
 def is_used(raw: Any) -> bool:
-    """Returns whether a page's message is one that pages of ours send, and can be read.
+    """Returns whether a page's message is one that pages of ours send.
 
     Args:
         raw: From the websocket. viser also takes files, forms, clicks, ..., and trusts them.
     """
     try:
-        content = msgspec.msgpack.decode(raw)
-        kind = content.pop("type")
-        return kind in USED and USED[kind](getattr(messages, kind)(**content))
-    except (LookupError, TypeError, ValueError, AttributeError, RecursionError):
+        USED.decode(raw)
+    except (msgspec.MsgspecError, TypeError, RecursionError):
         return False
+    return True
 
 
 def can_be(props: object, value: Any) -> bool:
@@ -214,10 +234,10 @@ class Door(websockets.asyncio.server.ServerConnection):
         return raw
 
 
-def _start(address: Address, title: str = "") -> viser.ViserServer:
-    """Starts viser with a gate in front; viser has no public hook for one."""
+def _start(host: str, port: int, title: str, gate: Gate) -> viser.ViserServer:
+    """Starts viser with a gate in front, on that port or a later one; viser has no public hook for a gate."""
     module = websockets.asyncio.server
-    serve_anyone, gate = module.serve, Gate(address)
+    serve_anyone = module.serve
 
     def serve_guarded(*arguments: Any, process_request: Answer, **options: Any) -> Any:
         guard = gate.guard(process_request)
@@ -226,62 +246,69 @@ def _start(address: Address, title: str = "") -> viser.ViserServer:
     module.serve = serve_guarded  # type: ignore[assignment,misc]
     try:
         with contextlib.redirect_stdout(io.StringIO()):
-            return viser.ViserServer(address.host, address.port, label=title, verbose=False)
+            return viser.ViserServer(host, port, label=title, verbose=False)
     finally:
         module.serve = serve_anyone  # type: ignore[misc]
 
 
-def serve(address: Address, title: str, camera: Point, look_at: Point) -> viser.ViserServer:
-    """Starts the server, which runs in its own threads.
+class Page:
+    """A page that threads of its own serve until `close`.
 
     Args:
-        address: From `find_address`.
         title: Of the page.
         camera: Where visitors look from [m].
         look_at: What they look at [m].
+        host: The address to bind to.
+        port: The port; None for the first free one from FIRST_PORT on.
 
     Raises:
-        PortInUse: If another process has taken the port since.
+        PortInUse: If nothing can be served there.
     """
-    server = _start(address, title)
-    if server.get_port() != address.port:
-        stop(server)
-        raise PortInUse(f"another process has just taken port {address.port}; start again")
-    _check_fields(server)
-    server.gui.main_panel.dock_right()
-    server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
-    server.initial_camera.position = camera
-    server.initial_camera.look_at = look_at
-    return server
 
+    def __init__(
+        self,
+        title: str,
+        camera: Point,
+        look_at: Point,
+        host: str = LOOPBACK,
+        port: int | None = None,
+    ) -> None:
+        check(host, port)
+        token = "" if is_loopback(host) else secrets.token_urlsafe(TOKEN_BYTES)
+        self.server = _start(host, FIRST_PORT if port is None else port, title, Gate(token))
+        self.address = Address(host, self.server.get_port(), token)
+        if port and port != self.address.port:
+            self.close()
+            raise PortInUse(f"another process has just taken port {port}; start again")
+        _check_fields(self.server)
+        self.server.gui.main_panel.dock_right()
+        self.server.gui.configure_theme(
+            control_width="medium", show_logo=False, show_share_button=False
+        )
+        self.server.initial_camera.position = camera
+        self.server.initial_camera.look_at = look_at
 
-def stop(server: viser.ViserServer) -> None:
-    """Stops the server."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        server.stop()
+    def announce(self, what: str, power: str, say: Say, warn: Say, browser: bool) -> list[str]:
+        """Says where the page is, in the lines that it returns; see `Address.advice`.
 
+        With `browser`, opens it on this machine, if it has a display; `warn` receives a line if that fails.
+        """
+        lines = self.address.advice(what, power)
+        for line in lines:
+            say(line)
+        if browser and has_display():  # some browsers block until the user closes them
+            threading.Thread(target=self._open, args=(warn,), daemon=True).start()
+        return lines
 
-@contextlib.contextmanager
-def hidden_page() -> Iterator[viser.ViserServer]:
-    """Serves a page for recordings, which viser makes only from a server; its token is secret."""
-    server = _start(Address(LOOPBACK, 0, secrets.token_urlsafe(TOKEN_BYTES)))
-    try:
-        yield server
-    finally:
-        stop(server)
+    def _open(self, warn: Say) -> None:
+        try:
+            opened = webbrowser.open(self.address.url)
+        except webbrowser.Error:
+            opened = False
+        if not opened:
+            warn(f"no browser could be opened here; open {self.address.url} in one")
 
-
-def open_browser(address: Address, warn: Callable[[str], None]) -> None:
-    """Opens the page in a browser on this machine, if it has a display.
-
-    Args:
-        warn: Receives a line if no browser could be opened.
-    """
-    if not has_display():
-        return
-    try:
-        opened = webbrowser.open(address.url)
-    except webbrowser.Error:
-        opened = False
-    if not opened:
-        warn(f"no browser could be opened here; open {address.url} in one")
+    def close(self) -> None:
+        """Stops serving it."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.server.stop()

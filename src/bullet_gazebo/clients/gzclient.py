@@ -22,7 +22,7 @@ from bullet_gazebo.common.node_process import (
 from bullet_gazebo.common.rospy_internals import free_polls_at_once, stop_hearing_clock
 from ros_calls.master import lives
 from ros_calls.requirements import WINDOW, lack
-from web_viewer.address import PortInUse, add_flags, find_address
+from web_viewer.address import PortInUse, add_flags
 
 NAME = "gazebo_gui"
 
@@ -46,8 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return 0
         window = importlib.import_module("bullet_gazebo.window.window")  # with viser, trimesh
         try:
-            address = find_address(options.host, options.port)
-            window.show(address, browser=not options.no_browser)
+            window.show(options.host, options.port, browser=not options.no_browser)
         except PortInUse as error:
             rospy.logerr("gazebo_gui: %s", error)
             return 1

@@ -103,7 +103,7 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     option("--replace", action="store_true", help="end a running simulator that has this name")
     option(
         "--video", action="append", default=[], metavar="FILE",
-        help="record the simulation: .mp4 a video, .html a page in 3-D, .png the last moment; repeatable",
+        help="record the simulation: .mp4 a video, .png the last moment; repeatable",
     )  # fmt: skip
     option("--video-rate", type=float, default=30.0, help="frames per second of simulated time")
     option("--video-size", type=int, nargs=2, default=(640, 480), help="width, height [pixels]")

@@ -144,9 +144,8 @@ class ModelPanel:
         rest = len(self._models) - MOST_SHOWN
         more = f"<tr><td colspan='4'>and {rest} more</td></tr>" if rest > 0 else ""
         head = "<tr><th align='left'>model</th><th>x [m]</th><th>y [m]</th><th>z [m]</th></tr>"
-        text = f"<table style='width: 100%; padding: 0 0.8em'>{head}{''.join(rows)}{more}</table>"
-        if self._list.content != text:
-            self._list.content = text
+        inner = f"{head}{''.join(rows)}{more}"
+        self._list.content = f"<table style='width: 100%; padding: 0 0.8em'>{inner}</table>"
 
     def _show_joints(self, positions: list[float]) -> None:
         """Moves the sliders with their joints, but for those that someone has just moved."""
@@ -167,17 +166,14 @@ class ModelPanel:
             if isinstance(holder, str):
                 reasons[joint] = holder
         for joint, slider in self._sliders.items():
-            if slider.disabled != (joint in reasons):
-                slider.disabled = joint in reasons
+            slider.disabled = joint in reasons
         lines = "".join(
             f"<li>{html.escape(shown(joint))}: {html.escape(reason)}</li>"
             for joint, reason in reasons.items()
         )
         inner = f"{UNMOVED}<ul style='margin: 0; padding-left: 1.2em'>{lines}</ul>"
-        text = f"<div style='padding: 0 0.8em'><small>{inner}</small></div>" if lines else ""
-        if self._unmoved.content != text:
-            self._unmoved.content = text
-            self._unmoved.visible = bool(text)
+        self._unmoved.content = f"<div style='padding: 0 0.8em'><small>{inner}</small></div>"
+        self._unmoved.visible = bool(lines)
 
     def follow(self, links: dict[str, np.ndarray]) -> None:
         """Keeps the followed model where it is on the page, and moves the world.

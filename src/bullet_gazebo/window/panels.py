@@ -44,7 +44,6 @@ class TimePanel:
         self.stands = False  # whether time stands still
         self._paused = False
         self._lockstep = False
-        self._shown = ""
         self._status = gui.add_html("")
         self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
         self._pause.on_click(lambda _: attempt(lambda: commands.set_paused(not self._paused)))
@@ -94,14 +93,10 @@ class TimePanel:
         physics = self._commands.physics()
         factor = physics.max_update_rate * physics.time_step
         names = [name for name, each in SPEEDS.items() if abs(each - factor) < 1e-6]
-        name = names[0] if names else OTHER
-        if self._speed.value != name:
-            self._speed.value = name  # type: ignore[misc]
+        self._speed.value = names[0] if names else OTHER  # type: ignore[misc]
 
     def _write(self, text: str) -> None:
-        if text != self._shown:
-            self._shown = text
-            self._status.content = f'<div style="padding: 0.4em 0.8em">{text}</div>'
+        self._status.content = f'<div style="padding: 0.4em 0.8em">{text}</div>'
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
-"""The page: shows the scene, passes clicks to the simulator, and shows the curves of a training."""
+"""The page: shows the scene, and passes clicks to the simulator."""
 
 import contextlib
 import io
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,18 +27,14 @@ from robot_sim.pictures.camera import ASPECT, THIRD, Camera, overview
 from robot_sim.pictures.page import Picture
 from robot_sim.pictures.page_batches import NUMBERS
 from ros_calls.service import ServiceFailed
-from web_viewer.address import Address
-from web_viewer.curves import Curves
-from web_viewer.server import open_browser, serve, stop
+from web_viewer.server import Page
 
 TITLE = "gzclient"
 CAMERA = Camera((0.0, 0.0, 0.35), 2.5, yaw=36.0, pitch=-18.0, view=75.0)  # while nothing moves
 UNTOUCHED, UNKNOWN = 1e-3, (3.0, 3.0, 3.0)  # [m]; viser's, before a browser has told its camera
 ADVICE = "~window"  # parameter: the lines that say where the page is
-CURVES = "~curves"  # parameter: a run folder, or the table of one
-TRAINED = "/gazebo_gui/curves"  # the same; a training sets it, for windows of any name
 WAIT = 0.5  # [s] for a message
-OFTEN, SELDOM, CURVES_PERIOD = 0.25, 2.0, 1.0  # [s] between updates of texts, controllers, curves
+OFTEN, SELDOM = 0.25, 2.0  # [s] between updates of texts, controllers
 NOTICE = 8.0  # [s] that a fault is shown
 RENDERING = 30.0  # [s] for a browser to draw a screenshot
 WORLD = "/world"  # the scene node above all models
@@ -78,7 +74,6 @@ class Window:
             self._drive = DrivePanel(gui)
         with tabs.add_tab("Sensors"):
             self._sensors = SensorPanel(server, WORLD)
-        TrainingTab(server, tabs).start()
         for box in (self._collisions, self._joint_frames):
             box.on_update(lambda _: self._redraw.set())
         self._due = {self._show_texts: 0.0, self._show_rest: 0.0}  # [s of wall time]
@@ -177,9 +172,7 @@ class Window:
             self._time.show_speed()
         self._drive.look()
         self._controllers.look()
-        tree = self._controllers.as_html()
-        if tree != self._tree.content:
-            self._tree.content = tree
+        self._tree.content = self._controllers.as_html()
 
     def _screenshot(self, event: viser.GuiEvent[Any]) -> None:
         """Sends what this page shows, at its size, to its browser as a file."""
@@ -200,60 +193,21 @@ class Window:
         client.send_file_download("gzclient.png", content.getvalue(), save_immediately=True)
 
 
-class TrainingTab:
-    """A tab with a training's curves, shown once someone has named a training.
-
-    A thread of its own reads the training's table.
-    """
-
-    def __init__(self, server: viser.ViserServer, tabs: viser.GuiTabGroupHandle) -> None:
-        """`tabs` is the group of tabs on the page, which receives this one."""
-        self._server, self._tabs = server, tabs
-        self._curves: Curves | None = None
-        self._named = ""
-
-    def start(self) -> None:
-        """Updates the tab until the node is shut down."""
-        threading.Thread(target=self._run, name="training", daemon=True).start()
-
-    def _run(self) -> None:
-        while not rospy.is_shutdown():
-            is_behind = bool(self._server.get_clients()) and self._look()
-            if not is_behind:
-                time.sleep(CURVES_PERIOD)
-
-    def _look(self) -> bool:
-        try:
-            named = str(rospy.get_param(CURVES, "") or rospy.get_param(TRAINED, ""))
-        except (OSError, rospy.ROSException) as fault:
-            rospy.logdebug("the master doesn't answer: %s", fault)
-            return False
-        if named and named != self._named:
-            self._named = named
-            if self._curves is None:
-                self._curves = Curves(self._server.gui, self._tabs.add_tab("Training"))
-            self._curves.follow(Path(named))
-        return self._curves is not None and self._curves.update()
-
-
-def show(address: Address, browser: bool) -> None:
+def show(host: str, port: int | None, browser: bool) -> None:
     """Serves the page until the node is shut down; with `browser` opens it where there is a display.
 
-    Raises PortInUse if another process was quicker.
+    Raises PortInUse if nothing can be served there.
     """
-    server = serve(address, TITLE, tuple(CAMERA.eye.tolist()), CAMERA.target)
-    try:
-        window = Window(server)
-        advice = address.advice("the window", "moves the simulation")
-        for line in advice:
-            print(f"gzclient: {line}", flush=True)
-        if not address.token:  # which is for no one else; other programs may show the lines
+    page = Page(TITLE, tuple(CAMERA.eye.tolist()), CAMERA.target, host, port)
+    with closing(page):
+        window = Window(page.server)
+        say = partial(print, "gzclient:", flush=True)
+        warn = partial(rospy.logwarn, "gazebo_gui: %s")
+        advice = page.announce("the window", "moves the simulation", say, warn, browser)
+        if not page.address.token:  # which is for no one else; other programs may show the lines
             rospy.set_param(ADVICE, advice)
-        if browser:  # may block until its user closes it
-            warn = partial(rospy.logwarn, "gazebo_gui: %s")
-            threading.Thread(target=open_browser, args=(address, warn), daemon=True).start()
-        window.run()
-    finally:
-        stop(server)
-        with contextlib.suppress(KeyError, OSError, rospy.ROSException):  # the master has gone
-            rospy.delete_param(ADVICE)
+        try:
+            window.run()
+        finally:
+            with contextlib.suppress(KeyError, OSError, rospy.ROSException):  # the master has gone
+                rospy.delete_param(ADVICE)

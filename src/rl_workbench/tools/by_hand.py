@@ -4,6 +4,7 @@ import argparse
 import queue
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from functools import partial
 from html import escape
 from typing import Any
@@ -18,9 +19,8 @@ from rl_workbench.tools.recording import CAMERA, LOOK_AT, make_view, step_rate
 from rl_workbench.training.checked import Env
 from rl_workbench.training.demonstrations import Demonstration, Recorder
 from rl_workbench.training.progress import tell, warn
-from web_viewer.address import PortInUse, find_address
 from web_viewer.keys import PAIRS
-from web_viewer.server import open_browser, serve, stop
+from web_viewer.server import Page
 
 HELD = 0.5  # [s of wall time] that a press lasts
 IDLE_PERIOD = 0.05  # [s] between two looks for a press
@@ -151,7 +151,7 @@ class Driver:
         if self._shown == (seed, recorder.length):
             return
         self._shown = seed, recorder.length
-        self._view.show(self._view.take())
+        self._view.show(self._view.look())
         lines = [f"seed {seed}, step {recorder.length}, return {recorder.total_reward:.1f}"]
         if recorder.has_ended:
             verdict = {None: "", True: ": success", False: ": no success"}[recorder.success]
@@ -164,20 +164,11 @@ def driven(
 ) -> Iterator[Demonstration]:
     """Serves the page, says where, and yields each episode that its driver keeps, until Ctrl-C."""
     interrupt.defer()
-    try:
-        address = find_address(arguments.host, arguments.port)
-        server = serve(address, arguments.out.name, CAMERA, LOOK_AT)
-    except PortInUse as error:
-        raise WorkbenchError(str(error)) from error
-    try:
-        driver = Driver(server, env, recorder)
-        for line in address.advice("the environment", "drives it"):
-            tell(line)
-        if not arguments.no_browser:
-            open_browser(address, warn)
+    page = Page(arguments.out.name, CAMERA, LOOK_AT, arguments.host, arguments.port)
+    with closing(page):
+        driver = Driver(page.server, env, recorder)
+        page.announce("the environment", "drives it", tell, warn, not arguments.no_browser)
         for seed in seeds:
             if (episode := driver.play(seed, interrupt)) is None:
                 return
             yield episode
-    finally:
-        stop(server)

@@ -1,11 +1,11 @@
-"""`record`: writes episodes as GIF, MP4, or an HTML file that plays them."""
+"""`record`: writes episodes as GIF or MP4."""
 
 import argparse
 import contextlib
 import shutil
 from collections.abc import Sequence
 from io import BytesIO
-from itertools import accumulate, pairwise, zip_longest
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
@@ -23,14 +23,13 @@ if TYPE_CHECKING:
     from rl_workbench.tools.recording import EpisodeFrame
     from rl_workbench.tools.runs import Run
 
-RATES = {".gif": 25.0, ".mp4": 50.0, ".html": 25.0}  # [Hz] by default, by the suffix
+RATES = {".gif": 25.0, ".mp4": 50.0}  # [Hz] by default, by the suffix
 MAX_GIF_RATE = 50.0  # [Hz]; browsers slow down faster ones
 GIF_TICK = 10  # [ms], the format's own
 COLOURS = 96  # of a GIF; drawings have few
 TEXT, PAPER = (40, 44, 52), (255, 255, 255)
 FADED = 0.4  # share of white in the picture of an episode that has ended
 LINES = 14.0  # lines of text that fit into a picture's height
-END = 1.0  # [s] for which a 3-D recording shows its last frame before it restarts
 
 
 class Film(NamedTuple):
@@ -45,7 +44,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of the command."""
     add_policy_flags(parser, POLICIES, several=True)
     add = parser.add_argument
-    add("--out", type=Path, required=True, metavar="FILE", help="ends in .gif, .mp4 or .html")
+    add("--out", type=Path, required=True, metavar="FILE", help="ends in .gif or .mp4")
     add("--max-steps", type=number(0), default=0, metavar="N",
         help="cut the episode off after N steps; 0: never (default)")  # fmt: skip
     add("--size", type=_size, metavar="WIDTHxHEIGHT",
@@ -74,13 +73,13 @@ def _rate(text: str) -> float:
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """Records an episode of each policy, and writes the file."""
     from rl_workbench.storage import check_writable
-    from rl_workbench.tools.recording import PictureView, draw_without_display, draws_itself
+    from rl_workbench.tools.recording import draw_without_display
     from rl_workbench.tools.runs import open_run
 
     out, run = arguments.out, open_run(arguments.run)
     suffix = out.suffix.lower()
     if suffix not in RATES:
-        raise WorkbenchError(f"a video's name ends in {', '.join(RATES)}: not {out}")
+        raise WorkbenchError(f"a video's name ends in {' or '.join(RATES)}: not {out}")
     if suffix == ".mp4":
         need("imageio_ffmpeg", "imageio-ffmpeg", "an MP4")
     rate = arguments.fps or RATES[suffix]
@@ -94,14 +93,8 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         for which in arguments.checkpoint:
             policies[which] = _policy(arguments, run, which)
             stack.callback(policies[which].env.close)
-        if suffix == ".html" and draws_itself(policies[arguments.checkpoint[0]].env):
-            films = _write_scene(arguments, policies, rate)
-        else:
-            views = {
-                name: PictureView(policies[name].env, size=arguments.size) for name in policies
-            }
-            films = [_record(arguments, name, policies[name], views[name], rate) for name in views]
-            write_video(out, SideBySide(films, not arguments.no_captions), films[0].rate)
+        films = [_record(arguments, *named, rate) for named in policies.items()]
+        write_video(out, SideBySide(films, not arguments.no_captions), films[0].rate)
     for film in films:
         title, end = f"{film.title}: " if film.title else "", film.frames[-1]
         words = {None: "", True: ", success", False: ", no success"}[end.success]
@@ -126,46 +119,16 @@ def _policy(arguments: argparse.Namespace, run: "Run", which: str) -> "Player":
     return load_any(run, which, options, arguments.seed)
 
 
-def _record(arguments: argparse.Namespace, which: str, policy: Any, view: Any, rate: float) -> Film:
+def _record(arguments: argparse.Namespace, which: str, policy: "Player", rate: float) -> Film:
     from rl_workbench.tools.policies import TEST_SEED
-    from rl_workbench.tools.recording import record_episode, step_rate
+    from rl_workbench.tools.recording import PictureView, record_episode, step_rate
 
-    steps = step_rate(policy.env)
+    steps, view = step_rate(policy.env), PictureView(policy.env, size=arguments.size)
     stride = max(1.0, steps / rate)
     frames = record_episode(policy.env, policy.act, view, TEST_SEED + arguments.seed,
                             stride=stride, max_steps=arguments.max_steps)  # fmt: skip
     title = which if len(arguments.checkpoint) > 1 else ""
     return Film(title, list(frames), steps / stride)
-
-
-def _write_scene(
-    arguments: argparse.Namespace, policies: dict[str, Any], rate: float
-) -> list[Film]:
-    """Writes one HTML file with the episodes side by side in 3-D."""
-    from rl_workbench.storage import write_file
-    from rl_workbench.tools.recording import SceneView
-    from web_viewer.server import hidden_page
-
-    if arguments.size:
-        raise WorkbenchError("--size: a recording in 3-D is as large as the browser's window")
-    with hidden_page() as server:
-        views = [SceneView(each.env, server, index) for index, each in enumerate(policies.values())]
-        films = [
-            _record(arguments, which, policy, view, rate)
-            for (which, policy), view in zip(policies.items(), views, strict=True)
-        ]
-        recording = server.get_scene_serializer()
-        for moment, frames in enumerate(zip_longest(*(film.frames for film in films))):
-            if moment:
-                recording.insert_sleep(1.0 / films[0].rate)
-            for film, view, frame in zip(films, views, frames, strict=True):
-                if frame is not None:  # a finished episode keeps its last frame
-                    caption = "" if arguments.no_captions else frame.caption(film.title)
-                    view.show(frame.seen, caption)
-        recording.insert_sleep(END)
-        page = recording.as_html()
-    write_file(arguments.out, lambda stream: stream.write(page.encode()))
-    return films
 
 
 class SideBySide(Sequence["np.ndarray"]):
@@ -220,7 +183,7 @@ def write_video(path: Path, frames: "Sequence[np.ndarray]", rate: float) -> None
     """Writes frames (H, W, 3) of uint8, `rate` a second, in the format of the suffix; atomically."""
     from rl_workbench.storage import write_file
 
-    write = {".gif": _write_gif, ".mp4": _write_mp4, ".html": _write_html}[path.suffix.lower()]
+    write = {".gif": _write_gif, ".mp4": _write_mp4}[path.suffix.lower()]
     write_file(path, lambda stream: write(stream, frames, rate))
 
 
@@ -240,20 +203,6 @@ def _write_gif(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) ->
         stream, format="GIF", save_all=True, append_images=reduced[1:], loop=0, optimize=False,
         duration=[GIF_TICK * (round(end) - round(begin)) for begin, end in pairwise(ticks)],
     )  # fmt: skip
-
-
-def _write_html(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -> None:
-    """Writes a page that plays the pictures without a network."""
-    from rl_workbench.tools.recording import CAMERA, LOOK_AT, Screen
-    from web_viewer.server import hidden_page
-
-    with hidden_page() as server:
-        server.initial_camera.position, server.initial_camera.look_at = CAMERA, LOOK_AT
-        screen, recording = Screen(server), server.get_scene_serializer()
-        for frame in frames:
-            screen.show(frame)
-            recording.insert_sleep(1.0 / rate)
-        stream.write(recording.as_html().encode())
 
 
 def _write_mp4(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import gymnasium
 import numpy as np
@@ -49,7 +49,7 @@ class EpisodeFrame(NamedTuple):
     """A moment of an episode; the first one is the reset."""
 
     step: int
-    seen: Any  # what `View.take` returned
+    seen: Any  # what `View.look` returned
     total_reward: float
     action: str  # empty at the reset
     success: bool | None = None  # at the end, if the environment says
@@ -63,26 +63,6 @@ class EpisodeFrame(NamedTuple):
         return "   ".join([*parts, "ended"] if self.ended else parts)
 
 
-class Screen:
-    """A picture in the middle of a page, at most WIDTH by HEIGHT."""
-
-    def __init__(self, server: "viser.ViserServer") -> None:
-        self._server = server
-        self._image: viser.ImageHandle | None = None
-
-    def show(self, picture: np.ndarray) -> None:
-        """Shows a picture (H, W, 3) of uint8; all have the same size."""
-        if self._image is not None:
-            self._image.image = picture
-            return
-        high, wide = picture.shape[:2]
-        scale = min(HEIGHT / high, WIDTH / wide)
-        self._image = self._server.scene.add_image(
-            "/picture", picture, wide * scale, high * scale, format="jpeg", jpeg_quality=QUALITY,
-            wxyz=FACING, cast_shadow=False, receive_shadow=False,
-        )  # fmt: skip
-
-
 class PictureView:
     """Takes the pictures of `render`, scaled to a size, and shows them on a page if there is one."""
 
@@ -91,10 +71,10 @@ class PictureView:
     ) -> None:
         if env.render_mode != "rgb_array":
             raise WorkbenchError("the environment draws no pictures")
-        self._env, self._size = env, size
-        self._screen = Screen(server) if server else None
+        self._env, self._server, self._size = env, server, size
+        self._image: viser.ImageHandle | None = None
 
-    def take(self) -> bytes:
+    def look(self) -> bytes:
         """Returns a PNG, because thousands are kept."""
         try:
             drawn: Any = self._env.render()
@@ -109,30 +89,27 @@ class PictureView:
         picture.convert("RGB").save(stream, "PNG", compress_level=1)
         return stream.getvalue()
 
-    def show(self, seen: bytes, caption: str = "") -> None:
-        """Shows a picture; the page has captions of its own."""
-        assert self._screen is not None
-        self._screen.show(np.asarray(Image.open(BytesIO(seen))))
+    def show(self, seen: bytes) -> None:
+        """Shows it in the middle of the page, at most WIDTH by HEIGHT; all have the same size."""
+        picture = np.asarray(Image.open(BytesIO(seen)))
+        if self._image is not None:
+            self._image.image = picture
+            return
+        assert self._server is not None
+        high, wide = picture.shape[:2]
+        scale = min(HEIGHT / high, WIDTH / wide)
+        self._image = self._server.scene.add_image(
+            "/picture", picture, wide * scale, high * scale, format="jpeg", jpeg_quality=QUALITY,
+            wxyz=FACING, cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
 
 
-class SceneView:
-    """Shows an environment that draws itself in 3-D on a page, as one of several with `index`."""
+class View(Protocol):
+    """Captures an environment by `look`, and shows what that returned on a page, maybe in another thread."""
 
-    def __init__(self, env: Env, server: "viser.ViserServer", index: int = 0) -> None:
-        try:
-            self._drawn = getattr(env.unwrapped, DRAW)(server, index)
-        except gymnasium.error.Error as error:
-            raise WorkbenchError(f"the environment can't be drawn: {error}") from error
+    def look(self) -> Any: ...
 
-    def take(self) -> Any:
-        return self._drawn.look()
-
-    def show(self, seen: Any, caption: str = "") -> None:
-        self._drawn.show(seen, *([caption] if caption else []))
-
-
-View = PictureView | SceneView
-"""Captures an environment by `take`, and shows what that returned on a page, maybe in another thread."""
+    def show(self, seen: Any) -> None: ...
 
 
 def draws_itself(env: Env) -> bool:
@@ -144,7 +121,10 @@ def make_view(server: "viser.ViserServer", env: Env) -> View:
     """Makes the best view that the environment has, and points the open pages' cameras at its front."""
     if not draws_itself(env):
         return PictureView(env, server)
-    view = SceneView(env, server)
+    try:
+        view: View = getattr(env.unwrapped, DRAW)(server)
+    except gymnasium.error.Error as error:
+        raise WorkbenchError(f"the environment can't be drawn: {error}") from error
     front = server.initial_camera
     for client in server.get_clients().values():
         with client.atomic():
@@ -164,7 +144,7 @@ def record_episode(
             continue
         action = "" if step.action is None else _action_text(step.action)
         ended = step.finished and length != max_steps
-        yield EpisodeFrame(length, view.take(), total, action, step.success, ended)
+        yield EpisodeFrame(length, view.look(), total, action, step.success, ended)
         while due <= length:
             due += stride
 

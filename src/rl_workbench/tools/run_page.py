@@ -1,11 +1,11 @@
-"""The page of a run: recorded episodes of its policies, and the curves of its training."""
+"""The page of a run: recorded episodes of its policies."""
 
-import contextlib
 import select
 import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,6 @@ from typing import Any
 import viser
 
 from rl_workbench.env_ids import import_module_of
-from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
 from rl_workbench.tools.recording import (
     CAMERA,
@@ -24,12 +23,9 @@ from rl_workbench.tools.recording import (
 )
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training.progress import tell, warn
-from web_viewer.address import PortInUse, find_address
-from web_viewer.curves import Curves
-from web_viewer.server import open_browser, serve, stop
+from web_viewer.server import Page
 
 PERIOD = 1.0 / 30.0  # [s] between two pictures
-CURVES_PERIOD = 1.0  # [s] between two reads of scalars.csv
 IDLE_PERIOD = 0.25  # [s] between two checks for a viewer
 SPEEDS = {"0.1 ×": 0.1, "0.25 ×": 0.25, "0.5 ×": 0.5, "1 ×": 1.0, "2 ×": 2.0, "5 ×": 5.0}
 LINGER = 1.0  # [s] on the last frame of an episode
@@ -68,38 +64,20 @@ def show_run(
         has_ended = beside_training and bool(select.select([sys.stdin], [], [], 0)[0])
         return has_ended or interrupt.requested()
 
-    try:
-        address = find_address(host, port)
-        server = serve(address, folder.name, CAMERA, LOOK_AT)
-    except PortInUse as error:
-        raise WorkbenchError(str(error)) from error
-    with contextlib.ExitStack() as stack:
-        stack.callback(stop, server)
-        recorder = EpisodeRecorder(folder, server, env_options)
-        stack.callback(recorder.close)
+    page = Page(folder.name, CAMERA, LOOK_AT, host, port)
+    server = page.server
+    with closing(page), closing(EpisodeRecorder(folder, server, env_options)) as recorder:
         if is_over():  # the training was shorter than this page's start
             return
-        for line in address.advice("the run", "plays its episodes"):
-            tell(line)
-        if browser:  # some browsers block until the user closes them
-            threading.Thread(target=open_browser, args=(address, warn), daemon=True).start()
+        page.announce("the run", "plays its episodes", tell, warn, browser)
         while not server.get_clients():  # nothing is played without a viewer
             if is_over():
                 return
             time.sleep(IDLE_PERIOD)
-        with server.gui.add_folder("Episode"):
-            playback = Playback(server.gui, recorder, policies, seed, episodes)
-        curves = Curves(server.gui, server.gui.add_folder("Training"))
-        curves.follow(folder)
-        _play(server, playback, curves, is_over)
+        _play(server, Playback(server.gui, recorder, policies, seed, episodes), is_over)
 
 
-def _play(
-    server: viser.ViserServer, playback: "Playback", curves: Curves, is_over: Callable[[], bool]
-) -> None:
-    ended = threading.Event()
-    drawing = threading.Thread(target=_draw, args=(server, curves, ended), daemon=True)
-    drawing.start()
+def _play(server: viser.ViserServer, playback: "Playback", is_over: Callable[[], bool]) -> None:
     last = time.monotonic()
     while not is_over():
         is_watched = bool(server.get_clients())
@@ -108,14 +86,6 @@ def _play(
         if is_watched:
             playback.tick(min(now - last, IDLE_PERIOD))
         last = now
-    ended.set()
-    drawing.join()
-
-
-def _draw(server: viser.ViserServer, curves: Curves, ended: threading.Event) -> None:
-    has_more = True
-    while not ended.wait(0.0 if has_more else CURVES_PERIOD):
-        has_more = bool(server.get_clients()) and curves.update()
 
 
 class Playback:
@@ -205,8 +175,7 @@ class Playback:
                 self._start()
 
     def _show(self, episode: RecordedEpisode, index: int) -> None:
-        if self._slider.max != max(1, episode.length):
-            self._slider.max = max(1, episode.length)
+        self._slider.max = max(1, episode.length)
         if self._drawn is not None and self._drawn[0] is episode and self._drawn[1] == index:
             return
         self._drawn = (episode, index)
@@ -225,6 +194,5 @@ class Playback:
             lines.append(f"action {frame.action or '-'}")
         if episode.note:
             lines.append(episode.note)
-        text = f'<div style="padding: 0.4em 0.8em">{"<br>".join(map(escape, lines))}</div>'
-        if text != self._about.content:
-            self._about.content = text
+        text = "<br>".join(map(escape, lines))
+        self._about.content = f'<div style="padding: 0.4em 0.8em">{text}</div>'

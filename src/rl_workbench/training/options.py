@@ -96,9 +96,7 @@ class RunOptions:
 class SessionOptions:
     """Options of one session. They aren't recorded, so they may differ when the training is resumed."""
 
-    gui: bool = option(
-        False, "show a page in the browser: the curves, and episodes of the newest checkpoint"
-    )
+    gui: bool = option(False, "show a page in the browser: episodes of the newest checkpoint")
     callback: str = option(
         "", "callbacks of your own as module:Class, several with commas", metavar="MODULE:CLASS"
     )

@@ -71,13 +71,13 @@ def train(algo: str, callbacks: Sequence[Callback] = (), **options: Any) -> Path
 def run_training(
     options: TrainingOptions,
     interrupt: Interrupt,
-    begin: Callable[[Path], object] = lambda _: None,
+    begin: Callable[[], object] = lambda: None,
     callbacks: Sequence[Callback] = (),
 ) -> Path:
     """Trains into the options' folder, or a new one below runs/; returns it.
 
-    `begin` is called with the folder before the training begins, to start what goes beside it. `callbacks`
-    are further ones than those that the options name. Raises WorkbenchError if something fails that the user
+    `begin` is called before the training begins, to start what goes beside it. `callbacks` are further ones
+    than those that the options name. Raises WorkbenchError if something fails that the user
     can mend; what was learned is saved, up to the step that the text names.
     """
     with interrupt.reading():  # both are slow to import, and --help needs neither
@@ -96,7 +96,7 @@ def run_training(
             else:
                 place = (run.run_dir, run.env_id, run.exp_name, run.seed)
                 folder = holding.enter_context(run_folder.opened(*place))
-            begin(folder)
+            begin()
             training = Training(options, folder, interrupt, callbacks)
             if doubt := options.doubt():
                 warn(doubt)

@@ -79,12 +79,12 @@ class RobotPicture:
         return placement, placement.camera(self._camera, self._size[0] / self._size[1]), renderer
 
     def draw_on(
-        self, server: "ViserServer", positions: Callable[[], Mapping[str, float]], beside: int = 0
+        self, server: "ViserServer", positions: Callable[[], Mapping[str, float]]
     ) -> "RobotOnPage":
         """Draws the robot on a viser page, where `positions` puts it; see `RobotEnv.draw_on`."""
         from robot_envs.pictures.page import RobotOnPage
 
-        made = RobotOnPage(server, self._place(), positions, self._camera, self._size, beside)
+        made = RobotOnPage(server, self._place(), positions, self._camera, self._size)
         self._on_page.append(made)
         return made
 
@@ -165,7 +165,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         """Returns a picture of the robot, (height, width, 3) of uint8; None in the render mode "human"."""
         return self._picture(self._positions()) if self.render_mode == "rgb_array" else None
 
-    def draw_on(self, server: "ViserServer", beside: int = 0) -> "RobotOnPage":
+    def draw_on(self, server: "ViserServer") -> "RobotOnPage":
         """Draws the robot on a viser page: its visuals, a ground and lights, as in the pictures.
 
         Needs no render mode, and works with any backend:
@@ -175,9 +175,8 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
             ...  # env.reset(), env.step(action)
             robot()
 
-        `beside` is how many robots of this kind are on the page already. Returns what moves the robot to
-        where it is now: a function, which takes a caption to show below it. Its two halves are `look()`,
-        which returns where the robot is, and `show()`, which moves it there, then or later. They raise
+        Returns a function that moves the robot to where it is now. Its two halves are `look()`, which
+        returns where the robot is, and `show()`, which moves it there, then or later. They raise
         SimulatorError if the backend has to be asked where the robot is, and doesn't answer.
         """
-        return self._picture.draw_on(server, self._positions, beside)
+        return self._picture.draw_on(server, self._positions)

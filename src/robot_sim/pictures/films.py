@@ -1,9 +1,8 @@
-"""The renderer process of recordings: a video, a 3-D page, or a picture."""
+"""The renderer process of recordings: a video, or a picture."""
 
 import logging
 import pickle
 import queue
-import signal
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -12,9 +11,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from PIL import Image
 
-from robot_sim.physics.files.world_file import empty_world
 from robot_sim.physics.pose import ZERO, Vector, add, subtract
-from robot_sim.pictures.camera import ASPECT, Camera, overview
+from robot_sim.pictures.camera import Camera, overview
 from robot_sim.pictures.recording import RecordedModel, RecordingOptions
 from robot_sim.pictures.renderer import Renderer
 from robot_sim.pictures.visuals import pose_of
@@ -22,12 +20,9 @@ from web_viewer.video import EncoderFailed, Mp4Writer
 
 NUMBERS = 7  # of a pose
 ROOM = 1.25  # factor on the camera's distance: things move
-END = 1.0  # [s] for which a page shows its last moment before it begins again
 
 Frames = Iterable[tuple[list[RecordedModel] | None, Sequence[float]]]
 """Models, None while they are those of the frame before, and the poses of their links."""
-
-logger = logging.getLogger(f"rosout.{__name__}")
 
 
 class FrameDrawer:
@@ -43,19 +38,18 @@ class FrameDrawer:
     def change(self, models: list[RecordedModel]) -> None:
         """Replaces the models; the next frame places the camera from scratch."""
         for model in self._models:
-            self._renderer.remove(model.seen.name)
+            self._renderer.remove(model.name)
         for model in models:
-            self._renderer.add(model.seen.name, model.shapes)
+            self._renderer.add(model.name, model.shapes)
         self._models, self._camera = models, None
 
     def frame(self, poses: Sequence[float]) -> np.ndarray:
         """Draws the models with their links at these poses, 7 numbers each."""
         rows = iter(np.reshape(np.asarray(poses), (-1, NUMBERS)))
         places: dict[str, Vector] = {}
-        for model, _ in self._models:
+        for model in self._models:
             found = [pose_of(next(rows)) for _ in model.links]
-            named = {link.name: pose for link, pose in zip(model.links, found, strict=True)}
-            self._renderer.place(model.name, named)
+            self._renderer.place(model.name, dict(zip(model.links, found, strict=True)))
             places[model.name] = found[model.root].position if found else ZERO
         width, height = self._options.width, self._options.height
         if self._camera is None:
@@ -65,7 +59,7 @@ class FrameDrawer:
         return self._renderer.picture(self._camera, width, height)
 
     def _aim(self, places: dict[str, Vector], aspect: float) -> Camera:
-        movable = [model.name for model, _ in self._models if not model.static]
+        movable = [model.name for model in self._models if not model.static]
         named = [self._options.model] if self._options.model in places else []
         names = named or movable or list(places)
         corners = [np.zeros((0, 3)), *(self._renderer.corners(name) for name in names)]
@@ -101,42 +95,14 @@ def write_picture(options: RecordingOptions, frames: Frames) -> None:
         Image.fromarray(picture).save(file, "PNG")
 
 
-def write_page(options: RecordingOptions, frames: Frames) -> None:
-    """Writes an HTML file that plays the frames in 3-D, in any browser and without a network."""
-    from robot_sim.pictures.page import Picture
-    from web_viewer.server import hidden_page
-
-    shown: list[RecordedModel] = []
-    last: Sequence[float] | None = None
-    with hidden_page() as server:
-        picture, recording = Picture(server, logger.warning), server.get_scene_serializer()
-        for models, last in frames:
-            if models is not None:
-                shown = models
-                picture.draw([each.seen for each in shown], empty_world().lights.values())
-            picture.move(np.reshape(np.asarray(last), (-1, NUMBERS)))
-            recording.insert_sleep(1.0 / options.rate)
-        if last is None:
-            return
-        links = picture.links
-        movable = [seen for seen, _ in shown if not seen.static]
-        corners = [each.corners(links[each.name]) for each in movable if each.name in links]
-        camera = overview(np.concatenate([np.zeros((0, 3)), *corners]), ASPECT)
-        x, y, z = camera.eye.tolist()
-        server.initial_camera.position, server.initial_camera.look_at = (x, y, z), camera.target
-        recording.insert_sleep(END)
-        options.path.write_text(recording.as_html(), encoding="utf-8")
-
-
 FILMS: dict[str, Callable[[RecordingOptions, Frames], None]] = {
     ".mp4": write_video,
-    ".html": write_page,
     ".png": write_picture,
 }
 
 
 def main() -> int:
-    """Draws until standard input ends; SIGTERM drops the frames that aren't drawn yet."""
+    """Draws until standard input ends."""
     logging.basicConfig(format="recording: %(message)s")
     options: RecordingOptions = pickle.load(sys.stdin.buffer)
     try:
@@ -152,21 +118,13 @@ def main() -> int:
 def _draw(options: RecordingOptions) -> int:
     """Draws the frames read from standard input; returns their number."""
     inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    stopping = False
-
-    def stop(*_: object) -> None:
-        nonlocal stopping
-        stopping = True
-        inbox.put(None)
-
-    signal.signal(signal.SIGTERM, stop)
     # In a thread, so that the simulator never waits for a frame.
     threading.Thread(target=_read, args=(sys.stdin.buffer, inbox), daemon=True).start()
     count = 0
 
     def frames() -> Iterator[Any]:
         nonlocal count
-        while (message := inbox.get()) is not None and not stopping:
+        while (message := inbox.get()) is not None:
             count += 1
             yield message
 

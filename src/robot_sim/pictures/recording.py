@@ -14,6 +14,7 @@ import subprocess
 import sys
 import threading
 from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,11 +23,11 @@ from robot_sim.constants import NANOSECONDS
 from robot_sim.physics.description import Shape
 from robot_sim.physics.engines import installing
 from robot_sim.physics.model import Model
-from robot_sim.pictures.visuals import VisibleModel, visible_model, visible_shapes
+from robot_sim.pictures.visuals import visible_shapes
 from robot_sim.simulator import Simulator
 
 MAIN = "import sys; from robot_sim.pictures.films import main; sys.exit(main())"
-SUFFIXES = (".mp4", ".html", ".png")
+SUFFIXES = (".mp4", ".png")
 MOST_WAITING = 100_000_000  # [bytes] for the other process; beyond it frames are dropped
 LEAST_SIZE, LARGEST_SIZE, FASTEST = 16, 4096, 240.0
 
@@ -39,7 +40,7 @@ class RecordingError(ValueError):
 
 @dataclass(frozen=True)
 class RecordingOptions:
-    """What is recorded: a video (.mp4), a page in 3-D (.html), or a picture of the last moment (.png)."""
+    """What is recorded: a video (.mp4), or a picture of the last moment (.png)."""
 
     path: Path  # of the file, which replaces an older one
     rate: float = 30.0  # [Hz]; frames per second of simulated time
@@ -51,7 +52,7 @@ class RecordingOptions:
         """Raises RecordingError if one of the options is invalid."""
         if self.path.suffix.lower() not in SUFFIXES:
             raise RecordingError(
-                f"a recording's name ends in {', '.join(SUFFIXES)}: not '{self.path}'"
+                f"a recording's name ends in {' or '.join(SUFFIXES)}: not '{self.path}'"
             )
         if self.path.suffix.lower() == ".mp4" and not importlib.util.find_spec("imageio_ffmpeg"):
             command = installing("imageio-ffmpeg")
@@ -67,12 +68,12 @@ class RecordingOptions:
 
 
 class RecordedModel(NamedTuple):
-    """What the drawing process needs to know about a model.
+    """What the drawing process needs to know about a model."""
 
-    `seen` has its links in the order of their poses, and is for pages; pictures are made of `shapes`.
-    """
-
-    seen: VisibleModel
+    name: str
+    links: Sequence[str]  # in the order of their poses
+    root: int  # index of its root link
+    static: bool
     shapes: list[tuple[str, Shape]]
 
 
@@ -150,6 +151,6 @@ class SimulationRecorder:
 
 
 def _recorded(model: Model) -> RecordedModel:
-    made = model.description
-    seen = visible_model(made, model.number, model.name, model.link_names, [], collisions=False)
-    return RecordedModel(seen, visible_shapes(made))
+    made, links = model.description, list(model.link_names)
+    root = links.index(made.root) if made.root in links else 0
+    return RecordedModel(model.name, links, root, made.static, visible_shapes(made))

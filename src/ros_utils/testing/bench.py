@@ -28,7 +28,7 @@ FAILURES = "ROS_TEST_FAILURES"  # environment variable: the folder of what faile
 STARTING = 120.0  # [s of wall time]
 DRAWING = 120.0  # [s of wall time] to complete a recording
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")  # of an object
-FILMS, BAG = ("world.png", "world.html"), "world.bag"
+PICTURE, BAG = "world.png", "world.bag"
 
 
 def failure_folder(test: str) -> Path:
@@ -84,7 +84,7 @@ class Bench:
 
     @contextlib.contextmanager
     def world(self, seed: int, recorded: Path | None = None) -> Iterator[RobotWorld]:
-        """Yields an empty world at time 0, recorded in a folder: a picture, a page in 3-D and a bag."""
+        """Yields an empty world at time 0, recorded in a folder: a picture and a bag."""
         if seed < 1:
             raise WorldError(f"the seed is {seed}: 1 or more is needed")
         with contextlib.ExitStack() as ending:
@@ -110,8 +110,8 @@ class Bench:
     def _launch(self, recorded: Path | None = None) -> Started:
         log, more = None, ""
         if recorded is not None:
-            log, more = str(recorded / "simulator.log"), f"--journal '{recorded / BAG}'"
-            more += "".join(f" --video '{recorded / name}'" for name in FILMS)
+            log = str(recorded / "simulator.log")
+            more = f"--journal '{recorded / BAG}' --video '{recorded / PICTURE}'"
         started = ros_gazebo.launch_Gazebo(
             gui=False, launch_new_term=False, lockstep=True, server_required=True, timeout=STARTING,
             output="screen" if log else "log", log_file=log,
@@ -146,12 +146,12 @@ def _forget_parameters(before: set[str]) -> None:
 
 
 def _await_recordings(folder: Path) -> None:
-    """Ends the simulator, and waits until it has completed the bag, and other processes their drawings."""
+    """Ends the simulator, and waits until it has completed the bag, and another process the picture."""
     ros_node.ros_kill_node(SIMULATOR)
-    log, lines = folder / "simulator.log", [f"recording: {folder / name}:" for name in FILMS]
+    log, drawn = folder / "simulator.log", f"recording: {folder / PICTURE}:"
 
     def look() -> bool:
         text = log.read_text(encoding="utf-8", errors="replace")
-        return all(line in text for line in lines) and (folder / BAG).exists()
+        return drawn in text and (folder / BAG).exists()
 
-    wait_until(look, DRAWING, "recordings")
+    wait_until(look, DRAWING, "recording")

@@ -111,7 +111,10 @@ class Browser:
         return self.run("document.body ? document.body.innerText : ''")
 
     def wait_for_text(self, text):
-        wait_for(lambda: text in self.text, f"text {text!r}")
+        try:
+            wait_for(lambda: text in self.text, f"text {text!r}")
+        except AssertionError as fault:  # as of a blank page, whose console may say why
+            raise AssertionError(f"{fault}; {self.text[:500]!r}; {self.log[-5:]}") from None
 
     def type(self, selector, text):
         """Types a text into the first input of a CSS selector, in place of what it has."""

@@ -1,18 +1,10 @@
 """Reads what a viser recording holds."""
 
-import base64
-import re
-
 import msgspec
 import numpy as np
 import zstandard
 
 ALIGNED = 8  # [bytes]; where an array begins
-
-
-def of_page(text):
-    """The recording that an HTML file plays."""
-    return Recording(base64.b64decode(re.search(r'__VISER_EMBED_DATA__="([^"]*)"', text)[1]))
 
 
 class Recording:

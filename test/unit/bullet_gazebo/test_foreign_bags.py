@@ -40,7 +40,7 @@ def test_a_world_file_that_has_gone_is_written_again(tmp_path):
     assert (tmp_path / "recorded.world").read_text() == "<sdf/>"
 
 
-@pytest.mark.parametrize("text", ["--video=x.html", "--journal=x", "-u", "__log:=x", "../x", "\0"])
+@pytest.mark.parametrize("text", ["--video=x.png", "--journal=x", "-u", "__log:=x", "../x", "\0"])
 @pytest.mark.parametrize("world_text", [None, "<sdf/>"])
 def test_no_text_of_a_bag_becomes_an_option_or_a_path(text, world_text, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -140,7 +140,7 @@ NAMES = (
 @pytest.mark.slow
 @pytest.mark.skipif(not find_browser(), reason="no Chromium: apt-get install chromium")
 def test_foreign_names_and_numbers_are_only_text_to_a_browser(server):
-    """As names of models, joints and curves, as options, labels, captions and faults; as stops of joints."""
+    """As names of models and joints, as options, labels, captions and faults; as stops of joints."""
     limits = (1.0, 1e14, 99999999999999999999.0, 1e-300, 1e308, -1.0)
     joints = [
         Joint(f"{name} joint", "revolute", "", "base", lower=-limit, upper=limit)

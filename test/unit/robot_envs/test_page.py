@@ -94,29 +94,6 @@ def switches(server):
     return [each for each in list(found) if each.label == "Follow"]
 
 
-def test_several_stand_beside_each_other_with_captions_and_are_all_seen(server):
-    picture = RobotPicture(ROVER_ROBOT, camera=Camera(distance=1.0, yaw=0.0))
-    robots = [
-        picture.draw_on(server, lambda lean=lean: {"neck": lean}, number)
-        for number, lean in enumerate((0.0, 0.3, -0.3))
-    ]
-    for count, robot in enumerate(robots):
-        robot(f"the {count}. one")
-    robots[2]()  # keeps its caption
-    kept = robots[1].look()
-    robots[1].show(kept)
-    nodes = Recording(server.get_scene_serializer().serialize()).at()
-    assert [n["text"] for n in shapes(nodes, "LabelMessage")] == [
-        "the 0. one", "the 1. one", "the 2. one"
-    ]  # fmt: skip
-    apart = [nodes[f"/world/{number}"]["position"] for number in range(3)]
-    assert apart[2][0] == pytest.approx(2.0 * apart[1][0]) and apart[1][0] > 0.4
-    assert len(shapes(nodes, "GridMessage")) == 1
-    assert server.initial_camera.look_at[0] == pytest.approx(apart[1][0], abs=0.1)
-    seen = server.initial_camera.position[1]
-    assert seen < -1.5 * apart[1][0]  # far enough away for all of them
-
-
 def test_the_render_mode_human_shows_the_robot_on_a_page_in_real_time(capsys):
     env = gymnasium.make("cartpole/Classic-v0", render_mode="human")
     assert env.metadata["render_modes"] == ["human", "rgb_array"]

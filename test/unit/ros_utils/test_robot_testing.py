@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import rosbag
 from PIL import Image
-from support.pages.viser_recording import of_page
 from support.ros.calls import executable
 
 from ros_utils.testing.bench import failure_folder
@@ -131,8 +130,6 @@ def test_a_failure_leaves_its_recording_and_seed(tmp_path):
     assert "seed: 7" in (folder / "failure.txt").read_text()
     with Image.open(folder / "world.png") as picture:
         assert len(np.unique(np.asarray(picture).reshape(-1, 3), axis=0)) > 20
-    played = of_page((folder / "world.html").read_text())
-    assert played.duration > 1.0
     with rosbag.Bag(str(folder / "world.bag")) as bag:
         seen = [message.position for _, message, _ in bag.read_messages("/joint_states")]
         assert min(seen) != max(seen) and 0.9 < bag.get_end_time() < 2.1
@@ -194,6 +191,5 @@ def test_with_unittest_a_failure_says_where_its_recording_is(tmp_path):
     assert "0.1 != 0.0" in (parts / "failure.txt").read_text()
     assert "self.world.assert_joint(" in done.stdout and "robot_world.py" not in done.stdout
     assert done.stdout.count("torn down") == 8
-    assert {path.name for path in folder.iterdir()} == {
-        "failure.txt", "simulator.log", "world.bag", "world.html", "world.png"
-    }  # fmt: skip
+    left = {path.name for path in folder.iterdir()}
+    assert left == {"failure.txt", "simulator.log", "world.bag", "world.png"}

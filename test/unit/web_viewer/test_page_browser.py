@@ -8,8 +8,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 from support.pages.browser import BOUND, Browser, find_browser, wait_for
 
-from web_viewer.address import find_address
-from web_viewer.server import serve, stop
+from web_viewer.server import Page
 
 pytestmark = [
     pytest.mark.slow,
@@ -31,14 +30,15 @@ TAP = """[...document.querySelectorAll("div")]
 
 @pytest.fixture
 def page():
-    server = serve(find_address("127.0.0.1", 0), "a page", (2.0, 2.0, 1.5), (0.0, 0.0, 0.3))
+    made = Page("a page", (2.0, 2.0, 1.5), (0.0, 0.0, 0.3), port=0)
+    server = made.server
     server.scene.add_box("/box", color=(255, 0, 0))
     with server.gui.add_tab_group().add_tab("World"):
         for number in range(30):
             server.gui.add_slider(f"joint {number}", 0.0, 1.0, 0.1, 0.5)
         server.gui.add_button("Push")
-    yield f"http://127.0.0.1:{server.get_port()}/"
-    stop(server)
+    yield made.address.url
+    made.close()
 
 
 def boxes(seen):

@@ -6,7 +6,6 @@ import os
 import re
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 
 import rospy
 
@@ -40,7 +39,6 @@ class RosSession:
         gui: Open the simulator's window, if it isn't open.
         seed: Seed of a simulator that is started here.
         rviz: Show the robot in RViz.
-        curves: A run folder, whose curves the window shows next to the robot, whoever opened it.
     """
 
     def __init__(
@@ -52,13 +50,12 @@ class RosSession:
         gui: bool,
         seed: int,
         rviz: bool = False,
-        curves: Path | None = None,
     ) -> None:
         self._scene = Scene([robots] if isinstance(robots, Robot) else robots)
         self._world = SharedWorld()
         self._name, self._argv = name, argv
         self._realtime, self._gui, self._seed = realtime, gui, seed
-        self._rviz, self._curves = rviz, curves
+        self._rviz = rviz
         self._undo = contextlib.ExitStack()
         # Outlives the world, since a process can become a node only once.
         self._node = contextlib.ExitStack()
@@ -92,8 +89,6 @@ class RosSession:
             restore = partial(running.physics_step, running.physics_step())
             self._undo.callback(_undo_if_running, RunningSimulator(), restore)
             running.physics_step(robot.physics_step)
-        if self._curves is not None:
-            self._undo.callback(windows.show_curves(self._curves))
         changes = bring_up(self._scene, say)
         if not self._started_simulator:  # otherwise it ends with all that is in it
             before = RunningSimulator()

@@ -4,7 +4,6 @@ import contextlib
 import os
 import shutil
 from collections.abc import Callable
-from pathlib import Path
 
 import rospy
 
@@ -19,20 +18,7 @@ Say = Callable[[str], None]
 
 NODE = "gazebo_gui"
 WINDOW = f"/{NODE}/window"  # parameter: lines that say where the window is
-CURVES = f"/{NODE}/curves"  # parameter: a run folder whose curves it shows
 TIMEOUT = 120.0  # [s] for it to open
-
-
-def show_curves(folder: Path) -> Callable[[], None]:
-    """Shows a training's curves in the window, open or to be opened; returns what ends that."""
-    rospy.set_param(CURVES, str(folder))
-
-    def forget() -> None:
-        with contextlib.suppress(KeyError, OSError, rospy.ROSException):  # the master may be gone
-            if rospy.get_param(CURVES, None) == str(folder):
-                rospy.delete_param(CURVES)
-
-    return forget
 
 
 def is_open() -> bool:

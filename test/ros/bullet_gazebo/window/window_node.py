@@ -59,9 +59,6 @@ SEEING = f"""<robot name="seeing"><link name="body">{INERTIAL}</link>
 </gazebo><gazebo><static>true</static></gazebo></robot>"""
 PICTURES = "[...document.querySelectorAll('img')].filter(e => e.naturalWidth === 320).length"
 ODD = "<b>ö\t\"&'/x"
-# The lengths of all charts' data, as viser's page offers them to tests.
-CHARTS = """Object.values((window.__viserTestpoints || {}).uplots || {})
-  .map(each => each.chart.data[0].length)"""
 LINKS = ("stand", "cart", "pole")
 FEW = 3  # [pixels]
 AWAY = (3.0, -4.0, 0.6)  # [m]; behind the camera
@@ -231,24 +228,6 @@ class WindowTest(WindowCase):
         self.assertAlmostEqual(red / count(self.view(), RED), 1.0, delta=0.1)
         rows = [each for each in range(height) if count(picture[each].T, RED)]
         self.assertAlmostEqual(len(rows) / height, 0.25, delta=0.08)  # its box is about a third
-
-    def test_the_curves_of_a_training_beside_the_robot(self):
-        with tempfile.TemporaryDirectory() as folder:
-            rospy.set_param("/gazebo_gui/curves", folder)
-            with Path(folder, "scalars.csv").open("w") as table:
-                table.write("step,tag,value,wall_time\n")
-                for first, end in ((0, 3), (3, 30)):
-                    table.writelines(
-                        f"{10 * step},charts/episodic_return,{step}.5,0\n"
-                        for step in range(first, end)
-                    )
-                    table.flush()
-                    self.page.wait_for_text("Training")
-                    self.page.click("Training")
-                    self.page.wait_for_text(f"{end} episodes")
-            wait_for(lambda: self.page.run(CHARTS) == [30], "chart")
-            rospy.delete_param("/gazebo_gui/curves")
-        self.page.wait_for_text("the table is gone")
 
     def test_the_page_shows_what_pictures_without_a_display_show(self):
         xml = rospy.get_param("/robot_description")

@@ -2,24 +2,17 @@
 
 import ctypes.util
 import os
-from argparse import Namespace
-from io import BytesIO
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
 from PIL import Image
-from support.pages import viser_recording
-from support.pages.browser import Browser, find_browser, wait_for
-from support.pages.pictures import pixel
 from support.training.workbench_runs import record as bare_run
 
 import cartpole  # noqa: F401 - registers the environments
-from cartpole.environment import CAMERA
 from rl_workbench import cli
-from rl_workbench.tools.policies import Player
-from rl_workbench.tools.record import Film, SideBySide, _write_scene, write_video
+from rl_workbench.tools.record import Film, SideBySide, write_video
 from rl_workbench.tools.recording import PictureView, draw_without_display, record_episode
 
 RATE = 40.0  # [Hz]
@@ -164,24 +157,10 @@ def test_flags_that_make_no_sense(robot_run: Path, tmp_path: Path, capsys, words
     [
         ("a.gif", ("--fps=100",), "at most 50 frames a second"),  # browsers would slow it down
         ("a.gif", ("--camera", "jaw=1"), "a camera has no 'jaw'; it has target, distance, yaw"),
-        ("a.html", ("--size=64x48",), "as large as the browser's window"),
     ],
 )
 def test_what_a_file_cannot_be_is_refused(robot_run: Path, tmp_path, refused, name, flags, text):
     assert text in refused("record", robot_run, "--out", tmp_path / name, *flags)
-
-
-def test_a_page_holds_all_that_it_shows(tmp_path: Path):
-    path = tmp_path / "a.html"
-    frames = [np.full((20, 30, 3), 40 * step, np.uint8) for step in range(5)]
-    write_video(path, frames, 12.5)
-    text = path.read_text()
-    assert 'src="http' not in text and 'href="http' not in text
-    found = viser_recording.of_page(text)
-    assert found.duration == pytest.approx(5 / 12.5)
-    nodes = [found.at(step / 12.5)["/picture"] for step in range(5)]
-    levels = [np.asarray(Image.open(BytesIO(bytes(each["_data"])))).mean() for each in nodes]
-    assert levels == pytest.approx([0, 40, 80, 120, 160], abs=3)
 
 
 class Narrow(Counter):
@@ -206,78 +185,6 @@ def test_an_environment_without_a_size_has_its_pictures_scaled(tmp_path: Path):
     assert record(run, tmp_path / "a.gif", "--checkpoint", "random", "--size", "100x30") == 0
     with Image.open(tmp_path / "a.gif") as video:
         assert video.size == (100, 30 + 8)
-
-
-# In 3-D.
-
-
-def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(robot_run: Path, tmp_path, capsys):
-    out = tmp_path / "a.html"
-    assert record(robot_run, out) == 0
-    steps = int(capsys.readouterr().out.split(" steps")[0].split()[-1])
-    text = out.read_text()
-    assert len(text) < 1_000_000
-    assert 'src="http' not in text and 'href="http' not in text
-    found = viser_recording.of_page(text)
-    frames = len({time for time, _ in found.messages})
-    assert frames == pytest.approx(steps / 5, abs=1.1)  # 125 steps a second, 25 frames
-    assert found.duration == pytest.approx(1.0 + (frames - 1) / 25)
-    labels = {when: found.at(when)["/caption0"]["text"] for when in (0.0, found.duration)}
-    assert labels[0.0].startswith("step 0   return 0.0")
-    assert labels[found.duration].startswith(f"step {steps}   return {steps:.1f}   action ")
-    before, after = ([part["wxyz"] for part in found.parts(when)] for when in (0.0, 9e9))
-    assert before != after
-
-
-def test_several_are_seen_beside_each_other(robot_run: Path, tmp_path: Path, capsys):
-    out = tmp_path / "a.html"
-    assert record(robot_run, out, "--checkpoint", "best", "last", "random", "--fps", "10") == 0
-    first, *told = capsys.readouterr().out.splitlines()
-    assert first == f"recording best, last, random of {robot_run}"
-    assert [line.split(":")[0] for line in told] == ["best", "last", "random", str(out)]
-    nodes = viser_recording.of_page(out.read_text()).at()
-    captions = [nodes[f"/caption{number}"]["text"] for number in range(3)]
-    assert [each.split()[0] for each in captions] == ["best", "last", "random"]
-
-
-def cart(page: Browser, height: int) -> np.ndarray:
-    """Column and row [pixels] of the blue cart, above the player's bar; infinite where there is none."""
-    picture = Image.open(BytesIO(page.screenshot())).convert("RGB")
-    red, _, blue = np.asarray(picture)[:height].astype(int).transpose(2, 0, 1)
-    seen = blue > 1.5 * red + 30
-    seen[:, : picture.width // 8] = False  # the page's own axes
-    return np.argwhere(seen)[:, ::-1].mean(axis=0) if seen.any() else np.full(2, np.inf)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not find_browser(), reason="no Chromium: apt-get install chromium")
-def test_a_browser_plays_it_without_any_network(tmp_path: Path):
-    places: list[float] = []
-    camera = CAMERA.at((*CAMERA.target[:2], CAMERA.target[2] + HEIGHT))
-
-    def right(observation: np.ndarray) -> list[float]:
-        places.append(float(observation[0]))
-        return [1.0]
-
-    path = tmp_path / "episode.html"
-    env = gymnasium.make("cartpole/SwingUp-v0", noise=0.0)
-    arguments = Namespace(
-        out=path, size=None, checkpoint=["best"], seed=0, max_steps=31, no_captions=True
-    )
-    _write_scene(arguments, {"best": Player(right, env)}, 125.0)
-    env.close()
-    with Browser(path.as_uri(), offline=True, size=(640, 400)) as page:
-        wait_for(lambda: page.run(f"!!document.querySelector({SEEK!r})"), "player")
-        canvas = "document.querySelector('canvas')"
-        width, height = page.run(f"[{canvas}.clientWidth, {canvas}.clientHeight]")
-        for step in (15, 0, 30):
-            wanted = pixel(camera, (places[step], 0.0, HEIGHT + CART), width, height)
-            page.type(SEEK, f"{step * 0.008 + 0.001:.4f}")
-            wait_for(lambda at=wanted: np.abs(cart(page, height) - at).max() < NEAR, f"step {step}")
-        assert all(each.startswith(("file:", "data:", "blob:")) for each in page.requests)
-        assert page.requests
-    across = [pixel(camera, (place, 0.0, HEIGHT), width, height)[0] for place in places]
-    assert across[15] - across[0] > 2.0 * NEAR and across[30] - across[15] > 2.0 * NEAR
 
 
 @pytest.mark.parametrize(

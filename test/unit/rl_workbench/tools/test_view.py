@@ -230,7 +230,7 @@ class Broken(Endless):
 class Lost(Broken):
     """One that fails when it is drawn on the page itself, as where its simulator doesn't answer any more."""
 
-    def draw_on(self, server, beside=0):
+    def draw_on(self, server):
         return self
 
     def look(self):
@@ -286,7 +286,7 @@ class Shelf:
     def newest(self, which: str) -> tuple[int, ...]:
         return self.checkpoint
 
-    def show(self, seen: int, caption: str = "") -> None:
+    def show(self, seen: int) -> None:
         self.shown.append(seen)
 
 

@@ -1,4 +1,4 @@
-"""A run's page in a real browser: its curves, its robot, its player; afterwards, and while it trains."""
+"""A run's page in a real browser: its robot, its player; afterwards, and while it trains."""
 
 import io
 import os
@@ -25,14 +25,10 @@ pytestmark = [
 ]
 WORKBENCH = (sys.executable, "-m", "cartpole.workbench")
 SRC = Path(__file__).resolve().parents[4] / "src"
-# The lengths of all charts' data, as viser's page offers them to tests.
-DATA = """Object.values((window.__viserTestpoints || {}).uplots || {})
-  .map(each => each.chart.data[0].length)"""
 SIZE = (900, 650)  # [pixels]: it is drawn without a graphics card
 BLUE, ORANGE = (20, 90, 190), (230, 140, 40)  # cart and pole of our robot
 BLACK, BROWN = (0, 0, 0), (202, 152, 101)  # and of the pictures of CartPole-v1
 HOSTILE = "<img src=x onerror='hurt=1'>né🤖"
-CANVASES = "document.querySelectorAll('.uplot canvas').length"
 
 
 class Command:
@@ -115,16 +111,9 @@ def is_served(url: str) -> bool:
 
 def test_a_run_is_seen_and_played(start, tmp_path) -> None:
     run = policy_gradient(tmp_path / HOSTILE, env_id="cartpole/Balance-v0", episodes=30, seed=1)
-    with (run / "scalars.csv").open("a") as table:
-        table.write(f"100000,losses/{HOSTILE},1,0\n100000,losses/value,{20 * '9'},0\n")
     viewing = start("view", str(run), "--port", "0", "--checkpoint", "best", "random")
     with Browser(viewing.url(), size=SIZE) as page:
-        page.wait_for_text("30 episodes")
-        wait_for(lambda: page.run(CANVASES) >= 3, "charts")
-        assert 30 in page.run(DATA)
         page.wait_for_text("best, of step")
-        page.wait_for_text(f"losses/{HOSTILE}")
-        page.wait_for_text("losses/value, in 10¹⁸")
         pause(page)
         wait_for(lambda: is_seen(page, BLUE, ORANGE), "robot in 3-D")
         page.press_keys("[role=slider]", "Home", 1)
@@ -140,7 +129,7 @@ def test_a_run_is_seen_and_played(start, tmp_path) -> None:
         page.type("input.mantine-NumberInput-input", 20 * "9")
         page.reload()
         page.wait_for_text("random, seed ")
-        assert page.text.count(HOSTILE) == 2, "the run's name, and a curve's"
+        assert HOSTILE in page.text, "the run's name"
         assert page.run("window.hurt") is None
     assert viewing.interrupt() == 130
     assert len(viewing.lines) == 2
@@ -154,9 +143,6 @@ def test_a_training_is_seen_while_it_learns(start, tmp_path) -> None:
     url = training.url()
     with Browser(url, size=SIZE) as page:
         pause(page)
-        wait_for(lambda: page.run(CANVASES) >= 3, "charts")
-        before = max(page.run(DATA))
-        wait_for(lambda: max(page.run(DATA)) > before + 5, "more episodes")
         wait_for(lambda: is_seen(page, BLACK, BROWN), "picture of the robot")
         learned = tmp_path / "run" / "checkpoints"
         wait_for(lambda: len(list(learned.glob("*.pt"))) > 1, "checkpoint that has learned")

@@ -268,8 +268,7 @@ def test_a_line_that_is_only_half_written_is_left_out(tmp_path: Path) -> None:
 
 def test_a_picture_or_a_video_of_another_format(runs: Path, tmp_path: Path, refused) -> None:
     for name in ("video.avi", "video"):
-        said = refused("record", runs / "dqn_0", "--out", tmp_path / name)
-        assert ".gif, .mp4, .html" in said
+        assert ".gif or .mp4" in refused("record", runs / "dqn_0", "--out", tmp_path / name)
     assert "PNG" in refused("plot", runs / "dqn_0", "--out", tmp_path / "a.jpg")
 
 

@@ -127,13 +127,13 @@ def test_all_shapes_are_drawn_without_scipy_and_networkx():
     program = """
 import sys
 sys.modules.update(scipy=None, networkx=None)
+import viser
 from robot_sim.physics.description import Link, Shape
 from robot_sim.pictures.page import Picture
 from robot_sim.pictures.visuals import VisibleModel
-from web_viewer.server import hidden_page
-with hidden_page() as server:
-    shapes = [Shape("box", (1, 1, 1)), Shape("sphere", (1,)), Shape("cylinder", (1, 1))]
-    Picture(server, sys.exit).draw([VisibleModel(1, "m", [Link("l", visuals=shapes)])], [])
+server = viser.ViserServer("127.0.0.1", 0, verbose=False)
+shapes = [Shape("box", (1, 1, 1)), Shape("sphere", (1,)), Shape("cylinder", (1, 1))]
+Picture(server, sys.exit).draw([VisibleModel(1, "m", [Link("l", visuals=shapes)])], [])
 """
     done = run_python(program, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (0, "")
