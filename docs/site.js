@@ -6,3 +6,9 @@ Worker.prototype.postMessage = function (message, ...rest) {
     message = { ...message, data: message.data.replace(/(^|\s)-+([\w-]+)/g, option) };
   return post.call(this, message, ...rest);
 };
+
+// A picture that is shown smaller than it is opens in its own size.
+for (const picture of document.querySelectorAll("article img")) {
+  picture.addEventListener("click", () => open(picture.src));
+  picture.style.cursor = "zoom-in";
+}
