@@ -50,7 +50,7 @@ class RemoteScene:
         if poses and now - max(self._heard, self._asked) > SILENCE:
             self._asked = now
             try:
-                self.world().command("show")
+                RemoteWorld(self.node, rosgraph.get_master_uri()).command("show")
             except ControlFailed as fault:
                 rospy.logdebug("no scene yet: %s", fault)
 
@@ -98,10 +98,6 @@ class RemoteScene:
                 return 0.0
             (wall, now), (last_wall, last) = self._times[0], self._times[-1]
         return (last - now) / max(last_wall - wall, 1e-6)
-
-    def world(self) -> RemoteWorld:
-        """Returns the client of `gz world`."""
-        return RemoteWorld(self.node, rosgraph.get_master_uri())
 
 
 class Commands:

@@ -55,23 +55,14 @@ class ShapeMaker:
     def add(self, where: Where, shape: Shape, what: str, collision: bool) -> None:
         """Adds a shape of a link; `what` it is, for the log."""
         rgba = COLLISION if collision else shape.rgba or GREY
-        size = [max(abs(each), SMALLEST) for each in shape.size]
-        if shape.kind == "box" and len(size) == 3:
-            scale = (size[0], size[1], size[2])
-            self._add_part(where, _box(), shape.pose, scale, rgba, collision)
-        elif shape.kind == "cylinder" and len(size) == 2:
-            scale = (size[0], size[0], size[1])
-            self._add_part(where, _cylinder(), shape.pose, scale, rgba, collision)
-        elif shape.kind == "sphere" and len(size) == 1:
-            scale = (size[0], size[0], size[0])
-            self._add_part(where, _ball(), shape.pose, scale, rgba, collision)
-        elif shape.kind == "plane":
+        if shape.kind == "plane":
             self._add_plane(where, shape.pose)
         elif shape.kind == "mesh":
             self._add_mesh(where, shape, what, rgba, collision)
         else:
-            complaint = f"{what}: a shape '{shown(shape.kind)}' is not known"
-            self._add_unshown(where, complaint, shape.pose)
+            solid, sizes = SOLIDS[shape.kind]
+            x, y, z = (max(abs(shape.size[index]), SMALLEST) for index in sizes)
+            self._add_part(where, solid(), shape.pose, (x, y, z), rgba, collision)
 
     def add_joint(self, where: Where, joint: Joint) -> None:
         """Adds a joint's frame, axis and name; `where` is the link that it moves."""
@@ -113,7 +104,7 @@ class ShapeMaker:
         except DescriptionError as error:
             self._add_unshown(where, f"{what}: {error}", shape.pose)
             return
-        x, y, z = shape.size if len(shape.size) == 3 else (1.0, 1.0, 1.0)
+        x, y, z = shape.size
         if look.glb is not None and not collision:
             if x * y * z < 0.0:  # mirrored: in a batch it would show its back
                 whole = self._scene.add_glb(self._singles.name(), look.glb, scale=(x, y, z))
@@ -168,6 +159,14 @@ def _cylinder() -> Geometry:
     is_end = np.abs(found.face_normals[:, 2:]) > 0.5
     faces = np.where(is_end, found.faces, found.faces + len(found.vertices))
     return _geometry(np.concatenate([found.vertices] * 2), faces, flat=False)
+
+
+# Each solid, and which of its shape's sizes are its factors along x, y and z.
+SOLIDS = {
+    "box": (_box, (0, 1, 2)),
+    "cylinder": (_cylinder, (0, 0, 1)),
+    "sphere": (_ball, (0, 0, 0)),
+}
 
 
 def _geometry(vertices: np.ndarray, faces: np.ndarray, **look: Any) -> Geometry:

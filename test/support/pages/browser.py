@@ -4,8 +4,10 @@ import base64
 import itertools
 import json
 import shutil
+import signal
 import subprocess
 import tempfile
+import threading
 import time
 import urllib.request
 from pathlib import Path
@@ -37,6 +39,47 @@ def wait_for(look, what):
         assert time.monotonic() < deadline, f"no {what} in {BOUND:g} s"
         time.sleep(POLL)
     return found
+
+
+class Output:
+    """What a program writes, line by line."""
+
+    def __init__(self, *command, **options):
+        self.process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
+            **options,
+        )  # fmt: skip
+        self.lines = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip())
+
+    def line(self, text):
+        """Returns the first line with `text` in it, once it is there."""
+        found = wait_for(
+            lambda: (
+                [each for each in self.lines if text in each] or self.process.poll() is not None
+            ),
+            f"line {text!r}",
+        )
+        assert found is not True, self.lines
+        return found[0]
+
+    @property
+    def url(self):
+        """Where its page is."""
+        return self.line("is the page").rpartition(" ")[2]
+
+    def close(self, number=signal.SIGTERM):
+        """Ends it by a signal; returns its exit code."""
+        self.process.send_signal(number)
+        code = self.process.wait(BOUND)
+        self._reader.join(BOUND)
+        self.process.stdout.close()
+        return code
 
 
 class Browser:
@@ -128,8 +171,13 @@ class Browser:
         )
 
     def reload(self):
-        """Opens the page anew: it is seen as at first."""
+        """Opens the page anew: it is seen as at first. Returns once the old one has gone."""
+        before = self._document()
         self._do("Page.reload")
+        wait_for(lambda: self._document() != before, "new document")
+
+    def _document(self):
+        return self._do("Page.getFrameTree")["frameTree"]["frame"]["loaderId"]
 
     def wait_for_value(self, value):
         """Waits until a field or a list shows `value`."""

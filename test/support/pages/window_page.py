@@ -3,13 +3,11 @@
 import atexit
 import functools
 import io
-import subprocess
-import threading
 import unittest
 
 import numpy as np
 from PIL import Image
-from support.pages.browser import BOUND, Browser, find_browser, wait_for
+from support.pages.browser import Browser, Output, find_browser, wait_for
 from support.ros.calls import delete_model, gazebo, model_names, spawn_model
 
 NOTICES = 160  # [pixels] from above that notices may take, and give back
@@ -33,46 +31,12 @@ def count(pixels, color):
     return int(shown[color].sum())
 
 
-class Output:
-    """What a program writes, line by line."""
-
-    def __init__(self, *command):
-        self._process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
-        )
-        self.lines = []
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def _read(self):
-        for line in self._process.stdout:
-            self.lines.append(line.rstrip())
-
-    def line(self, text):
-        """Returns the first line with `text` in it, once it is there."""
-        found = wait_for(
-            lambda: (
-                [each for each in self.lines if text in each] or self._process.poll() is not None
-            ),
-            f"line {text!r}",
-        )
-        assert found is not True, self.lines
-        return found[0]
-
-    def close(self):
-        self._process.terminate()
-        code = self._process.wait(BOUND)
-        self._reader.join(BOUND)
-        self._process.stdout.close()
-        return code
-
-
 class Shown:
     """A window, and its page in a browser."""
 
     def __init__(self):
         self.window = Output("rosrun", "gazebo_ros", "gzclient", "--no-browser")
-        self.url = self.window.line("is the page").rpartition(" ")[2]
+        self.url = self.window.url
         self.page = Browser(self.url).__enter__()
         atexit.register(self.close)
         self.page.wait_for_text("One step")

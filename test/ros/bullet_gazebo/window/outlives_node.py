@@ -12,8 +12,8 @@ import rosnode
 import rospy
 import rostest
 import zstandard
-from support.pages.browser import BOUND, wait_for
-from support.pages.window_page import INERTIAL, Output
+from support.pages.browser import BOUND, Output, wait_for
+from support.pages.window_page import INERTIAL
 from support.ros.calls import spawn_model
 from websockets.sync.client import connect
 
@@ -76,8 +76,7 @@ class OutlivesTest(unittest.TestCase):
         with simulator():
             window = Output("rosrun", "gazebo_ros", "gzclient", "--no-browser")
             self.addCleanup(window.close)
-            url = window.line("is the page").rpartition(" ")[2]
-            page = Page(url)
+            page = Page(window.url)
             self.addCleanup(page.close)
             page.wait_for("real-time factor")
             spawn("first")
@@ -85,12 +84,12 @@ class OutlivesTest(unittest.TestCase):
             page.wait_for("<td>first")
             another = Output("rosrun", "gazebo_ros", "gzclient", "--no-browser")
             self.addCleanup(another.close)
-            another_page = Page(another.line("is the page").rpartition(" ")[2])
+            another_page = Page(another.url)
             self.addCleanup(another_page.close)
             another_page.wait_for("<td>first")  # and the first one goes on below
             self.assertEqual(sum("gazebo_gui" in name for name in rosnode.get_node_names()), 2)
         page.wait_for("no simulator /gazebo")
-        stuck = [Page(url) for _ in range(10)]  # they take nothing of what is sent
+        stuck = [Page(window.url) for _ in range(10)]  # they take nothing of what is sent
         with simulator():
             page.wait_for("real-time factor")
             spawn("second")

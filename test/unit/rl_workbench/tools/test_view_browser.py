@@ -4,9 +4,7 @@ import io
 import os
 import re
 import signal
-import subprocess
 import sys
-import threading
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -14,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from support.pages.browser import BOUND, Browser, find_browser, wait_for
+from support.pages.browser import BOUND, Browser, Output, find_browser, wait_for
 from support.training.workbench_runs import policy_gradient
 
 import cartpole  # noqa: F401 - registers its environments
@@ -31,56 +29,18 @@ BLACK, BROWN = (0, 0, 0), (202, 152, 101)  # and of the pictures of CartPole-v1
 HOSTILE = "<img src=x onerror='hurt=1'>né🤖"
 
 
-class Command:
-    """A command that serves a page."""
-
-    def __init__(self, *words: str) -> None:
-        self.lines: list[str] = []
-        self._process = subprocess.Popen(
-            [*WORKBENCH, *words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env={**os.environ, "PYTHONPATH": str(SRC)},
-        )  # fmt: skip
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def _read(self) -> None:
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            self.lines.append(line.rstrip())
-
-    def url(self) -> str:
-        return wait_for(self._url, f"address in {self.lines}")
-
-    def _url(self) -> str:
-        found = re.search("http://[0-9.:]+/", "\n".join(self.lines))
-        return found[0] if found else ""
-
-    def children(self) -> list[int]:
-        pid = self._process.pid
-        return [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-
-    def interrupt(self) -> int:
-        self._process.send_signal(signal.SIGINT)
-        code = self._process.wait(BOUND)
-        self._reader.join(BOUND)
-        return code
-
-    def kill(self) -> None:
-        self._process.kill()
-        self._process.wait()
-
-
 @pytest.fixture
 def start():
     commands = []
 
-    def started(*words: str) -> Command:
-        commands.append(Command(*words))
+    def started(*words: str) -> Output:
+        environment = {**os.environ, "PYTHONPATH": str(SRC)}
+        commands.append(Output(*WORKBENCH, *words, env=environment))
         return commands[-1]
 
     yield started
     for each in commands:
-        each.kill()
+        each.close(signal.SIGKILL)
 
 
 def is_seen(page: Browser, *colours: tuple[int, int, int]) -> bool:
@@ -112,7 +72,7 @@ def is_served(url: str) -> bool:
 def test_a_run_is_seen_and_played(start, tmp_path) -> None:
     run = policy_gradient(tmp_path / HOSTILE, env_id="cartpole/Balance-v0", episodes=30, seed=1)
     viewing = start("view", str(run), "--port", "0", "--checkpoint", "best", "random")
-    with Browser(viewing.url(), size=SIZE) as page:
+    with Browser(viewing.url, size=SIZE) as page:
         page.wait_for_text("best, of step")
         pause(page)
         wait_for(lambda: is_seen(page, BLUE, ORANGE), "robot in 3-D")
@@ -131,7 +91,7 @@ def test_a_run_is_seen_and_played(start, tmp_path) -> None:
         page.wait_for_text("random, seed ")
         assert HOSTILE in page.text, "the run's name"
         assert page.run("window.hurt") is None
-    assert viewing.interrupt() == 130
+    assert viewing.close(signal.SIGINT) == 130
     assert len(viewing.lines) == 2
 
 
@@ -140,7 +100,7 @@ def test_a_training_is_seen_while_it_learns(start, tmp_path) -> None:
         "train", "--algo=reinforce", "--env-id=CartPole-v1", f"--run-dir={tmp_path / 'run'}",
         "--total-timesteps=100000000", "--stop-at-length=0", "--checkpoint-frequency=2000", "--gui",
     )  # fmt: skip
-    url = training.url()
+    url = training.url
     with Browser(url, size=SIZE) as page:
         pause(page)
         wait_for(lambda: is_seen(page, BLACK, BROWN), "picture of the robot")
@@ -148,20 +108,20 @@ def test_a_training_is_seen_while_it_learns(start, tmp_path) -> None:
         wait_for(lambda: len(list(learned.glob("*.pt"))) > 1, "checkpoint that has learned")
         page.click("Play the newest now")
         wait_for(lambda: re.search(r"last, of step [1-9]", page.text), "its episode")
-    (child,) = training.children()
-    os.kill(child, signal.SIGKILL)
+    pid = training.process.pid
+    os.kill(int(Path(f"/proc/{pid}/task/{pid}/children").read_text()), signal.SIGKILL)
     table = tmp_path / "run" / "scalars.csv"
     size = table.stat().st_size
     wait_for(lambda: table.stat().st_size > size + 5000, "training that goes on")
     assert not is_served(url)
-    assert training.interrupt() == 130
+    assert training.close(signal.SIGINT) == 130
     assert any("interrupted" in line for line in training.lines)
 
 
 def test_the_page_ends_with_its_training_whatever_ends_it(start, tmp_path) -> None:
     long = ("--total-timesteps=100000000", "--gui")
     training = start("train", "--algo=dqn", f"--run-dir={tmp_path / 'run'}", *long)
-    url = training.url()
+    url = training.url
     assert is_served(url)
-    training.kill()
+    training.process.kill()
     wait_for(lambda: not is_served(url), "end of the page")
