@@ -254,6 +254,7 @@ MESH = collision("<mesh><uri>model://x/y.stl</uri></mesh>")
         (sdf(link("a", more=collision(box("1 0 1")))), "collision 'c', box: sizes must be above 0"),
         (sdf(link("a"), joint("j", "fixed", "a", "x")), "joint 'j': link 'x'"),
         (sdf(link("a"), link("b"), joint("j", "ball", "a", "b")), "type 'ball' is not simulated"),
+        (sdf(link("a"), link("b"), joint("j", "bendy", "a", "b")), "joint 'j': type 'bendy' is none of"),
         (sdf(link("a"), joint("j", "revolute", "a", "world")), "not its child"),
         (sdf(link("a"), link("b"), joint("j", "revolute", "a", "b", "0 0 0")), "axis has length 0"),
         (sdf(link("a"), LEANING.format("b", "z")), "frame 'z' does not exist"),
