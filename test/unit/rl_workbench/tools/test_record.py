@@ -208,9 +208,6 @@ def test_an_environment_without_a_size_has_its_pictures_scaled(tmp_path: Path):
         assert video.size == (100, 30 + 8)
 
 
-# In 3-D.
-
-
 def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(robot_run: Path, tmp_path, capsys):
     out = tmp_path / "a.html"
     assert record(robot_run, out) == 0

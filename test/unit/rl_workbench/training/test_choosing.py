@@ -42,22 +42,16 @@ def refusal(kind: AlgorithmKind, *flags: str, **parameters: Any) -> str:
     return str(raised.value)
 
 
-# Where they come from.
-
-
 def test_defaults(empty: str) -> None:
     run = RunOptions(exp_name="dqn", total_timesteps=50_000, eval_frequency=1000,
                      confirm_episodes=100, checkpoint_frequency=5000)  # fmt: skip
     assert choose(DQN, [empty]) == TrainingOptions(DQN, run, DQNSettings())
     episodic = {"episodes": 600, "eval_frequency": 0, "eval_episodes": 20}
-    assert choose(REINFORCE, [empty]) == TrainingOptions(
-        REINFORCE,
-        RunOptions(exp_name="reinforce", **episodic),
-        ReinforceSettings(normalize_observations=True),
-    )
-    assert choose(DOCUMENT, [empty]) == TrainingOptions(
-        DOCUMENT, RunOptions(exp_name="reinforce-document", **episodic), DocumentSettings()
-    )
+    run = RunOptions(exp_name="reinforce", **episodic)
+    own = ReinforceSettings(normalize_observations=True)
+    assert choose(REINFORCE, [empty]) == TrainingOptions(REINFORCE, run, own)
+    run = RunOptions(exp_name="reinforce-document", **episodic)
+    assert choose(DOCUMENT, [empty]) == TrainingOptions(DOCUMENT, run, DocumentSettings())
 
 
 @pytest.mark.parametrize("kind", [REINFORCE, DOCUMENT])
@@ -132,9 +126,6 @@ def test_a_preset_may_name_the_environment_and_a_flag_another() -> None:
     assert "unknown preset 'tutoral'; did you mean tutorial" in refusal(DQN, "--preset=tutoral")
 
 
-# What is refused.
-
-
 @pytest.mark.parametrize(
     ("kind", "flags", "words"),
     [
@@ -203,9 +194,6 @@ def test_help_explains_every_option(name: str, capsys) -> None:
     assert all(flag in told for flag in ("--params", "--resume", "--stop-at-return", own))
 
 
-# The environment's.
-
-
 @pytest.mark.parametrize("name", ["env_kwargs", "train_env_kwargs", "eval_env_kwargs"])
 def test_options_of_the_environment(tmp_path: Path, name: str) -> None:
     flag = f"--{name.replace('_', '-')}"
@@ -239,9 +227,6 @@ def test_options_of_the_environment_that_cannot_be_read(text: str, capsys) -> No
 def test_options_of_the_environment_that_no_record_can_hold(tmp_path: Path, value: str) -> None:
     with pytest.raises(WorkbenchError, match="env_kwargs has values that JSON can't hold"):
         read(tmp_path, f"CartPole-v1: {{env_kwargs: {{noise: {value}}}}}")
-
-
-# Wrong ones.
 
 
 @pytest.mark.parametrize(
@@ -292,8 +277,6 @@ def test_a_missing_file(tmp_path: Path) -> None:
     with pytest.raises(WorkbenchError, match=r"bytes.yaml isn't YAML"):
         choose(DQN, [f"--config={tmp_path / 'bytes.yaml'}"])
 
-
-# The package's own files.
 
 SECTIONS = [
     (kind.name, name)

@@ -57,9 +57,6 @@ def test_one_that_is_in_use(tmp_path: Path) -> None:
         pass
 
 
-# Options on record.
-
-
 @pytest.mark.parametrize("name", ALL)
 def test_a_record_comes_back(name: str) -> None:
     """Also by way of JSON, which knows no tuples."""

@@ -87,9 +87,6 @@ def test_the_record_says_with_which_version(whole) -> None:
     assert told["stable_baselines3"] == stable_baselines3.__version__
 
 
-# --resume
-
-
 def test_a_resumed_training_goes_on_with_figures_and_networks(whole, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(whole("ppo"), tmp_path / "run"))
     before, state = summary(folder), checkpoint(folder)
@@ -130,9 +127,6 @@ def test_what_is_learned_after_the_last_step_is_saved(tmp_path: Path) -> None:
     model = dict(PPO.load(folder / "model.zip").policy.state_dict())
     for name in ("last.pt", "best.pt"):
         assert_same(dict(weights(folder / name)), model)
-
-
-# What goes wrong on the way: one line, and nothing lost.
 
 
 def test_a_rate_that_blows_up(tmp_path: Path) -> None:
