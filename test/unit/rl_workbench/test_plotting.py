@@ -45,9 +45,6 @@ def test_one_training_has_two_axes_and_can_be_written_as_png(tmp_path: Path, cou
     assert (tmp_path / "curve.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
-# Means over seeds.
-
-
 def test_a_seed_that_has_ended_keeps_its_last_value_in_the_mean() -> None:
     solved, slow = seed([100, 200], [100, 500]), seed([100, 1000], [100, 100])
     positions, mean, _, _ = plotting.mean_over_seeds([solved, slow])
@@ -72,15 +69,10 @@ def test_where_seeds_ended_is_marked_and_whether_they_were_complete() -> None:
     assert stopped.get_xydata().tolist() == [[9, 3]]
 
 
-# Panels.
-
-
 def test_each_environment_has_axes_and_a_line_of_its_own() -> None:
     cart, car = seed([1, 2], [450, 520]), seed([1, 2], [-110, -100])
-    panels = [
-        panel({"dqn": [cart]}, "my_module:CartPole-v1", 475.0),
-        panel({"dqn": [car], "ppo": [car]}, "MountainCar-v0", -110.0),
-    ]
+    first = panel({"dqn": [cart]}, "my_module:CartPole-v1", 475.0)
+    panels = [first, panel({"dqn": [car], "ppo": [car]}, "MountainCar-v0", -110.0)]
     for figure in (seed_curves(panels), training_curves(panels, "episode")):
         assert figure.get_figwidth() <= 10.0, "it is read on a page of half its pixels"
         first, second = figure.axes

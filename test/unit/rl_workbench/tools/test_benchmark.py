@@ -241,9 +241,6 @@ def test_a_damaged_record_costs_no_other_run_its_row(tmp_path: Path) -> None:
     assert "isn't JSON" in text and "0 of 2, 2 failed" in text
 
 
-# Tables.
-
-
 def row(seed: int, score: float | None, step: int | None, fault: str = "") -> RunResult:
     return RunResult(
         "a", seed, "run", score, final=score, evaluations=score, solved_step=step, seconds=1.0,

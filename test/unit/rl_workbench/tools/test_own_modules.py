@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
+from support.training.workbench_runs import work
 
 import rl_workbench
 from rl_workbench import cli
-from rl_workbench.tools.runs import open_run
-from rl_workbench.training.train import PROGRAM
+from rl_workbench.training.algorithms import ALGORITHMS
+from rl_workbench.training.train import PROGRAM, choose
 
 pytestmark = pytest.mark.slow
 
@@ -68,19 +69,21 @@ def test_eval_knows_the_line_and_the_successes(trained: Path, capsys) -> None:
     assert told.err.splitlines()[0].endswith(("| success", "| no success"))
 
 
-@pytest.mark.parametrize("over", ["episodes", "steps"])
-def test_plot_and_compare(trained: Path, tmp_path: Path, capsys, over: str) -> None:
-    picture, figures = tmp_path / "curves.png", tmp_path / "figures.json"
-    assert cli.main(["plot", str(trained), "--out", str(picture), "--over", over]) == 0
-    wanted = ["--episodes", "3", "--json", str(figures), "--out", str(tmp_path / "seeds.png")]
-    assert cli.main(["compare", str(trained), *wanted]) == 0
+def test_plot_and_compare(trained: Path, tmp_path: Path, capsys) -> None:
+    figures, pictures = tmp_path / "figures.json", []
+    for over in ("episodes", "steps"):
+        pictures.append(tmp_path / f"{over}.png")
+        assert work("plot", trained, "--out", pictures[-1], "--over", over) == 0
+    pictures.append(tmp_path / "seeds.png")
+    wanted = ["--episodes", "3", "--json", figures, "--out", pictures[-1]]
+    capsys.readouterr()
+    assert work("compare", trained, *wanted) == 0
     (group,) = json.loads(figures.read_text())["groups"].values()
     assert group["runs"][0]["success"] in (0.0, 1 / 3, 2 / 3, 1.0)
-    head, _, row, *_ = capsys.readouterr().out.splitlines()[1:]
+    head, _, row, *_ = capsys.readouterr().out.splitlines()
     assert "| success |" in head and "%" in row
-    one, two = Image.open(picture), Image.open(tmp_path / "seeds.png")
-    for each in (one, two):
-        assert each.width > 2 * each.height, "returns and successes, side by side"
+    for picture in map(Image.open, pictures):
+        assert picture.width > 2 * picture.height, "returns and successes, side by side"
 
 
 def test_benchmark_trains_in_processes_of_their_own(tmp_path: Path, monkeypatch, capsys) -> None:
@@ -99,13 +102,11 @@ def test_benchmark_trains_in_processes_of_their_own(tmp_path: Path, monkeypatch,
 
 
 @pytest.mark.parametrize("section", [ENV_ID, "own_arm/Reach-v0"])
-def test_a_section_of_options_is_found_by_either_name(tmp_path: Path, capsys, section: str) -> None:
+def test_a_section_of_options_is_found_by_either_name(tmp_path: Path, section: str) -> None:
     config = tmp_path / "options.yaml"
     config.write_text(f"{section}: {{gamma: 0.25}}\nother: {{gamma: 0.5}}\n")
-    run = tmp_path / "run"
-    wanted = ["--config", str(config), "--run-dir", str(run), *SMALL]
-    assert cli.main(["train", "--algo", "dqn", *wanted]) == 0
-    assert open_run(run).config["hyperparameters"]["gamma"] == 0.25
+    options = choose(ALGORITHMS["dqn"], [f"--config={config}", f"--env-id={ENV_ID}"])
+    assert options.hyperparameters.gamma == 0.25
 
 
 @pytest.mark.parametrize(

@@ -74,9 +74,6 @@ def returns(folder: Path, which: str, seed: int) -> list[float]:
     return np.cumsum(rewards).tolist()
 
 
-# What is recorded.
-
-
 @pytest.mark.slow
 def test_an_episode_is_that_of_record_with_pictures(run, make_recorder) -> None:
     recorder = make_recorder(run)
@@ -336,9 +333,6 @@ def test_several_episodes_follow_each_other(server) -> None:
     player = Playback(server.gui, shelf, ("best",), seed=7, episodes=3)
     tick(player, 4 * (0.1 + LINGER + 0.2))
     assert [seed for _, seed in shelf.played[:4]] == [7, 8, 9, 7]
-
-
-# The command.
 
 
 def test_what_is_no_run_is_one_line(tmp_path, run, refused) -> None:

@@ -191,9 +191,6 @@ def test_compare_by_training_needs_no_checkpoint(tmp_path: Path, capsys) -> None
     assert "| 115.0 ± 190.2 | 25.0 | 25.0 [" in capsys.readouterr().out
 
 
-# With Stable-Baselines3.
-
-
 @SB3
 def test_runs_of_stable_baselines_are_taken_by_all(tmp_path: Path) -> None:
     run = workbench_runs.sb3(tmp_path / "run", num_envs=2)
@@ -209,9 +206,6 @@ def test_many_environments_of_training_are_one_when_playing(tmp_path: Path, recw
     recwarn.clear()
     assert work("eval", run, "--episodes", 1) == 0
     assert not [each for each in recwarn if "mini-batch" in str(each.message)]
-
-
-# Bad input: one line each, and an exit code.
 
 
 def test_no_run_folder(tmp_path: Path, refused) -> None:

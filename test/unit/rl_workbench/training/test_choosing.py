@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 import yaml
-from support.training.training_runs import ALL, EXACT
+from support.training.training_runs import ALL, EXACT, failure
 
 import robot_envs.robots  # noqa: F401 - registers what some sections are for
 from rl_workbench.agents.settings import DocumentSettings, DQNSettings, ReinforceSettings
@@ -36,13 +36,7 @@ def read(tmp_path: Path, text: str, kind: AlgorithmKind = DQN, *flags: str) -> T
 
 
 def refusal(kind: AlgorithmKind, *flags: str, **parameters: Any) -> str:
-    with pytest.raises(WorkbenchError) as raised:
-        choose(kind, list(flags), parameters)
-    assert "\n" not in str(raised.value)
-    return str(raised.value)
-
-
-# Where they come from.
+    return failure(lambda: choose(kind, list(flags), parameters))
 
 
 def test_defaults(empty: str) -> None:
@@ -50,14 +44,11 @@ def test_defaults(empty: str) -> None:
                      confirm_episodes=100, checkpoint_frequency=5000)  # fmt: skip
     assert choose(DQN, [empty]) == TrainingOptions(DQN, run, DQNSettings())
     episodic = {"episodes": 600, "eval_frequency": 0, "eval_episodes": 20}
-    assert choose(REINFORCE, [empty]) == TrainingOptions(
-        REINFORCE,
-        RunOptions(exp_name="reinforce", **episodic),
-        ReinforceSettings(normalize_observations=True),
-    )
-    assert choose(DOCUMENT, [empty]) == TrainingOptions(
-        DOCUMENT, RunOptions(exp_name="reinforce-document", **episodic), DocumentSettings()
-    )
+    run = RunOptions(exp_name="reinforce", **episodic)
+    own = ReinforceSettings(normalize_observations=True)
+    assert choose(REINFORCE, [empty]) == TrainingOptions(REINFORCE, run, own)
+    run = RunOptions(exp_name="reinforce-document", **episodic)
+    assert choose(DOCUMENT, [empty]) == TrainingOptions(DOCUMENT, run, DocumentSettings())
 
 
 @pytest.mark.parametrize("kind", [REINFORCE, DOCUMENT])
@@ -132,9 +123,6 @@ def test_a_preset_may_name_the_environment_and_a_flag_another() -> None:
     assert "unknown preset 'tutoral'; did you mean tutorial" in refusal(DQN, "--preset=tutoral")
 
 
-# What is refused.
-
-
 @pytest.mark.parametrize(
     ("kind", "flags", "words"),
     [
@@ -203,9 +191,6 @@ def test_help_explains_every_option(name: str, capsys) -> None:
     assert all(flag in told for flag in ("--params", "--resume", "--stop-at-return", own))
 
 
-# The environment's.
-
-
 @pytest.mark.parametrize("name", ["env_kwargs", "train_env_kwargs", "eval_env_kwargs"])
 def test_options_of_the_environment(tmp_path: Path, name: str) -> None:
     flag = f"--{name.replace('_', '-')}"
@@ -239,9 +224,6 @@ def test_options_of_the_environment_that_cannot_be_read(text: str, capsys) -> No
 def test_options_of_the_environment_that_no_record_can_hold(tmp_path: Path, value: str) -> None:
     with pytest.raises(WorkbenchError, match="env_kwargs has values that JSON can't hold"):
         read(tmp_path, f"CartPole-v1: {{env_kwargs: {{noise: {value}}}}}")
-
-
-# Wrong ones.
 
 
 @pytest.mark.parametrize(
@@ -292,8 +274,6 @@ def test_a_missing_file(tmp_path: Path) -> None:
     with pytest.raises(WorkbenchError, match=r"bytes.yaml isn't YAML"):
         choose(DQN, [f"--config={tmp_path / 'bytes.yaml'}"])
 
-
-# The package's own files.
 
 SECTIONS = [
     (kind.name, name)

@@ -48,9 +48,6 @@ def test_an_evaluation_is_due_where_a_multiple_is_passed(tmp_path: Path, name: s
     assert [step for step, _ in result["evaluations"]] == ends + at_the_end
 
 
-# The best one.
-
-
 @pytest.mark.parametrize("name", training_runs.ALL)
 def test_the_best_is_that_of_the_best_evaluation(tmp_path: Path, name: str) -> None:
     changed = {"confirm_episodes": 0, "eval_frequency": 50}
@@ -95,9 +92,6 @@ def test_more_episodes_confirm_the_best_policy(tmp_path: Path, monkeypatch, name
     assert confirmed == [("64", "4.0"), ("256", "6.0")]
     first, more = (1_000_007, 3), (2_000_007, 6)
     assert asked == [first, more, first, more, first, first, more]
-
-
-# Its environment.
 
 
 @pytest.mark.parametrize("name", EXACT)

@@ -32,9 +32,6 @@ def fill_disk(monkeypatch: pytest.MonkeyPatch, when: Callable[[], bool]) -> None
     monkeypatch.setattr(os, "fsync", fsync)
 
 
-# Full disks.
-
-
 @pytest.mark.parametrize("name", runs.ALL)
 def test_a_disk_that_is_full_from_the_beginning_fails_before_tensorboard(tmp_path, name) -> None:
     """TensorBoard writes in a thread of its own, which would end in a traceback."""
@@ -63,9 +60,6 @@ def test_a_disk_that_fills_up_keeps_a_checkpoint(whole, tmp_path, monkeypatch, n
     assert summary(run)["complete"] and summary(run)["failure"] is None
     if name in EXACT:
         assert summary(run)["returns"] == summary(whole(name))["returns"]
-
-
-# Folders that go away.
 
 
 class MovedAfter(runs.InterruptAfter):
@@ -107,9 +101,6 @@ def test_a_folder_moved_away_is_one_line(whole, times, tmp_path, capsys, name, i
     runs.assert_same_run(whole(name), resume(tmp_path / "moved"))
 
 
-# Numbers that are none.
-
-
 @pytest.mark.parametrize("name", LEARNERS)
 @pytest.mark.parametrize("what", ["observation", "reward"])
 def test_a_number_that_is_none_ends_it_and_is_not_learned_from(tmp_path, name, what) -> None:
@@ -144,9 +135,6 @@ def test_a_loss_that_is_no_number_leaves_the_networks(tmp_path, name, options, w
     content = checkpoint(tmp_path)
     networks = {key: content[key] for key in ("q_net", "agent", "policy") if key in content}
     assert networks and all_finite(networks)
-
-
-# Simulators that die.
 
 
 def dying(monkeypatch: pytest.MonkeyPatch, after: int) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from support.training.training_runs import ALL, EXACT, flags, small, train
+from support.training.training_runs import ALL, EXACT, failure, flags, small, train
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs import open_run
@@ -55,9 +55,6 @@ def test_one_that_is_in_use(tmp_path: Path) -> None:
         pass
     with pytest.raises(WorkbenchError, match="is not a run folder"), held(tmp_path / "none"):
         pass
-
-
-# Options on record.
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -111,7 +108,6 @@ def test_what_may_be_extended(done: Path) -> None:
 )  # fmt: skip
 @pytest.mark.parametrize("name", EXACT)
 def test_what_may_not(done: Path, name: str, flag: str, given: list[str]) -> None:
-    with pytest.raises(WorkbenchError) as raised:
-        choose(algorithm(name), [f"--resume={done}", *given])
+    line = failure(lambda: choose(algorithm(name), [f"--resume={done}", *given]))
     others = "--total-timesteps, --episodes, --stop-at-length, --stop-at-return, --device"
-    assert f"--resume allows no {flag}, only {others}" in str(raised.value)
+    assert f"--resume allows no {flag}, only {others}" in line

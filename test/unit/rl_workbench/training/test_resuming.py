@@ -25,9 +25,6 @@ class Killed(Exception):
     """Nobody catches it, as nobody catches kill -9."""
 
 
-# Ctrl-C.
-
-
 @pytest.mark.parametrize("share", [0.0, 0.004, 0.22, 0.6, 0.97])
 @pytest.mark.parametrize("name", EXACT)
 def test_ctrl_c_anywhere_and_resumed_is_the_same(whole, times, tmp_path, name, share) -> None:
@@ -70,9 +67,6 @@ def test_whatever_generator_an_environment_draws_from_comes_back(
         run = train(tmp_path / str(asked), name, runs.InterruptAfter(asked), **options)
         assert rows(run) != rows(whole), "interrupted"
         assert_same_run(whole, resume(run))
-
-
-# Complete ones, and how to prolong them.
 
 
 @pytest.mark.parametrize("name", EXACT)
@@ -142,9 +136,6 @@ def test_an_evaluation_that_a_checkpoint_knows_of_is_not_held_again(tmp_path: Pa
     assert checkpoint(run, "checkpoints/step_000000150.pt")["history"]["evaluations"]
     assert_same_run(whole, resume(run))
     runs.assert_no_doubles(run)
-
-
-# Killed.
 
 
 @pytest.mark.parametrize("name", EXACT)

@@ -52,9 +52,6 @@ def told_and_left(capsys, *arguments: str) -> tuple[int, str, str]:
     return (ended.value.code, *capsys.readouterr())
 
 
-# What it does.
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "options"),
@@ -103,9 +100,6 @@ def test_a_node_may_have_defaults() -> None:
     assert (options.kind.name, options.run.env_id) == ("dqn", "A-v0")
 
 
-# Wrong arguments: exit code 2.
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -143,9 +137,6 @@ def test_help_shows_the_flags_of_a_command_around_it(capsys) -> None:
         choose_training(["--help"], {}, "node.py", "dqn", parent=parent)
     told = capsys.readouterr().out
     assert "--backend" in told and "--dueling" in told and "node.py" in told
-
-
-# What goes wrong: exit code 1, one line.
 
 
 @pytest.mark.parametrize(

@@ -13,11 +13,8 @@ from rl_workbench.errors import WorkbenchError
 
 FILES = {"last.pt", "best.pt", "checkpoints", "config.json", "scalars.csv", "summary.json",
          "learning_curve.png"}  # fmt: skip
-NETWORKS = {
-    f"{kind}_network{suffix}.pth"
-    for kind in ("policy", "value")
-    for suffix in ("", "_episode_0", "_episode_5", "_episode_10")
-}
+TIMES = ("", "_episode_0", "_episode_5", "_episode_10")
+NETWORKS = {f"{kind}_network{time}.pth" for kind in ("policy", "value") for time in TIMES}
 OWN_FILES = {"dqn": set(), "ppo": {"model.zip"}, "sac": {"model.zip"}}
 TAGS = {"charts/episodic_return", "charts/episodic_length", "charts/SPS", "eval/mean_reward",
         "eval/confirmed_reward"}  # fmt: skip
@@ -87,9 +84,6 @@ def test_hyper_parameters_stand_beside_the_result(whole, name: str) -> None:
     assert "hp_metric" not in points(whole(name))
 
 
-# The same seed and options: the same bits.
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_the_same_seed_gives_the_same_bits_and_another_one_others(whole, tmp_path, name) -> None:
@@ -114,9 +108,6 @@ def test_evaluations_and_checkpoints_change_nothing_that_is_learned(whole, tmp_p
         del content["config"], content["history"]
         content.pop("best_at_the_end", None)
     runs.assert_same(mine, other)
-
-
-# How long it lasts.
 
 
 @pytest.mark.slow
