@@ -7,7 +7,7 @@ import pytest
 from support.stress.trainings import forked, new
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Returns the run folder of a training by its name in `trainings.OPTIONS` that nothing has disturbed."""
     folder = tmp_path_factory.mktemp("whole")

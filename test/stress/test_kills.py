@@ -15,7 +15,7 @@ full = pytest.mark.stress(full=True)
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param("dqn", marks=pytest.mark.stress),
+        pytest.param("dqn", marks=full),  # a few: test_killed.py
         pytest.param("reinforce", marks=full),
         pytest.param("reinforce-document", marks=full),
         pytest.param("ppo", marks=[full, pytest.mark.extras("stable_baselines3")]),

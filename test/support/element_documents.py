@@ -21,9 +21,6 @@ ROOTS = ("sdf", "robot")
 NAMED = ("world", "model", "light", "actor", "link", "joint", "collision", "visual", "sensor", "transmission",
          "frame", "plugin")  # fmt: skip
 
-Found = tuple[str, str, str]
-"""Of a schema: a section of the table, a path in it, and the value that the schema has for it."""
-
 MODEL = """<sdf version="1.7"><model name="m"><link name="l">
 <inertial><mass>1</mass></inertial>
 <collision name="c"><geometry/></collision><visual name="v"><geometry/></visual>

@@ -7,7 +7,7 @@ import unittest
 
 import numpy as np
 import rostest
-from support.ros.programs import Place
+from support.ros.programs import PlaceCase
 from support.ros.virtual_display import missing, virtual_display
 
 BOUND = 180.0  # [s] for anything
@@ -28,11 +28,10 @@ def middle(picture, colour):
 
 
 @unittest.skipIf(missing(*NEEDED), f"{missing(*NEEDED)} isn't installed: apt-get install rviz xvfb")
-class Rviz(unittest.TestCase):
+class Rviz(PlaceCase):
     def setUp(self):
+        super().setUp()
         self.display = self.enterContext(virtual_display())
-        self.place = Place()
-        self.addCleanup(self.place.close)
         self.place.environment |= {"DISPLAY": self.display.name, "LIBGL_ALWAYS_SOFTWARE": "1"}
         self.launch = self.place.start("roslaunch", "cartpole", "simulation.launch", "rviz:=true")
         self.addCleanup(self.launch.end)

@@ -9,7 +9,7 @@ import json
 import unittest
 from pathlib import Path
 
-from support.ros.programs import Place
+from support.ros.programs import PlaceCase
 
 from cartpole import workbench
 
@@ -23,41 +23,35 @@ def figures(run: Path) -> list[str]:
         return [",".join(row.split(",")[:3]) for row in rows if "SPS" not in row]
 
 
-class WorkbenchGoals(unittest.TestCase):
-    def setUp(self):
-        self.place = Place()
-        self.addCleanup(self.place.close)
-
+class WorkbenchGoals(PlaceCase):
     def over_ros(self, *arguments: str) -> None:
-        command = self.place.start("rosrun", "cartpole", "workbench.py", *arguments)
-        self.assertEqual(command.end(), 0, command.output)
+        self.run_here("rosrun", "cartpole", "workbench.py", *arguments)
 
     def here(self, *arguments: str) -> None:
         self.assertEqual(workbench.main(list(arguments)), 0)
 
     @unittest.skipUnless(HAS_SB3, "./ws extras isn't installed")
-    def test_hindsight_learns_the_same_and_its_policy_acts_anywhere(self):
-        params = ["her=true", "learning_starts=100", "net_arch=[16]",
-                  "batch_size=16", "train_freq=2"]  # fmt: skip
+    def test_hindsight_learns_the_same_and_its_policy_acts_in_process(self):
         ros, here = self.place.folder / "ros", self.place.folder / "bullet"
-        train = ["train", "--algo", "sac", "--env-id", ARM,
-                 "--params", "eval_frequency=130", "eval_episodes=2", *params]  # fmt: skip
-        self.over_ros(
-            *train, "total_timesteps=150", "--env-kwargs", "backend=ros", "--run-dir", str(ros)
-        )
+        params = ["her=true", "learning_starts=100", "net_arch=[16]", "batch_size=16", "train_freq=2",
+                  "eval_frequency=130", "eval_episodes=2"]  # fmt: skip
+
+        def train(run, backend, steps):
+            return ["train", "--algo", "sac", "--env-id", ARM, "--env-kwargs", f"backend={backend}",
+                    "--run-dir", str(run), "--params", f"total_timesteps={steps}", *params]  # fmt: skip
+
+        self.over_ros(*train(ros, "ros", 150))
         self.over_ros("train", "--resume", str(ros), "--total-timesteps", "300")
-        self.here(
-            *train, "total_timesteps=300", "--env-kwargs", "backend=bullet", "--run-dir", str(here)
-        )
+        self.here(*train(here, "bullet", 300))
         self.assertEqual(figures(ros), figures(here))
         evaluated = [row.split(",")[0] for row in figures(ros) if ",eval/success_rate," in row]
         self.assertEqual(evaluated, ["130", "260", "300"])
 
         figures_file = self.place.folder / "figures.json"
-        command = ["eval", str(ros), "--episodes", "2", "--json", str(figures_file)]
+        options = ["--episodes", "2", "--json", str(figures_file)]
         returns = []
-        for evaluate, backend in ((self.over_ros, "ros"), (self.here, "bullet")):
-            evaluate(*command, "--env-kwargs", f"backend={backend}")
+        for run in (ros, here):
+            self.here("eval", str(run), *options, "--env-kwargs", "backend=bullet")
             returns.append(json.loads(figures_file.read_text())["returns"])
         self.assertEqual(*returns)
-        self.assertEqual(self.place.left_after(), {})
+        self.assert_nothing_left()

@@ -19,23 +19,13 @@ from robot_envs.variation import Variation
 REALTIME = "ros-realtime" in sys.argv
 GAINS = "/rig/servo_position/pid"
 VARIED = {
-    "mass": 0.3,
-    "length": 0.2,
-    "com": 0.01,
-    "damping": 0.5,
-    "friction": {"rig::rail": (0.1, 0.5)},
-    "surface_friction": 0.5,
-    "gains": 0.3,
-    "gravity": 0.1,
-}
+    "mass": 0.3, "length": 0.2, "com": 0.01, "damping": 0.5, "friction": {"rig::rail": (0.1, 0.5)},
+    "surface_friction": 0.5, "gains": 0.3, "gravity": 0.1,
+}  # fmt: skip
 OPTIONS = {
-    "sensor_noise": (0.01, 0.1),
-    "sensor_delay": 2,
-    "encoder_step": 0.001,
-    "action_delay": 3,
-    "actuator_limit": {"/rig/motors": 4.0, "/rig/servo_position": 0.5},
-    "actuator_lag": 0.03,
-}
+    "sensor_noise": (0.01, 0.1), "sensor_delay": 2, "encoder_step": 0.001, "action_delay": 3,
+    "actuator_limit": {"/rig/motors": 4.0, "/rig/servo_position": 0.5}, "actuator_lag": 0.03,
+}  # fmt: skip
 
 
 def rollout(env, steps=100):

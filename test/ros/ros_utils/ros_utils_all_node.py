@@ -37,9 +37,7 @@ class All(unittest.TestCase):
         assert not cls.simulation.running
 
     def setUp(self):
-        block = self.simulation.active()
-        block.__enter__()
-        self.addCleanup(block.__exit__, None, None, None)
+        self.enterContext(self.simulation.active())
 
     def test_masters_do_not_meet(self):
         with Simulation(lockstep=True, seed=1) as other:
@@ -72,13 +70,11 @@ class All(unittest.TestCase):
         self.assertEqual(ros_gazebo.gazebo_get_time_step(), 0.002)
         self.assertFalse(ros_gazebo.gazebo_set_time_step(0.0))
         self.assertFalse(ros_gazebo.gazebo_set_gravity(0.0, 0.0, math.nan))
-        self.assertTrue(
-            ros_gazebo.gazebo_set_physics_properties(gravity=np.array([0.0, 0.0, -1.0]))
-        )
+        gravity = np.array([0.0, 0.0, -1.0])
+        self.assertTrue(ros_gazebo.gazebo_set_physics_properties(gravity=gravity))
         self.assertEqual(ros_gazebo.gazebo_get_time_step(), 0.002, "not named, not changed")
-        self.assertTrue(
-            ros_gazebo.gazebo_set_ODE_physics(False, 0, 70, 1.3, 0, 0.001, 1, 0, 0.2, 20)
-        )
+        settings = (False, 0, 70, 1.3, 0, 0.001, 1, 0, 0.2, 20)
+        self.assertTrue(ros_gazebo.gazebo_set_ODE_physics(*settings))
         ode = ros_gazebo.gazebo_get_ODE_physics()
         self.assertIsInstance(ode, ODEPhysics)
         self.assertEqual(ode.sor_pgs_iters, 70)
@@ -145,17 +141,13 @@ class Session(unittest.TestCase):
         self.assertFalse(ros_gazebo.gazebo_pause_physics(timeout=0.5), "it is gone")
 
     def spawn(self):
-        self.assertTrue(
-            ros_spawn.spawn_model_in_gazebo(
-                "cartpole_gazebo", "cartpole_v1.urdf", "joint_position_control.yaml", CONTROLLERS,
-                model_urdf_folder="/robots", gazebo_name="cartpole",
-                controllers_pkg="cartpole_controller",
-            )
+        spawned = ros_spawn.spawn_model_in_gazebo(
+            "cartpole_gazebo", "cartpole_v1.urdf", "joint_position_control.yaml", CONTROLLERS,
+            model_urdf_folder="/robots", gazebo_name="cartpole", controllers_pkg="cartpole_controller",
         )  # fmt: skip
-        self.assertIn(
-            "joint_state_controller/JointStateController",
-            ros_controllers.list_controller_types_srv(),
-        )
+        self.assertTrue(spawned)
+        types = ros_controllers.list_controller_types_srv()
+        self.assertIn("joint_state_controller/JointStateController", types)
         spawned, text = ros_gazebo.gazebo_spawn_urdf_param("robot_description", "cartpole")
         self.assertFalse(spawned)
         self.assertTrue(text)

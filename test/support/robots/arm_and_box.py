@@ -19,7 +19,6 @@ FILES = Path(__file__).resolve().parents[2] / "data" / "robots"
 ARM = FILES / "two_link_arm.urdf"
 ARM_PARAMETERS = FILES / "two_link_arm.yaml"
 CONTROLLERS = ("shoulder_effort_controller", "elbow_effort_controller")
-JOINTS = ("shoulder", "elbow")
 MASS = 2.0  # [kg] of the box
 BOX = f"""<robot name="box"><link name="box">
 <inertial><mass value="{MASS}"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>

@@ -1,6 +1,5 @@
 """A gripper as URDF text: two fingers on a lift, one driven, one that follows it, and a cube between them."""
 
-GAP = 0.1  # [m] between the pads of the open gripper, at 0
 CUBE = 0.05  # [m]
 EFFORT = 10.0  # [N] of the driven finger
 MIMIC = '<mimic joint="left"/>'

@@ -5,7 +5,6 @@ import math
 from support.robots.snippets import box, collision, sdf, sdf_joint, sdf_link
 
 CRANK, COUPLER, ROCKER, GROUND = 0.4, 1.0, 0.8, 1.0  # [m]
-WIDTH = 0.02  # [m]
 START = 1.0  # [rad], the crank's angle in the file
 DENSITY = 2.0  # [kg/m]
 

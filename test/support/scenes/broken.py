@@ -12,19 +12,27 @@ def of(task, environment=RobotEnv, **own):
 
 
 class Wobbling(Hold):
+    """Its episodes begin somewhere, so that seeds matter."""
+
     def initial_state(self, rng):
         return InitialState({"elbow": rng.uniform(-0.1, 0.1)})
 
 
-def wobbling(**parts):
-    """A task whose episodes begin somewhere, so that seeds matter."""
-    return Wobbling(**parts)
+wobbling = Wobbling
 
 
-class Numbers(RobotEnv):
-    def step(self, action):
-        seen, reward, *rest = super().step(action)
-        return seen, np.float32(reward), *rest
+def telling(change):
+    """A class of environments whose steps tell what `change` makes of it."""
+
+    class Changed(RobotEnv):
+        def step(self, action):
+            return change(*super().step(action))
+
+    return Changed
+
+
+BothEnds = telling(lambda seen, reward, end, cut, info: (seen, reward, end or cut, cut, info))
+Miscounts = telling(lambda seen, reward, *rest: (seen, reward + 0.5, *rest))
 
 
 class NoCut(RobotEnv):
@@ -34,12 +42,6 @@ class NoCut(RobotEnv):
             return super().step(action)
         finally:
             self.max_steps = most
-
-
-class BothEnds(RobotEnv):
-    def step(self, action):
-        seen, reward, terminated, truncated, info = super().step(action)
-        return seen, reward, terminated or truncated, truncated, info
 
 
 class GoesOn(RobotEnv):
@@ -101,19 +103,12 @@ class SmallPicture(RobotEnv):
         return np.zeros((3, 3, 3), np.uint8)
 
 
-class Miscounts(RobotEnv):
-    def step(self, action):
-        seen, reward, *rest = super().step(action)
-        return seen, reward + 0.5, *rest
-
-
 class Forgets(RobotEnv):
     """A goal that somebody has asked for isn't the episode's."""
 
     def reset(self, *, seed=None, options=None):
-        others = {name: value for name, value in (options or {}).items() if name != "goal"}
-        if options and "goal" in options and np.isfinite(options["goal"]).all():
-            options = others
+        if options and np.isfinite(options.get("goal", np.nan)).all():
+            options = {name: value for name, value in options.items() if name != "goal"}
         return super().reset(seed=seed, options=options)
 
 
@@ -150,16 +145,6 @@ def counting(task):
     return task
 
 
-INSTANCES = iter(range(10**6))
-
-
-def numbered(task):
-    """A task that differs from instance to instance."""
-    begin = 0.001 * next(INSTANCES)
-    task.initial_state = lambda rng: InitialState({"elbow": begin})
-    return task
-
-
 class OneByOne(Reach):
     """Its rewards are those of single goals."""
 
@@ -170,11 +155,6 @@ class OneByOne(Reach):
 class NeverThere(Reach):
     def is_success(self, achieved, desired):
         return np.linalg.norm(achieved - desired, axis=-1) < -1.0
-
-
-class Tells(Reach):
-    def info(self, state):
-        return {}
 
 
 class FarGoals(Reach):

@@ -21,7 +21,7 @@ from support.training.training_runs import SMALL, flags
 BOUND = 600.0  # [s] for anything that a training does, on a busy machine
 # Trainings of about two seconds, with checkpoints and evaluations as often as a kill is to find one.
 OPTIONS: dict[str, dict[str, Any]] = {
-    "dqn": {"total_timesteps": 6000, "eval_frequency": 1000, "checkpoint_frequency": 250},
+    "dqn": {"total_timesteps": 3500, "eval_frequency": 1000, "checkpoint_frequency": 250},
     "reinforce": {"num_envs": 2, "episodes": 90, "eval_frequency": 500, "checkpoint_frequency": 25},
     "reinforce-document": {"episodes": 90, "eval_frequency": 500, "checkpoint_frequency": 25},
     "ppo": {"total_timesteps": 5000, "eval_frequency": 1000, "checkpoint_frequency": 250},

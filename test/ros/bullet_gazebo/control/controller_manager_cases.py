@@ -15,24 +15,19 @@ from support.ros.manager import BEST_EFFORT, STRICT
 class ControllerManagerTest(PausedRobot):
     # load and unload
 
-    def test_load(self):
+    def test_load_what_can_be_and_once(self):
         rospy.set_param("/other/params", {"joint": "stand_cart"})
         bad = {
-            "nobody": None,
+            **dict.fromkeys(["nobody", "two words", ""]),
             "untyped": {"joint": "stand_cart"},
             "number": {"type": 3},
             "odd": {"type": "no_such_package/Controller"},
-            "colons": {
-                "type": "effort_controllers::JointPositionController",
-                "joint": "stand_cart",
-            },
+            "colons": {"type": POSITION.replace("/", "::"), "joint": "stand_cart"},
             "jointless": {"type": POSITION, "pid": WEAK},
             "elbow": {"type": POSITION, "joint": "elbow", "pid": WEAK},
             "gainless": {"type": POSITION, "joint": "stand_cart"},
             "rateless": {"type": "joint_state_controller/JointStateController"},
-            "text": "effort_controllers/JointPositionController",
-            "two words": None,
-            "": None,
+            "text": POSITION,
         }
         self.load("cart")
         topics = rospy.get_published_topics()
@@ -43,9 +38,6 @@ class ControllerManagerTest(PausedRobot):
                 self.assertFalse(self.manager.load(name))
                 self.assertEqual(self.manager.states(), {"cart": "initialized"})
         self.assertEqual(rospy.get_published_topics(), topics)
-
-    def test_what_is_loaded_is_loaded_once(self):
-        self.load("cart")
         self.manager.switch(["cart"], [], STRICT)
         self.assertFalse(self.manager.load("cart"))
         self.assertEqual(self.manager.states(), {"cart": "running"})

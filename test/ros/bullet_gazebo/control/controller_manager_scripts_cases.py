@@ -42,17 +42,18 @@ class ScriptsTest(PausedRobot):
         )  # fmt: skip
         return done.returncode, done.stdout, done.stderr
 
-    def expect(self, command, expected):
-        """`command` is a command line of controller_manager, or of the script that it begins with."""
+    def run_here(self, command):
+        """The same of a command line of controller_manager, or of the script that it begins with."""
         words = command.split()
         grouped = words[0] == "controller_group"
-        main, argv = (
-            (group_main, words) if grouped else (manager_main, ["controller_manager", *words])
-        )
-        printed = io.StringIO()
-        with contextlib.redirect_stdout(printed):
-            self.assertEqual(main(argv), 0, command)
-        self.assertEqual(printed.getvalue(), expected, command)
+        main = group_main if grouped else manager_main
+        output, errors = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
+            code = main(words if grouped else ["controller_manager", *words])
+        return code, output.getvalue(), errors.getvalue()
+
+    def expect(self, command, expected):
+        self.assertEqual(self.run_here(command)[:2], (0, expected), command)
 
     # controller_manager
 
@@ -99,12 +100,11 @@ class ScriptsTest(PausedRobot):
         delete_model()
         name = "/controller_manager/reload_controller_libraries"
         patience = {"MANAGER_PATIENCE": 0.5, "NOTICE": 0.1}
-        for words in (["list"], ["load", "cart"]):
-            printed = io.StringIO()
-            with contextlib.redirect_stderr(printed), mock.patch.multiple(COMMANDS, **patience):
-                self.assertEqual(manager_main(["controller_manager", *words]), 1)
-            waiting, gone = printed.getvalue().splitlines()
-            self.assertEqual(waiting, f"waiting up to 0.5 s for the service {name}")
+        for command in ("list", "load cart"):
+            with mock.patch.multiple(COMMANDS, **patience):
+                code, _, errors = self.run_here(command)
+            waiting, gone = errors.splitlines()
+            self.assertEqual((code, waiting), (1, f"waiting up to 0.5 s for the service {name}"))
             self.assertIn(
                 f"there is no controller manager: no node offers the service {name}", gone
             )
@@ -114,10 +114,8 @@ class ScriptsTest(PausedRobot):
             reserved.bind(("127.0.0.1", 0))
             master = f"http://127.0.0.1:{reserved.getsockname()[1]}"
             for script in ("controller_manager", "controller_group"):
-                code, _, errors = self.run_script(script, "list", ROS_MASTER_URI=master)
-                self.assertEqual(
-                    (code, errors), (1, f"{script}: there is no ROS master at {master}\n")
-                )
+                found = self.run_script(script, "list", ROS_MASTER_URI=master)
+                self.assertEqual(found, (1, "", f"{script}: there is no ROS master at {master}\n"))
 
     # controller_group
 
@@ -158,14 +156,14 @@ class ScriptsTest(PausedRobot):
             ({"lower": [1]}, ": group 'lower' must be a list of names of controllers"),
         ):
             rospy.set_param("/controller_groups", groups)
-            found = self.run_script("controller_group", "spawn", "lower")
+            found = self.run_here("controller_group spawn lower")
             self.assertEqual(found, (1, "", f"{place}{text}\n"))
         rospy.delete_param("/controller_groups")
-        found = self.run_script("controller_group", "list")
+        found = self.run_here("controller_group list")
         self.assertEqual(found, (1, "", f"{place} isn't set\n"))
 
     def test_an_unknown_group(self):
-        code, output, errors = self.run_script("controller_group", "switch", "nobody")
+        code, output, errors = self.run_here("controller_group switch nobody")
         self.assertEqual((code, output), (1, ""))
         self.assertIn(
             "no group 'nobody' in /controller_groups: ['empty', 'lower', 'other', 'upper']", errors

@@ -5,7 +5,7 @@ import rospy
 import rostest
 from dynamic_reconfigure.client import Client as DynamicClient
 from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
-from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
+from geometry_msgs.msg import Twist, TwistStamped, Vector3, WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 from support.robots.vehicles import RADIUS, TRACK, four_wheels, two_wheels
@@ -60,12 +60,15 @@ class Drives(WorldCase):
     def state(self):
         return gazebo("get_model_state", "bot", "world")
 
-    def follow(self, publisher, message, odometry):
-        """Publishes until the robot moves: a message that is underway when a step begins is late."""
-        publisher.publish(message)
-        return wait_until(
-            lambda: self.step(20) or abs(self.newest(odometry).twist.twist.linear.x) > 1e-3
-        )
+    def follow(self, topic, message, odometry):
+        """Publishes, and waits until the robot moves: what is underway when a step begins is late."""
+        self.publisher(topic, type(message), latch=True).publish(message)
+
+        def moves():
+            self.step(20)
+            return abs(self.newest(odometry).twist.twist.linear.x) > 1e-3
+
+        self.assertTrue(wait_until(moves))
 
     def test_two_wheels_drive_by_their_plugin(self):
         self.begin(two_wheels(**DIFF))
@@ -73,11 +76,7 @@ class Drives(WorldCase):
         joints = self.hear("/joint_states", JointState)
         self.step(500)
         self.assertEqual(self.stamps(odometry, 49), list(range(11, 500, 10)))
-        command = Twist()
-        command.linear.x = 0.2
-        self.assertTrue(
-            self.follow(self.publisher("/cmd_vel", Twist, latch=True), command, odometry)
-        )
+        self.follow("/cmd_vel", Twist(linear=Vector3(x=0.2)), odometry)
         begin = self.state().pose.position.x
         for _ in range(10):  # a publisher's queue holds 100 messages
             self.step(500)
@@ -97,9 +96,7 @@ class Drives(WorldCase):
         by_wheels = {"odometrySource": "encoder"} | DIFF["libgazebo_ros_diff_drive.so"]
         self.begin(two_wheels(**{"libgazebo_ros_diff_drive.so": by_wheels}))
         odometry = self.hear("/odom", Odometry)
-        command, publisher = Twist(), self.publisher("/cmd_vel", Twist, latch=True)
-        command.linear.x, command.angular.z = 0.3, 0.5
-        self.assertTrue(self.follow(publisher, command, odometry))
+        self.follow("/cmd_vel", Twist(Vector3(x=0.3), Vector3(z=0.5)), odometry)
         self.step(200)
         begin = self.now
         self.assertTrue(gazebo("save_state", name="driving").success)
@@ -130,11 +127,7 @@ class Drives(WorldCase):
         commands = self.hear("/base/cmd_vel_out", TwistStamped)
         self.step(100)
         self.assertEqual(self.stamps(odometry, 4), [21, 41, 61, 81])
-        command = Twist()
-        command.linear.x = 0.2
-        self.assertTrue(
-            self.follow(self.publisher("/base/cmd_vel", Twist, latch=True), command, odometry)
-        )
+        self.follow("/base/cmd_vel", Twist(linear=Vector3(x=0.2)), odometry)
         tuner = DynamicClient("/base", timeout=BOUND)
         self.addCleanup(tuner.close)
         tuned = tuner.update_configuration({"wheel_separation_multiplier": 1.2})
@@ -142,9 +135,8 @@ class Drives(WorldCase):
         self.step(2000)
         self.assertTrue(commands.wait_for(lambda each: each[-1].twist.linear.x == 0.2))
         self.assertAlmostEqual(self.newest(odometry).twist.twist.linear.x, 0.2, delta=1e-3)
-        self.assertTrue(
-            tf.wait_for(lambda each: each[-1].transforms[0].header.stamp.to_nsec() >= 2e9)
-        )
+        two_seconds = tf.wait_for(lambda each: each[-1].transforms[0].header.stamp.to_sec() >= 2.0)
+        self.assertTrue(two_seconds)
         self.assertGreater(len(odometry.messages), 100)
         gazebo("reset_simulation")
         self.step(30)
@@ -169,12 +161,10 @@ class Drives(WorldCase):
         steering = self.hear("/base/odom_steer", FourWheelSteeringStamped)
         self.step(100)
         command = FourWheelSteering(speed=0.2, front_steering_angle=0.3, rear_steering_angle=-0.3)
-        topic = self.publisher("/base/cmd_four_wheel_steering", FourWheelSteering, latch=True)
-        self.assertTrue(self.follow(topic, command, odometry))
+        self.follow("/base/cmd_four_wheel_steering", command, odometry)
         self.step(1000)
-        self.assertTrue(
-            steering.wait_for(lambda each: abs(each[-1].data.rear_steering_angle + 0.3) < 0.02)
-        )
+        steered = steering.wait_for(lambda got: abs(got[-1].data.rear_steering_angle + 0.3) < 0.02)
+        self.assertTrue(steered)
         self.assertGreater(self.newest(odometry).twist.twist.angular.z, 0.2)
 
     def test_controllers_report_an_imu_and_a_joints_forces(self):

@@ -82,14 +82,12 @@ LAUNCH = """<launch>
   <node name="controller_spawner" pkg="controller_manager" type="spawner"
         args="states elbow_position"/>
 </launch>"""
-ARM_SDF = """<sdf version="1.6"><model name="arm">{more}
-<link name="base">{inertial}</link><link name="upper"><pose>0 0 0.5 0 0 0</pose>{inertial}</link>
+BODY = "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>"
+SDF = f"""<sdf version="1.6"><model name="arm"><pose>0 0 2 0 0 0</pose>
+<link name="base">{BODY}</link><link name="upper"><pose>0 0 0.5 0 0 0</pose>{BODY}</link>
 <joint name="elbow" type="revolute"><parent>base</parent><child>upper</child><axis><xyz>0 0 1</xyz>
 <limit><lower>-2</lower><upper>2</upper></limit></axis></joint>
 <plugin name="c" filename="libgazebo_ros_control.so"/></model></sdf>"""
-SDF = ARM_SDF.format(more="<pose>0 0 2 0 0 0</pose>", inertial=(
-    "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>"
-))  # fmt: skip
 CRATE = """<sdf version="1.6"><model name="any"><static>true</static><link name="box"><collision name="c">
 <geometry><box><size>1 1 1</size></box></geometry></collision></link></model></sdf>"""
 CONFIG = "<model><name>crate</name><sdf version='1.6'>model.sdf</sdf></model>"
