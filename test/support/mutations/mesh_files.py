@@ -3,9 +3,7 @@
 import itertools
 import struct
 
-CORNERS = [
-    tuple(c) for c in itertools.product((-1.0, 1.0), repeat=3)
-]  # of a cube with edges of 2 m
+CORNERS = list(itertools.product((-1.0, 1.0), repeat=3))  # of a cube with edges of 2 m
 FACES = [(0, 2, 1), (1, 2, 3), (4, 5, 6), (5, 7, 6), (0, 1, 4), (1, 5, 4),
          (2, 6, 3), (3, 6, 7), (0, 4, 2), (2, 4, 6), (1, 3, 5), (3, 7, 5)]  # fmt: skip
 

@@ -118,9 +118,8 @@ def _line(draw: Callable, data: bytes) -> bytes:
     elif kind == "cut":
         del lines[at:]
     else:
-        lines = [
-            line.replace(b"\n", draw(st.sampled_from([b"\r\n", b"\r", b" "]))) for line in lines
-        ]
+        ends = st.sampled_from([b"\r\n", b"\r", b" "])
+        lines = [line.replace(b"\n", draw(ends)) for line in lines]
     return b"".join(lines)
 
 
@@ -148,9 +147,8 @@ def _element(draw: Callable, data: bytes) -> bytes:
             if element in list(parent):
                 parent.remove(element)
     elif kind == "copy":  # into itself, too: what is written nests
-        draw(st.sampled_from(elements)).append(
-            ElementTree.fromstring(ElementTree.tostring(element))
-        )
+        inner = ElementTree.fromstring(ElementTree.tostring(element))
+        draw(st.sampled_from(elements)).append(inner)
     elif kind == "tag":
         element.tag = space + draw(st.sampled_from(TAGS))
     elif kind == "attribute":

@@ -13,12 +13,9 @@ RICH = {  # options of each kind
 }
 CONTROLLERS = {
     "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 120},
-    "cart": {
-        "type": "effort_controllers/JointPositionController",
-        "joint": "stand_cart",
-        "pid": {"p": 100.0, "i": 0.01, "d": 10.0},
-    },
-}
+    "cart": {"type": "effort_controllers/JointPositionController", "joint": "stand_cart",
+             "pid": {"p": 100.0, "i": 0.01, "d": 10.0}},
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -38,12 +35,8 @@ class CartPole:
         """
         _, speed, angle, rate = state
         m, ml = self.pole, self.pole * self.length
-        mass = np.array(
-            [
-                [self.cart + m, -ml * np.cos(angle)],
-                [-ml * np.cos(angle), self.inertia + ml * self.length],
-            ]
-        )
+        across = -ml * np.cos(angle)
+        mass = np.array([[self.cart + m, across], [across, self.inertia + ml * self.length]])
         right = np.array([force - ml * np.sin(angle) * rate**2, GRAVITY * ml * np.sin(angle)])
         acceleration = np.linalg.solve(mass, right)
         return np.array([speed, acceleration[0], rate, acceleration[1]])

@@ -14,21 +14,8 @@ BOX = """<robot name="box"><link name="body"><inertial><mass value="2"/>
 <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial>
 <collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link></robot>"""
 
-NAMES = st.sampled_from(
-    [
-        *MODELS,
-        *LINKS,
-        *JOINTS,
-        "body_collision",
-        "grounding",
-        "sun",
-        "world",
-        "map",
-        "",
-        "::",
-        "a::b",
-    ]
-)
+OTHERS = ["body_collision", "grounding", "sun", "world", "map", "", "::", "a::b"]
+NAMES = st.sampled_from([*MODELS, *LINKS, *JOINTS, *OTHERS])
 ODD_TEXTS = ["x" * 100_000, "\0", "cartpole\0", "世界", "\u202ecartpole", "{", "<robot", "1e300"]
 TEXTS = NAMES | st.text(max_size=8) | st.sampled_from(ODD_TEXTS)
 SOUND = st.sampled_from([0.0, 1.0, 1e12, -1e12, 1e-9, 1e6]) | st.floats(-10.0, 10.0)
@@ -73,9 +60,7 @@ def values(kind, simple):
 def messages(kind, simple):
     """Draws messages of that class, each field on its own; `simple` may have some by their names."""
     fields = zip(kind.__slots__, kind._slot_types, strict=True)
-    drawn = {
-        name: simple[name] if name in simple else values(type_, simple) for name, type_ in fields
-    }
+    drawn = {name: simple[name] if name in simple else values(of, simple) for name, of in fields}
     return st.builds(kind, **drawn)
 
 
@@ -83,9 +68,8 @@ def requests(kind):
     """Draws requests with a fault in them more likely than not, and requests that may be carried out."""
     sound = SIMPLE | {"string": NAMES, "float64": SOUND, "float32": SOUND}
     drawn = messages(kind, SIMPLE) | messages(kind, sound) | messages(kind, sound | FITTING)
-    if (
-        kind is srv.SetLinkPropertiesRequest
-    ):  # a tensor drawn at random is hardly ever one of a body
+    if kind is srv.SetLinkPropertiesRequest:
+        # A tensor drawn at random is hardly ever one of a body.
         size = st.sampled_from([1.0, 1e-9, 1e12, 5.0])
         sizes = {"mass": size, "ixx": size, "iyy": size, "izz": size}
         near = st.floats(-1.0, 1.0)

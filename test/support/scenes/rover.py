@@ -32,16 +32,12 @@ PARTS = [
 ]
 ROVER = Robot(
     urdf=f'<robot name="rover">{"".join(PARTS)}</robot>',
-    controllers={
-        "wheels": {
-            "type": "velocity_controllers/JointGroupVelocityController",
-            "joints": ["right_axle", "left_axle"],
-        }
-    },
+    controllers={"wheels": {"type": "velocity_controllers/JointGroupVelocityController",
+                            "joints": ["right_axle", "left_axle"]}},
     run=("wheels",),
     pose=Pose((0.0, 0.0, 0.1)),
     control_period=0.02,
-)
+)  # fmt: skip
 CRATE = """<robot name="crate"><link name="crate">
   <inertial><mass value="0.5"/>
     <inertia ixx="0.003" ixy="0" ixz="0" iyy="0.003" iyz="0" izz="0.003"/></inertial>

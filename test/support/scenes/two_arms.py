@@ -49,15 +49,9 @@ PLINTH = f"""<robot name="plinth"><link name="world"/><joint name="fixed" type="
     <material name="blue"><color rgba="0 0 1 1"/></material></visual></link></robot>"""
 PID = {"p": 40.0, "i": 1.0, "d": 2.0}
 LEFT_CONTROLLERS = {
-    "pair": {
-        "type": "position_controllers/JointGroupPositionController",
-        "joints": ["elbow", "shoulder"],
-    },
-    "joint_state_controller": {
-        "type": "joint_state_controller/JointStateController",
-        "publish_rate": 100,
-    },
-}
+    "pair": {"type": "position_controllers/JointGroupPositionController", "joints": ["elbow", "shoulder"]},
+    "joint_state_controller": {"type": "joint_state_controller/JointStateController", "publish_rate": 100},
+}  # fmt: skip
 RIGHT_CONTROLLERS = {
     "lift": {"type": "effort_controllers/JointPositionController", "joint": "shoulder", "pid": PID},
     "swing": {"type": "velocity_controllers/JointVelocityController", "joint": "elbow"},
