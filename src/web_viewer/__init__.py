@@ -6,7 +6,7 @@ needs viser, which takes a second to load; the others load at once.
 Modules:
     address: `Address`, and the command-line flags of a page.
     keys: held keys, and gamepads.
-    server: `Page`.
+    server: `ServedPage`.
     table: `GrowingTable`.
     video: `Mp4Writer`.
 """

@@ -251,7 +251,7 @@ def _start(host: str, port: int, title: str, gate: Gate) -> viser.ViserServer:
         module.serve = serve_anyone  # type: ignore[misc]
 
 
-class Page:
+class ServedPage:
     """A page that threads of its own serve until `close`.
 
     Args:

@@ -27,7 +27,7 @@ from robot_sim.pictures.camera import ASPECT, THIRD, Camera, overview
 from robot_sim.pictures.page import Picture
 from robot_sim.pictures.page_batches import NUMBERS
 from ros_calls.service import ServiceFailed
-from web_viewer.server import Page
+from web_viewer.server import ServedPage
 
 TITLE = "gzclient"
 CAMERA = Camera((0.0, 0.0, 0.35), 2.5, yaw=36.0, pitch=-18.0, view=75.0)  # while nothing moves
@@ -198,7 +198,7 @@ def show(host: str, port: int | None, browser: bool) -> None:
 
     Raises PortInUse if nothing can be served there.
     """
-    page = Page(TITLE, tuple(CAMERA.eye.tolist()), CAMERA.target, host, port)
+    page = ServedPage(TITLE, tuple(CAMERA.eye.tolist()), CAMERA.target, host, port)
     with closing(page):
         window = Window(page.server)
         say = partial(print, "gzclient:", flush=True)

@@ -20,7 +20,7 @@ from rl_workbench.training.checked import Env
 from rl_workbench.training.demonstrations import Demonstration, Recorder
 from rl_workbench.training.progress import tell, warn
 from web_viewer.keys import PAIRS
-from web_viewer.server import Page
+from web_viewer.server import ServedPage
 
 HELD = 0.5  # [s of wall time] that a press lasts
 IDLE_PERIOD = 0.05  # [s] between two looks for a press
@@ -164,7 +164,7 @@ def driven(
 ) -> Iterator[Demonstration]:
     """Serves the page, says where, and yields each episode that its driver keeps, until Ctrl-C."""
     interrupt.defer()
-    page = Page(arguments.out.name, CAMERA, LOOK_AT, arguments.host, arguments.port)
+    page = ServedPage(arguments.out.name, CAMERA, LOOK_AT, arguments.host, arguments.port)
     with closing(page):
         driver = Driver(page.server, env, recorder)
         page.announce("the environment", "drives it", tell, warn, not arguments.no_browser)

@@ -23,7 +23,7 @@ from rl_workbench.tools.recording import (
 )
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training.progress import tell, warn
-from web_viewer.server import Page
+from web_viewer.server import ServedPage
 
 PERIOD = 1.0 / 30.0  # [s] between two pictures
 IDLE_PERIOD = 0.25  # [s] between two checks for a viewer
@@ -64,7 +64,7 @@ def show_run(
         has_ended = beside_training and bool(select.select([sys.stdin], [], [], 0)[0])
         return has_ended or interrupt.requested()
 
-    page = Page(folder.name, CAMERA, LOOK_AT, host, port)
+    page = ServedPage(folder.name, CAMERA, LOOK_AT, host, port)
     server = page.server
     with closing(page), closing(EpisodeRecorder(folder, server, env_options)) as recorder:
         if is_over():  # the training was shorter than this page's start

@@ -16,7 +16,7 @@ from robot_sim.physics.pose import IDENTITY, ZERO
 from robot_sim.pictures.camera import ASPECT, CameraLike
 from robot_sim.pictures.page import Picture
 from robot_sim.pictures.visuals import VisibleModel, visible_model
-from web_viewer.server import Page
+from web_viewer.server import ServedPage
 
 WORLD = "/world"  # node
 
@@ -98,7 +98,7 @@ class LivePage:
     def __init__(
         self, title: str, draw_on: Callable[[viser.ViserServer], RobotOnPage], period: float
     ) -> None:
-        self._page = Page(title, (1.0, 1.0, 1.0), ZERO)
+        self._page = ServedPage(title, (1.0, 1.0, 1.0), ZERO)
         print(f"the robot is shown on the page {self._page.address.url}", flush=True)
         self._move, self._period, self._due = draw_on(self._page.server), period, time.monotonic()
 

@@ -8,7 +8,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 from support.pages.browser import BOUND, Browser, find_browser, wait_for
 
-from web_viewer.server import Page
+from web_viewer.server import ServedPage
 
 pytestmark = [
     pytest.mark.slow,
@@ -30,7 +30,7 @@ TAP = """[...document.querySelectorAll("div")]
 
 @pytest.fixture
 def page():
-    made = Page("a page", (2.0, 2.0, 1.5), (0.0, 0.0, 0.3), port=0)
+    made = ServedPage("a page", (2.0, 2.0, 1.5), (0.0, 0.0, 0.3), port=0)
     server = made.server
     server.scene.add_box("/box", color=(255, 0, 0))
     with server.gui.add_tab_group().add_tab("World"):

@@ -16,7 +16,7 @@ from websockets.http11 import Request, Response
 from websockets.sync.client import connect
 
 from web_viewer.address import Address, PortInUse, check
-from web_viewer.server import Gate, Page, is_used
+from web_viewer.server import Gate, ServedPage, is_used
 
 TOKEN, COOKIE = "a-token", "viewer_a-to"
 WINDOW = ("the window", "moves the simulation")
@@ -59,7 +59,7 @@ def test_a_free_port_is_found(page):
     assert found.port >= 8080
     assert not found.token
     assert found.url == f"http://127.0.0.1:{found.port}/"
-    with closing(Page("another", *LOOKING)) as another:
+    with closing(ServedPage("another", *LOOKING)) as another:
         assert another.address.port > found.port
 
 
@@ -74,7 +74,7 @@ def test_this_machine_needs_no_token_and_no_display(monkeypatch):
 
 
 def test_other_machines_need_a_token_and_that_is_said():
-    with closing(Page("a page", *LOOKING, "0.0.0.0", 0)) as page:
+    with closing(ServedPage("a page", *LOOKING, "0.0.0.0", 0)) as page:
         found = page.address
     assert len(found.token) > 16
     assert found.url.endswith(f"/?token={found.token}")
@@ -131,7 +131,7 @@ def test_no_request_is_an_error_of_the_page(token, path, headers):
 
 @pytest.fixture
 def page():
-    with closing(Page("a page", *LOOKING)) as made:
+    with closing(ServedPage("a page", *LOOKING)) as made:
         yield made
 
 
