@@ -16,8 +16,8 @@ from rl_workbench.option import is_plain, key_values
 from rl_workbench.starting import Interrupt
 from rl_workbench.storage import as_json, as_text, write_file
 from rl_workbench.tools.flags import add_job_flags, number, write_figure
-from rl_workbench.tools.job import Job, last_words
-from rl_workbench.tools.jobs import claim, job_pool
+from rl_workbench.tools.jobs import Job, last_words
+from rl_workbench.tools.pool import claim, job_pool
 from rl_workbench.tools.runs import SUITE_RECORD, Run, open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm
@@ -102,7 +102,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
             job = Job(name, own, tuple(training_flags(variant, seed)))
             planned.append((variant.name, seed, job))
         jobs = [job for _, _, job in planned]
-        with job_pool(arguments, folder, interrupt, jobs) as pool:
+        with job_pool(arguments, folder, interrupt, len(jobs)) as pool:
             interrupt.defer()
             pool.run_all(jobs)
         if interrupt.requested():

@@ -7,7 +7,7 @@ from support.training import training_runs
 from support.training.training_runs import train
 
 from rl_workbench.tools.benchmark import make_variant, training_flags
-from rl_workbench.tools.job import Job
+from rl_workbench.tools.jobs import Job
 
 PPO = {"env_id": "CartPole-v1", "n_steps": 64, "batch_size": 64, "total_timesteps": 256,
        "eval_frequency": 128, "eval_episodes": 2}  # fmt: skip

@@ -17,7 +17,7 @@ from support.training.workbench_runs import QUICK, job
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.tools import job as job_module
+from rl_workbench.tools import jobs as jobs_module
 from rl_workbench.tools import results
 from rl_workbench.tools.benchmark import (
     CONFIG,
@@ -29,7 +29,7 @@ from rl_workbench.tools.benchmark import (
     read_suite,
     training_flags,
 )
-from rl_workbench.tools.job import Job, command
+from rl_workbench.tools.jobs import Job, command
 from rl_workbench.tools.results import SUMMARY, RunResult, examine, grouped, summary_table
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training import folder as run_folder
@@ -223,7 +223,7 @@ def complete(out: Path) -> list[str]:
 
 
 def test_what_is_done_is_not_done_again(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(job_module, "command", lambda *_: pytest.fail("it is done"))
+    monkeypatch.setattr(jobs_module, "command", lambda *_: pytest.fail("it is done"))
     assert cli.main(complete(tmp_path)) == 1  # it has no checkpoint to play
     assert (tmp_path / "results.md").exists()
 
