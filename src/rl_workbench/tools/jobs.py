@@ -1,8 +1,8 @@
 """A training as a process, which resumes from its last checkpoint if it was killed or stopped.
 
-FOLDER/NAME             the run folder
-FOLDER/NAME.log         the output of its training
-FOLDER/NAME.cost.json   the processor time of its processes [s]
+FOLDER/GROUP/seed_N             the run folder
+FOLDER/GROUP/seed_N.log         the output of its training
+FOLDER/GROUP/seed_N.cost.json   the processor time of its processes [s]
 """
 
 import contextlib
@@ -26,7 +26,7 @@ from rl_workbench.training.progress import tell
 
 POLL = 0.2  # [s]
 RETRIES = 3  # of a training whose process is killed
-TIME_TO_END = 4.0  # [s] for a training that is stopped
+TIME_TO_END = 10.0  # [s] for a training that is stopped
 # The networks are too small to gain from more cores.
 ONE_CORE = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 # By the kernel, as when memory is short; by a user or a batch system.
@@ -37,9 +37,20 @@ KILLED = {-signal.SIGKILL, -signal.SIGTERM, 128 + signal.SIGTERM}
 class Job:
     """One training. A complete one is skipped; an incomplete one is resumed, bit-identical."""
 
-    name: str  # for the user
-    folder: Path  # of the run
-    flags: tuple[str, ...]  # of `train`, all but --run-dir
+    root: Path  # of all trainings
+    group: str  # of seeds: a variant, or a trial
+    seed: int
+    flags: Sequence[str]  # of `train`: algorithm and options
+
+    @property
+    def name(self) -> str:
+        """The name of the training for the user."""
+        return f"{self.group}, seed {self.seed}"
+
+    @property
+    def folder(self) -> Path:
+        """The run folder."""
+        return self.root / self.group / f"seed_{self.seed}"
 
     @property
     def log(self) -> Path:
@@ -119,7 +130,8 @@ def command(job: Job, program: Sequence[str]) -> list[str]:
             if (job.folder / LAST).exists():
                 return [*program, "train", f"--resume={job.folder}"]
             shutil.rmtree(job.folder)  # it ended before its first checkpoint
-    return [*program, "train", f"--run-dir={job.folder}", *job.flags]
+    own = f"--run-dir={job.folder}", f"--exp-name={job.group}", f"--seed={job.seed}"
+    return [*program, "train", *own, *job.flags]
 
 
 def _finish(

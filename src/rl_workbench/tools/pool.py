@@ -4,19 +4,21 @@ import argparse
 import contextlib
 import json
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt, search_path
-from rl_workbench.storage import as_json, read_json, write_file
+from rl_workbench.storage import as_json, check_writable, read_json, write_file
 from rl_workbench.tools.jobs import Job, Program, run_here
 from rl_workbench.tools.ray_tasks import RayTasks, joined
+from rl_workbench.training.folder import held
 from rl_workbench.training.progress import tell
 
+T = TypeVar("T")
 RunJob = Callable[[Job, Callable[[], bool]], str]
 """Runs a job, until a function returns True; returns why it failed, or ""."""
 
@@ -37,10 +39,10 @@ class Pool:
         """Returns whether no further job begins, and those that run are stopped."""
         return self._interrupt.requested() or self._is_broken
 
-    def run_all(self, jobs: Sequence[Job]) -> None:
-        """Runs independent jobs."""
+    def map(self, function: Callable[[T], object], items: Iterable[T]) -> None:
+        """Calls a function in threads, which may run jobs in them."""
         with ThreadPoolExecutor(self.at_once) as threads:
-            list(threads.map(self.run, jobs))
+            list(threads.map(function, items))
 
     def run(self, job: Job, is_needed: Callable[[], bool] = lambda: True) -> str:
         """Runs a job that isn't complete in the calling thread; returns why it failed, or "" if it didn't.
@@ -90,13 +92,21 @@ def job_pool(
         yield Pool(run, at_once, interrupt, total, where)
 
 
-def claim(folder: Path, name: str, wanted: Any, refusal: str) -> None:
-    """Writes the settings of a folder's runs to a file, or refuses those that differ from the file's."""
-    claimed = read_json(folder / name)
-    if claimed is None:
-        write_file(folder / name, as_json(wanted))
-    elif claimed != json.loads(json.dumps(wanted)):
-        raise WorkbenchError(f"{folder} holds {refusal}; name another folder with --out")
+@contextlib.contextmanager
+def claimed(record: Path, wanted: Any, what: str) -> Iterator[Path]:
+    """Holds the folder of a command's trainings, whose settings it records; refuses that of other ones."""
+    check_writable(record)
+    folder = record.parent
+    with held(folder, f"another {what}"):
+        found = read_json(record)
+        if found is None and any(folder.iterdir()):
+            raise WorkbenchError(f"{folder} holds something else; name another folder with --out")
+        if found not in (None, json.loads(json.dumps(wanted))):
+            raise WorkbenchError(
+                f"{folder} holds a {what} with other options; name another folder with --out"
+            )
+        write_file(record, as_json(wanted))
+        yield folder
 
 
 def _outcome(summary: dict[str, Any]) -> str:

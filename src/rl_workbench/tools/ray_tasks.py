@@ -28,7 +28,6 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",  # sends nothing home
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",  # no warning about processors for graphics
-    "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
     "RAY_DEDUP_LOGS_SKIP_REGEX": ".",  # nothing printed about workers and nodes that die
 }
 

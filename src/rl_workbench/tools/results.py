@@ -220,8 +220,3 @@ SUMMARY = (
     _steps_to_solve("median steps to solve", np.median),
     _steps_to_solve("most", max),
 )  # fmt: skip
-COSTS_SUMMARY = (
-    _NAME,
-    _of("median seconds", "seconds", lambda each: f"{each.median:.1f}"),
-    ("most", "seconds", lambda results: _cell(max(each.seconds or 0.0 for each in results) or None)),
-)  # fmt: skip

@@ -45,4 +45,4 @@ def record(folder: Path, returns: list[float], **run: object) -> Path:
 def job(folder: Path, seed: int = 0, **options: object) -> Job:
     """A quick training of DQN, as a benchmark begins it."""
     variant = make_variant("test", "quick", {**QUICK, **options})
-    return Job(f"quick, seed {seed}", folder / f"seed_{seed}", tuple(training_flags(variant, seed)))
+    return Job(folder, variant.name, seed, training_flags(variant))

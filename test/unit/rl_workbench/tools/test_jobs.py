@@ -33,6 +33,11 @@ def pool(at_once: int = 1, interrupt: Interrupt | None = None) -> Pool:
     return Pool(partial(run_here, program=HERE), at_once, interrupt or Interrupt())
 
 
+def run_all(jobs: list[Job], at_once: int, interrupt: Interrupt | None = None) -> None:
+    made = pool(at_once, interrupt)
+    made.map(made.run, jobs)
+
+
 def sleeping(
     monkeypatch: pytest.MonkeyPatch, program: str = "import time; time.sleep(1000)"
 ) -> None:
@@ -43,7 +48,7 @@ def sleeping(
 
 def test_a_folder_that_another_training_holds_is_left_alone(tmp_path: Path) -> None:
     one = job(tmp_path)
-    one.folder.mkdir()
+    one.folder.mkdir(parents=True)
     with run_folder.held(one.folder):
         assert pool().run(one) == f"a training is running in {one.folder}"
     assert one.folder.exists() and not one.log.exists()
@@ -69,7 +74,7 @@ def test_a_training_that_is_killed_goes_on_bit_identically(
 
     monkeypatch.setattr(jobs_module, "_finish", finishing)
     assert pool().run(killed, is_needed) == ""
-    assert cli.main(["train", f"--run-dir={other.folder}", *other.flags]) == 0
+    assert cli.main(jobs_module.command(other, [])) == 0
     assert "seed 0: its process was killed\n" in capsys.readouterr().out
     assert "resuming at step" in killed.log.read_text()
     assert_same_run(killed.folder, other.folder)
@@ -86,7 +91,7 @@ def test_one_that_ends_without_a_result_has_failed(tmp_path: Path, monkeypatch, 
     """Every training can tell that it is one of several."""
     sleeping(monkeypatch, "import os; print(os.environ['RL_WORKBENCH_JOB'])")
     jobs = [job(tmp_path, seed) for seed in range(2)]
-    pool(2).run_all(jobs)
+    run_all(jobs, 2)
     said = capsys.readouterr().out
     assert "[2, 2 failed] quick, seed " in said
     assert all(f"ended with exit code 0, see {one.log}: 1\n" in said for one in jobs)
@@ -103,7 +108,7 @@ def test_no_further_job_begins_after_ctrl_c(tmp_path: Path, monkeypatch) -> None
         interrupt.signal = signal.SIGINT
 
     threading.Thread(target=press).start()
-    pool(1, interrupt).run_all(jobs)
+    run_all(jobs, 1, interrupt)
     assert cost_of(one.folder)["cpu_seconds"] >= 0.0
     assert not other.log.exists()
 
@@ -118,9 +123,9 @@ def test_one_that_is_not_needed_any_more_is_stopped(tmp_path: Path, monkeypatch,
 def test_a_folder_that_cannot_be_written_to_ends_all(tmp_path: Path, monkeypatch) -> None:
     sleeping(monkeypatch)
     (tmp_path / "file").write_text("")
-    jobs = [job(tmp_path), Job("second", tmp_path / "file" / "run", ())]
+    jobs = [job(tmp_path), Job(tmp_path, "file", 1, ())]
     with pytest.raises(WorkbenchError, match="can't train into"):
-        pool(2).run_all(jobs)
+        run_all(jobs, 2)
 
 
 TRAINING = """
@@ -136,14 +141,14 @@ from pathlib import Path
 from rl_workbench.tools import jobs
 
 jobs.command = lambda *_: [sys.executable, "-c", {TRAINING!r}]
-one = jobs.Job("one", Path(sys.argv[1]) / "run", ())
+one = jobs.Job(Path(sys.argv[1]), "run", 0, ())
 jobs.attempt(one, jobs.Program((), ""), lambda: False)
 """
 
 
 def test_a_training_whose_worker_is_killed_does_not_outlive_it(tmp_path: Path) -> None:
     """Otherwise there would be two of them once the worker is replaced."""
-    log = tmp_path / "run.log"
+    log = tmp_path / "run" / "seed_0.log"
     with subprocess.Popen([sys.executable, "-c", WORKER, str(tmp_path)]) as worker:
         while not (log.exists() and log.read_text().endswith("\n")):
             assert worker.poll() is None

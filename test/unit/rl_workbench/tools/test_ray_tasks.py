@@ -1,15 +1,16 @@
 """`--ray` with a real cluster of two nodes on this machine; workers, nodes and the driver are killed."""
 
 import os
-import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
+import psutil
 import pytest
-from support.training.ray_nodes import QUIET, RayCluster, title, wait_until
 
 from rl_workbench import cli
 
@@ -19,6 +20,17 @@ pytestmark = [pytest.mark.extras("ray"), pytest.mark.slow, pytest.mark.xdist_gro
 PARAMS = ["total_timesteps=5000", "learning_starts=50", "batch_size=8", "hidden_sizes=8",
           "eval_frequency=1000", "eval_episodes=1", "confirm_episodes=1",
           "checkpoint_frequency=100"]  # fmt: skip
+
+
+QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_AUTH_MODE": "disabled"}
+PATIENCE = 600.0  # [s], on a busy machine
+
+
+def wait_until(condition: Callable[[], object], what: str) -> None:
+    until = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < until, f"waited for {what}"
+        time.sleep(0.05)
 
 
 def benchmark(out: Path, *flags: str) -> subprocess.Popen[str]:
@@ -59,20 +71,37 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Iterator[bytes]:
 
 
 @pytest.fixture(scope="module")
-def cluster() -> Iterator[RayCluster]:
+def cluster() -> Iterator[Any]:
     """Two nodes, each with room for a job."""
-    cluster = RayCluster()
-    try:
-        cluster.add()
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in QUIET.items():
+            patch.setenv(name, value)
+        from ray.cluster_utils import Cluster
+
+        cluster = Cluster()
+        for _ in range(2):
+            cluster.add_node(wait=False, include_dashboard=False)
         yield cluster
-    finally:
-        cluster.close()
+        cluster.shutdown()
 
 
-def trainings(out: Path) -> list[int]:
+def title(process: psutil.Process) -> str:
+    try:
+        return " ".join(process.cmdline())
+    except psutil.Error:
+        return ""
+
+
+def workers(node: Any) -> list[psutil.Process]:
+    """A node's processes that do a job."""
+    raylet = psutil.Process(node.all_processes["raylet"][0].process.pid)
+    return [each for each in raylet.children(True) if title(each).startswith("ray::train")]
+
+
+def trainings(out: Path) -> list[psutil.Process]:
     """The processes that train into a folder."""
-    every = [int(each.name) for each in Path("/proc").iterdir() if each.name.isdigit()]
-    return [each for each in every if re.search(f"--(run-dir|resume)={out}", title(each))]
+    words = (f"--run-dir={out}", f"--resume={out}")
+    return [each for each in psutil.process_iter() if any(word in title(each) for word in words)]
 
 
 def test_what_is_killed_changes_no_byte_of_the_table(cluster, table: bytes, tmp_path: Path) -> None:
@@ -81,10 +110,11 @@ def test_what_is_killed_changes_no_byte_of_the_table(cluster, table: bytes, tmp_
     driver = benchmark(tmp_path, flag)
     try:
         wait_until(lambda: is_half_done(tmp_path, 0), "a training")
-        wait_until(cluster.nodes[0].workers, "a job on the first node")
-        os.kill(cluster.nodes[0].workers()[0], signal.SIGKILL)
-        wait_until(cluster.nodes[1].workers, "a job on the second node")
-        cluster.nodes[1].kill()
+        first, (second,) = cluster.head_node, cluster.worker_nodes
+        wait_until(lambda: workers(first), "a job on the first node")
+        workers(first)[0].kill()
+        wait_until(lambda: workers(second), "a job on the second node")
+        cluster.remove_node(second, allow_graceful=False)
         logs = [run_of(tmp_path, seed).with_suffix(".log") for seed in range(2)]
         wait_until(lambda: any("resuming at step" in log.read_text() for log in logs), "the rest")
     finally:

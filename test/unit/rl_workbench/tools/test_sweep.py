@@ -4,7 +4,6 @@ import json
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,7 +15,7 @@ from rl_workbench.starting import Interrupt
 from rl_workbench.tools import sweep as sweep_module
 from rl_workbench.tools.jobs import Job
 from rl_workbench.tools.pool import Pool
-from rl_workbench.tools.sweep import Sweep, open_study, read_ranges, write_results
+from rl_workbench.tools.sweep import Sweep, open_study, read_ranges, write_best
 from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.options import known_options
 
@@ -43,13 +42,6 @@ def parabola(seed: int, x: float) -> float:
     return seed - (x - 3.0) ** 2
 
 
-class QuickSweep(Sweep):
-    """One whose options are none of a real algorithm."""
-
-    def run_options(self, values: dict[str, Any]) -> Any:
-        return SimpleNamespace(eval_frequency=EVERY, total_timesteps=STEPS)
-
-
 class Trainer:
     """Trainings that come to what a function says, which raises a ValueError if one fails."""
 
@@ -65,7 +57,7 @@ class Trainer:
         rows = ["step,tag,value,wall_time"]
         for step in range(EVERY, STEPS + 1, EVERY):
             try:
-                final = self._curve(int(given["--seed"]), x)
+                final = self._curve(job.seed, x)
             except ValueError as error:
                 return str(error)
             rows.append(f"{step},eval/mean_reward,{final + step - STEPS},0")
@@ -86,15 +78,22 @@ def search(
 
     folder.mkdir(exist_ok=True)
     ranges = {"x": FloatDistribution(-10.0, 10.0), "kind": CategoricalDistribution(["a", "b"])}
-    sweep = QuickSweep(folder, "dqn", {}, ranges, trials, seeds, 0, pruner)
+    sweep = Sweep(folder, "dqn", {}, ranges, trials, seeds, 0, pruner)
     trainer, study = Trainer(curve), open_study(sweep)
     sweep_module.search(sweep, study, Pool(trainer, at_once, interrupt or Interrupt()))
-    write_results(folder, study, "Some-v0")
+    write_best(folder, study, "Some-v0")
     return trainer
 
 
 def trials(folder: Path) -> list[dict[str, Any]]:
-    return json.loads((folder / "trials.json").read_text())
+    import optuna
+
+    study = optuna.load_study(study_name="sweep", storage=f"sqlite:///{folder}/study.db")
+    return [
+        {"folder": sweep_module._name(each), "state": each.state.name.lower(), "score": each.value,
+         "options": each.params, "failure": each.user_attrs.get("failure"), "pruned_at": each.last_step}
+        for each in sweep_module._ended(study)
+    ]  # fmt: skip
 
 
 def states(folder: Path) -> list[str]:
@@ -146,7 +145,7 @@ def test_trials_that_fall_behind_are_ended(tmp_path: Path, pruner: str) -> None:
     pruned = [row for row in trials(tmp_path) if row["state"] == "pruned"]
     assert len(pruned) >= 3
     assert trainer.stopped == {
-        f"{row['folder']}, seed 0" for row in pruned if row["pruned_at"] < STEPS
+        f"{row['folder']}, seed 0" for row in pruned if row["pruned_at"] < STEPS / EVERY
     }
     assert len(trainer.begun) == 30 - len(pruned)  # nor is a second seed of theirs trained
     best = yaml.safe_load((tmp_path / "best.yaml").read_text())["Some-v0"]
@@ -165,17 +164,10 @@ def test_a_trial_that_is_interrupted_goes_on(tmp_path: Path, at_once: int) -> No
 
     first = search(tmp_path, 6, curve, at_once=at_once, interrupt=interrupt)
     assert first.stopped and "running" not in states(tmp_path)
-    again = search(tmp_path, 6)
+    again = search(tmp_path, 6, at_once=at_once)
     assert {name: again.begun[name] for name in first.stopped}.items() <= first.begun.items()
     assert states(tmp_path) == ["complete"] * 6
     assert len({row["folder"] for row in trials(tmp_path)}) == 6
-
-
-def test_a_damaged_study_is_one_line(tmp_path: Path, command, capsys) -> None:
-    (tmp_path / "study").mkdir()
-    (tmp_path / "study" / "study.db").write_bytes(b"no study" * 100)
-    assert command("dqn") == 1
-    assert "study.db can't be read or written: file is not a database" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -231,10 +223,13 @@ def test_the_command_trains_and_its_best_options_can_be_used(
     assert "its options are in" in capsys.readouterr().out
     best = yaml.safe_load((tmp_path / "study" / "best.yaml").read_text())
     assert list(best) == ["ppo CartPole-v1" if algorithm == "ppo" else "CartPole-v1"]
+    (tmp_path / "study" / "study.db").write_bytes(b"no study" * 100)
+    assert command(algorithm, "--trials=1") == 1
+    assert "study.db can't be read or written: file is not a database" in capsys.readouterr().err
 
 
 def test_a_folder_of_another_search_is_refused(tmp_path: Path, command, capsys) -> None:
     (tmp_path / "study").mkdir()
     (tmp_path / "study" / "sweep.json").write_text("{}")
     assert command("dqn") == 1
-    assert "other options, ranges or seeds" in capsys.readouterr().err
+    assert "a search with other options" in capsys.readouterr().err
