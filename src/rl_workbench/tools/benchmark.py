@@ -78,9 +78,8 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """Trains the incomplete runs, then writes results.md, costs.md, results.json and two pictures."""
     suite = _suite(arguments)
     folder = (arguments.out or Path("runs/benchmark") / suite.name).resolve()
-    seeds = range(arguments.seeds or suite.seeds)
     jobs = [Job(folder, variant.name, seed, training_flags(variant))
-            for variant in suite.variants for seed in seeds]  # fmt: skip
+            for variant in suite.variants for seed in range(arguments.seeds or suite.seeds)]  # fmt: skip
     record = [asdict(each) for each in suite.variants]
     with claimed(folder / SUITE_RECORD, record, "benchmark"):
         with job_pool(arguments, folder, interrupt, len(jobs)) as pool:

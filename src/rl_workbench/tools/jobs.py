@@ -5,7 +5,6 @@ FOLDER/GROUP/seed_N.log         the output of its training
 FOLDER/GROUP/seed_N.cost.json   the processor time of its processes [s]
 """
 
-import contextlib
 import math
 import os
 import shutil
@@ -117,8 +116,7 @@ def attempt(job: Job, program: Program, is_stopped: Callable[[], bool]) -> str:
         return ""
     if code in KILLED:
         raise Killed("its process was killed")
-    words_at_end = last_words(job.log)
-    return f"ended with exit code {code}, see {job.log}" + f": {words_at_end}" * bool(words_at_end)
+    return f"ended with exit code {code}, see {job.log}: {last_words(job.log)}"
 
 
 def command(job: Job, program: Sequence[str]) -> list[str]:
@@ -158,7 +156,5 @@ def _finish(
 
 def last_words(log: Path) -> str:
     """Returns the last line of a training's output; empty if there is none."""
-    with contextlib.suppress(OSError):
-        lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
-        return next((line.strip() for line in reversed(lines) if line.strip()), "")
-    return ""
+    lines = log.read_text("utf-8", "replace").splitlines() if log.exists() else []
+    return next((line.strip() for line in reversed(lines) if line.strip()), "")

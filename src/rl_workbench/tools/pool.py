@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt, search_path
@@ -18,7 +18,6 @@ from rl_workbench.tools.ray_tasks import RayTasks, joined
 from rl_workbench.training.folder import held
 from rl_workbench.training.progress import tell
 
-T = TypeVar("T")
 RunJob = Callable[[Job, Callable[[], bool]], str]
 """Runs a job, until a function returns True; returns why it failed, or ""."""
 
@@ -39,7 +38,7 @@ class Pool:
         """Returns whether no further job begins, and those that run are stopped."""
         return self._interrupt.requested() or self._is_broken
 
-    def map(self, function: Callable[[T], object], items: Iterable[T]) -> None:
+    def map(self, function: Callable[[Any], object], items: Iterable[Any]) -> None:
         """Calls a function in threads, which may run jobs in them."""
         with ThreadPoolExecutor(self.at_once) as threads:
             list(threads.map(function, items))
@@ -86,7 +85,7 @@ def job_pool(
         else:
             with interrupt.reading():  # an interrupted start of Ray leaves processes behind
                 cluster = RayTasks(stack.enter_context(joined(arguments.ray)), folder, program)
-            run, where = cluster.run, cluster.about()
+            run, where = cluster.run, cluster.about
             at_once = min(arguments.jobs or cluster.cpus, cluster.cpus)
             tell(where)
         yield Pool(run, at_once, interrupt, total, where)
@@ -99,12 +98,11 @@ def claimed(record: Path, wanted: Any, what: str) -> Iterator[Path]:
     folder = record.parent
     with held(folder, f"another {what}"):
         found = read_json(record)
-        if found is None and any(folder.iterdir()):
-            raise WorkbenchError(f"{folder} holds something else; name another folder with --out")
+        other = "something else" if found is None and any(folder.iterdir()) else ""
         if found not in (None, json.loads(json.dumps(wanted))):
-            raise WorkbenchError(
-                f"{folder} holds a {what} with other options; name another folder with --out"
-            )
+            other = f"a {what} with other options"
+        if other:
+            raise WorkbenchError(f"{folder} holds {other}; name another folder with --out")
         write_file(record, as_json(wanted))
         yield folder
 

@@ -65,16 +65,9 @@ class RayTasks:
         self._ray = ray
         self._task = ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=[Killed])(train)
         self._arguments = program, folder, token, library_versions()
-
-    @property
-    def cpus(self) -> int:
-        """The number of cores of all nodes."""
-        return int(self._ray.cluster_resources().get("CPU", 1))
-
-    def about(self) -> str:
-        """Returns the size of the cluster in half a line."""
-        nodes = sum(bool(each["Alive"]) for each in self._ray.nodes())
-        return f"{nodes} node{'s' * (nodes > 1)} of a Ray cluster with {self.cpus} cores"
+        nodes = sum(bool(each["Alive"]) for each in ray.nodes())
+        self.cpus = int(ray.cluster_resources().get("CPU", 1))
+        self.about = f"{nodes} node{'s' * (nodes > 1)} of a Ray cluster with {self.cpus} cores"
 
     def run(self, job: Job, is_stopped: Callable[[], bool]) -> str:
         """Runs a job until `is_stopped` returns True; returns why it failed, or ""."""

@@ -128,14 +128,6 @@ def test_an_interrupted_benchmark_goes_on_where_it_was(tmp_path: Path) -> None:
     assert not same.is_done() and command(same, PROGRAM)[-1] == f"--resume={run}"
 
 
-def test_a_folder_of_other_options_is_refused(suites: Path, tmp_path: Path, capsys) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "suite.json").write_text("[]")
-    assert cli.main(["benchmark", "two", f"--suites={suites}", f"--out={out}"]) == 1
-    assert "a benchmark with other options" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
@@ -189,6 +181,10 @@ def test_a_failed_training_stays_in_the_table(tmp_path: Path) -> None:
     )
     row = examined(one)
     assert row.score is None and row.fault.startswith("the loss is nan")
+    (one.folder / "summary.json").unlink()
+    assert examined(one).fault.startswith("not complete")
+    with run_folder.held(one.folder):
+        assert examined(one).fault.startswith("running")
     assert row.avg20 == row.training_mean == pytest.approx(20.0)
 
 
@@ -233,11 +229,16 @@ def test_ctrl_c_while_policies_are_played(tmp_path: Path, monkeypatch) -> None:
     assert not (tmp_path / "results.md").exists()
 
 
-def test_two_benchmarks_do_not_share_a_folder(tmp_path: Path, capsys) -> None:
+def test_a_folder_belongs_to_one_benchmark(tmp_path: Path, capsys) -> None:
     command = complete(tmp_path)
     with run_folder.held(tmp_path):
         assert cli.main(command) == 1
     assert f"another benchmark is running in {tmp_path}" in capsys.readouterr().err
+    assert cli.main([*command, "--total-timesteps=7"]) == 1
+    assert f"{tmp_path} holds a benchmark with other options" in capsys.readouterr().err
+    (tmp_path / "suite.json").unlink()
+    assert cli.main(command) == 1
+    assert f"{tmp_path} holds something else" in capsys.readouterr().err
 
 
 def test_a_damaged_record_costs_no_other_run_its_row(tmp_path: Path) -> None:
