@@ -33,7 +33,6 @@ COMMANDS = {
     TRAIN: "train with DQN, REINFORCE or Stable-Baselines3",
     "sweep": "search options with Optuna",
     "benchmark": "train several seeds, or a suite; table per seed, curves",
-    "jobs": "how the trainings of a benchmark or a sweep are getting on",
 }
 
 

@@ -2,7 +2,6 @@
 
 import argparse
 import datetime
-import itertools
 import os
 import platform
 import re
@@ -16,8 +15,8 @@ from rl_workbench.option import is_plain, key_values
 from rl_workbench.starting import Interrupt
 from rl_workbench.storage import as_json, as_text, write_file
 from rl_workbench.tools.flags import add_job_flags, number, write_figure
-from rl_workbench.tools.job import Job, last_words
-from rl_workbench.tools.jobs import claim, job_pool
+from rl_workbench.tools.jobs import Job, last_words
+from rl_workbench.tools.pool import claimed, job_pool
 from rl_workbench.tools.runs import SUITE_RECORD, Run, open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
 
 CONFIG = "benchmark.yaml"
 NAME = re.compile(r"\w[\w.+-]*")  # of a variant, and so of a folder
-MAX_SEEDS = 10_000
 OWN = ("seed", "run_dir", "exp_name")  # options that the benchmark itself sets
 SEEDS = 5  # default
 KEYS = ("about", "seeds", "common", "variants")
@@ -53,10 +51,6 @@ class Suite:
     about: str
     seeds: int  # default number per variant
     variants: tuple[Variant, ...]
-
-
-Planned = list[tuple[str, int, Job]]
-"""The trainings of a benchmark: variant, seed and job."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -83,33 +77,19 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """Trains the incomplete runs, then writes results.md, costs.md, results.json and two pictures."""
     suite = _suite(arguments)
-    for variant in suite.variants:
-        check_options(variant)
     folder = (arguments.out or Path("runs/benchmark") / suite.name).resolve()
-    seeds = range(arguments.seeds or suite.seeds)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise WorkbenchError(f"can't make {folder}: {error.strerror}") from error
-    with run_folder.held(folder, "another benchmark"):
-        if not (folder / SUITE_RECORD).exists() and any(folder.iterdir()):
-            raise WorkbenchError(f"{folder} holds something else; name another folder with --out")
-        variants = [asdict(each) for each in suite.variants]
-        claim(folder, SUITE_RECORD, variants, "runs with other options")
-        planned: Planned = []
-        for variant, seed in itertools.product(suite.variants, seeds):
-            name, own = f"{variant.name}, seed {seed}", folder / variant.name / f"seed_{seed}"
-            job = Job(name, own, tuple(training_flags(variant, seed)))
-            planned.append((variant.name, seed, job))
-        jobs = [job for _, _, job in planned]
-        with job_pool(arguments, folder, interrupt, jobs) as pool:
+    jobs = [Job(folder, variant.name, seed, training_flags(variant))
+            for variant in suite.variants for seed in range(arguments.seeds or suite.seeds)]  # fmt: skip
+    record = [asdict(each) for each in suite.variants]
+    with claimed(folder / SUITE_RECORD, record, "benchmark"):
+        with job_pool(arguments, folder, interrupt, len(jobs)) as pool:
             interrupt.defer()
-            pool.run_all(jobs)
+            pool.map(pool.run, jobs)
         if interrupt.requested():
             tell("interrupted; run the same command again to continue")
             return
         interrupt.at_once()  # the report takes minutes and can be repeated
-        _report(folder, suite, planned, arguments.episodes, pool.where)
+        _report(folder, suite, jobs, arguments.episodes, pool.where)
 
 
 def _suite(arguments: argparse.Namespace) -> Suite:
@@ -124,13 +104,11 @@ def _suite(arguments: argparse.Namespace) -> Suite:
     if arguments.suites:
         raise WorkbenchError(f"which suite of {arguments.suites}? Name one")
     kind, env_id = arguments.algo or "dqn", arguments.env_id or "CartPole-v1"
-    given = {"env_id": env_id, **key_values(arguments.params, "--params")}
-    if arguments.config:
-        given["config"] = arguments.config
-    if steps:
-        given["total_timesteps"] = str(steps)
+    given = {"algo": kind, "env_id": env_id, **key_values(arguments.params, "--params")}
+    own = {"config": arguments.config, "total_timesteps": steps}
+    given |= {key: str(value) for key, value in own.items() if value}
     name = f"{kind}__{as_file_name(given['env_id'])}"
-    return Suite(name, "", SEEDS, (make_variant("--params", name, {"algo": kind, **given}),))
+    return Suite(name, "", SEEDS, (make_variant("--params", name, given),))
 
 
 def read_suite(name: str, path: Path | None = None) -> Suite:
@@ -147,8 +125,8 @@ def read_suite(name: str, path: Path | None = None) -> Suite:
         for key, own in section["variants"].items()
     )
     seeds = section.get("seeds", SEEDS)
-    if type(seeds) is not int or not 1 <= seeds <= MAX_SEEDS:
-        raise WorkbenchError(f"{origin}: seeds is a number from 1 to {MAX_SEEDS}, not {seeds!r}")
+    if type(seeds) is not int or seeds < 1:
+        raise WorkbenchError(f"{origin}: seeds is a number from 1, not {seeds!r}")
     return Suite(name, str(section.get("about", "")), seeds, variants)
 
 
@@ -161,7 +139,7 @@ def _options(value: Any, origin: str) -> dict[str, Any]:
 
 
 def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
-    """Makes a variant; `check_options` checks its options."""
+    """Makes a variant, whose algorithm must be installed and know its options."""
     if not NAME.fullmatch(name):
         raise WorkbenchError(
             f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}"
@@ -173,54 +151,39 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
     taken = [key for key in rest if key in OWN]
     if taken:
         raise WorkbenchError(f"{origin}: the benchmark sets {taken[0]} itself")
-    return Variant(name, kind, rest)
-
-
-def check_options(variant: Variant) -> None:
-    """Checks that the variant's algorithm knows its options, and that its package is installed."""
+    variant = Variant(name, kind, rest)
     try:
-        choose(algorithm(variant.algorithm), training_flags(variant, 0)[2:])
+        choose(algorithm(kind), training_flags(variant)[2:])
     except WorkbenchError as error:
-        raise WorkbenchError(f"{variant.name}: {error}") from error
+        raise WorkbenchError(f"{name}: {error}") from error
+    return variant
 
 
-def training_flags(variant: Variant, seed: int) -> list[str]:
-    """Returns the flags of `train` for one run, except --run-dir."""
+def training_flags(variant: Variant) -> list[str]:
+    """Returns the flags of `train` that all runs of a variant share."""
     rest = dict(variant.options)
-    special: dict[str, Any] = {key: rest.pop(key) for key in ("config", "preset") if key in rest}
-    if "config" in special:  # a cluster node may have another current folder
-        special["config"] = Path(special["config"]).resolve()
-    own = {"exp_name": variant.name, "seed": seed, **special}
-    flags = [f"--{key.replace('_', '-')}={value}" for key, value in own.items()]
+    if "config" in rest:  # a cluster node may have another current folder
+        rest["config"] = Path(rest["config"]).resolve()
+    flags = [f"--{key}={rest.pop(key)}" for key in ("config", "preset") if key in rest]
     pairs = [f"{key}={_text(value)}" for key, value in rest.items()]
     return ["--algo", variant.algorithm, *flags, *(["--params", *pairs] if pairs else [])]
 
 
 def _text(value: Any) -> str:
     """Formats a value so that `train` reads the same value back."""
-    if isinstance(value, list | tuple):
-        return f"[{','.join(map(str, value))}]"
-    if isinstance(value, dict):
-        return ",".join(f"{key}={each}" for key, each in value.items())
-    return str(value)
+    is_mapping = isinstance(value, dict)
+    return ",".join(f"{key}={each}" for key, each in value.items()) if is_mapping else str(value)
 
 
-def _report(folder: Path, suite: Suite, planned: Planned, episodes: int, where: str) -> None:
+def _report(folder: Path, suite: Suite, jobs: list[Job], episodes: int, where: str) -> None:
     """Writes all files. results.md depends neither on interruptions nor on the folder's place."""
     from rl_workbench.tools import results as figures
 
-    runs, results = _examine(planned, episodes)
+    runs, results = _examine(jobs, episodes)
     results = [replace(each, fault=each.fault.replace(f"{folder}/", "")) for each in results]
-    if all(each.steps is None for each in results):
-        fault = results[0].fault
-        raise WorkbenchError(
-            f"no training has a result; the first one ({planned[0][2].log}): {fault}"
-        )
-    groups = figures.grouped(results)
-    summary = figures.summary_table(groups, figures.SUMMARY)
+    summary = figures.summary_table(figures.grouped(results), figures.SUMMARY)
     every = figures.table(results, figures.RESULTS)
-    costs = figures.summary_table(groups, figures.COSTS_SUMMARY)
-    costs += f"\n\n{figures.table(results, figures.COSTS)}"
+    costs = figures.table(results, figures.COSTS)
     content = {
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "versions": run_folder.versions(),
@@ -260,26 +223,24 @@ def _draw(folder: Path, runs: list[Run]) -> None:
         ("evaluations.png", variant_panels, evaluation_curves),
     ):
         try:
-            figure = draw(panels(runs))
+            write_figure(folder / name, draw(panels(runs)))
         except WorkbenchError as error:
             warn(f"no {name}: {error}")
-        else:
-            write_figure(folder / name, figure)
 
 
-def _examine(planned: Planned, episodes: int) -> "tuple[list[Run], list[RunResult]]":
+def _examine(jobs: list[Job], episodes: int) -> "tuple[list[Run], list[RunResult]]":
     """Returns the runs whose record is readable, and a row of results for every planned run."""
     from rl_workbench.tools.results import RunResult, examine
 
     runs, results = [], []
-    for count, (name, seed, job) in enumerate(planned, 1):
+    for count, job in enumerate(jobs, 1):
         try:
             runs.append(open_run(job.folder))
         except WorkbenchError as error:
             fault = last_words(job.log) or str(error)  # the log says why a training couldn't begin
-            results.append(RunResult(name, seed, job.folder.name, fault=fault))
+            results.append(RunResult(job.group, job.seed, job.folder.name, fault=fault))
         else:
             each = f"{episodes} episodes each by the best and the last policy"
-            tell(f"evaluating {count} of {len(planned)}: {each} of {job.name}")
-            results.append(examine(runs[-1], name, episodes, warn, also_last=True))
+            tell(f"evaluating {count} of {len(jobs)}: {each} of {job.name}")
+            results.append(examine(runs[-1], job.group, episodes, warn, also_last=True))
     return runs, results

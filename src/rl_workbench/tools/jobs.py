@@ -1,260 +1,160 @@
-"""A pool of jobs, their states in FOLDER/jobs.json, and the command `jobs`."""
+"""A training as a process, which resumes from its last checkpoint if it was killed or stopped.
 
-import argparse
-import contextlib
-import datetime
-import json
+FOLDER/GROUP/seed_N             the run folder
+FOLDER/GROUP/seed_N.log         the output of its training
+FOLDER/GROUP/seed_N.cost.json   the processor time of its processes [s]
+"""
+
+import math
 import os
-import threading
+import shutil
+import signal
+import subprocess
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
-from functools import partial
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.starting import Interrupt, search_path
-from rl_workbench.storage import as_json, read_json, write_file
-from rl_workbench.tools.job import (
-    MAX_ATTEMPTS,
-    TIME_TO_SAVE,
-    Ending,
-    Job,
-    Program,
-    StopWithin,
-    last_words,
-    outcome,
-    run_here,
-    steps_of,
-)
-from rl_workbench.tools.runs import cost_of
-from rl_workbench.training.folder import is_held
+from rl_workbench.starting import JOB
+from rl_workbench.storage import as_json, write_file
+from rl_workbench.tools.runs import SUMMARY, cost_file, cost_of, read_leniently
+from rl_workbench.training import folder as run_folder
 from rl_workbench.training.progress import tell
 
-NAME = "jobs.json"
-WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
-STOPPED = "stopped"  # neither complete nor running
-TIME_TO_END = 4.0  # [s] for all trainings after Ctrl-C
-
-
-@contextlib.contextmanager
-def job_pool(
-    arguments: argparse.Namespace, folder: Path, interrupt: Interrupt, jobs: Sequence[Job] = ()
-) -> Iterator["JobPool"]:
-    """Makes the pool that a command's flags choose, on this machine or on a Ray cluster."""
-    program = Program(arguments.program, search_path())
-    with contextlib.ExitStack() as stack:
-        if arguments.ray is None:
-            run: RunJob = partial(run_here, program=program, since=time.time())
-            at_once = arguments.jobs or 1
-            where = f"{at_once} at a time"
-        else:
-            with interrupt.reading():  # an interrupted start of Ray leaves processes behind
-                from rl_workbench.tools.ray_tasks import RayJobs, joined
-
-                cluster = RayJobs(stack.enter_context(joined(arguments.ray)), folder, program)
-            run, where = cluster.run, cluster.about()
-            at_once = min(arguments.jobs or cluster.cpus, cluster.cpus)
-            tell(where)
-        yield JobPool(folder, run, at_once, interrupt, jobs, where)
-
-
-def claim(folder: Path, name: str, wanted: Any, refusal: str) -> None:
-    """Writes the settings of a folder's runs to a file, or refuses those that differ from the file's."""
-    claimed = read_json(folder / name)
-    if claimed is None:
-        write_file(folder / name, as_json(wanted))
-    elif claimed != json.loads(json.dumps(wanted)):
-        raise WorkbenchError(f"{folder} holds {refusal}; name another folder with --out")
-
-
-RunJob = Callable[[Job, StopWithin, Callable[[str], None]], Ending]
-"""Runs a job to its end; the last argument receives a line for each attempt that is lost."""
-
-
-@dataclass
-class JobEntry:
-    """A job in jobs.json."""
-
-    name: str
-    folder: str  # run folder, relative to that of jobs.json
-    state: str = WAITING
-    note: str = ""  # why it failed or was lost
-
-
-class JobPool:
-    """Runs jobs in threads, reports each end, and keeps jobs.json in the folder of all runs.
-
-    `jobs` are those known from the beginning; `run` adds others.
-    """
-
-    def __init__(
-        self,
-        folder: Path,
-        run: RunJob,
-        at_once: int,
-        interrupt: Interrupt,
-        jobs: Sequence[Job] = (),
-        where: str = "",
-    ) -> None:
-        self.at_once, self.where = at_once, where  # the latter describes the machines
-        self.failure: BaseException | None = None  # it ends all jobs
-        self._folder, self._run, self._interrupt = folder, run, interrupt
-        self._lock = threading.Lock()
-        self._total = len(jobs)
-        self._entries: dict[str, JobEntry] = {}
-        if not jobs:
-            with contextlib.suppress(WorkbenchError):  # the list is written anew
-                self._entries = {each.folder: each for each in _written(folder)}
-        for each in self._entries.values():
-            each.state = WAITING if each.state == RUNNING else each.state
-        for job in jobs:
-            self._set(job, DONE if job.is_done() else WAITING, write=False)
-        self._write()
-
-    def run_all(self, jobs: Sequence[Job]) -> None:
-        """Runs independent jobs."""
-        with ThreadPoolExecutor(self.at_once) as threads:
-            list(threads.map(self.run, jobs))
-
-    def run(self, job: Job, is_needed: Callable[[], bool] = lambda: True) -> str:
-        """Runs a job that isn't complete in the calling thread; returns why it failed, or "" if it didn't.
-
-        A job that is stopped, by the user or because `is_needed` (called several times a second) says so, has
-        not failed.
-        """
-        if job.is_done():
-            self._set(job, DONE)
-            return ""
-        if self._is_over():
-            return ""
-
-        def stop_within() -> float | None:
-            if self._is_over():
-                return TIME_TO_END
-            return None if is_needed() else TIME_TO_SAVE
-
-        self._set(job, RUNNING)
-        try:
-            ending = self._run(job, stop_within, lambda reason: self._lost(job, reason))
-        except BaseException as error:
-            self.failure = error
-            raise
-        if job.is_done() or not is_needed():
-            return self._ended(job, "")
-        if self._is_over():
-            self._set(job, WAITING)
-            return ""
-        words = last_words(job.log)
-        failure = f"ended with exit code {ending.code}, see {job.log}" + f": {words}" * bool(words)
-        if ending.lost:
-            failure = f"given up after {MAX_ATTEMPTS} attempts without progress: {ending.lost}"
-        return self._ended(job, failure)
-
-    def _is_over(self) -> bool:
-        return self._interrupt.requested() or self.failure is not None
-
-    def _lost(self, job: Job, reason: str) -> None:
-        self._set(job, RUNNING, reason)
-        tell(f"{job.name}: lost, retrying: {reason}")
-
-    def _ended(self, job: Job, failure: str) -> str:
-        self._set(job, FAILED if failure else DONE, failure)
-        summary = job.summary()
-        words = failure or ("stopped" if summary.get("steps") is None else
-                            f"{summary['steps']} steps {outcome(summary)}")  # fmt: skip
-        with self._lock:
-            counts = Counter(each.state for each in self._entries.values())
-        over = counts[DONE] + counts[FAILED]
-        position = f"{over} of {self._total}" if self._total else str(over)
-        failed = f", {counts[FAILED]} failed" if counts[FAILED] else ""
-        tell(f"[{position}{failed}] {job.name}: {words}")
-        return failure
-
-    def _set(self, job: Job, state: str, note: str = "", write: bool = True) -> None:
-        folder = os.path.relpath(job.folder, self._folder)
-        with self._lock:
-            self._entries[folder] = JobEntry(job.name, folder, state, note)
-        if write:
-            self._write()
-
-    def _write(self) -> None:
-        with self._lock:
-            content = [asdict(each) for each in self._entries.values()]
-            write_file(self._folder / NAME, as_json({"jobs": content}))
-
-
-def _written(folder: Path) -> list[JobEntry]:
-    """Returns the jobs of earlier commands."""
-    content = read_json(folder / NAME)
-    try:
-        return [JobEntry(**each) for each in content["jobs"]]
-    except (KeyError, TypeError) as error:
-        raise WorkbenchError(f"{folder / NAME} isn't a list of jobs: {error}") from error
+POLL = 0.2  # [s]
+RETRIES = 3  # of a training whose process is killed
+TIME_TO_END = 10.0  # [s] for a training that is stopped
+# The networks are too small to gain from more cores.
+ONE_CORE = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+# By the kernel, as when memory is short; by a user or a batch system.
+KILLED = {-signal.SIGKILL, -signal.SIGTERM, 128 + signal.SIGTERM}
 
 
 @dataclass(frozen=True)
-class JobStatus:
-    """The progress of a job."""
+class Job:
+    """One training. A complete one is skipped; an incomplete one is resumed, bit-identical."""
 
-    name: str
-    folder: str
-    state: str  # done, running, failed, waiting or stopped
-    step: int  # environment steps so far
-    steps: int  # of the whole training; 0 if its length isn't counted in steps
-    node: str  # the machine of the last attempt
-    attempts: int
-    seconds: float  # since the running attempt began; else 0
-    line: str  # why it failed; else the last line of its output
+    root: Path  # of all trainings
+    group: str  # of seeds: a variant, or a trial
+    seed: int
+    flags: Sequence[str]  # of `train`: algorithm and options
 
+    @property
+    def name(self) -> str:
+        """The name of the training for the user."""
+        return f"{self.group}, seed {self.seed}"
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags of the command."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER",
-                        help="folder of a benchmark or sweep; it may still be running")  # fmt: skip
+    @property
+    def folder(self) -> Path:
+        """The run folder."""
+        return self.root / self.group / f"seed_{self.seed}"
 
+    @property
+    def log(self) -> Path:
+        """The file with the training's output."""
+        return self.folder.with_name(f"{self.folder.name}.log")
 
-def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Lists the jobs of a benchmark or a sweep; only reads files."""
-    jobs = read_jobs(arguments.folder)
-    width = max((len(each.name) for each in jobs), default=0)
-    for each in jobs:
-        steps = f"{each.step} of {each.steps}" if each.steps else str(each.step)
-        parts = [f"{each.state:8}", f"{each.name:{width}}", f"{steps:>15} steps"]
-        if each.state == RUNNING:
-            parts.append(f"for {datetime.timedelta(seconds=int(each.seconds))} on {each.node}")
-        if each.attempts > 1:
-            parts.append(f"attempt {each.attempts}")
-        tell("  ".join([*parts, each.line]).rstrip())
-    counts = Counter(each.state for each in jobs)
-    tell(f"{len(jobs)} jobs: {', '.join(f'{count} {state}' for state, count in counts.items())}")
+    def summary(self) -> dict[str, Any]:
+        """Returns the training's summary; empty until its end."""
+        return read_leniently(self.folder / SUMMARY)
+
+    def is_done(self) -> bool:
+        """Returns whether the training is complete."""
+        return bool(self.summary().get("complete"))
 
 
-def read_jobs(folder: Path) -> list[JobStatus]:
-    """Returns the progress of a folder's jobs."""
-    if not (folder / NAME).exists():
-        raise WorkbenchError(
-            f"{folder} has no jobs: {NAME} is in the folder of a benchmark or a sweep"
-        )
-    is_alive = is_held(folder)
-    return [_status(folder, entry, is_alive) for entry in _written(folder)]
+class Program(NamedTuple):
+    """The command that starts trainings."""
+
+    words: tuple[str, ...]  # the command line, without `train`
+    modules: str  # PYTHONPATH
 
 
-def _status(folder: Path, entry: JobEntry, is_alive: bool) -> JobStatus:
-    run = folder / entry.folder
-    job, cost = Job(entry.name, run, ()), cost_of(run)
-    summary, spans = job.summary(), cost.get("spans", [])
-    (step, steps), state, line = steps_of(run), entry.state, entry.note or last_words(job.log)
-    if summary.get("complete"):
-        step, state, line = summary["steps"], DONE, outcome(summary)
-    elif state == DONE:
-        line = "stopped early: its result is no longer needed"
-    elif not is_alive and (state == RUNNING or step and state == WAITING):
-        state = STOPPED
-        line = outcome(summary) if summary.get("interrupted") else line
-    seconds = round(max(time.time() - spans[-1][0], 0.0), 1) if state == RUNNING and spans else 0.0
-    node = str(cost.get("node", ""))
-    return JobStatus(entry.name, entry.folder, state, step, steps, node, len(spans), seconds, line)
+class Killed(Exception):
+    """A training's process was killed from outside, so another attempt may succeed."""
+
+
+def run_here(job: Job, is_stopped: Callable[[], bool], program: Program) -> str:
+    """Runs a training on this machine; one that is killed is resumed."""
+    for _ in range(RETRIES + 1):
+        try:
+            return attempt(job, program, is_stopped)
+        except Killed as error:
+            tell(f"{job.name}: {error}")
+    return f"its process was killed {RETRIES + 1} times"
+
+
+def attempt(job: Job, program: Program, is_stopped: Callable[[], bool]) -> str:
+    """Runs a training as a child process, which ends with the calling thread; returns why it failed, or "".
+
+    `is_stopped` is called several times a second; a KeyboardInterrupt stops the training, too.
+    """
+    try:
+        words = command(job, program.words)
+    except WorkbenchError as error:  # another training runs in its folder
+        return str(error)
+    prefix = ["setpriv", "--pdeathsig", "KILL", "--"] if shutil.which("setpriv") else []
+    try:
+        job.folder.parent.mkdir(parents=True, exist_ok=True)
+        with job.log.open("ab") as output:
+            process = subprocess.Popen(
+                [*prefix, *words],
+                env={**os.environ, **ONE_CORE, JOB: "1", "PYTHONPATH": program.modules},
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,  # Ctrl-C in the terminal must reach this process alone
+            )
+    except OSError as error:
+        raise WorkbenchError(f"can't train into {job.folder}: {error.strerror}") from error
+    code, cpu_seconds, was_stopped = _finish(process, is_stopped)
+    cpu_seconds += cost_of(job.folder).get("cpu_seconds", 0.0)
+    write_file(cost_file(job.folder), as_json({"cpu_seconds": round(cpu_seconds, 1)}))
+    if was_stopped or job.is_done():
+        return ""
+    if code in KILLED:
+        raise Killed("its process was killed")
+    return f"ended with exit code {code}, see {job.log}: {last_words(job.log)}"
+
+
+def command(job: Job, program: Sequence[str]) -> list[str]:
+    """Returns the command that starts or resumes a training."""
+    from rl_workbench.training.checkpoints import LAST
+
+    if job.folder.exists():
+        with run_folder.held(job.folder):
+            if (job.folder / LAST).exists():
+                return [*program, "train", f"--resume={job.folder}"]
+            shutil.rmtree(job.folder)  # it ended before its first checkpoint
+    own = f"--run-dir={job.folder}", f"--exp-name={job.group}", f"--seed={job.seed}"
+    return [*program, "train", *own, *job.flags]
+
+
+def _finish(
+    process: subprocess.Popen[bytes], is_stopped: Callable[[], bool]
+) -> tuple[int, float, bool]:
+    """Waits for a training; returns its exit code, its processor time [s] and whether it was stopped."""
+    deadline = math.inf
+    # wait4 reports this one process; getrusage only the sum over all children.
+    while not (ended := os.wait4(process.pid, os.WNOHANG))[0]:
+        try:
+            time.sleep(POLL)
+            must_end = is_stopped()
+        except KeyboardInterrupt:  # Ray cancels a task
+            must_end = True
+        if must_end and deadline == math.inf:
+            deadline = time.monotonic() + TIME_TO_END
+            os.kill(process.pid, signal.SIGTERM)
+        if time.monotonic() > deadline:
+            os.killpg(process.pid, signal.SIGKILL)
+    _, status, usage = ended
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return process.returncode, usage.ru_utime + usage.ru_stime, deadline < math.inf
+
+
+def last_words(log: Path) -> str:
+    """Returns the last line of a training's output; empty if there is none."""
+    lines = log.read_text("utf-8", "replace").splitlines() if log.exists() else []
+    return next((line.strip() for line in reversed(lines) if line.strip()), "")

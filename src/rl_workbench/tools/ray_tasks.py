@@ -1,7 +1,7 @@
 """Trainings on a Ray cluster: one task for each, in a folder that all nodes share.
 
 Ray retries a task whose worker or node dies, and the training resumes from its own checkpoints, so only
-the folder has to survive. A killed command is continued in the same way.
+the folder has to survive.
 """
 
 import contextlib
@@ -11,8 +11,6 @@ import secrets
 import signal
 import socket
 import sys
-import tempfile
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -20,119 +18,74 @@ from typing import Any
 from file_access.locks import scratch_folder
 from rl_workbench.errors import WorkbenchError, need
 from rl_workbench.storage import as_text, write_file
-from rl_workbench.tools.job import POLL, Ending, Job, Program, StopWithin, is_hopeless, run_attempt
+from rl_workbench.tools.jobs import POLL, RETRIES, TIME_TO_END, Job, Killed, Program, attempt
 from rl_workbench.training.folder import library_versions
 
 TOKEN = ".seen_by_nodes"
-LOCAL = "local"
 CONNECT_TIMEOUT = 5.0  # [s]; Ray itself would try for more than a minute
-OBJECT_STORE = 128 * 2**20  # [bytes] of a local cluster; jobs hardly use it
-SOCKET_PATH = 31  # [bytes] of a temporary folder's path, so that Ray's sockets fit below
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # Ray reads these as it is imported.
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",  # sends nothing home
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",  # no warning about processors for graphics
-    "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
     "RAY_DEDUP_LOGS_SKIP_REGEX": ".",  # nothing printed about workers and nodes that die
 }
 
 
-class TrainingLost(Exception):
-    """The training ended through no fault of its own, so Ray runs the task again."""
-
-
-class NodeUnusable(Exception):
-    """A node can't train; the text says why."""
-
-
-def train(
-    job: Job, program: Program, folder: Path, token: str, wanted: dict[str, str], since: float
-) -> Ending:
-    """Runs one attempt at a training in a separate process: Ray's task.
+def train(job: Job, program: Program, folder: Path, token: str, wanted: dict[str, str]) -> str:
+    """Runs one attempt at a training: Ray's task. Returns why it failed, or "".
 
     Raises:
-        NodeUnusable: If this node doesn't see the folder, or has other versions of the libraries.
-        TrainingLost: If the process was killed.
+        WorkbenchError: If this node doesn't see the folder, or has other versions of the libraries.
+        Killed: If the process was killed; Ray tries again.
     """
-    node = socket.gethostname()
-    try:
+    node, seen = socket.gethostname(), ""
+    with contextlib.suppress(OSError):
         seen = (folder / TOKEN).read_text(encoding="utf-8")
-    except OSError:
-        seen = ""
     if seen != token:
-        raise NodeUnusable(
+        raise WorkbenchError(
             f"{node} doesn't see {folder}: --out must be a folder that all nodes share"
         )
     versions = library_versions()
-    wrong = [name for name, its in wanted.items() if versions.get(name) != its]
-    others = [f"{name} {versions.get(name)}, not {wanted[name]}" for name in wrong]
+    others = [f"{name} {versions.get(name)}, not {its}" for name, its in wanted.items()
+              if versions.get(name) != its]  # fmt: skip
     if others:
-        raise NodeUnusable(f"{node} would not be bit-identical: it has {', '.join(others)}")
-    if is_hopeless(job, since):
-        return Ending(lost="its worker or its process was killed again and again")
-    own = os.environ.get("PYTHONPATH", "").split(os.pathsep)
-    modules = os.pathsep.join(filter(None, [*own, program.modules]))
+        raise WorkbenchError(f"{node} would not be bit-identical: it has {', '.join(others)}")
+    modules = os.pathsep.join(filter(None, [os.environ.get("PYTHONPATH"), program.modules]))
     here = Program((sys.executable, *program.words[1:]), modules)
-    ending = run_attempt(job, here, lambda: None, since, death_signal="KILL")
-    if ending.lost and not is_hopeless(job, since):
-        raise TrainingLost(ending.lost)
-    return ending
+    return attempt(job, here, lambda: False)
 
 
-class RayJobs:
+class RayTasks:
     """Runs jobs on a joined cluster."""
 
     def __init__(self, ray: Any, folder: Path, program: Program) -> None:
-        self._ray, self._folder, self._program = ray, folder, program
-        self._token, self._since = secrets.token_hex(8), time.time()
-        self._wanted = library_versions()
-        write_file(folder / TOKEN, as_text(self._token))
-        self._task = ray.remote(num_cpus=1, max_retries=-1, retry_exceptions=[TrainingLost])(train)
+        token = secrets.token_hex(8)
+        write_file(folder / TOKEN, as_text(token))
+        self._ray = ray
+        self._task = ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=[Killed])(train)
+        self._arguments = program, folder, token, library_versions()
+        nodes = sum(bool(each["Alive"]) for each in ray.nodes())
+        self.cpus = int(ray.cluster_resources().get("CPU", 1))
+        self.about = f"{nodes} node{'s' * (nodes > 1)} of a Ray cluster with {self.cpus} cores"
 
-    @property
-    def cpus(self) -> int:
-        """The number of cores of all nodes."""
-        return int(self._ray.cluster_resources().get("CPU", 1))
-
-    def about(self) -> str:
-        """Returns the size of the cluster in half a line."""
-        nodes = sum(bool(each["Alive"]) for each in self._ray.nodes())
-        return f"{nodes} node{'s' * (nodes > 1)} of a Ray cluster with {self.cpus} cores"
-
-    def run(self, job: Job, stop_within: StopWithin, say: Callable[[str], None]) -> Ending:
-        """Runs a job to its end."""
-        options = self._task.options(name=f"train {job.name}")
-        task = options.remote(
-            job, self._program, self._folder, self._token, self._wanted, self._since
-        )
-        deadline, was_stopped = float("inf"), False
-        while not self._ray.wait([task], timeout=POLL)[0]:
-            grace = stop_within()
-            if grace is not None:
-                deadline = min(deadline, time.monotonic() + grace)
-                if not was_stopped:
-                    self._ray.cancel(task)  # raises KeyboardInterrupt in the task, which saves
-                    was_stopped = True
-            if time.monotonic() > deadline:
-                self._ray.cancel(task, force=True)
-                return Ending()
-        return self._result(task)
-
-    def _result(self, task: Any) -> Ending:
-        errors = self._ray.exceptions
+    def run(self, job: Job, is_stopped: Callable[[], bool]) -> str:
+        """Runs a job until `is_stopped` returns True; returns why it failed, or ""."""
+        ray = self._ray
+        task = self._task.options(name=f"train {job.name}").remote(job, *self._arguments)
+        while not ray.wait([task], timeout=POLL)[0]:
+            if is_stopped():
+                ray.cancel(task)  # raises KeyboardInterrupt in the task, which saves
+                if not ray.wait([task], timeout=TIME_TO_END)[0]:
+                    ray.cancel(task, force=True)
+                return ""
         try:
-            ending: Ending = self._ray.get(task)
-            return ending
-        except errors.TaskCancelledError:
-            return Ending()
-        except errors.RayError as error:
-            cause = getattr(error, "cause", None)  # the task's own error
-            if isinstance(cause, NodeUnusable | WorkbenchError):
+            return str(ray.get(task))
+        except ray.exceptions.RayError as error:
+            cause = getattr(error, "cause", None) or error  # the task's own error
+            if isinstance(cause, WorkbenchError):
                 raise WorkbenchError(str(cause)) from error
-            # Ray's own messages are pages long.
-            lines = str(cause or error).strip().split("\n")
-            return Ending(lost=lines[-1].strip() or type(cause or error).__name__)
+            return str(cause).strip().split("\n")[-1].strip()  # Ray's own messages are pages long
 
 
 @contextlib.contextmanager
@@ -146,8 +99,18 @@ def joined(address: str) -> Iterator[Any]:
     for name, value in QUIET.items():
         os.environ.setdefault(name, value)
     with contextlib.ExitStack() as stack:
-        options = _local_cluster(stack) if address == LOCAL else {}
-        if address not in (LOCAL, "auto"):
+        options: dict[str, Any] = {}
+        if address == "local":
+            if "ray" not in sys.modules:  # Ray reads these when it is imported
+                os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN=secrets.token_hex(32))
+            options = {
+                "num_cpus": len(os.sched_getaffinity(0)),
+                "object_store_memory": 128 * 2**20,  # [bytes]; jobs hardly use it
+                "include_dashboard": False,
+                # Short, so that Ray's sockets fit below.
+                "_temp_dir": str(stack.enter_context(scratch_folder("/tmp"))),
+            }
+        elif address != "auto":
             _check_address(address)
         import ray
 
@@ -164,19 +127,6 @@ def joined(address: str) -> Iterator[Any]:
                 signal.signal(number, handler)
         stack.callback(ray.shutdown)
         yield ray
-
-
-def _local_cluster(stack: contextlib.ExitStack) -> dict[str, Any]:
-    """Returns options for a private cluster on this machine; the stack removes its files."""
-    if "ray" not in sys.modules:  # Ray reads these when it is imported
-        os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN=secrets.token_hex(32))
-    where = None if len(tempfile.gettempdir()) < SOCKET_PATH else "/tmp"
-    return {
-        "num_cpus": len(os.sched_getaffinity(0)),
-        "object_store_memory": OBJECT_STORE,
-        "include_dashboard": False,
-        "_temp_dir": str(stack.enter_context(scratch_folder(where))),
-    }
 
 
 def _check_address(address: str) -> None:

@@ -15,6 +15,7 @@ from rl_workbench.statistics import Statistics, describe
 from rl_workbench.tools.policies import load_learned, play
 from rl_workbench.tools.runs import Run, cost_of, curve_of, summary_of, training_curve
 from rl_workbench.training.evaluator import Evaluation
+from rl_workbench.training.folder import is_held
 from rl_workbench.training.history import LAST
 from rl_workbench.training.scalar_log import CONFIRMED, EVALUATION
 
@@ -64,7 +65,8 @@ def examine(
 
     summary = attempt(lambda: summary_of(run)) or {}
     if not summary.get("complete"):
-        faults.append(str(summary.get("failure") or "not complete"))
+        state = "running" if is_held(run.folder) else "not complete"
+        faults.append(str(summary.get("failure") or state))
     returns, steps = np.array(summary.get("returns") or []), summary.get("steps")
     curve = None if "returns" in summary else attempt(lambda: training_curve(run))
     if curve is not None:  # so far
@@ -219,9 +221,4 @@ SUMMARY = (
     _of("evaluations: IQM [95 %]", "evaluations", _iqm),
     _steps_to_solve("median steps to solve", np.median),
     _steps_to_solve("most", max),
-)  # fmt: skip
-COSTS_SUMMARY = (
-    _NAME,
-    _of("median seconds", "seconds", lambda each: f"{each.median:.1f}"),
-    ("most", "seconds", lambda results: _cell(max(each.seconds or 0.0 for each in results) or None)),
 )  # fmt: skip

@@ -8,7 +8,7 @@ from support.training.training_runs import train
 
 from rl_workbench import cli
 from rl_workbench.tools.benchmark import make_variant, training_flags
-from rl_workbench.tools.job import Job
+from rl_workbench.tools.jobs import Job
 
 PPO = {"env_id": "CartPole-v1", "n_steps": 64, "batch_size": 64, "total_timesteps": 256,
        "eval_frequency": 128, "eval_episodes": 2}  # fmt: skip
@@ -51,4 +51,4 @@ def record(folder: Path, returns: list[float], **run: object) -> Path:
 def job(folder: Path, seed: int = 0, **options: object) -> Job:
     """A quick training of DQN, as a benchmark begins it."""
     variant = make_variant("test", "quick", {**QUICK, **options})
-    return Job(f"quick, seed {seed}", folder / f"seed_{seed}", tuple(training_flags(variant, seed)))
+    return Job(folder, variant.name, seed, training_flags(variant))

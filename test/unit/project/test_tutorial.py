@@ -31,7 +31,7 @@ SHORTER = {  # command: flags behind its own
     "sweep": "--trials 1 --total-timesteps 1200",
 }
 MADE = ["cartpole_training.png", "episode.gif", "episode.mp4", "policy.png", "last.json", "compare.png",
-        "compare.json", "both.png", "runs/sweep/trials.json", "robot.gif", "swing_up.gif",
+        "compare.json", "both.png", "runs/sweep/best.yaml", "robot.gif", "swing_up.gif",
         "gamma.png"]  # fmt: skip
 MAINS = {"dqn_train.py": dqn_train.main, "workbench.py": workbench.main}
 
