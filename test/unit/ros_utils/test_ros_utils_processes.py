@@ -123,7 +123,7 @@ def test_names_of_this_machine_mean_the_same_master(monkeypatch):
 )
 def test_a_stubborn_program_is_ended(place, monkeypatch, trap, number):
     monkeypatch.setitem(_processes.END_PATIENCE, "node", 0.3)
-    monkeypatch.setattr(_processes, "AFTER_TERM", 0.3)
+    monkeypatch.setattr(_processes, "AFTER_TERM", 0.3 if number == signal.SIGKILL else BOUND)
     code = "import signal; [signal.signal(getattr(signal, 'SIG' + n), signal.SIG_IGN)"
     code += f" for n in '{trap}'.split()]; open({str(place / 'pid')!r}, 'w').write('1\\n'); "
     handle = _programs.start([sys.executable, "-c", code + "signal.pause()"], "node", "stubborn")
